@@ -1,5 +1,7 @@
 //! The mesh that a problem only names or quotes.
 
+use std::collections::BTreeSet;
+
 use solver::mesh::{External, ExternalMesh, Mesh};
 use solver::problem::{MeshSource, Problem};
 use solver::solution::Warning;
@@ -12,7 +14,15 @@ pub fn external_mesh(problem: &Problem, stored: Option<Mesh>) -> Option<External
     match &problem.mesh.source {
         MeshSource::Grid(_) | MeshSource::Inline(_) => None,
         MeshSource::Gmsh(text) => Some(at("/mesh/gmsh", gmsh::read(text.as_bytes()))),
-        MeshSource::Abaqus(text) => Some(at("/mesh/abaqus", abaqus::read(text.as_bytes()))),
+        MeshSource::Abaqus(text) => {
+            let sets = problem
+                .supports
+                .iter()
+                .filter_map(|support| support.nodes.as_deref());
+            let sets: BTreeSet<&str> = sets.collect();
+            let read = abaqus::read_for(text.as_bytes(), |set| sets.contains(set));
+            Some(at("/mesh/abaqus", read))
+        }
         MeshSource::Stored(_) => stored.map(|mesh| Ok(mesh.into())),
     }
 }

@@ -181,8 +181,8 @@ fn faults_of_a_mesh_are_reported_with_their_line() {
         ("both, S3", "booth, S3", "`booth` in the surface `Upper`"),
         (
             "*Instance, name=Part-1-1, part=Part-1",
-            "*Instance, name=Part-1-1, part=Part-1\n 5., 0., 0.",
-            "line 23: `5., 0., 0.`",
+            "*Instance, name=Part-1-1, part=Part-2",
+            "line 22: the part `Part-2`",
         ),
         (
             "*Material",

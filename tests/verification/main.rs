@@ -17,6 +17,7 @@ mod contact_patch;
 mod cook;
 mod corner;
 mod cylinder;
+mod decks;
 mod disc_pressure;
 mod element_errors;
 mod even_profiles;

@@ -1,11 +1,25 @@
 //! Blocks of data lines: what each line adds to the deck.
 
-use super::deck::{
-    Deck, Elastic, ElementType, Force, MOST_CONSTANTS, Name, Prescribed, Pressure, Target,
+use super::deck::Deck;
+use super::element::Shape;
+use super::part::Numbered;
+use super::written::{
+    Elastic, Force, MOST_CONSTANTS, Name, Prescribed, Pressure, Sides, Target, fields, number,
 };
 use solver::element::{Element, Family};
 use solver::error::Reason;
 use solver::mesh::NO_NODE;
+
+/// What rows of loads act on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Rows {
+    /// `*DLOAD`: sides of elements.
+    Sides,
+    /// `*DSLOAD`.
+    Surfaces,
+    /// `*CLOAD`.
+    Nodes,
+}
 
 /// The keyword that the following data lines belong to.
 pub(super) enum Block {
@@ -13,32 +27,40 @@ pub(super) enum Block {
     Title,
     Nodes(Option<Name>),
     Elements {
-        kind: ElementType,
+        shape: Shape,
         set: Option<Name>,
         pending: Vec<u64>,
+        /// The last line of an element of unknown size ended in a comma.
+        continued: bool,
     },
     NodeSet {
         name: Name,
+        of: Option<Name>,
         generate: bool,
     },
     ElementSet {
         name: Name,
+        of: Option<Name>,
         generate: bool,
     },
     Surface(Name),
     NodeSurface(Name),
-    Elastic {
-        material: Option<Name>,
-        elastic: Elastic,
-    },
+    Elastic(Elastic),
+    Orientation(Name),
+    Amplitude(Name),
     Thickness,
-    Boundary,
-    Dload,
-    Dsload,
-    Cload,
+    Period,
+    /// Rows of `*BOUNDARY`, and the name of their amplitude.
+    Boundary(Option<Name>),
+    Load(Rows, Option<Name>),
+    /// Where an instance of a part is.
+    Instance(Vec<Vec<f64>>),
     /// A keyword that allows no data lines here.
     NoData(&'static str),
 }
+
+/// Values of an amplitude that are kept: more than a curve of loads has.
+const MOST_VALUES: usize = 1 << 16;
 
 impl Deck {
     /// One line of a block.
@@ -46,10 +68,6 @@ impl Deck {
         if !matches!(block, Block::Skip | Block::Title) && self.has_long_name(line, text) {
             return self.forget(block);
         }
-        let words = text
-            .split(',')
-            .map(str::trim)
-            .filter(|word| !word.is_empty());
         match block {
             Block::Skip => {}
             Block::Title => {
@@ -69,140 +87,112 @@ impl Deck {
                 *block = Block::Skip;
             }
             Block::Nodes(set) => self.node(set, line, text),
-            Block::Elements { kind, set, pending } => {
-                for word in words {
-                    match word.parse() {
-                        Ok(number) => pending.push(number),
-                        Err(_) => {
-                            self.fault(
-                                line,
-                                Reason::Malformed,
-                                format!("`{word:.40}`"),
-                                "a number of a node or element",
-                                "Correct that line.",
-                            );
-                            // its next line begins another element, or continues this one: both are unknown
-                            pending.clear();
-                            self.incomplete.elements = true;
-                            return;
-                        }
-                    }
-                    if pending.len() == kind.nodes + 1 {
-                        let numbers = std::mem::take(pending);
-                        let (kind, set) = (*kind, set.clone());
-                        self.element(kind, set, line, &numbers);
-                    }
+            Block::Elements {
+                shape: Shape::Plane(family, nodes),
+                set,
+                pending,
+                ..
+            } => self.plane_elements((*family, *nodes), set, pending, line, text),
+            Block::Elements {
+                shape: Shape::Line(nodes),
+                set,
+                ..
+            } => self.line_element(*nodes, set, line, text),
+            Block::Elements {
+                shape: Shape::Other(nodes),
+                set,
+                pending,
+                continued,
+            } => self.other_element(*nodes, set, (pending, continued), text),
+            Block::NodeSet { name, of, generate } => {
+                if let Some(found) = self.members(*generate, line, text) {
+                    self.node_set(name, of, line).extend(found);
                 }
             }
-            Block::NodeSet { name, generate } => {
+            Block::ElementSet { name, of, generate } => {
                 if let Some(found) = self.members(*generate, line, text) {
-                    self.node_set(name, line).extend(found);
-                }
-            }
-            Block::ElementSet { name, generate } => {
-                if let Some(found) = self.members(*generate, line, text) {
-                    self.element_set(name, line).extend(found);
+                    self.element_set(name, of, line).extend(found);
                 }
             }
             Block::NodeSurface(name) => {
-                let target = self.target(text.split(',').next().unwrap_or_default());
-                self.node_set(name, line).push(target);
-            }
-            Block::Surface(name) => {
-                let mut words = words;
-                let (target, side) = (
-                    words.next().unwrap_or_default(),
-                    words.next().unwrap_or_default(),
-                );
-                let target = self.target(target);
-                match side_number(side, 'S') {
-                    Some(side) => self.surface(name, line).push((target, side)),
-                    None => self.fault(
-                        line,
-                        Reason::Malformed,
-                        format!("`{text:.40}`"),
-                        "an element or a set of them, and S1 … S4",
-                        "Name the sides of the surface.",
-                    ),
+                if let Some(word) = fields(text).first() {
+                    let target = self.target(word);
+                    self.node_surface(name, line).push(target);
                 }
             }
-            Block::Elastic { elastic, .. } => {
+            Block::Surface(name) => self.side(name, line, text),
+            Block::Elastic(elastic) => {
+                let words = fields(text);
                 // one more than any form has: the violation reports the excess
                 let room = MOST_CONSTANTS + 1 - elastic.values.len().min(MOST_CONSTANTS);
-                for word in words.take(room) {
+                for word in words.into_iter().take(room) {
                     match number(word) {
                         Some(value) => elastic.values.push(value),
                         None => {
                             elastic.unreadable = true;
-                            self.doubt(
-                                line,
-                                format!("`{word:.40}`"),
-                                "a number",
-                                "Correct that line.",
-                            );
+                            let got = match word {
+                                "" => "a blank constant".to_owned(),
+                                _ => format!("`{word:.40}`"),
+                            };
+                            self.doubt(line, got, "a number", "Correct that line.");
                         }
                     }
                 }
             }
-            Block::Thickness => {
-                if let (Some(section), Some(word)) =
-                    (self.sections.last_mut(), words.into_iter().next())
+            Block::Orientation(name) => {
+                let values = self.numbers(line, text);
+                if let Some(known) = self.orientations.get_mut(name)
+                    && known.lines.len() < 3
                 {
-                    section.thickness = number(word);
+                    known.lines.push(values);
+                }
+            }
+            Block::Amplitude(name) => {
+                let values = self.numbers(line, text);
+                if let Some(known) = self.amplitudes.get_mut(name) {
+                    let room = MOST_VALUES - known.values.len().min(MOST_VALUES);
+                    known.other |= values.len() > room;
+                    known.values.extend(values.into_iter().take(room));
+                }
+            }
+            Block::Thickness => {
+                if let Some(word) = fields(text).first().filter(|word| !word.is_empty()) {
+                    let thickness = number(word);
+                    if thickness.is_none() {
+                        self.doubt(
+                            line,
+                            format!("`{word:.40}`"),
+                            "a thickness",
+                            "Correct that line.",
+                        );
+                    }
+                    if let Some(section) = self.here.sections.last_mut() {
+                        section.thickness = thickness;
+                    }
                 }
                 *block = Block::Skip;
             }
-            Block::Boundary => self.boundary(line, text),
-            Block::Dload | Block::Dsload => {
-                let words: Vec<&str> = words.collect();
-                let surface = matches!(block, Block::Dsload);
-                let side = match surface {
-                    true => words
-                        .get(1)
-                        .filter(|w| w.eq_ignore_ascii_case("P"))
-                        .map(|_| None),
-                    false => words.get(1).and_then(|w| side_number(w, 'P')).map(Some),
-                };
-                match (side, words.get(2).and_then(|w| number(w))) {
-                    (Some(side), Some(value)) => {
-                        let target = self.target(words[0]);
-                        self.pressures.push(Pressure {
-                            line,
-                            target,
-                            side,
-                            value,
-                        });
-                    }
-                    _ => self.doubt(
-                        line,
-                        format!("`{text:.60}`"),
-                        "a pressure: element or set, P1 … P4, value (*DSLOAD: surface, P, value)",
-                        "Give other loads in a problem of Signorini.",
-                    ),
-                }
+            Block::Period => {
+                // a period of 0 stands for that of 1 that a step has by itself
+                let words = fields(text);
+                let period = words.get(1).and_then(|word| number(word));
+                self.period = period.filter(|period| *period > 0.0);
+                *block = Block::Skip;
             }
-            Block::Cload => {
-                let words: Vec<&str> = words.collect();
-                let component = words
-                    .get(1)
-                    .and_then(|w| w.parse().ok())
-                    .filter(|c| (1..=2).contains(c));
-                match (component, words.get(2).and_then(|w| number(w))) {
-                    (Some(component), Some(value)) => {
-                        let target = self.target(words[0]);
-                        self.forces.push(Force {
-                            line,
-                            target,
-                            component,
-                            value,
-                        });
-                    }
-                    _ => self.doubt(
+            Block::Boundary(amplitude) => self.boundary(amplitude, line, text),
+            Block::Load(rows, amplitude) => self.load(*rows, amplitude, line, text),
+            Block::Instance(lines) => {
+                let values = self.numbers(line, text);
+                if lines.len() < 2 {
+                    lines.push(values);
+                } else {
+                    self.fault(
                         line,
-                        format!("`{text:.60}`"),
-                        "a force: node or set, 1 or 2, value",
-                        "Forces act along x (1) and y (2).",
-                    ),
+                        Reason::Malformed,
+                        format!("`{text:.40}`"),
+                        "at most two lines after *INSTANCE: how far it is moved, and how it is turned",
+                        "Remove the line, or add the keyword that it belongs to.",
+                    );
                 }
             }
         }
@@ -211,10 +201,14 @@ impl Deck {
     /// The end of a block, which must be complete.
     pub(super) fn end(&mut self, block: Block, line: u64) {
         match block {
-            Block::Elements { kind, pending, .. } if !pending.is_empty() => {
-                self.incomplete.elements = true;
+            Block::Elements {
+                shape: Shape::Plane(_, nodes),
+                pending,
+                ..
+            } if !pending.is_empty() => {
+                self.here.incomplete.elements = true;
                 let got = format!("{} numbers for element {}", pending.len() - 1, pending[0]);
-                let expected = format!("{} nodes", kind.nodes);
+                let expected = format!("{nodes} nodes");
                 self.fault(
                     line,
                     Reason::Truncated,
@@ -223,32 +217,104 @@ impl Deck {
                     "The last element before this line is not complete.",
                 );
             }
-            Block::Elastic { material, elastic } => match material {
-                Some(name) => {
-                    self.materials.insert(name, elastic);
+            Block::Elastic(elastic) => {
+                let at = elastic.line;
+                match self.material() {
+                    Some(material) if material.elastic.is_none() => {
+                        material.elastic = Some(elastic);
+                    }
+                    Some(_) => self.doubt(
+                        at,
+                        "*ELASTIC a second time for one material",
+                        "it once",
+                        "Give the other a material of its own.",
+                    ),
+                    None => self.doubt(
+                        at,
+                        "*ELASTIC",
+                        "*ELASTIC after *MATERIAL, NAME=…",
+                        "Name the material of these constants.",
+                    ),
                 }
-                None => self.doubt(
-                    elastic.line,
-                    "*ELASTIC",
-                    "*ELASTIC after *MATERIAL, NAME=…",
-                    "Name the material of these constants.",
-                ),
-            },
+            }
+            Block::Instance(lines) => self.place(lines, line),
             _ => {}
         }
+    }
+
+    /// Keeps where the instance is: nodes that it adds to those of its part are moved with them.
+    fn place(&mut self, lines: Vec<Vec<f64>>, line: u64) {
+        let at = |row: usize, k: usize| {
+            lines
+                .get(row)
+                .and_then(|values| values.get(k))
+                .copied()
+                .unwrap_or(0.0)
+        };
+        let moved = [at(0, 0), at(0, 1), at(0, 2)];
+        let axis = [
+            at(1, 3) - at(1, 0),
+            at(1, 4) - at(1, 1),
+            at(1, 5) - at(1, 2),
+        ];
+        let degrees = at(1, 6);
+        let mut turned = None;
+        if degrees != 0.0 {
+            if axis[0] != 0.0 || axis[1] != 0.0 || axis[2] == 0.0 {
+                self.fault(
+                    line,
+                    Reason::Unsupported,
+                    format!(
+                        "an instance turned by {degrees} degrees about ({}, {}, {})",
+                        axis[0], axis[1], axis[2]
+                    ),
+                    "an axis along z, by two points",
+                    "The body lies in the plane of x and y, and stays there.",
+                );
+            } else {
+                turned = Some((
+                    [at(1, 0), at(1, 1)],
+                    (degrees * axis[2].signum()).to_radians(),
+                ));
+            }
+        }
+        self.placement = Some((moved, turned));
+    }
+
+    /// All numbers of a line; those that are left out are 0.
+    fn numbers(&mut self, line: u64, text: &str) -> Vec<f64> {
+        let mut values = Vec::new();
+        for word in fields(text) {
+            match number(word) {
+                Some(value) => values.push(value),
+                None => {
+                    values.push(0.0);
+                    if !word.is_empty() {
+                        self.fault(
+                            line,
+                            Reason::Malformed,
+                            format!("`{word:.40}`"),
+                            "a number",
+                            "Correct that line.",
+                        );
+                    }
+                }
+            }
+        }
+        values
     }
 
     /// A line of a block cannot be read: what it would have added is unknown.
     fn forget(&mut self, block: &Block) {
         match block {
-            Block::Nodes(_) => self.incomplete.nodes = true,
-            Block::Elements { .. } => self.incomplete.elements = true,
-            _ => self.incomplete.names = true,
+            Block::Nodes(_) => self.here.incomplete.nodes = true,
+            Block::Elements { .. } => self.here.incomplete.elements = true,
+            _ => self.here.incomplete.names = true,
         }
     }
 
     fn node(&mut self, set: &Option<Name>, line: u64, text: &str) {
-        let mut words = text.split(',').map(str::trim);
+        let mut words = fields(text).into_iter();
         let label = words.next().and_then(|w| w.parse::<u64>().ok());
         let mut place = [0.0; 3];
         let mut sound = label.is_some();
@@ -259,7 +325,7 @@ impl Deck {
             }
         }
         let Some(label) = label.filter(|_| sound) else {
-            self.incomplete.nodes = true;
+            self.here.incomplete.nodes = true;
             self.fault(
                 line,
                 Reason::Malformed,
@@ -269,31 +335,72 @@ impl Deck {
             );
             return;
         };
-        if self.raw.nodes.len() >= NO_NODE as usize || !self.nodes.add(label) {
-            self.fault(
-                line,
-                Reason::RepeatedNode,
-                format!("node {label} a second time"),
-                "each node once",
-                "Renumber it.",
-            );
-            return;
+        let [x, y, z] = place;
+        if self.here.nodes.len() >= NO_NODE as usize || !self.here.node_places.add(label) {
+            // programs write a node again where it belongs to another set
+            let known = self.here.node_places.get(label).map(|node| node as usize);
+            let same =
+                |node: usize| self.here.nodes[node] == [x, y] && self.here.heights[node] == z;
+            if !known.is_some_and(same) {
+                self.fault(
+                    line,
+                    Reason::RepeatedNode,
+                    format!("node {label} a second time"),
+                    "each node once",
+                    "Renumber it.",
+                );
+                return;
+            }
+        } else {
+            self.here.nodes.push([x, y]);
+            self.here.heights.push(z);
+            self.here.node_labels.push(label);
         }
-        self.plane.add(label, place);
         if let Some(name) = set {
-            self.node_set(name, line).push(Target::Label(label));
+            self.node_set(name, &None, line).push(Target::Label(label));
         }
-        self.raw.nodes.push([place[0], place[1]]);
-        self.raw.node_labels.push(label);
     }
 
-    fn element(&mut self, kind: ElementType, set: Option<Name>, line: u64, numbers: &[u64]) {
+    /// A line of elements of the plane, which may go on on the next.
+    fn plane_elements(
+        &mut self,
+        kind: (Family, usize),
+        set: &Option<Name>,
+        pending: &mut Vec<u64>,
+        line: u64,
+        text: &str,
+    ) {
+        for word in fields(text).into_iter().filter(|word| !word.is_empty()) {
+            match word.parse() {
+                Ok(number) => pending.push(number),
+                Err(_) => {
+                    self.fault(
+                        line,
+                        Reason::Malformed,
+                        format!("`{word:.40}`"),
+                        "a number of a node or element",
+                        "Correct that line.",
+                    );
+                    // its next line begins another element, or continues this one: both are unknown
+                    pending.clear();
+                    self.here.incomplete.elements = true;
+                    return;
+                }
+            }
+            if pending.len() == kind.1 + 1 {
+                let numbers = std::mem::take(pending);
+                self.element(kind, set, line, &numbers);
+            }
+        }
+    }
+
+    fn element(&mut self, kind: (Family, usize), set: &Option<Name>, line: u64, numbers: &[u64]) {
         let label = numbers[0];
-        let mut nodes = [NO_NODE; 8];
+        let mut nodes = [NO_NODE; 9];
         for (slot, number) in nodes.iter_mut().zip(&numbers[1..]) {
-            let Some(node) = self.nodes.get(*number) else {
-                self.incomplete.elements = true;
-                if self.incomplete.nodes {
+            let Some(node) = self.here.node_places.get(*number) else {
+                self.here.incomplete.elements = true;
+                if self.here.incomplete.nodes {
                     return; // it may be the node that could not be read
                 }
                 self.fault(
@@ -307,7 +414,8 @@ impl Deck {
             };
             *slot = node;
         }
-        if !self.elements.add(label) {
+        let place = Numbered::Plane(self.here.elements.len() as u32);
+        if !self.number(label, place, set, line) {
             self.fault(
                 line,
                 Reason::RepeatedElement,
@@ -317,81 +425,159 @@ impl Deck {
             );
             return;
         }
-        let [a, b, c, d, e, f, g, h] = nodes;
-        self.raw.elements.push(match (kind.family, kind.nodes) {
+        let [a, b, c, d, e, f, g, h, _] = nodes;
+        self.here.elements.push(match kind {
             (Family::Quad, _) => Element::Quad([a, b, c, d, e, f, g, h]),
             (Family::Triangle, 3) => Element::Triangle([a, b, c, NO_NODE, NO_NODE, NO_NODE]),
             (Family::Triangle, _) => Element::Triangle([a, b, c, d, e, f]),
         });
-        self.raw.element_labels.push(label);
+        self.here.with_centre += usize::from(kind.1 == 9);
+        self.here.element_labels.push(label);
+    }
+
+    /// Gives an element its number; false if another has it.
+    fn number(&mut self, label: u64, place: Numbered, set: &Option<Name>, line: u64) -> bool {
+        if !self.here.element_places.add(label) {
+            return false;
+        }
+        self.here.numbered.push(place);
         if let Some(name) = set {
-            self.element_set(&name, line).push(Target::Label(label));
+            self.element_set(name, &None, line)
+                .push(Target::Label(label));
+        }
+        true
+    }
+
+    /// A line element; one that cannot be read is of no use to the mesh.
+    fn line_element(&mut self, count: usize, set: &Option<Name>, line: u64, text: &str) {
+        let words = fields(text);
+        let Some(label) = words.first().and_then(|word| word.parse().ok()) else {
+            return;
+        };
+        let mut nodes = [NO_NODE; 3];
+        for (slot, word) in nodes.iter_mut().zip(&words[1..]).take(count) {
+            let known = word.parse().ok();
+            *slot = known
+                .and_then(|label| self.here.node_places.get(label))
+                .unwrap_or(NO_NODE);
+        }
+        let whole = nodes[..count].iter().all(|node| *node != NO_NODE);
+        let place = match whole {
+            true => Numbered::Line(self.here.lines.len() as u32),
+            false => Numbered::Other,
+        };
+        if self.number(label, place, set, line) && whole {
+            self.here.lines.push(nodes);
+        }
+    }
+
+    /// An element of no use to the mesh, which may be named nevertheless.
+    fn other_element(
+        &mut self,
+        count: Option<usize>,
+        set: &Option<Name>,
+        (pending, continued): (&mut Vec<u64>, &mut bool),
+        text: &str,
+    ) {
+        let words = fields(text).into_iter().filter(|word| !word.is_empty());
+        let numbers: Vec<u64> = words.map(|word| word.parse().unwrap_or_default()).collect();
+        let begins = pending.is_empty() && !*continued;
+        if begins && let Some(label) = numbers.first() {
+            self.number(*label, Numbered::Other, set, 0);
+        }
+        match count {
+            Some(count) => {
+                pending.extend(numbers);
+                if pending.len() > count {
+                    pending.clear();
+                }
+            }
+            None => *continued = text.trim_end().ends_with(','),
+        }
+    }
+
+    /// A line of a surface: an element or set, and the number of a side; without it, all sides on the body's surface.
+    fn side(&mut self, name: &Name, line: u64, text: &str) {
+        let words = fields(text);
+        let side = match words.get(1) {
+            None => Some(Sides::Outer),
+            // edges of shells are the sides of their plane
+            Some(word) => match &word.to_uppercase()[..] {
+                "SPOS" | "SNEG" | "END1" | "END2" | "CIRCUMFERENTIAL" | "S5" | "S6" | "SP"
+                | "SN" => Some(Sides::None),
+                _ => side_number(word, &['S', 'E']).map(Sides::Number),
+            },
+        };
+        match (words.first().filter(|word| !word.is_empty()), side) {
+            (Some(word), Some(side)) => {
+                let target = self.target(word);
+                self.surface(name, line).push((target, side));
+            }
+            _ => self.fault(
+                line,
+                Reason::Malformed,
+                format!("`{text:.40}`"),
+                "an element or a set of them, and S1 … S4",
+                "Name the sides of the surface.",
+            ),
         }
     }
 
     fn members(&mut self, generate: bool, line: u64, text: &str) -> Option<Vec<Target>> {
-        let words: Vec<&str> = text
-            .split(',')
-            .map(str::trim)
-            .filter(|w| !w.is_empty())
-            .collect();
+        let words = fields(text);
         if !generate {
-            return Some(words.into_iter().map(|word| self.target(word)).collect());
+            let written = words.into_iter().filter(|word| !word.is_empty());
+            return Some(written.map(|word| self.target(word)).collect());
         }
-        let numbers: Vec<u64> = words.iter().filter_map(|word| word.parse().ok()).collect();
-        match numbers[..] {
-            [first, last] if words.len() == 2 => Some(vec![Target::Range([first, last, 1].into())]),
-            [first, last, step] if step > 0 => {
-                Some(vec![Target::Range([first, last, step].into())])
-            }
-            _ => {
-                self.fault(
-                    line,
-                    Reason::Malformed,
-                    format!("`{text:.40}`"),
-                    "first, last, step",
-                    "Correct that line.",
-                );
-                None
-            }
-        }
-    }
-
-    fn boundary(&mut self, line: u64, text: &str) {
-        let words: Vec<&str> = text
-            .split(',')
-            .map(str::trim)
-            .filter(|w| !w.is_empty())
-            .collect();
-        let component = |k: usize| words.get(k).and_then(|w| w.parse::<u64>().ok());
-        let named = words.get(1).map(|w| w.to_uppercase());
-        let components = match (
-            component(1),
-            words.get(2).is_some(),
-            component(2),
-            named.as_deref(),
-        ) {
-            (Some(first), true, Some(last), _) => Some((first, last)),
-            (Some(first), false, _, _) => Some((first, first)),
-            (_, false, _, Some("PINNED" | "ENCASTRE")) => Some((1, 2)),
-            (_, false, _, Some("XSYMM")) => Some((1, 1)),
-            (_, false, _, Some("YSYMM")) => Some((2, 2)),
+        let numbers: Option<Vec<u64>> = words.iter().map(|word| word.parse().ok()).collect();
+        let range = match numbers.as_deref() {
+            Some([first, last]) => Some([*first, *last, 1]),
+            Some([first, last, step]) if *step > 0 => Some([*first, *last, *step]),
             _ => None,
         };
-        let value = words.get(3).map_or(Some(0.0), |word| number(word));
+        if range.is_none() {
+            self.fault(
+                line,
+                Reason::Malformed,
+                format!("`{text:.40}`"),
+                "first, last, step",
+                "Correct that line.",
+            );
+        }
+        range.map(|range| vec![Target::Range(range.into())])
+    }
+
+    /// A row of `*BOUNDARY`: node or set; first component; last, which is the first where it is left out; value, 0 where
+    /// it is left out. Or a name in place of the components.
+    fn boundary(&mut self, amplitude: &Option<Name>, line: u64, text: &str) {
+        let words = fields(text);
+        let word = |k: usize| words.get(k).copied().unwrap_or_default();
+        let component = |k: usize| word(k).parse::<u64>().ok();
+        let first = component(1);
+        let components = match (first, &word(1).to_uppercase()[..]) {
+            (Some(first), _) if word(2).is_empty() => Some((first, first)),
+            (Some(first), _) => component(2).map(|last| (first, last)),
+            (None, name) if words.len() == 2 => named_components(name),
+            _ => None,
+        };
+        let value = match word(3) {
+            "" => Some(0.0),
+            word => number(word),
+        };
         // the third displacement and the rotations of a plane body are always zero
         let known =
             |(first, last): &(u64, u64)| (1..=6).contains(first) && first <= last && *last <= 6;
-        match (components.filter(known), value) {
-            (Some((3.., _)), Some(0.0)) => {}
-            (Some((first, last)), Some(value)) if first < 3 && (last < 3 || value == 0.0) => {
-                let target = self.target(words[0]);
-                let components = (first, last.min(2));
-                self.prescribed.push(Prescribed {
+        let row = components.filter(known).zip(value);
+        match row.filter(|_| words.len() <= 4 && !word(0).is_empty()) {
+            Some(((3.., _), 0.0)) => {}
+            Some(((first, last), value)) if first < 3 && (last < 3 || value == 0.0) => {
+                let target = self.target(word(0));
+                self.here.prescribed.push(Prescribed {
                     line,
                     target,
-                    components,
+                    components: (first, last.min(2)),
                     value,
+                    amplitude: amplitude.clone(),
                 });
             }
             _ => self.doubt(
@@ -402,18 +588,72 @@ impl Deck {
             ),
         }
     }
+
+    /// A row of loads: what it acts on, which load or component, and its size, 0 where it is left out.
+    fn load(&mut self, rows: Rows, amplitude: &Option<Name>, line: u64, text: &str) {
+        let words = fields(text);
+        let word = |k: usize| words.get(k).copied().unwrap_or_default();
+        let value = match word(2) {
+            "" => Some(0.0),
+            word => number(word),
+        };
+        let value = value.filter(|_| words.len() <= 3 && !word(0).is_empty());
+        let amplitude = amplitude.clone();
+        let component = word(1).parse().ok().filter(|c| (1..=2).contains(c));
+        let side = match rows {
+            Rows::Surfaces => word(1).eq_ignore_ascii_case("P").then_some(None),
+            _ => side_number(word(1), &['P']).map(Some),
+        };
+        match (rows, value, side, component) {
+            (Rows::Nodes, Some(value), _, Some(component)) => {
+                let target = self.target(word(0));
+                self.here.forces.push(Force {
+                    line,
+                    target,
+                    component,
+                    value,
+                    amplitude,
+                });
+            }
+            (Rows::Nodes, ..) => self.doubt(
+                line,
+                format!("`{text:.60}`"),
+                "a force: node or set, 1 or 2, value",
+                "Forces act along x (1) and y (2).",
+            ),
+            (_, Some(value), Some(side), _) => {
+                let target = self.target(word(0));
+                self.here.pressures.push(Pressure {
+                    line,
+                    target,
+                    side,
+                    value,
+                    amplitude,
+                });
+            }
+            _ => self.doubt(
+                line,
+                format!("`{text:.60}`"),
+                "a pressure: element or set, P1 … P4, value (*DSLOAD: surface, P, value)",
+                "Give other loads in a problem of Signorini.",
+            ),
+        }
+    }
 }
 
-/// Fortran writes exponents with D.
-fn number(word: &str) -> Option<f64> {
-    let parsed = word
-        .parse()
-        .or_else(|_| word.replace(['d', 'D'], "e").parse());
-    parsed.ok().filter(|value: &f64| value.is_finite())
+/// Components by name: those of the plane that it holds, or some that a plane body holds by itself.
+fn named_components(name: &str) -> Option<(u64, u64)> {
+    match name {
+        "PINNED" | "ENCASTRE" | "ZASYMM" => Some((1, 2)),
+        "XSYMM" | "YASYMM" => Some((1, 1)),
+        "YSYMM" | "XASYMM" => Some((2, 2)),
+        "ZSYMM" => Some((3, 3)),
+        _ => None,
+    }
 }
 
 /// S1 … S4, P1 … P4.
-fn side_number(word: &str, letter: char) -> Option<usize> {
-    let rest = word.strip_prefix([letter, letter.to_ascii_lowercase()])?;
+fn side_number(word: &str, letters: &[char]) -> Option<usize> {
+    let rest = word.strip_prefix(|c: char| letters.contains(&c.to_ascii_uppercase()))?;
     rest.parse().ok().filter(|side| (1..=4).contains(side))
 }

@@ -1,158 +1,57 @@
 //! The content of a deck: the supported parts, and the violations of the others.
 
 use std::collections::{BTreeMap, HashMap};
-use std::rc::Rc;
 
-use crate::source::{Labels, Plane};
-use solver::element::Family;
-use solver::error::{Findings, Reason, Violation};
-use solver::mesh::RawMesh;
+use super::part::Part;
+use super::written::{
+    Amplitude, LONGEST_NAME, MOST_NAMES, MaterialDefinition, Name, Orientation, Set, Sides,
+    Surface, Target, on_line,
+};
+use solver::error::Reason;
 
-/// A name of a set, surface or material, stored once however often the deck uses it.
-pub(super) type Name = Rc<str>;
-
-/// Characters of a name; Abaqus and CalculiX allow 80. A line may be a million times as long, and every entry of a
-/// set is compared with names.
-pub(super) const LONGEST_NAME: usize = 256;
-
-/// Names of sets and surfaces: each takes hundreds of bytes, and is compared with the whole surface of the mesh.
-pub(super) const MOST_NAMES: usize = 1 << 16;
-
-/// Constants of a material.
-pub(super) const MOST_CONSTANTS: usize = 10;
-
-/// The theory of a type of element.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Theory {
-    PlaneStrain,
-    PlaneStress,
-    Axisymmetric,
-}
-
-/// The target of a set or a load.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Target {
-    Label(u64),
-    /// First, last, step; in a box, since labels are many and ranges few.
-    Range(Box<[u64; 3]>),
-    Set(Name),
-}
-
-/// One `*ELEMENT` type in use.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct ElementType {
-    pub(super) theory: Theory,
-    pub(super) family: Family,
-    pub(super) nodes: usize,
-    /// Integrated with the smaller rule.
-    pub(super) reduced: bool,
-}
-
-impl ElementType {
-    pub(super) fn is_triangle(&self) -> bool {
-        self.family == Family::Triangle
-    }
-}
-
-/// `*ELASTIC`.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Elastic {
-    pub(super) line: u64,
-    pub(super) engineering_constants: bool,
-    pub(super) values: Vec<f64>,
-    /// A line of the constants could not be read, and a violation says so.
-    pub(super) unreadable: bool,
-}
-
-/// `*SOLID SECTION`.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Section {
-    pub(super) line: u64,
-    pub(super) elements: Name,
-    pub(super) material: Name,
-    pub(super) thickness: Option<f64>,
-}
-
-/// A row of `*BOUNDARY`: components first … last (1: x, 2: y) have a value.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Prescribed {
-    pub(super) line: u64,
-    pub(super) target: Target,
-    pub(super) components: (u64, u64),
-    pub(super) value: f64,
-}
-
-/// A row of `*DLOAD` or `*DSLOAD`: a pressure on sides, or on a surface.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Pressure {
-    pub(super) line: u64,
-    pub(super) target: Target,
-    /// Number of the side from 1; none: `target` is a surface.
-    pub(super) side: Option<usize>,
-    pub(super) value: f64,
-}
-
-/// A row of `*CLOAD`.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Force {
-    pub(super) line: u64,
-    pub(super) target: Target,
-    pub(super) component: u64,
-    pub(super) value: f64,
-}
-
-/// A set as it is written.
+/// Where in a deck a line is.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Set {
-    /// The line that begins it.
-    pub(super) line: u64,
-    pub(super) members: Vec<Target>,
-}
-
-/// A surface as it is written: sides by element or set and number.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Surface {
-    /// The line that begins it.
-    pub(super) line: u64,
-    pub(super) sides: Vec<(Target, usize)>,
-}
-
-/// Which parts of a deck are not all known, since a line of them could not be read.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Incomplete {
-    pub(super) nodes: bool,
-    pub(super) elements: bool,
-    /// Names of sets, surfaces and materials.
-    pub(super) names: bool,
+pub(super) enum Inside {
+    /// In the assembly, or in no part at all.
+    #[default]
+    Assembly,
+    Part(Name),
+    Instance(Name),
 }
 
 /// The supported parts of a deck, and the violations.
 #[derive(Default)]
 pub(super) struct Deck {
-    pub(super) raw: RawMesh,
-    pub(super) nodes: Labels,
-    pub(super) elements: Labels,
-    pub(super) plane: Plane,
-    pub(super) node_sets: BTreeMap<Name, Set>,
-    pub(super) element_sets: BTreeMap<Name, Set>,
-    /// Sides by element or set and number.
-    pub(super) surfaces: BTreeMap<Name, Surface>,
+    /// The part, instance or assembly that lines now belong to.
+    pub(super) here: Part,
+    pub(super) inside: Inside,
+    /// The assembly, while lines belong to a part or instance.
+    pub(super) assembly: Part,
+    pub(super) assembly_name: Option<Name>,
+    pub(super) parts: BTreeMap<Name, Part>,
+    pub(super) instances: Vec<(Name, Part)>,
+    /// Sizes of all parts together, and of all instances.
+    pub(super) written: u64,
+    pub(super) instantiated: u64,
+    /// Names of sets and surfaces so far.
+    pub(super) names: usize,
     /// The spelling of each name, by the name in capitals.
     spelling: HashMap<String, Name>,
-    /// The parts of which a line could not be read: what is missing there is no second violation.
-    pub(super) incomplete: Incomplete,
-    pub(super) types: Vec<ElementType>,
-    pub(super) materials: BTreeMap<Name, Elastic>,
-    pub(super) sections: Vec<Section>,
-    pub(super) prescribed: Vec<Prescribed>,
-    pub(super) pressures: Vec<Pressure>,
-    pub(super) forces: Vec<Force>,
+    /// The material that properties belong to.
+    pub(super) material: Option<Name>,
+    pub(super) materials: BTreeMap<Name, MaterialDefinition>,
+    pub(super) orientations: BTreeMap<Name, Orientation>,
+    pub(super) amplitudes: BTreeMap<Name, Amplitude>,
+    /// The first line that gives temperatures.
+    pub(super) temperatures: Option<u64>,
     pub(super) steps: usize,
+    /// How far the instance that lines belong to is moved, and then turned: about which point, by which angle (radians).
+    pub(super) placement: Option<([f64; 3], Option<([f64; 2], f64)>)>,
+    /// The length of the step's time.
+    pub(super) period: Option<f64>,
+    /// The step has had a `*BOUNDARY`.
+    pub(super) supported_in_step: bool,
     pub(super) title: Option<String>,
-    /// Violations of the mesh.
-    pub(super) faults: Findings,
-    /// Parts of the analysis that are not supported.
-    pub(super) doubts: Findings,
 }
 
 impl Deck {
@@ -164,20 +63,16 @@ impl Deck {
         expected: &str,
         hint: &str,
     ) {
-        if self.faults.is_full() {
-            return self.faults.count(1);
-        }
-        self.faults
-            .add(on_line(line, reason, got.into(), expected, hint));
+        self.here
+            .faults
+            .add(|| on_line(line, reason, got.into(), expected, hint));
     }
 
     pub(super) fn doubt(&mut self, line: u64, got: impl Into<String>, expected: &str, hint: &str) {
-        if self.doubts.is_full() {
-            return self.doubts.count(1);
-        }
         let reason = Reason::NotUnderstood;
-        self.doubts
-            .add(on_line(line, reason, got.into(), expected, hint));
+        self.here
+            .doubts
+            .add(|| on_line(line, reason, got.into(), expected, hint));
     }
 
     /// The name as it was first written.
@@ -191,23 +86,62 @@ impl Deck {
         }
     }
 
-    /// A set of nodes, which begins on this line if it is new.
-    pub(super) fn node_set(&mut self, name: &Name, line: u64) -> &mut Vec<Target> {
-        set(&mut self.node_sets, name, line)
+    /// The material that properties now belong to.
+    pub(super) fn material(&mut self) -> Option<&mut MaterialDefinition> {
+        let name = self.material.as_ref()?;
+        self.materials.get_mut(name)
     }
 
-    /// A set of elements, which begins on this line if it is new.
-    pub(super) fn element_set(&mut self, name: &Name, line: u64) -> &mut Vec<Target> {
-        set(&mut self.element_sets, name, line)
+    /// The name as it was first written, if the deck has it.
+    pub(super) fn known(&self, name: &str) -> Option<&Name> {
+        self.spelling.get(&name.to_uppercase())
+    }
+
+    /// The members of a set of nodes, which begins on this line if it is new.
+    pub(super) fn node_set(
+        &mut self,
+        name: &Name,
+        of: &Option<Name>,
+        line: u64,
+    ) -> &mut Vec<Target> {
+        let set = new_or_known(&mut self.here.node_sets, &mut self.names, name, line);
+        members(set, of)
+    }
+
+    /// The members of a set of elements, which begins on this line if it is new.
+    pub(super) fn element_set(
+        &mut self,
+        name: &Name,
+        of: &Option<Name>,
+        line: u64,
+    ) -> &mut Vec<Target> {
+        let set = new_or_known(&mut self.here.element_sets, &mut self.names, name, line);
+        members(set, of)
+    }
+
+    /// Gives a set of nodes those of a set of elements.
+    pub(super) fn nodes_of(&mut self, name: &Name, of: &Option<Name>, elements: Name, line: u64) {
+        let set = new_or_known(&mut self.here.node_sets, &mut self.names, name, line);
+        set.of_elements.push((of.clone(), elements));
+    }
+
+    /// The nodes of a surface of nodes: its name is none of a set.
+    pub(super) fn node_surface(&mut self, name: &Name, line: u64) -> &mut Vec<Target> {
+        let surfaces = &mut self.here.node_surfaces;
+        &mut new_or_known(surfaces, &mut self.names, name, line).members
     }
 
     /// A surface, which begins on this line if it is new.
-    pub(super) fn surface(&mut self, name: &Name, line: u64) -> &mut Vec<(Target, usize)> {
-        let known = self.surfaces.entry(name.clone());
-        let new = || Surface {
-            line,
-            ..Surface::default()
+    pub(super) fn surface(&mut self, name: &Name, line: u64) -> &mut Vec<(Target, Sides)> {
+        let names = &mut self.names;
+        let new = || {
+            *names += 1;
+            Surface {
+                line,
+                ..Surface::default()
+            }
         };
+        let known = self.here.surfaces.entry(name.clone());
         &mut known.or_insert_with(new).sides
     }
 
@@ -223,30 +157,75 @@ impl Deck {
         true
     }
 
+    /// The factor of an amplitude at the end of the step, or what is wrong with it.
+    pub(super) fn factor(&self, name: &Name) -> Result<f64, String> {
+        let Some(amplitude) = self.amplitudes.get(name) else {
+            return Err(format!("the unknown amplitude `{name:.60}`"));
+        };
+        let (times, rest) = amplitude.values.as_chunks::<2>();
+        if amplitude.other
+            || times.is_empty()
+            || !rest.is_empty()
+            || !times.is_sorted_by(|a, b| a[0] < b[0])
+        {
+            return Err(format!(
+                "the amplitude `{name:.60}` (line {})",
+                amplitude.line
+            ));
+        }
+        let end = self.period.unwrap_or(1.0);
+        let after = times.partition_point(|[time, _]| *time < end);
+        Ok(
+            match (
+                times.get(after),
+                after.checked_sub(1).map(|before| &times[before]),
+            ) {
+                (Some([_, factor]), None) | (None, Some([_, factor])) => *factor,
+                (Some([next, up]), Some([last, low])) => {
+                    low + (up - low) * (end - last) / (next - last)
+                }
+                (None, None) => 1.0,
+            },
+        )
+    }
+
     pub(super) fn target(&mut self, word: &str) -> Target {
-        let word = word.trim().trim_matches('"');
         match word.parse() {
             Ok(label) => Target::Label(label),
-            // sets of an assembly may be named with their instance: INSTANCE.SET
-            Err(_) => Target::Set(self.spelled(word.rsplit('.').next().unwrap_or(word))),
+            Err(_) => Target::Set(self.spelled(word)),
         }
     }
 }
 
-fn set<'a>(sets: &'a mut BTreeMap<Name, Set>, name: &Name, line: u64) -> &'a mut Vec<Target> {
-    let new = || Set {
-        line,
-        ..Set::default()
+fn new_or_known<'a>(
+    sets: &'a mut BTreeMap<Name, Set>,
+    names: &mut usize,
+    name: &Name,
+    line: u64,
+) -> &'a mut Set {
+    let new = || {
+        *names += 1;
+        Set {
+            line,
+            ..Set::default()
+        }
     };
-    &mut sets.entry(name.clone()).or_insert_with(new).members
+    sets.entry(name.clone()).or_insert_with(new)
 }
 
-pub(super) fn on_line(
-    line: u64,
-    reason: Reason,
-    got: String,
-    expected: &str,
-    hint: &str,
-) -> Violation {
-    Violation::new("", reason, format!("line {line}: {got}"), expected, hint)
+/// The members of a set that are numbered and named as its part is, or as an instance.
+fn members<'a>(set: &'a mut Set, instance: &Option<Name>) -> &'a mut Vec<Target> {
+    let Some(instance) = instance else {
+        return &mut set.members;
+    };
+    // lines of one instance follow one another
+    if set
+        .of_instances
+        .last()
+        .is_none_or(|(last, _)| last != instance)
+    {
+        set.of_instances.push((instance.clone(), Vec::new()));
+    }
+    let last = set.of_instances.len() - 1;
+    &mut set.of_instances[last].1
 }

@@ -1,9 +1,103 @@
 //! Keyword lines: `*NAME, PARAMETER=value, …`, and the block of data that each begins.
 
-use super::block::Block;
-use super::deck::{Deck, Elastic, ElementType, Incomplete, MOST_NAMES, Name, Section, Theory};
-use solver::element::Family;
+use super::block::{Block, Rows};
+use super::deck::{Deck, Inside};
+use super::element::{ElementType, Shape};
+use super::part::Part;
+use super::written::{
+    Amplitude, Elastic, Incomplete, MOST_NAMES, Name, Orientation, Section, fields,
+};
 use solver::error::Reason;
+
+/// Parts of a deck, and instances of them.
+const MOST_PARTS: usize = 1 << 8;
+
+/// How often instances may repeat what the parts contain.
+const MOST_TIMES: u64 = 16;
+
+/// Keywords without effect on a linear static step: requests for output, options of its solution, and what only other
+/// kinds of steps use.
+const IDLE: &[&str] = &[
+    "END STEP",
+    "DENSITY",
+    "DAMPING",
+    "CONDUCTIVITY",
+    "SPECIFIC HEAT",
+    "LATENT HEAT",
+    "PHYSICAL CONSTANTS",
+    "USER OUTPUT VARIABLES",
+    "MASS",
+    "ROTARY INERTIA",
+    "NODE PRINT",
+    "EL PRINT",
+    "NODE FILE",
+    "EL FILE",
+    "NODE OUTPUT",
+    "ELEMENT OUTPUT",
+    "EL OUTPUT",
+    "OUTPUT",
+    "FILE OUTPUT",
+    "CONTACT FILE",
+    "CONTACT PRINT",
+    "CONTACT OUTPUT",
+    "SECTION PRINT",
+    "SECTION FILE",
+    "SECTION OUTPUT",
+    "ENERGY PRINT",
+    "ENERGY FILE",
+    "ENERGY OUTPUT",
+    "INTEGRATED OUTPUT",
+    "INTEGRATED OUTPUT SECTION",
+    "INCREMENTATION OUTPUT",
+    "TIME POINTS",
+    "FILTER",
+    "PREPRINT",
+    "PRINT",
+    "RESTART",
+    "MONITOR",
+    "FILE FORMAT",
+    "NODE RESPONSE",
+    "DIAGNOSTICS",
+    "CONTROLS",
+    "CONTACT CONTROLS",
+    "SOLVER CONTROLS",
+    "SECTION CONTROLS",
+    "HOURGLASS STIFFNESS",
+    "WAVEFRONT MINIMIZATION",
+    "DISTRIBUTION",
+    "DISTRIBUTION TABLE",
+    "POST OUTPUT",
+];
+
+/// Properties of a material that a linear elastic one does not have. A material that nothing is made of may have them.
+const NOT_ELASTIC: &[&str] = &[
+    "PLASTIC",
+    "CYCLIC HARDENING",
+    "RATE DEPENDENT",
+    "DEFORMATION PLASTICITY",
+    "HYPERELASTIC",
+    "HYPERFOAM",
+    "MULLINS EFFECT",
+    "VISCOELASTIC",
+    "VISCOUS",
+    "CREEP",
+    "SWELLING",
+    "POROUS ELASTIC",
+    "POROUS METAL PLASTICITY",
+    "POTENTIAL",
+    "CAP PLASTICITY",
+    "CLAY PLASTICITY",
+    "DRUCKER PRAGER",
+    "DRUCKER PRAGER HARDENING",
+    "MOHR COULOMB",
+    "CONCRETE",
+    "CONCRETE DAMAGED PLASTICITY",
+    "DAMAGE INITIATION",
+    "USER MATERIAL",
+    "NO TENSION",
+    "NO COMPRESSION",
+    "FAIL STRESS",
+];
 
 /// A keyword line in parts.
 pub(super) struct Keyword {
@@ -13,7 +107,7 @@ pub(super) struct Keyword {
 
 impl Keyword {
     pub(super) fn new(text: &str) -> Self {
-        let mut parts = text[1..].split(',').map(str::trim);
+        let mut parts = fields(&text[1..]).into_iter();
         // blanks count as one
         let words: Vec<&str> = parts
             .next()
@@ -44,21 +138,20 @@ impl Keyword {
 
     fn get(&self, name: &str) -> Option<&str> {
         let found = self.parameters.iter().find(|p| p.0 == name)?;
-        found.1.as_deref()
+        found.1.as_deref().filter(|value| !value.is_empty())
+    }
+
+    fn is(&self, name: &str, value: &str) -> bool {
+        self.get(name)
+            .is_some_and(|given| given.eq_ignore_ascii_case(value))
     }
 }
 
 impl Deck {
-    /// The block that a keyword begins; `material` is the last one that was named.
-    pub(super) fn begin(
-        &mut self,
-        keyword: &Keyword,
-        line: u64,
-        material: &mut Option<Name>,
-    ) -> Block {
-        let names = self.node_sets.len() + self.element_sets.len() + self.surfaces.len();
-        if names > MOST_NAMES {
-            if !std::mem::replace(&mut self.incomplete.names, true) {
+    /// The block that a keyword begins.
+    pub(super) fn begin(&mut self, keyword: &Keyword, line: u64) -> Block {
+        if self.names > MOST_NAMES {
+            if !std::mem::replace(&mut self.here.incomplete.names, true) {
                 let (got, expected) = (
                     format!("more than {MOST_NAMES} names"),
                     format!("at most {MOST_NAMES} sets and surfaces"),
@@ -77,97 +170,177 @@ impl Deck {
             "HEADING" => Block::Title,
             "NODE" => {
                 if keyword.has("SYSTEM") || keyword.has("INPUT") {
-                    self.incomplete.nodes = true;
-                    self.fault(line, Reason::Unsupported, "*NODE with SYSTEM or INPUT", "coordinates x, y in the deck itself", "Write the nodes out.");
+                    self.here.incomplete.nodes = true;
+                    self.fault(
+                        line,
+                        Reason::Unsupported,
+                        "*NODE with SYSTEM or INPUT",
+                        "coordinates x, y in the deck itself",
+                        "Write the nodes out.",
+                    );
                 }
-                Block::Nodes(keyword.get("NSET").map(|name| self.spelled(name)))
+                Block::Nodes(self.named(keyword, "NSET"))
             }
             "ELEMENT" => self.element_block(keyword, line),
-            "NSET" => match keyword.get("NSET").map(|name| self.spelled(name)) {
+            "NSET" => self.node_set_block(keyword, line),
+            "ELSET" => match self.named(keyword, "ELSET") {
                 Some(name) => {
-                    self.node_set(&name, line);
-                    Block::NodeSet { name, generate: keyword.has("GENERATE") }
-                }
-                None => self.nameless(line, "*NSET", "NSET"),
-            },
-            "ELSET" => match keyword.get("ELSET").map(|name| self.spelled(name)) {
-                Some(name) => {
-                    self.element_set(&name, line);
-                    Block::ElementSet { name, generate: keyword.has("GENERATE") }
+                    let of = self.named(keyword, "INSTANCE");
+                    self.element_set(&name, &of, line);
+                    Block::ElementSet {
+                        name,
+                        of,
+                        generate: keyword.has("GENERATE"),
+                    }
                 }
                 None => self.nameless(line, "*ELSET", "ELSET"),
             },
-            "SURFACE" => match keyword.get("NAME").map(|name| self.spelled(name)) {
-                Some(name) if keyword.get("TYPE").is_some_and(|t| t.eq_ignore_ascii_case("NODE")) => Block::NodeSurface(name),
-                Some(name) => {
-                    self.surface(&name, line);
-                    Block::Surface(name)
-                }
-                None => self.nameless(line, "*SURFACE", "NAME"),
-            },
+            "SURFACE" => self.surface_block(keyword, line),
             "MATERIAL" => {
-                *material = keyword.get("NAME").map(|name| self.spelled(name));
+                self.material = self.named(keyword, "NAME");
+                if let Some(name) = self.material.clone() {
+                    if self.materials.contains_key(&name) {
+                        self.doubt(
+                            line,
+                            format!("the material `{name:.60}` a second time"),
+                            "each material once",
+                            "Give one of them another name.",
+                        );
+                    }
+                    self.materials.entry(name).or_default();
+                }
                 Block::NoData("*MATERIAL")
             }
             "ELASTIC" => {
                 let kind = keyword.get("TYPE").unwrap_or("ISO").to_uppercase();
-                let engineering_constants = kind == "ENGINEERING CONSTANTS";
-                if !engineering_constants && kind != "ISO" && kind != "ISOTROPIC" {
-                    self.doubt(line, format!("*ELASTIC, TYPE={kind:.40}"), "TYPE=ISO or TYPE=ENGINEERING CONSTANTS", "Give the constants in one of these forms.");
-                }
-                let elastic = Elastic { line, engineering_constants, values: Vec::new(), unreadable: false };
-                Block::Elastic { material: material.clone(), elastic }
+                Block::Elastic(Elastic {
+                    line,
+                    kind,
+                    values: Vec::new(),
+                    unreadable: false,
+                })
             }
+            "EXPANSION" => {
+                if let Some(material) = self.material() {
+                    material.expansion.get_or_insert(line);
+                }
+                Block::Skip
+            }
+            "TEMPERATURE" => self.temperature(line),
+            "INITIAL CONDITIONS" if keyword.is("TYPE", "TEMPERATURE") => self.temperature(line),
+            "ORIENTATION" => self.orientation_block(keyword),
+            "AMPLITUDE" => self.amplitude_block(keyword, line),
             "SOLID SECTION" => {
-                let name = |deck: &mut Self, parameter: &str| keyword.get(parameter).map(|name| deck.spelled(name));
-                match (name(self, "ELSET"), name(self, "MATERIAL")) {
+                let (elements, material) = (
+                    self.named(keyword, "ELSET"),
+                    self.named(keyword, "MATERIAL"),
+                );
+                let orientation = self.named(keyword, "ORIENTATION");
+                match (elements, material) {
                     (Some(elements), Some(material)) => {
-                        if keyword.has("ORIENTATION") {
-                            self.doubt(line, "*SOLID SECTION with ORIENTATION", "materials along x and y", "Give `orthotropic.angle` in a problem of Signorini.");
-                        }
-                        self.sections.push(Section { line, elements, material, thickness: None });
+                        self.here.sections.push(Section {
+                            line,
+                            elements,
+                            material,
+                            thickness: None,
+                            orientation,
+                        });
                         Block::Thickness
                     }
                     _ => {
-                        self.doubt(line, "*SOLID SECTION", "*SOLID SECTION with ELSET and MATERIAL", "Name the elements and their material.");
+                        self.doubt(
+                            line,
+                            "*SOLID SECTION",
+                            "*SOLID SECTION with ELSET and MATERIAL",
+                            "Name the elements and their material.",
+                        );
                         Block::Skip
                     }
                 }
             }
-            "BOUNDARY" => self.plain(keyword, line, &["OP"], Block::Boundary),
-            "DLOAD" => self.plain(keyword, line, &["OP"], Block::Dload),
-            "DSLOAD" => self.plain(keyword, line, &["OP"], Block::Dsload),
-            "CLOAD" => self.plain(keyword, line, &["OP"], Block::Cload),
+            "BOUNDARY" => {
+                // the first in a step decides whether those of the model remain
+                if self.steps > 0
+                    && !std::mem::replace(&mut self.supported_in_step, true)
+                    && keyword.is("OP", "NEW")
+                {
+                    self.here.prescribed.clear();
+                    for (_, part) in &mut self.instances {
+                        part.prescribed.clear();
+                    }
+                }
+                Block::Boundary(self.amplitude(keyword, line))
+            }
+            // they only add to one another, and nothing comes before the first step
+            "DLOAD" => Block::Load(Rows::Sides, self.amplitude(keyword, line)),
+            "DSLOAD" => Block::Load(Rows::Surfaces, self.amplitude(keyword, line)),
+            "CLOAD" => Block::Load(Rows::Nodes, self.amplitude(keyword, line)),
             "STEP" => {
                 self.steps += 1;
-                if keyword.has("NLGEOM") && !keyword.get("NLGEOM").is_some_and(|v| v.eq_ignore_ascii_case("NO")) {
-                    self.doubt(line, "*STEP, NLGEOM", "a linear step", "Displacements are assumed small; remove NLGEOM.");
+                self.supported_in_step = false;
+                if keyword.has("NLGEOM") && !keyword.is("NLGEOM", "NO") {
+                    self.doubt(
+                        line,
+                        "*STEP, NLGEOM",
+                        "a linear step",
+                        "Displacements are assumed small; remove NLGEOM.",
+                    );
                 }
                 Block::Skip
             }
-            // requests for output, and options for solving a linear step, have no effect here
-            "STATIC" | "END STEP" | "DENSITY" | "NODE PRINT" | "EL PRINT" | "NODE FILE" | "EL FILE"
-            | "NODE OUTPUT" | "ELEMENT OUTPUT" | "OUTPUT" | "CONTACT FILE" | "CONTACT PRINT" | "SECTION PRINT"
-            | "ENERGY PRINT" | "PREPRINT" | "PRINT" | "RESTART" | "MONITOR" | "FILE FORMAT" | "NODE RESPONSE"
-            // one part in one place is the same as no part
-            | "PART" | "END PART" | "ASSEMBLY" | "END ASSEMBLY" | "INSTANCE" | "END INSTANCE" => match &keyword.name[..] {
-                "INSTANCE" => Block::NoData("*INSTANCE without data (moving or rotating a part is not supported)"),
-                _ => Block::Skip,
-            },
-            "INCLUDE" | "NGEN" | "NFILL" | "NCOPY" | "NMAP" | "ELGEN" | "ELCOPY" | "SYSTEM" | "TRANSFORM" => {
-                self.incomplete = Incomplete { nodes: true, elements: true, names: true };
-                self.fault(line, Reason::Unsupported, format!("*{}", keyword.name), "nodes and elements written out in one file", "Let the preprocessor write the whole mesh.");
+            "STATIC" => {
+                for name in ["RIKS", "STABILIZE"] {
+                    if keyword.has(name) {
+                        self.doubt(
+                            line,
+                            format!("*STATIC, {name}"),
+                            "a linear static step",
+                            "Remove that parameter.",
+                        );
+                    }
+                }
+                Block::Period
+            }
+            "PART" | "END PART" | "ASSEMBLY" | "END ASSEMBLY" | "INSTANCE" | "END INSTANCE" => {
+                self.part_block(keyword, line)
+            }
+            "INCLUDE" | "NGEN" | "NFILL" | "NCOPY" | "NMAP" | "ELGEN" | "ELCOPY" | "SYSTEM" => {
+                self.here.incomplete = Incomplete::ALL;
+                self.fault(
+                    line,
+                    Reason::Unsupported,
+                    format!("*{}", keyword.name),
+                    "nodes and elements written out in one file",
+                    "Let the preprocessor write the whole mesh.",
+                );
+                Block::Skip
+            }
+            name if IDLE.contains(&name) => Block::Skip,
+            name if NOT_ELASTIC.contains(&name) && self.material.is_some() => {
+                let got = format!("*{name}");
+                if let Some(material) = self.material() {
+                    material.other.push((line, got));
+                }
                 Block::Skip
             }
             name => {
-                self.doubt(line, format!("*{name:.60}"), "a supported keyword", "*NODE, *ELEMENT, *NSET, *ELSET, *SURFACE, *MATERIAL, *ELASTIC, *SOLID SECTION, *BOUNDARY, *DLOAD, *DSLOAD, *CLOAD, *STEP, *STATIC and requests for output are supported.");
+                self.doubt(line, format!("*{name:.60}"), "a supported keyword", "*NODE, *ELEMENT, *NSET, *ELSET, *SURFACE, *PART, *INSTANCE, *MATERIAL, *ELASTIC, *ORIENTATION, *SOLID SECTION, *BOUNDARY, *DLOAD, *DSLOAD, *CLOAD, *AMPLITUDE, *STEP, *STATIC and requests for output are supported.");
                 Block::Skip
             }
         }
     }
 
+    fn named(&mut self, keyword: &Keyword, parameter: &str) -> Option<Name> {
+        keyword.get(parameter).map(|name| self.spelled(name))
+    }
+
+    fn temperature(&mut self, line: u64) -> Block {
+        self.temperatures.get_or_insert(line);
+        Block::Skip
+    }
+
     fn nameless(&mut self, line: u64, keyword: &str, parameter: &str) -> Block {
-        self.incomplete.names = true;
+        self.here.incomplete.names = true;
         self.fault(
             line,
             Reason::Malformed,
@@ -178,72 +351,267 @@ impl Deck {
         Block::Skip
     }
 
-    /// A keyword that supports only the parameters `known`, since others change its meaning.
-    fn plain(&mut self, keyword: &Keyword, line: u64, known: &[&str], block: Block) -> Block {
+    /// The amplitude that a keyword of loads or supports names; other parameters than that and OP change its meaning.
+    fn amplitude(&mut self, keyword: &Keyword, line: u64) -> Option<Name> {
         for (name, value) in &keyword.parameters {
-            if !known.contains(&&name[..])
-                || value
-                    .as_deref()
-                    .is_some_and(|v| v.eq_ignore_ascii_case("NEW"))
-            {
+            let known = match &name[..] {
+                "AMPLITUDE" | "OP" => true,
+                "TYPE" => keyword.name == "BOUNDARY" && keyword.is("TYPE", "DISPLACEMENT"),
+                _ => false,
+            };
+            if !known {
+                let value = value
+                    .as_ref()
+                    .map(|v| format!("={v:.40}"))
+                    .unwrap_or_default();
                 self.doubt(
                     line,
-                    format!("*{} with {name:.40}", keyword.name),
+                    format!("*{} with {name:.40}{value}", keyword.name),
                     &format!("*{} without {name:.40}", keyword.name),
                     "Values are those at the end of one linear step.",
                 );
             }
         }
-        block
+        self.named(keyword, "AMPLITUDE")
+    }
+
+    fn node_set_block(&mut self, keyword: &Keyword, line: u64) -> Block {
+        let Some(name) = self.named(keyword, "NSET") else {
+            return self.nameless(line, "*NSET", "NSET");
+        };
+        let of = self.named(keyword, "INSTANCE");
+        match self.named(keyword, "ELSET") {
+            Some(elements) => {
+                self.nodes_of(&name, &of, elements, line);
+                Block::NoData("*NSET with ELSET")
+            }
+            None => {
+                self.node_set(&name, &of, line);
+                Block::NodeSet {
+                    name,
+                    of,
+                    generate: keyword.has("GENERATE"),
+                }
+            }
+        }
+    }
+
+    fn surface_block(&mut self, keyword: &Keyword, line: u64) -> Block {
+        let Some(name) = self.named(keyword, "NAME") else {
+            return self.nameless(line, "*SURFACE", "NAME");
+        };
+        let kind = keyword.get("TYPE").unwrap_or("ELEMENT").to_uppercase();
+        match &kind[..] {
+            "NODE" => Block::NodeSurface(name),
+            // rigid surfaces of their own, and combinations of others, are no sides of elements: whoever names one is
+            // told that it is unknown
+            "ELEMENT" if !keyword.has("COMBINE") => {
+                self.surface(&name, line);
+                Block::Surface(name)
+            }
+            _ => Block::Skip,
+        }
+    }
+
+    fn orientation_block(&mut self, keyword: &Keyword) -> Block {
+        let Some(name) = self.named(keyword, "NAME") else {
+            return Block::Skip;
+        };
+        let system = keyword.get("SYSTEM").unwrap_or("RECTANGULAR");
+        let straight = system.eq_ignore_ascii_case("RECTANGULAR");
+        let offsets =
+            keyword.is("DEFINITION", "NODES") || keyword.is("DEFINITION", "OFFSET TO NODES");
+        let orientation = Orientation {
+            curved: !straight || offsets || keyword.has("LOCAL DIRECTIONS"),
+            lines: Vec::new(),
+        };
+        self.orientations.insert(name.clone(), orientation);
+        Block::Orientation(name)
+    }
+
+    fn amplitude_block(&mut self, keyword: &Keyword, line: u64) -> Block {
+        let Some(name) = self.named(keyword, "NAME") else {
+            return Block::Skip;
+        };
+        let unlike =
+            |parameter: &str, value: &str| keyword.has(parameter) && !keyword.is(parameter, value);
+        let known = ["NAME", "DEFINITION", "VALUE", "TIME"];
+        let amplitude = Amplitude {
+            line,
+            other: unlike("DEFINITION", "TABULAR")
+                || unlike("VALUE", "RELATIVE")
+                || keyword
+                    .parameters
+                    .iter()
+                    .any(|(name, _)| !known.contains(&&name[..])),
+            values: Vec::new(),
+        };
+        self.amplitudes.insert(name.clone(), amplitude);
+        Block::Amplitude(name)
     }
 
     fn element_block(&mut self, keyword: &Keyword, line: u64) -> Block {
         let name = keyword.get("TYPE").unwrap_or_default().to_uppercase();
-        let set = keyword.get("ELSET").map(|name| self.spelled(name));
+        let set = self.named(keyword, "ELSET");
         if let Some(name) = &set {
-            self.element_set(name, line);
+            self.element_set(name, &None, line);
         }
-        let Some(kind) = element_type(&name) else {
-            self.incomplete.elements = true;
+        if keyword.has("INPUT") {
+            self.here.incomplete.elements = true;
             self.fault(
                 line,
                 Reason::Unsupported,
-                format!("elements of type `{name:.20}`"),
-                "CPE, CPS or CAX with 3, 4, 6 or 8 nodes (and R for reduced integration)",
-                "Mesh with solid elements of plane strain, plane stress or axisymmetry.",
+                "*ELEMENT with INPUT",
+                "elements in the deck itself",
+                "Write the elements out.",
             );
-            return Block::Skip;
-        };
-        if !self.types.contains(&kind) {
-            self.types.push(kind);
+        }
+        let kind = ElementType::new(&name);
+        let got = format!("elements of type `{name:.20}`");
+        match kind.mechanics {
+            Some(mechanics) => {
+                if !self.here.types.contains(&mechanics) {
+                    self.here.types.push(mechanics);
+                }
+            }
+            None if kind.idle => {}
+            None => self.doubt(
+                line,
+                got.clone(),
+                "CPE, CPS or CAX with 3, 4, 6 or 8 nodes (and R, I, H, M or T)",
+                "Remove them from the problem, or use the deck as a mesh: there they are left out or name boundaries.",
+            ),
+        }
+        if matches!(kind.shape, Shape::Other(_)) {
+            self.here.unused_type.get_or_insert((line, got));
         }
         Block::Elements {
-            kind,
+            shape: kind.shape,
             set,
             pending: Vec::new(),
+            continued: false,
         }
     }
-}
 
-fn element_type(name: &str) -> Option<ElementType> {
-    let theory = match name.get(..3)? {
-        "CPE" => Theory::PlaneStrain,
-        "CPS" => Theory::PlaneStress,
-        "CAX" => Theory::Axisymmetric,
-        _ => return None,
-    };
-    let (family, nodes, reduced) = match &name[3..] {
-        "3" => (Family::Triangle, 3, false),
-        "6" => (Family::Triangle, 6, false),
-        "4" | "4I" | "4R" => (Family::Quad, 4, false),
-        "8" => (Family::Quad, 8, false),
-        "8R" => (Family::Quad, 8, true),
-        _ => return None,
-    };
-    Some(ElementType {
-        theory,
-        family,
-        nodes,
-        reduced,
-    })
+    fn part_block(&mut self, keyword: &Keyword, line: u64) -> Block {
+        let name = self.named(keyword, "NAME");
+        match (&keyword.name[..], std::mem::take(&mut self.inside), name) {
+            ("PART", Inside::Assembly, Some(name)) => {
+                self.assembly = std::mem::take(&mut self.here);
+                self.inside = Inside::Part(name);
+            }
+            ("INSTANCE", Inside::Assembly, Some(name)) => {
+                let part = self.instantiated(keyword, line);
+                self.assembly = std::mem::replace(&mut self.here, part);
+                self.inside = Inside::Instance(name);
+                return Block::Instance(Vec::new());
+            }
+            ("END PART", Inside::Part(name), _) => {
+                let part = std::mem::replace(&mut self.here, std::mem::take(&mut self.assembly));
+                self.written += part.size();
+                if self.parts.len() >= MOST_PARTS || self.parts.contains_key(&name) {
+                    let got = format!("the part `{name:.60}`");
+                    let expected = format!("at most {MOST_PARTS} parts, each once");
+                    self.fault(
+                        line,
+                        Reason::TooMany,
+                        got,
+                        &expected,
+                        "Leave out the parts that are not used.",
+                    );
+                } else {
+                    self.parts.insert(name, part);
+                }
+            }
+            ("END INSTANCE", Inside::Instance(name), _) => {
+                if let Some((moved, turned)) = self.placement.take() {
+                    self.here.put(moved, turned);
+                }
+                let part = std::mem::replace(&mut self.here, std::mem::take(&mut self.assembly));
+                if self.instances.iter().any(|(known, _)| *known == name) {
+                    let got = format!("the instance `{name:.60}` a second time");
+                    self.fault(
+                        line,
+                        Reason::DuplicateName,
+                        got,
+                        "each instance once",
+                        "Rename one.",
+                    );
+                }
+                self.instances.push((name, part));
+            }
+            ("ASSEMBLY", inside, name) => {
+                self.inside = inside;
+                self.assembly_name = name;
+            }
+            ("END ASSEMBLY", inside, _) => self.inside = inside,
+            (keyword, inside, name) => {
+                let place = match &inside {
+                    Inside::Assembly => "outside of one".to_owned(),
+                    Inside::Part(part) => format!("in the part `{part:.60}`"),
+                    Inside::Instance(instance) => format!("in the instance `{instance:.60}`"),
+                };
+                self.inside = inside;
+                let named = if name.is_some() { "" } else { " without NAME" };
+                self.fault(
+                    line,
+                    Reason::Malformed,
+                    format!("*{keyword}{named} {place}"),
+                    "*PART, NAME=… to *END PART, and in the assembly *INSTANCE, NAME=…, PART=… to *END INSTANCE",
+                    "End one part or instance before the next.",
+                );
+            }
+        }
+        Block::Skip
+    }
+
+    /// A copy of the part that an instance is of.
+    fn instantiated(&mut self, keyword: &Keyword, line: u64) -> Part {
+        let Some(name) = self.named(keyword, "PART") else {
+            self.here.incomplete = Incomplete::ALL;
+            self.fault(
+                line,
+                Reason::Unsupported,
+                "*INSTANCE without PART",
+                "*INSTANCE, NAME=…, PART=…",
+                "Write the part into the deck.",
+            );
+            return Part::default();
+        };
+        let Some(part) = self.parts.get(&name) else {
+            self.here.incomplete = Incomplete::ALL;
+            let names: Vec<&str> = self.parts.keys().take(20).map(|name| &**name).collect();
+            let hint = format!("Known parts: {}.", names.join(", "));
+            self.fault(
+                line,
+                Reason::UnknownName,
+                format!("the part `{name:.60}`"),
+                "the name of an earlier *PART",
+                &hint,
+            );
+            return Part::default();
+        };
+        self.instantiated += part.size();
+        let most = (1 << 16) + MOST_TIMES * self.written;
+        if self.instances.len() < MOST_PARTS && self.instantiated <= most {
+            return part.clone();
+        }
+        self.here.incomplete = Incomplete::ALL;
+        let got = format!(
+            "{} instances with {} nodes, elements and members of sets",
+            self.instances.len() + 1,
+            self.instantiated
+        );
+        let expected = format!(
+            "at most {MOST_PARTS} instances, and {MOST_TIMES} times what the parts contain"
+        );
+        self.fault(
+            line,
+            Reason::TooMany,
+            got,
+            &expected,
+            "Write a smaller assembly.",
+        );
+        Part::default()
+    }
 }

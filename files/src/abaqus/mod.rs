@@ -4,13 +4,22 @@
 //! Written by hand: there is no crate for the format. A keyword begins with `*`, a comment with `**`,
 //! data lines follow their keyword; names are compared without regard to case, as both programs do,
 //! and kept as they were first written.
+//!
+//! As a mesh a deck needs elements of a plane and nothing else: other elements are left out or, if they are lines, name
+//! boundaries; what only its analysis needs is not looked at. As a problem everything counts that changes the solution.
 
 mod block;
+mod build;
 mod deck;
+mod element;
 mod keyword;
 mod names;
+mod part;
 mod problem;
 mod read;
+mod scope;
+mod supports;
+mod written;
 
 pub use problem::problem;
 
@@ -18,14 +27,34 @@ use std::io::BufRead;
 
 use crate::source::ReadError;
 use solver::mesh::{self, Mesh};
-use solver::solution::Warning;
+use solver::solution::{Warning, WarningCode};
 
 /// Reads the mesh of a deck, with warnings of what was changed. The analysis of the deck is not used, except that
 /// the sets and faces that it loads get names: `SET P3` for a pressure on the third
 /// sides of the elements of SET, `7` for the node 7.
 pub fn read(reader: impl BufRead) -> Result<(Mesh, Vec<Warning>), ReadError> {
-    let deck = read::read(reader)?;
-    let (raw, faults) = deck.into_raw();
-    let raw = faults.into_result(raw);
-    raw.and_then(mesh::build).map_err(ReadError::Invalid)
+    read_for(reader, |_| false)
+}
+
+/// The same for a problem. `holds`: whether it has a support on a set of nodes; where that is what is left of a set
+/// since rows of `*BOUNDARY` overlap, a warning says so.
+pub(crate) fn read_for(
+    reader: impl BufRead,
+    holds: impl Fn(&str) -> bool,
+) -> Result<(Mesh, Vec<Warning>), ReadError> {
+    let mut built = read::read(reader)?.build();
+    let supports = supports::supports(&built);
+    built.raw.node_sets.extend(supports.sets);
+    let raw = built.faults.into_result(built.raw);
+    let read = raw.and_then(mesh::build).map_err(ReadError::Invalid);
+    let overlaps = supports.overlaps.into_iter().filter(|(set, _)| holds(set));
+    let overlaps = overlaps.map(|(_, message)| Warning {
+        code: WarningCode::SupportsOverlap,
+        pointer: String::new(),
+        message,
+    });
+    read.map(|(mesh, mut warnings)| {
+        warnings.extend(overlaps);
+        (mesh, warnings)
+    })
 }

@@ -1,183 +1,343 @@
 //! Resolves the names and numbers of a deck to places in a mesh.
+//!
+//! A part, each instance of it and the assembly have numbers and names of their own. In the assembly and in steps
+//! `INSTANCE.SET` and `INSTANCE.7` are those of an instance; a name alone is one of the assembly, or else of the only
+//! instance that has it. The mesh has the same names: `SET` of the assembly, `INSTANCE.SET`, and `SET` where only one
+//! instance has that.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::deck::{Deck, Incomplete, Name, Set, Surface, Target, on_line};
-use crate::source::Labels;
+use super::deck::Deck;
+use super::scope::{Kind, Scope};
+use super::written::{Name, Set, Target, on_line};
 use solver::error::{Findings, Reason, Violation};
-use solver::mesh::RawMesh;
 
-/// How often all sets together may name a node or an element on average, beside what the deck writes out: sets that
-/// contain sets are short in the deck, and may be very long when written out.
-const MOST_TIMES: u64 = 16;
+/// A set by the place of its scope and its name.
+pub(super) type Key = (usize, Name);
 
-impl Deck {
-    /// The name of the target of a load or support, as `into_raw` gives it to the mesh.
-    pub(super) fn name_of(target: &Target, side: Option<usize>) -> String {
-        let name = match target {
-            Target::Label(label) => label.to_string(),
-            Target::Set(name) => name.to_string(),
-            Target::Range(range) => format!("{}-{}:{}", range[0], range[1], range[2]),
-        };
-        match side {
-            Some(side) => format!("{name} P{side}"),
-            None => name,
+/// What a target is.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Meant {
+    Set(Key),
+    Label(usize, u64),
+}
+
+/// The scopes of a deck, the assembly first, and its spelling of names.
+pub(super) struct Names<'a> {
+    pub(super) deck: &'a Deck,
+    pub(super) scopes: &'a [Scope],
+}
+
+impl Names<'_> {
+    /// The name in the mesh of a set or surface of a scope.
+    pub(super) fn full(&self, scope: usize, name: &str) -> String {
+        match &self.scopes[scope].name {
+            None => name.to_owned(),
+            Some(instance) => format!("{instance}.{name}"),
         }
     }
 
-    /// The mesh with all its names, and its violations.
-    pub(super) fn into_raw(mut self) -> (RawMesh, Findings) {
-        let mut faults = std::mem::take(&mut self.faults);
-        let mut room = self.room();
-        let incomplete = self.incomplete;
-        let elements = Labelled {
-            labels: &self.elements,
-            what: "element",
-            keyword: "ELSET",
-            incomplete: incomplete.elements,
+    /// The name in the mesh of what a target is.
+    pub(super) fn of(&self, meant: &Meant) -> String {
+        match meant {
+            Meant::Set((scope, name)) => self.full(*scope, name),
+            Meant::Label(scope, label) => self.full(*scope, &label.to_string()),
+        }
+    }
+
+    /// The set or number that a target of a scope is.
+    pub(super) fn meant(&self, kind: Kind, scope: usize, target: &Target) -> Option<Meant> {
+        let has = |scope: usize, label: u64| self.scopes[scope].place(kind, label).is_some();
+        match target {
+            Target::Range(_) => None,
+            Target::Label(label) => {
+                let found = self.in_scopes(scope, |scope| has(scope, *label))?;
+                Some(Meant::Label(found, *label))
+            }
+            Target::Set(word) => {
+                let sets = |scope: usize| self.scopes[scope].sets(kind);
+                if let Some((scope, name)) =
+                    self.named(scope, word, |scope, name| sets(scope).contains_key(name))
+                {
+                    return Some(Meant::Set((scope, name)));
+                }
+                let (instance, rest) = self.dotted(scope, word)?;
+                let label = rest.parse().ok().filter(|label| has(instance, *label))?;
+                Some(Meant::Label(instance, label))
+            }
+        }
+    }
+
+    /// The scope of a name, and the name there. `has`: whether a scope has a name.
+    pub(super) fn named(
+        &self,
+        scope: usize,
+        word: &Name,
+        has: impl Fn(usize, &Name) -> bool,
+    ) -> Option<Key> {
+        // a name may contain a dot
+        if has(scope, word) {
+            return Some((scope, word.clone()));
+        }
+        if scope == 0
+            && let Some(name) = self
+                .in_assembly(word)
+                .and_then(|rest| self.deck.known(rest))
+            && has(scope, name)
+        {
+            return Some((scope, name.clone()));
+        }
+        if let Some((instance, rest)) = self.dotted(scope, word) {
+            let name = self.deck.known(rest)?;
+            return has(instance, name).then(|| (instance, name.clone()));
+        }
+        let found = self.in_scopes(scope, |scope| has(scope, word))?;
+        Some((found, word.clone()))
+    }
+
+    /// This scope if it has something; in the assembly otherwise the only instance that has it.
+    fn in_scopes(&self, scope: usize, has: impl Fn(usize) -> bool) -> Option<usize> {
+        if has(scope) {
+            return Some(scope);
+        }
+        let instances = if scope == 0 {
+            1..self.scopes.len()
+        } else {
+            0..0
         };
-        let nodes = Labelled {
-            labels: &self.nodes,
-            what: "node",
-            keyword: "NSET",
-            incomplete: incomplete.nodes,
-        };
-        let element_sets = resolve(
-            &self.element_sets,
-            elements,
-            incomplete,
-            &mut room,
-            &mut faults,
-        );
-        let node_sets = resolve(&self.node_sets, nodes, incomplete, &mut room, &mut faults);
-        let surfaces = std::mem::take(&mut self.surfaces);
-        let mut surfaces: Vec<(String, Surface)> = surfaces
+        let mut found = instances.filter(|instance| has(*instance));
+        match (found.next(), found.next()) {
+            (Some(only), None) => Some(only),
+            _ => None,
+        }
+    }
+
+    /// The instance of `INSTANCE.NAME` in the assembly, and the name.
+    fn dotted<'w>(&self, scope: usize, word: &'w str) -> Option<(usize, &'w str)> {
+        if scope != 0 {
+            return None;
+        }
+        let word = self.in_assembly(word).unwrap_or(word);
+        // names of instances may contain a dot too
+        [word.split_once('.'), word.rsplit_once('.')]
             .into_iter()
-            .map(|(name, surface)| (name.to_string(), surface))
-            .collect();
-        // a deck may load the same side many times
-        let mut loaded = BTreeSet::new();
-        for pressure in &self.pressures {
-            if let Some(side) = pressure.side {
-                let name = Deck::name_of(&pressure.target, Some(side));
-                if loaded.insert(name.clone()) {
-                    let (line, sides) = (pressure.line, vec![(pressure.target.clone(), side)]);
-                    surfaces.push((name, Surface { line, sides }));
+            .flatten()
+            .find_map(|(start, rest)| Some((self.instance(start)?, rest)))
+    }
+
+    /// What follows the name of the assembly.
+    fn in_assembly<'w>(&self, word: &'w str) -> Option<&'w str> {
+        let assembly = self.deck.assembly_name.as_deref()?;
+        let (start, rest) = word.split_once('.')?;
+        start.eq_ignore_ascii_case(assembly).then_some(rest)
+    }
+
+    /// The scope of an instance.
+    pub(super) fn instance(&self, name: &str) -> Option<usize> {
+        let name = self.deck.known(name)?;
+        let named = |scope: &Scope| scope.name.as_ref() == Some(name);
+        self.scopes.iter().position(named)
+    }
+
+    pub(super) fn all_sets(&self, kind: Kind) -> Vec<String> {
+        let names = (0..self.scopes.len()).flat_map(|scope| {
+            let sets = self.scopes[scope].sets(kind).keys();
+            sets.map(move |name| self.full(scope, name))
+        });
+        names.take(MOST_LISTED).collect()
+    }
+
+    /// All sets of a kind as places in the mesh. `elements`: those of sets of elements, and the nodes of each element.
+    pub(super) fn resolve(
+        &self,
+        kind: Kind,
+        nodes_of: impl Fn(&Key, &mut Vec<u32>) -> bool,
+        room: &mut Room,
+        faults: &mut Findings,
+    ) -> BTreeMap<Key, Vec<u32>> {
+        let mut resolved = BTreeMap::new();
+        for scope in 0..self.scopes.len() {
+            for (name, set) in self.scopes[scope].sets(kind) {
+                if room.is_used_up() {
+                    return resolved;
+                }
+                let mut members = Members {
+                    names: self,
+                    kind: kind.named(),
+                    name: self.full(scope, name),
+                    line: set.line,
+                    found: Vec::new(),
+                    open: Vec::new(),
+                    seen: BTreeSet::from([(scope, name.clone())]),
+                };
+                members.open(scope, set, &nodes_of, room, faults);
+                members.visit(&nodes_of, room, faults);
+                let mut found = members.found;
+                found.sort_unstable();
+                found.dedup();
+                found.shrink_to_fit();
+                resolved.insert((scope, name.clone()), found);
+            }
+        }
+        resolved
+    }
+}
+
+/// The members of a set while they are looked up. Sets may contain sets; one that contains itself is visited once.
+struct Members<'a> {
+    names: &'a Names<'a>,
+    kind: Kind,
+    name: String,
+    line: u64,
+    found: Vec<u32>,
+    /// Lists that are being gone through, their scopes, and how many sets they are inside of.
+    open: Vec<(usize, std::slice::Iter<'a, Target>, usize)>,
+    seen: BTreeSet<Key>,
+}
+
+impl<'a> Members<'a> {
+    fn open(
+        &mut self,
+        scope: usize,
+        set: &'a Set,
+        nodes_of: &impl Fn(&Key, &mut Vec<u32>) -> bool,
+        room: &mut Room,
+        faults: &mut Findings,
+    ) {
+        // what is missing in a set is reported there, not in all that contain it
+        let depth = self.open.last().map_or(0, |(_, _, depth)| depth + 1);
+        for (instance, elements) in &set.of_elements {
+            let scope = match instance {
+                Some(instance) => self.names.instance(instance),
+                None => Some(scope),
+            };
+            let target = Target::Set(elements.clone());
+            let meant = scope.and_then(|scope| self.names.meant(Kind::Elements, scope, &target));
+            let before = self.found.len();
+            let known = match meant {
+                Some(Meant::Set(key)) => nodes_of(&key, &mut self.found),
+                _ => false,
+            };
+            room.take(
+                (self.found.len() - before) as u64,
+                self.line,
+                &self.name,
+                faults,
+            );
+            if !known && depth == 0 && !self.names.scopes[0].incomplete.names {
+                let got = format!("`{elements:.60}` in the set `{:.60}`", self.name);
+                unknown(faults, &got, "a set of elements (*ELSET)", || {
+                    self.names.all_sets(Kind::Elements)
+                });
+            }
+        }
+        for (instance, members) in &set.of_instances {
+            match self.names.instance(instance) {
+                Some(scope) => self.open.push((scope, members.iter(), depth)),
+                None if self.names.scopes[0].incomplete.names || depth > 0 => {}
+                None => {
+                    let got = format!(
+                        "the instance `{instance:.60}` of the set `{:.60}`",
+                        self.name
+                    );
+                    unknown(faults, &got, "the name of an *INSTANCE", Vec::new);
                 }
             }
         }
-        for (name, surface) in surfaces {
-            let mut lines = Vec::new();
-            for (target, side) in surface.sides {
-                let single;
-                let elements: Option<&[u32]> = match &target {
-                    Target::Label(label) => {
-                        single = self.elements.get(*label).map(|e| [e]);
-                        single.as_ref().map(|e| &e[..])
+        self.open.push((scope, set.members.iter(), depth));
+    }
+
+    fn visit(
+        &mut self,
+        nodes_of: &impl Fn(&Key, &mut Vec<u32>) -> bool,
+        room: &mut Room,
+        faults: &mut Findings,
+    ) {
+        let (names, kind, what) = (self.names, self.kind, self.kind.what());
+        while let Some((scope, members, depth)) = self.open.last_mut() {
+            let (scope, told) = (*scope, *depth > 0);
+            let Some(target) = members.next() else {
+                self.open.pop();
+                continue;
+            };
+            if !room.take(1, self.line, &self.name, faults) {
+                break;
+            }
+            let place = &names.scopes[scope];
+            let numbers = place.incomplete_numbers(kind);
+            if let Target::Range(range) = target {
+                // numbers in between need not exist
+                let [first, last, step] = **range;
+                let (inside, visited) = place.range(kind, (first, last, step), room.left);
+                room.take(visited, self.line, &self.name, faults);
+                if inside.is_empty() && !(numbers || told || room.is_used_up()) {
+                    let got = format!("{what}s {first} to {last} in the set `{:.60}`", self.name);
+                    unknown(
+                        faults,
+                        &got,
+                        &format!("numbers that {what}s have"),
+                        Vec::new,
+                    );
+                }
+                self.found.extend(inside);
+                continue;
+            }
+            match (target, names.meant(kind, scope, target)) {
+                (_, Some(Meant::Label(scope, label))) => {
+                    self.found.extend(names.scopes[scope].place(kind, label));
+                }
+                (_, Some(Meant::Set(key))) => {
+                    let inner = names.scopes[key.0].sets(kind).get(&key.1);
+                    let scope = key.0;
+                    if let (Some(inner), true) = (inner, self.seen.insert(key)) {
+                        self.open(scope, inner, nodes_of, room, faults);
                     }
-                    Target::Set(set) => element_sets.get(set).map(|set| &set[..]),
-                    Target::Range(..) => None,
-                };
-                let Some(elements) = elements else {
-                    let label = matches!(target, Target::Label(_));
-                    if !(incomplete.names || label && incomplete.elements) {
-                        let got =
-                            format!("`{}` in the surface `{name}`", Deck::name_of(&target, None));
+                }
+                (_, None) if told => {}
+                (Target::Set(other), None) => {
+                    if !(place.incomplete.names || names.scopes[0].incomplete.names) {
                         unknown(
-                            &mut faults,
-                            &got,
-                            "an element or a set of elements",
-                            element_sets.keys(),
+                            faults,
+                            &format!("`{other:.60}` in the set `{:.60}`", self.name),
+                            &format!("a {what} or a set (*{})", kind.keyword()),
+                            || names.all_sets(kind),
                         );
                     }
-                    continue;
-                };
-                if !room.take(elements.len() as u64, surface.line, &name, &mut faults) {
-                    break;
                 }
-                for &place in elements {
-                    let element = &self.raw.elements[place as usize];
-                    let corners = element.family().corners();
-                    if side > corners {
-                        let label = self.raw.element_labels[place as usize];
-                        faults.add(Violation::new(
-                            "",
-                            Reason::UnknownEdge,
-                            format!("side {side} of the triangle {label} in `{name:.60}`"),
-                            "sides 1 … 3 of a triangle",
-                            "Name the sides of triangles and of quadrilaterals in sets of their own.",
-                        ));
-                        break;
-                    }
-                    lines.push([element[side - 1], element[side % corners]]);
-                }
-            }
-            self.raw.lines.entry(name).or_default().extend(lines);
-        }
-        let named = |sets: BTreeMap<Name, Vec<u32>>| -> BTreeMap<String, Vec<u32>> {
-            sets.into_iter()
-                .map(|(name, set)| (name.to_string(), set))
-                .collect()
-        };
-        self.raw.groups = named(element_sets);
-        self.raw.node_sets = named(node_sets);
-        // a node by itself is a set of one
-        let single = self.prescribed.iter().map(|row| &row.target);
-        for target in single.chain(self.forces.iter().map(|row| &row.target)) {
-            match target {
-                Target::Label(label) => match self.nodes.get(*label) {
-                    Some(node) => {
-                        self.raw.node_sets.insert(label.to_string(), vec![node]);
-                    }
-                    None if incomplete.nodes => {}
-                    None => unknown(
-                        &mut faults,
-                        &format!("node {label}"),
-                        "a node of *NODE",
-                        self.raw.node_sets.keys(),
-                    ),
-                },
-                Target::Set(name)
-                    if !incomplete.names && !self.raw.node_sets.contains_key(&**name) =>
-                {
+                (Target::Label(label), None) if !numbers => {
+                    let got = format!("{what} {label} in the set `{:.60}`", self.name);
                     unknown(
-                        &mut faults,
-                        &format!("the node set `{name:.60}`"),
-                        "a node or a set of nodes",
-                        self.raw.node_sets.keys(),
+                        faults,
+                        &got,
+                        &format!("a number that a {what} has"),
+                        Vec::new,
                     );
                 }
                 _ => {}
             }
         }
-        self.raw.sets_span_boundaries = true;
-        (self.raw, faults)
-    }
-
-    /// The room for the members of all sets and surfaces.
-    fn room(&self) -> Room {
-        let sets = self.node_sets.values().chain(self.element_sets.values());
-        let written: usize = sets.map(|set| set.members.len()).sum();
-        let sides: usize = self
-            .surfaces
-            .values()
-            .map(|surface| surface.sides.len())
-            .sum();
-        let mesh = (self.raw.nodes.len() + self.raw.elements.len()) as u64;
-        let most = (1 << 16) + 2 * (written + sides) as u64 + MOST_TIMES * mesh;
-        Room { most, left: most }
     }
 }
 
 /// How many members of sets may still be visited.
-struct Room {
+pub(super) struct Room {
     most: u64,
     left: u64,
 }
 
 impl Room {
+    pub(super) fn new(most: u64) -> Self {
+        Room { most, left: most }
+    }
+
     /// Takes some of it; reports, once, that there is not enough.
-    fn take(&mut self, count: u64, line: u64, name: &str, faults: &mut Findings) -> bool {
+    pub(super) fn take(
+        &mut self,
+        count: u64,
+        line: u64,
+        name: &str,
+        faults: &mut Findings,
+    ) -> bool {
         if let Some(left) = self.left.checked_sub(count) {
             self.left = left;
             return true;
@@ -198,119 +358,28 @@ impl Room {
         false
     }
 
-    fn is_used_up(&self) -> bool {
+    pub(super) fn is_used_up(&self) -> bool {
         self.most == 0
     }
 }
 
-/// The numbers of nodes or of elements, and the words for them.
-#[derive(Clone, Copy)]
-struct Labelled<'a> {
-    labels: &'a Labels,
-    what: &'static str,
-    keyword: &'static str,
-    /// A missing one may be on a line that could not be read.
-    incomplete: bool,
-}
+/// Names that a hint lists.
+const MOST_LISTED: usize = 20;
 
-/// Sets as places in the mesh.
-fn resolve(
-    sets: &BTreeMap<Name, Set>,
-    labelled: Labelled<'_>,
-    incomplete: Incomplete,
-    room: &mut Room,
-    faults: &mut Findings,
-) -> BTreeMap<Name, Vec<u32>> {
-    let Labelled {
-        labels,
-        what,
-        keyword,
-        incomplete: numbers,
-    } = labelled;
-    let mut resolved: BTreeMap<Name, Vec<u32>> = BTreeMap::new();
-    for (name, set) in sets {
-        let mut found = Vec::new();
-        // sets may contain sets; one that contains itself is visited once
-        let mut open = vec![set.members.iter()];
-        let mut seen = BTreeSet::from([name]);
-        while let Some(members) = open.last_mut() {
-            let Some(target) = members.next() else {
-                open.pop();
-                continue;
-            };
-            if !room.take(1, set.line, name, faults) {
-                break;
-            }
-            // what is missing in a set is reported there, not in all that contain it
-            let told = open.len() > 1;
-            match target {
-                Target::Label(label) => match labels.get(*label) {
-                    Some(place) => found.push(place),
-                    None if numbers || told => {}
-                    None => unknown(
-                        faults,
-                        &format!("{what} {label} in the set `{name:.60}`"),
-                        &format!("a number that a {what} has"),
-                        NONE.iter(),
-                    ),
-                },
-                // numbers in between need not exist
-                Target::Range(range) => {
-                    let [first, last, step] = **range;
-                    let (inside, visited) = labels.range(first, last, step, room.left);
-                    room.take(visited, set.line, name, faults);
-                    if inside.is_empty() && !(numbers || told || room.is_used_up()) {
-                        unknown(
-                            faults,
-                            &format!("{what}s {first} to {last} in the set `{name:.60}`"),
-                            &format!("numbers that {what}s have"),
-                            NONE.iter(),
-                        );
-                    }
-                    found.extend(inside);
-                }
-                Target::Set(other) => match sets.get_key_value(other) {
-                    Some((key, inner)) => {
-                        if seen.insert(key) {
-                            open.push(inner.members.iter());
-                        }
-                    }
-                    None if incomplete.names || told => {}
-                    None => unknown(
-                        faults,
-                        &format!("`{other:.60}` in the set `{name:.60}`"),
-                        &format!("a {what} or a set (*{keyword})"),
-                        sets.keys(),
-                    ),
-                },
-            }
-        }
-        found.sort_unstable();
-        found.dedup();
-        found.shrink_to_fit();
-        resolved.insert(name.clone(), found);
-        if room.is_used_up() {
-            break;
-        }
-    }
-    resolved
-}
-
-/// No names to list.
-const NONE: [&str; 0] = [];
-
-fn unknown<'a, S: AsRef<str> + 'a>(
+/// Reports a name or number that nothing has; `known`: the names that there are.
+pub(super) fn unknown(
     faults: &mut Findings,
     got: &str,
     expected: &str,
-    known: impl Iterator<Item = &'a S>,
+    known: impl FnOnce() -> Vec<String>,
 ) {
     if faults.is_full() {
         return faults.count(1);
     }
-    let names: Vec<String> = known
-        .take(20)
-        .map(|name| format!("{:.60}", name.as_ref()))
+    let names: Vec<String> = known()
+        .iter()
+        .take(MOST_LISTED)
+        .map(|name| format!("{name:.60}"))
         .collect();
     let hint = match names.is_empty() {
         true => "Correct the number.".to_owned(),
@@ -318,7 +387,6 @@ fn unknown<'a, S: AsRef<str> + 'a>(
     };
     faults.add(Violation::new("", Reason::UnknownName, got, expected, hint));
 }
-
 #[cfg(test)]
 mod tests {
     use super::super::read;
@@ -394,7 +462,6 @@ mod tests {
             ("2, 1, 0\n", "two, 1, 0\n"),
             ("10, 1, 2, 3, 4\n", "10, 1, 2, 3, x\n"),
             ("10, 1, 2, 3, 4\n", "10, 1, 2, 3\n"),
-            ("TYPE=CPE4", "TYPE=C3D8"),
             ("NSET=A\n", "\n"),
             ("NAME=S\n", "\n"),
             ("*NODE\n", "*INCLUDE, INPUT=nodes.inp\n"),

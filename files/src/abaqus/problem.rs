@@ -1,46 +1,53 @@
 //! A deck as a whole problem: a part that is not supported is a violation with its line.
 
-use std::{
-    collections::{BTreeSet, HashMap},
-    mem,
-};
+use std::collections::BTreeSet;
 
-use super::deck::{Deck, Elastic, ElementType, MOST_CONSTANTS, Section, Theory};
+use super::build::{Built, Row, key, sides_of_two};
+use super::element::{Mechanics, Theory};
 use super::read::read;
+use super::supports::supports;
+use super::written::{
+    Elastic, MOST_CONSTANTS, MaterialDefinition, Name, Orientation, Section, on_line,
+};
 use crate::source::ReadError;
-use solver::error::Violation;
+use solver::error::{Reason, Violation};
 use solver::problem::{
     Analysis, BoundaryValue, Elasticity, Load, Material, MeshInput, MeshSource, Orthotropic,
-    Problem, SolverControls, Support,
+    Problem, SolverControls,
 };
 
 /// The problem that a deck states: one linear static step, without contact. The text itself becomes
 /// the problem's mesh.
 pub fn problem(text: &str) -> Result<Problem, Vec<Violation>> {
-    let mut deck = read(text.as_bytes()).map_err(ReadError::into_violations)?;
-    let analysis = analysis(&mut deck);
-    let quadrature = quadrature(&mut deck);
-    let materials = materials(&mut deck);
-    if deck.steps != 1 {
-        let got = format!("{} steps", deck.steps);
-        deck.doubt(
-            0,
-            got,
-            "one *STEP",
-            "Give the load steps in a problem of Signorini.",
+    let deck = read(text.as_bytes()).map_err(ReadError::into_violations)?;
+    let mut built = deck.build();
+    let analysis = analysis(&mut built);
+    let quadrature = quadrature(&mut built);
+    let materials = materials(&mut built);
+    built.check_steps();
+    let supports = supports(&built);
+    for (line, name) in supports.of_no_element {
+        built.doubt(
+            line,
+            format!("a displacement of `{name:.60}`"),
+            "nodes of plane elements",
+            "Move a rigid tool by the `indentation` and `drag` of a contact, in a problem of Signorini.",
         );
     }
-    let supports = supports(&deck);
-    let loads = loads(&mut deck, &analysis);
-    let (title, doubts) = (deck.title.take(), std::mem::take(&mut deck.doubts));
-    let (_, mut faults) = deck.into_raw();
+    let loads = loads(&mut built, &analysis);
+    let Built {
+        mut deck,
+        mut faults,
+        doubts,
+        ..
+    } = built;
     faults.extend(doubts.into_violations());
     faults.into_result(Problem {
-        title,
+        title: deck.title.take(),
         analysis,
         mesh: MeshInput::new(MeshSource::Abaqus(text.to_owned())),
         materials,
-        supports,
+        supports: supports.list,
         loads,
         contacts: Vec::new(),
         steps: Vec::new(),
@@ -50,32 +57,67 @@ pub fn problem(text: &str) -> Result<Problem, Vec<Violation>> {
     })
 }
 
-fn analysis(deck: &mut Deck) -> Analysis {
-    let theory = deck
+impl Built {
+    fn doubt(&mut self, line: u64, got: impl Into<String>, expected: &str, hint: &str) {
+        let reason = Reason::NotUnderstood;
+        self.doubts.add(match line {
+            0 => Violation::new("", reason, got.into(), expected, hint),
+            _ => on_line(line, reason, got.into(), expected, hint),
+        });
+    }
+
+    fn check_steps(&mut self) {
+        if self.deck.steps != 1 {
+            let got = format!("{} steps", self.deck.steps);
+            self.doubt(
+                0,
+                got,
+                "one *STEP",
+                "Give the load steps in a problem of Signorini.",
+            );
+        }
+        // without one of the two there are no thermal strains
+        let expansion = |material: &MaterialDefinition| material.expansion;
+        if let (Some(line), Some(_)) = (
+            self.deck.temperatures,
+            self.deck.materials.values().find_map(expansion),
+        ) {
+            self.doubt(
+                line,
+                "temperatures of a material with *EXPANSION",
+                "no thermal strains",
+                "Remove the temperatures, or the expansion.",
+            );
+        }
+    }
+}
+
+fn analysis(built: &mut Built) -> Analysis {
+    let theory = built
         .types
         .first()
         .map_or(Theory::PlaneStrain, |kind| kind.theory);
-    if deck.types.iter().any(|kind| kind.theory != theory) {
-        deck.doubt(
+    if built.types.iter().any(|kind| kind.theory != theory) {
+        built.doubt(
             0,
             "elements of different theories",
             "one of CPE, CPS, CAX throughout",
             "Use one theory for all elements.",
         );
     }
-    let first = deck.sections.first().and_then(|section| section.thickness);
-    let thicknesses: Vec<(u64, Option<f64>)> = deck
+    let thicknesses: Vec<(u64, Option<f64>)> = built
         .sections
         .iter()
-        .map(|s| (s.line, s.thickness))
+        .map(|s| (s.row.line, s.row.thickness))
         .collect();
+    let first = thicknesses.first().and_then(|(_, thickness)| *thickness);
     for (line, thickness) in thicknesses {
         let wanted = match theory {
             Theory::PlaneStress => first.unwrap_or(1.0),
             _ => 1.0,
         };
         if theory != Theory::Axisymmetric && thickness.unwrap_or(1.0) != wanted {
-            deck.doubt(
+            built.doubt(
                 line,
                 format!("a thickness of {}", thickness.unwrap_or(1.0)),
                 &format!("{wanted}"),
@@ -95,14 +137,14 @@ fn analysis(deck: &mut Deck) -> Analysis {
 /// The rule of the quadrilaterals; where there are none that of the triangles, which Abaqus and CalculiX
 /// integrate with three points. In a mixed mesh triangles get the larger rule, which is at least as accurate but
 /// not the same.
-fn quadrature(deck: &mut Deck) -> u32 {
-    if deck.types.iter().all(ElementType::is_triangle) {
+fn quadrature(built: &mut Built) -> u32 {
+    if built.types.iter().all(Mechanics::is_triangle) {
         return 2;
     }
-    deck.types.retain(|kind| !kind.is_triangle());
-    let reduced = deck.types.iter().filter(|kind| kind.reduced).count();
-    if reduced != 0 && reduced != deck.types.len() {
-        deck.doubt(
+    built.types.retain(|kind| !kind.is_triangle());
+    let reduced = built.types.iter().filter(|kind| kind.reduced).count();
+    if reduced != 0 && reduced != built.types.len() {
+        built.doubt(
             0,
             "elements of full and of reduced integration",
             "one kind of integration",
@@ -112,20 +154,24 @@ fn quadrature(deck: &mut Deck) -> u32 {
     if reduced > 0 { 2 } else { 3 }
 }
 
-fn materials(deck: &mut Deck) -> Vec<Material> {
+fn materials(built: &mut Built) -> Vec<Material> {
     let mut materials = Vec::new();
-    let (sections, known) = (
-        mem::take(&mut deck.sections),
-        mem::take(&mut deck.materials),
-    );
+    let sections = std::mem::take(&mut built.sections);
+    let known = std::mem::take(&mut built.deck.materials);
     // a material is reported once, however many sections have it
-    let mut told = BTreeSet::new();
-    for section in &sections {
-        let Some(elastic) = known.get(&section.material) else {
-            if !deck.incomplete.names && told.insert(&section.material) {
-                let got = format!("the material `{:.60}`", section.material);
-                deck.doubt(
-                    section.line,
+    let mut told: BTreeSet<&Name> = BTreeSet::new();
+    for Row { row, name } in &sections {
+        // a section of trusses or springs: what they are is told where they are
+        if !built.raw.groups.contains_key(name) {
+            continue;
+        }
+        let definition = known.get(&row.material);
+        let Some((definition, elastic)) = definition.and_then(|m| Some((m, m.elastic.as_ref()?)))
+        else {
+            if !built.incomplete.names && told.insert(&row.material) {
+                let got = format!("the material `{:.60}`", row.material);
+                built.doubt(
+                    row.line,
                     got,
                     "a *MATERIAL with *ELASTIC",
                     "Define the material.",
@@ -133,38 +179,104 @@ fn materials(deck: &mut Deck) -> Vec<Material> {
             }
             continue;
         };
-        match material(section, elastic) {
-            Some(material) => materials.push(material),
-            None if elastic.unreadable || !told.insert(&section.material) => {}
+        if told.contains(&row.material) {
+            continue;
+        }
+        for (line, got) in &definition.other {
+            told.insert(&row.material);
+            built.doubt(
+                *line,
+                got.clone(),
+                "a linear elastic material",
+                "Remove it, if the material stays elastic.",
+            );
+        }
+        match elasticity(elastic) {
+            Some(mut elasticity) => {
+                if let Elasticity::Orthotropic(constants) = &mut elasticity {
+                    constants.angle = angle(built, row);
+                }
+                materials.push(Material {
+                    elasticity,
+                    group: Some(name.clone()),
+                    name: Some(row.material.to_string()),
+                });
+            }
+            None if elastic.unreadable || !told.insert(&row.material) => {}
             None => {
-                let got = match elastic.values.len() {
-                    count @ ..=MOST_CONSTANTS => format!("{count} elastic constants"),
-                    _ => format!("more than {MOST_CONSTANTS} elastic constants"),
-                };
-                deck.doubt(
-                    elastic.line,
-                    got,
-                    "E, ν; or E1, E2, E3, ν12, ν13, ν23, G12, G13, G23; at one temperature",
-                    "Correct the constants.",
-                );
+                let (got, expected) = constants(elastic);
+                built.doubt(elastic.line, got, expected, "Correct the constants.");
             }
         }
     }
+    // the deck's definitions stay where checks look for them
+    built.deck.materials = known;
     materials
 }
 
-fn material(section: &Section, elastic: &Elastic) -> Option<Material> {
+/// The angle of a material's first direction (degrees): only where directions differ does it matter.
+fn angle(built: &mut Built, section: &Section) -> f64 {
+    let Some(name) = &section.orientation else {
+        return 0.0;
+    };
+    let angle = built.deck.orientations.get(name).map(Orientation::angle);
+    match angle {
+        Some(Some(angle)) => angle,
+        found => {
+            let got = match found {
+                Some(_) => format!("the orientation `{name:.60}`"),
+                None => format!("the unknown orientation `{name:.60}`"),
+            };
+            built.doubt(
+                section.line,
+                got,
+                "*ORIENTATION with two points in the plane of x and y, and a rotation about 3 at most",
+                "Give `orthotropic.angle` in a problem of Signorini.",
+            );
+            0.0
+        }
+    }
+}
+
+impl Orientation {
+    /// The angle from x to the first direction (degrees), if both directions lie in the plane.
+    fn angle(&self) -> Option<f64> {
+        let points = self.lines.first().filter(|_| !self.curved)?;
+        let at = |k: usize| points.get(k).copied().unwrap_or(0.0);
+        let (origin, a, b) = (
+            [at(6), at(7), at(8)],
+            [at(0), at(1), at(2)],
+            [at(3), at(4), at(5)],
+        );
+        let [a, b] = [a, b].map(|p| [p[0] - origin[0], p[1] - origin[1], p[2] - origin[2]]);
+        let cross = a[0] * b[1] - a[1] * b[0];
+        if a[2] != 0.0 || b[2] != 0.0 || cross == 0.0 {
+            return None;
+        }
+        let further = match self.lines.get(1).map(|line| &line[..]) {
+            None | Some([]) => 0.0,
+            // about the third direction, which points along z or against it
+            Some([3.0]) => 0.0,
+            Some([3.0, angle]) => angle * cross.signum(),
+            Some([_, 0.0]) => 0.0,
+            Some(_) => return None,
+        };
+        Some(a[1].atan2(a[0]).to_degrees() + further)
+    }
+}
+
+fn elasticity(elastic: &Elastic) -> Option<Elasticity> {
     // a temperature may follow
-    let elasticity = match (elastic.engineering_constants, &elastic.values[..]) {
-        (false, [e, nu] | [e, nu, _]) => Elasticity::Isotropic {
+    match (&elastic.kind[..], &elastic.values[..]) {
+        ("ISO" | "ISOTROPIC", [e, nu] | [e, nu, _]) => Some(Elasticity::Isotropic {
             youngs_modulus: *e,
             poissons_ratio: *nu,
-        },
+        }),
         (
-            true,
+            "ENGINEERING CONSTANTS",
             [e1, e2, e3, nu12, nu13, nu23, g12, _, _]
             | [e1, e2, e3, nu12, nu13, nu23, g12, _, _, _],
-        ) => Elasticity::Orthotropic(Orthotropic {
+        ) => Some(Elasticity::Orthotropic(Orthotropic {
             e1: *e1,
             e2: *e2,
             nu12: *nu12,
@@ -173,53 +285,73 @@ fn material(section: &Section, elastic: &Elastic) -> Option<Material> {
             e3: Some(*e3),
             nu13: Some(*nu13),
             nu23: Some(*nu23),
-        }),
-        _ => return None,
-    };
-    Some(Material {
-        elasticity,
-        group: Some(section.elements.to_string()),
-        name: Some(section.material.to_string()),
-    })
+        })),
+        _ => None,
+    }
 }
 
-/// One support for each row; a later row for the same nodes and component replaces the earlier one.
-fn supports(deck: &Deck) -> Vec<Support> {
-    let mut supports: Vec<Support> = Vec::new();
-    let mut places: HashMap<String, usize> = HashMap::new();
-    for row in &deck.prescribed {
-        let nodes = Deck::name_of(&row.target, None);
-        let place = *places.entry(nodes).or_insert_with_key(|nodes| {
-            supports.push(Support {
-                nodes: Some(nodes.clone()),
-                ..Support::default()
-            });
-            supports.len() - 1
-        });
-        let value = Some(BoundaryValue::Constant(row.value));
-        let (first, last) = row.components;
-        if first == 1 {
-            supports[place].ux = value;
-        }
-        if last == 2 {
-            supports[place].uy = value;
+/// What constants are, that are not understood, and what they might be.
+fn constants(elastic: &Elastic) -> (String, &'static str) {
+    let known = ["ISO", "ISOTROPIC", "ENGINEERING CONSTANTS"].contains(&&elastic.kind[..]);
+    if !known {
+        let got = format!("*ELASTIC, TYPE={:.40}", elastic.kind);
+        return (got, "TYPE=ISO or TYPE=ENGINEERING CONSTANTS");
+    }
+    let got = match elastic.values.len() {
+        count @ ..=MOST_CONSTANTS => format!("{count} elastic constants"),
+        _ => format!("more than {MOST_CONSTANTS} elastic constants"),
+    };
+    (
+        got,
+        "E, ν; or E1, E2, E3, ν12, ν13, ν23, G12, G13, G23; at one temperature",
+    )
+}
+
+fn loads(built: &mut Built, analysis: &Analysis) -> Vec<Load> {
+    let mut loads = Vec::new();
+    let pressures = std::mem::take(&mut built.pressures);
+    let inner = match pressures.is_empty() {
+        true => Vec::new(),
+        false => sides_of_two(&built.raw),
+    };
+    for Row { row, name } in pressures {
+        let sides = built.raw.lines.get(&name).map_or(&[][..], |sides| sides);
+        let inside = sides
+            .iter()
+            .filter(|ends| inner.binary_search(&key(**ends)).is_ok());
+        match (sides.len(), inside.count()) {
+            (0, _) => built.doubt(
+                row.line,
+                format!("a pressure on `{name:.60}`, which has no side"),
+                "sides of plane elements",
+                "Name elements of the plane.",
+            ),
+            (_, 0) => loads.push(Load::Pressure(name, BoundaryValue::Constant(row.value))),
+            (all, inside) => built.doubt(
+                row.line,
+                format!("a pressure on `{name:.60}`: {inside} of its {all} sides lie inside the body"),
+                "sides on the surface of the body",
+                "Load only the elements at the surface, or give forces at the nodes inside by *CLOAD.",
+            ),
         }
     }
-    supports
-}
-
-fn loads(deck: &mut Deck, analysis: &Analysis) -> Vec<Load> {
-    let mut loads: Vec<Load> = deck
-        .pressures
-        .iter()
-        .map(|row| {
-            let boundary = Deck::name_of(&row.target, row.side);
-            Load::Pressure(boundary, BoundaryValue::Constant(row.value))
-        })
-        .collect();
-    for row in deck.forces.clone() {
+    for Row { row, name } in std::mem::take(&mut built.forces) {
+        let nodes = built
+            .raw
+            .node_sets
+            .get(&name)
+            .map_or(&[][..], |nodes| nodes);
+        if !nodes.iter().any(|node| built.used[*node as usize]) {
+            built.doubt(
+                row.line,
+                format!("a force on `{name:.60}`, which has no node of an element"),
+                "nodes of plane elements",
+                "Press by a rigid tool through a contact, in a problem of Signorini.",
+            );
+            continue;
+        }
         if matches!(analysis, Analysis::Axisymmetric {}) {
-            deck.doubt(
+            built.doubt(
                 row.line,
                 "*CLOAD on a body of revolution",
                 "a pressure",
@@ -231,7 +363,7 @@ fn loads(deck: &mut Deck, analysis: &Analysis) -> Vec<Load> {
         } else {
             [0.0, row.value]
         };
-        loads.push(Load::Force(Deck::name_of(&row.target, None), force));
+        loads.push(Load::Force(name, force));
     }
     loads
 }

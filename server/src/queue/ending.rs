@@ -96,10 +96,10 @@ fn gravity(code: WarningCode) -> u8 {
         | RoundingLimitsResidual
         | MeshTooCoarseForContact
         | MeshTooCoarseForRadius => 1,
-        LinesInside | CentreNodesDropped | ElementsReversed | RaisedToSecondOrder
-        | StripCutsPolyline | ObstacleCutsEdge | SmoothingFlattens | ContactTurns
-        | KinkInContact | RadiusExceedsContact | CohesionJumps | OscillatingStick
-        | SlowContraction => 2,
+        LinesInside | SupportsOverlap | CentreNodesDropped | ElementsReversed
+        | RaisedToSecondOrder | StripCutsPolyline | ObstacleCutsEdge | SmoothingFlattens
+        | ContactTurns | KinkInContact | RadiusExceedsContact | CohesionJumps
+        | OscillatingStick | SlowContraction => 2,
     }
 }
 

@@ -292,6 +292,8 @@ pub struct Warning {
 pub enum WarningCode {
     /// Lines of a mesh file that are not sides of the surface.
     LinesInside,
+    /// Rows of a deck that prescribe different displacements of one node, of which the last holds.
+    SupportsOverlap,
     /// 9-node quadrilaterals that became 8-node elements.
     CentreNodesDropped,
     /// Elements that were numbered clockwise.

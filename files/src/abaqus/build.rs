@@ -1,0 +1,691 @@
+//! From the parts of a deck to one mesh, with the names of what its rows act on.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::deck::Deck;
+use super::element::Mechanics;
+use super::names::{Key, Meant, Names, Room, unknown};
+use super::part::{Numbered, Part};
+use super::scope::{Kind, Scope};
+use super::written::{
+    Force, Incomplete, Name, Prescribed, Pressure, Section, Sides, Target, on_line,
+};
+use crate::source::Plane;
+use solver::error::{Findings, Reason, Violation};
+use solver::mesh::{NO_NODE, RawMesh};
+
+/// How often all sets together may name a node or an element on average, beside what the deck writes out: sets that
+/// contain sets are short in the deck, and may be very long when written out.
+const MOST_TIMES: u64 = 16;
+
+/// A row of a deck, with the name that its target has in the mesh.
+pub(super) struct Row<T> {
+    pub(super) row: T,
+    pub(super) name: String,
+}
+
+/// A deck as a mesh, and what is left of it for a problem.
+pub(super) struct Built {
+    /// Materials and steps.
+    pub(super) deck: Deck,
+    pub(super) raw: RawMesh,
+    /// Violations of the mesh.
+    pub(super) faults: Findings,
+    /// What a problem cannot have.
+    pub(super) doubts: Findings,
+    pub(super) incomplete: Incomplete,
+    pub(super) types: Vec<Mechanics>,
+    pub(super) sections: Vec<Row<Section>>,
+    pub(super) prescribed: Vec<Row<Prescribed>>,
+    pub(super) pressures: Vec<Row<Pressure>>,
+    pub(super) forces: Vec<Row<Force>>,
+    /// Which nodes belong to plane elements.
+    pub(super) used: Vec<bool>,
+}
+
+impl Deck {
+    /// The mesh with all its names, and its violations.
+    pub(super) fn build(mut self) -> Built {
+        let mut merged = Merged::default();
+        let scopes = merged.add_all(&mut self);
+        merged.apply_amplitudes(&self);
+        let names = Names {
+            deck: &self,
+            scopes: &scopes,
+        };
+        let mut sets = merged.sets(&names);
+        let used = merged.used();
+        merged.check_plane(&used);
+        let sections = merged.named_sections(&names);
+        let prescribed = merged.named_nodes(
+            &names,
+            |rows| &mut rows.prescribed,
+            |row| (&row.target, row.line),
+        );
+        let forces = merged.named_nodes(
+            &names,
+            |rows| &mut rows.forces,
+            |row| (&row.target, row.line),
+        );
+        let pressures = merged.surfaces(&names, &mut sets);
+        merged.groups(&names, sets.elements);
+        merged.raw.sets_span_boundaries = true;
+        let Merged {
+            raw,
+            faults,
+            doubts,
+            incomplete,
+            types,
+            ..
+        } = merged;
+        Built {
+            deck: self,
+            raw,
+            faults,
+            doubts,
+            incomplete,
+            types,
+            sections,
+            prescribed,
+            pressures,
+            forces,
+            used,
+        }
+    }
+}
+
+/// The rows of all parts, each with the place of its scope.
+#[derive(Default)]
+struct Rows {
+    sections: Vec<(usize, Section)>,
+    prescribed: Vec<(usize, Prescribed)>,
+    pressures: Vec<(usize, Pressure)>,
+    forces: Vec<(usize, Force)>,
+}
+
+/// All parts in one.
+#[derive(Default)]
+struct Merged {
+    raw: RawMesh,
+    heights: Vec<f64>,
+    lines: Vec<[u32; 3]>,
+    numbered: Vec<Numbered>,
+    types: Vec<Mechanics>,
+    unused_type: Option<(u64, String)>,
+    rows: Rows,
+    incomplete: Incomplete,
+    /// Members of sets and surfaces, as they are written.
+    written: u64,
+    faults: Findings,
+    doubts: Findings,
+}
+
+/// The sets of a deck: nodes, and elements by their place among all that have a number.
+struct Sets {
+    elements: BTreeMap<Key, Vec<u32>>,
+    room: Room,
+}
+
+impl Merged {
+    /// The assembly and all instances.
+    fn add_all(&mut self, deck: &mut Deck) -> Vec<Scope> {
+        let mut instances = std::mem::take(&mut deck.instances);
+        if instances.is_empty() && !deck.parts.is_empty() {
+            let parts = std::mem::take(&mut deck.parts);
+            if parts.len() > 1 {
+                let names: Vec<String> = parts
+                    .keys()
+                    .take(5)
+                    .map(|name| format!("{name:.60}"))
+                    .collect();
+                self.incomplete = Incomplete::ALL;
+                self.faults.add(Violation::new(
+                    "",
+                    Reason::Malformed,
+                    format!("the parts {} without *INSTANCE", names.join(", ")),
+                    "*ASSEMBLY with *INSTANCE, NAME=…, PART=…",
+                    "Say which parts the body has, and where they are.",
+                ));
+            } else {
+                // a single part may stand for itself
+                instances.extend(parts);
+            }
+        }
+        let assembly = std::mem::take(&mut deck.here);
+        let all = std::iter::once((None, assembly));
+        let all = all.chain(instances.into_iter().map(|(name, part)| (Some(name), part)));
+        let scopes: Vec<Scope> = all
+            .enumerate()
+            .map(|(place, (name, part))| self.add(place, name, part))
+            .collect();
+        if self.raw.nodes.is_empty() && !self.incomplete.nodes {
+            self.faults.add(Violation::new(
+                "",
+                Reason::TooFew,
+                "a deck without *NODE",
+                "nodes and elements",
+                "Check that the file is an Abaqus or CalculiX deck (.inp), and that its parts have an *INSTANCE.",
+            ));
+        }
+        if let Some((line, got)) = self
+            .unused_type
+            .take()
+            .filter(|_| self.raw.elements.is_empty())
+        {
+            self.incomplete.elements = true;
+            self.faults.add(on_line(
+                line,
+                Reason::Unsupported,
+                got,
+                "CPE, CPS or CAX with 3, 4, 6 or 8 nodes, or others of a plane",
+                "Mesh with solid elements of plane strain, plane stress or axisymmetry.",
+            ));
+        }
+        scopes
+    }
+
+    fn add(&mut self, place: usize, name: Option<Name>, mut part: Part) -> Scope {
+        self.written += part.size();
+        let (nodes, numbered) = (self.raw.nodes.len() as u32, self.numbered.len() as u32);
+        let (elements, lines) = (self.raw.elements.len() as u32, self.lines.len() as u32);
+        let moved = |node: u32| if node == NO_NODE { node } else { node + nodes };
+        if nodes > 0 {
+            for element in &mut part.elements {
+                *element = element.map_nodes(moved);
+            }
+        }
+        join(&mut self.raw.nodes, part.nodes);
+        join(&mut self.raw.node_labels, part.node_labels);
+        join(&mut self.heights, part.heights);
+        join(&mut self.raw.elements, part.elements);
+        join(&mut self.raw.element_labels, part.element_labels);
+        self.lines
+            .extend(part.lines.into_iter().map(|line| line.map(moved)));
+        self.numbered
+            .extend(part.numbered.into_iter().map(|element| match element {
+                Numbered::Plane(place) => Numbered::Plane(place + elements),
+                Numbered::Line(place) => Numbered::Line(place + lines),
+                Numbered::Other => Numbered::Other,
+            }));
+        self.raw.without_centre += part.with_centre;
+        for kind in part.types {
+            if !self.types.contains(&kind) {
+                self.types.push(kind);
+            }
+        }
+        self.unused_type = self.unused_type.take().or(part.unused_type);
+        let rows = &mut self.rows;
+        rows.sections
+            .extend(part.sections.into_iter().map(|row| (place, row)));
+        rows.prescribed
+            .extend(part.prescribed.into_iter().map(|row| (place, row)));
+        rows.pressures
+            .extend(part.pressures.into_iter().map(|row| (place, row)));
+        rows.forces
+            .extend(part.forces.into_iter().map(|row| (place, row)));
+        self.incomplete.add(part.incomplete);
+        part.faults.add_to(&mut self.faults);
+        part.doubts.add_to(&mut self.doubts);
+        Scope {
+            name,
+            incomplete: part.incomplete,
+            node_places: part.node_places,
+            nodes_from: nodes,
+            element_places: part.element_places,
+            elements_from: numbered,
+            node_sets: part.node_sets,
+            element_sets: part.element_sets,
+            node_surfaces: part.node_surfaces,
+            surfaces: part.surfaces,
+        }
+    }
+
+    /// Which nodes belong to plane elements.
+    fn used(&self) -> Vec<bool> {
+        let mut used = vec![false; self.raw.nodes.len()];
+        for element in &self.raw.elements {
+            for node in element.iter().filter(|node| **node != NO_NODE) {
+                used[*node as usize] = true;
+            }
+        }
+        used
+    }
+
+    /// Nodes of plane elements must lie in one plane; others, like reference points, may be anywhere.
+    fn check_plane(&mut self, used: &[bool]) {
+        let mut plane = Plane::default();
+        for (node, height) in self
+            .heights
+            .drain(..)
+            .enumerate()
+            .filter(|(node, _)| used[*node])
+        {
+            let [x, y] = self.raw.nodes[node];
+            plane.add(self.raw.node_labels[node], [x, y, height]);
+        }
+        self.faults.extend(plane.fault());
+    }
+
+    /// All sets; those of nodes get their names in the mesh.
+    fn sets(&mut self, names: &Names<'_>) -> Sets {
+        let mesh = (self.raw.nodes.len() + self.numbered.len()) as u64;
+        let mut room = Room::new((1 << 16) + 2 * self.written + MOST_TIMES * mesh);
+        let none = |_: &Key, _: &mut Vec<u32>| false;
+        let elements = names.resolve(Kind::Elements, none, &mut room, &mut self.faults);
+        let nodes_of = |key: &Key, found: &mut Vec<u32>| {
+            let Some(set) = elements.get(key) else {
+                return false;
+            };
+            found.extend(set.iter().flat_map(|element| self.nodes_of(*element)));
+            true
+        };
+        let mut faults = Findings::default();
+        let nodes = names.resolve(Kind::Nodes, nodes_of, &mut room, &mut faults);
+        let surfaces = names.resolve(Kind::NodeSurfaces, nodes_of, &mut room, &mut faults);
+        self.faults.extend(faults.into_violations());
+        for (name, set) in exported(names, nodes, &mut self.faults) {
+            self.raw.node_sets.insert(name, set);
+        }
+        for (name, set) in exported(names, surfaces, &mut self.faults) {
+            self.raw.node_sets.entry(name).or_insert(set);
+        }
+        Sets { elements, room }
+    }
+
+    /// The sets of elements under their names in the mesh: groups, and boundaries where they contain lines.
+    fn groups(&mut self, names: &Names<'_>, elements: BTreeMap<Key, Vec<u32>>) {
+        for (name, set) in exported(names, elements, &mut self.faults) {
+            let plane = |element: &u32| match self.numbered[*element as usize] {
+                Numbered::Plane(place) => Some(place),
+                _ => None,
+            };
+            let group: Vec<u32> = set.iter().filter_map(plane).collect();
+            let lines: Vec<[u32; 2]> = set
+                .iter()
+                .filter_map(|element| self.ends(*element))
+                .collect();
+            // a surface of the same name is another thing, and comes first
+            if !lines.is_empty() {
+                self.raw.lines.entry(name.clone()).or_insert(lines);
+            }
+            // a set of lines only is no group
+            if !group.is_empty() {
+                self.raw.groups.insert(name, group);
+            }
+        }
+    }
+
+    /// The nodes of an element.
+    fn nodes_of(&self, element: u32) -> impl Iterator<Item = u32> + '_ {
+        let (element, line) = match self.numbered[element as usize] {
+            Numbered::Plane(place) => (Some(&self.raw.elements[place as usize]), None),
+            Numbered::Line(place) => (None, Some(&self.lines[place as usize])),
+            Numbered::Other => (None, None),
+        };
+        let element = element.into_iter().flat_map(|element| element.iter());
+        let all = element.chain(line.into_iter().flatten());
+        all.copied().filter(|node| *node != NO_NODE)
+    }
+
+    /// The ends of a line element: of three nodes the two that are farthest apart, since programs differ in where they
+    /// write the middle.
+    fn ends(&self, element: u32) -> Option<[u32; 2]> {
+        let Numbered::Line(place) = self.numbered[element as usize] else {
+            return None;
+        };
+        let [a, b, c] = self.lines[place as usize];
+        if c == NO_NODE {
+            return Some([a, b]);
+        }
+        let far = |[p, q]: [u32; 2]| {
+            let [p, q] = [p, q].map(|node| self.raw.nodes[node as usize]);
+            (p[0] - q[0]).hypot(p[1] - q[1])
+        };
+        let pairs = [[a, b], [a, c], [b, c]];
+        pairs.into_iter().max_by(|p, q| far(*p).total_cmp(&far(*q)))
+    }
+
+    /// Values become those at the end of the step.
+    fn apply_amplitudes(&mut self, deck: &Deck) {
+        let rows = &mut self.rows;
+        let prescribed = rows.prescribed.iter_mut();
+        let prescribed = prescribed.map(|(_, row)| (row.line, &row.amplitude, &mut row.value));
+        let pressures = rows.pressures.iter_mut();
+        let pressures = pressures.map(|(_, row)| (row.line, &row.amplitude, &mut row.value));
+        let forces = rows.forces.iter_mut();
+        let forces = forces.map(|(_, row)| (row.line, &row.amplitude, &mut row.value));
+        for (line, amplitude, value) in prescribed.chain(pressures).chain(forces) {
+            let Some(name) = amplitude else { continue };
+            match deck.factor(name) {
+                Ok(factor) => *value *= factor,
+                Err(got) => self.doubts.add(on_line(
+                    line,
+                    Reason::NotUnderstood,
+                    got,
+                    "*AMPLITUDE with a table of times and factors",
+                    "Give the values at the end of the step.",
+                )),
+            }
+        }
+    }
+
+    fn named_sections(&mut self, names: &Names<'_>) -> Vec<Row<Section>> {
+        let mut found = Vec::new();
+        for (scope, row) in std::mem::take(&mut self.rows.sections) {
+            let target = Target::Set(row.elements.clone());
+            match names.meant(Kind::Elements, scope, &target) {
+                Some(meant) => found.push(Row {
+                    name: names.of(&meant),
+                    row,
+                }),
+                None if self.incomplete.names => {}
+                None => self.doubts.add(on_line(
+                    row.line,
+                    Reason::UnknownName,
+                    format!("the element set `{:.60}`", row.elements),
+                    "a set of elements (*ELSET)",
+                    "Define the set.",
+                )),
+            }
+        }
+        found
+    }
+
+    /// Rows for nodes, in the order of the deck; a node by itself becomes a set of one.
+    fn named_nodes<T>(
+        &mut self,
+        names: &Names<'_>,
+        rows: impl Fn(&mut Rows) -> &mut Vec<(usize, T)>,
+        target: impl Fn(&T) -> (&Target, u64),
+    ) -> Vec<Row<T>> {
+        let mut rows = std::mem::take(rows(&mut self.rows));
+        rows.sort_by_key(|(_, row)| target(row).1);
+        let mut found = Vec::new();
+        for (scope, row) in rows {
+            let (to, line) = target(&row);
+            let Some(meant) = names.meant(Kind::Nodes, scope, to) else {
+                let label = matches!(to, Target::Label(_));
+                if !(self.incomplete.names || label && self.incomplete.nodes) {
+                    self.unknown_target(line, &word(to), "a node or a set of nodes", || {
+                        names.all_sets(Kind::Nodes)
+                    });
+                }
+                continue;
+            };
+            let name = names.of(&meant);
+            if let Meant::Label(scope, label) = meant {
+                let node = names.scopes[scope].place(Kind::Nodes, label);
+                self.raw
+                    .node_sets
+                    .entry(name.clone())
+                    .or_insert_with(|| node.into_iter().collect());
+            }
+            found.push(Row { row, name });
+        }
+        found
+    }
+
+    fn unknown_target(
+        &mut self,
+        line: u64,
+        got: &str,
+        expected: &str,
+        known: impl FnOnce() -> Vec<String>,
+    ) {
+        let got = format!("line {line}: `{got:.60}`");
+        unknown(&mut self.doubts, &got, expected, known);
+    }
+
+    /// The surfaces of the deck, and the sides that it loads; returns the rows of loads.
+    fn surfaces(&mut self, names: &Names<'_>, sets: &mut Sets) -> Vec<Row<Pressure>> {
+        let mut building = Building {
+            names,
+            sets,
+            twice: None,
+        };
+        let mut known = BTreeSet::new();
+        for (scope, place) in names.scopes.iter().enumerate() {
+            for (name, surface) in &place.surfaces {
+                let full = names.full(scope, name);
+                let lines = building.lines(self, scope, &full, surface.line, &surface.sides);
+                known.insert((scope, name.clone()));
+                if let Some(lines) = lines {
+                    self.raw.lines.insert(full, lines);
+                }
+            }
+        }
+        // as of sets, the name without that of the instance
+        let mut short: BTreeMap<&Name, Option<usize>> = BTreeMap::new();
+        for (scope, name) in &known {
+            let only = short.entry(name);
+            only.and_modify(|only| *only = None)
+                .or_insert(Some(*scope).filter(|scope| *scope > 0));
+        }
+        for (name, scope) in short {
+            let full = scope.map(|scope| names.full(scope, name));
+            if let Some(lines) = full.and_then(|full| self.raw.lines.get(&full)).cloned() {
+                self.raw.lines.insert(name.to_string(), lines);
+            }
+        }
+        let mut rows = std::mem::take(&mut self.rows.pressures);
+        rows.sort_by_key(|(_, row)| row.line);
+        let mut found = Vec::new();
+        let mut loaded = BTreeSet::new();
+        for (scope, row) in rows {
+            let Some(side) = row.side else {
+                let Target::Set(name) = &row.target else {
+                    self.unknown_target(
+                        row.line,
+                        &word(&row.target),
+                        "a surface (*SURFACE)",
+                        Vec::new,
+                    );
+                    continue;
+                };
+                match names.named(scope, name, |scope, name| {
+                    known.contains(&(scope, name.clone()))
+                }) {
+                    Some((scope, name)) => {
+                        let name = names.full(scope, &name);
+                        if self.raw.lines.contains_key(&name) {
+                            found.push(Row { row, name });
+                        } else {
+                            let known = "a surface of sides of plane elements";
+                            self.unknown_target(row.line, &name, known, Vec::new);
+                        }
+                    }
+                    None if self.incomplete.names => {}
+                    None => self.unknown_target(row.line, name, "a surface (*SURFACE)", || {
+                        known
+                            .iter()
+                            .take(20)
+                            .map(|(scope, name)| names.full(*scope, name))
+                            .collect()
+                    }),
+                }
+                continue;
+            };
+            let Some(meant) = names.meant(Kind::Elements, scope, &row.target) else {
+                let label = matches!(row.target, Target::Label(_));
+                if !(self.incomplete.names || label && self.incomplete.elements) {
+                    self.unknown_target(
+                        row.line,
+                        &word(&row.target),
+                        "an element or a set of elements",
+                        || names.all_sets(Kind::Elements),
+                    );
+                }
+                continue;
+            };
+            let name = format!("{} P{side}", names.of(&meant));
+            // a deck may load the same side many times
+            if loaded.insert(name.clone()) {
+                let sides = [(row.target.clone(), Sides::Number(side))];
+                let lines = building.lines(self, scope, &name, row.line, &sides);
+                self.raw
+                    .lines
+                    .entry(name.clone())
+                    .or_insert(lines.unwrap_or_default());
+            }
+            found.push(Row { row, name });
+        }
+        found
+    }
+}
+
+/// Sides of elements by name.
+struct Building<'a> {
+    names: &'a Names<'a>,
+    sets: &'a mut Sets,
+    /// Sides of two elements, once they are needed.
+    twice: Option<Vec<(u32, u32)>>,
+}
+
+impl Building<'_> {
+    /// The corners of sides; none if some are no sides of plane elements.
+    fn lines(
+        &mut self,
+        merged: &mut Merged,
+        scope: usize,
+        name: &str,
+        line: u64,
+        sides: &[(Target, Sides)],
+    ) -> Option<Vec<[u32; 2]>> {
+        let mut lines = Vec::new();
+        for (target, side) in sides {
+            let single;
+            let elements: &[u32] = match self.names.meant(Kind::Elements, scope, target) {
+                Some(Meant::Label(scope, label)) => {
+                    single = self.names.scopes[scope].place(Kind::Elements, label);
+                    single.as_slice()
+                }
+                Some(Meant::Set(key)) => self.sets.elements.get(&key).map_or(&[][..], |set| set),
+                None => {
+                    let label = matches!(target, Target::Label(_));
+                    if !(merged.incomplete.names || label && merged.incomplete.elements) {
+                        let got = format!("`{:.60}` in the surface `{name:.60}`", word(target));
+                        unknown(
+                            &mut merged.faults,
+                            &got,
+                            "an element or a set of elements",
+                            || self.names.all_sets(Kind::Elements),
+                        );
+                    }
+                    continue;
+                }
+            };
+            if !self
+                .sets
+                .room
+                .take(elements.len() as u64, line, name, &mut merged.faults)
+            {
+                break;
+            }
+            for place in elements {
+                let Numbered::Plane(place) = merged.numbered[*place as usize] else {
+                    continue;
+                };
+                let element = &merged.raw.elements[place as usize];
+                let corners = element.family().corners();
+                let between = |side: usize| [element[side], element[(side + 1) % corners]];
+                match *side {
+                    Sides::None => return None,
+                    Sides::Number(side) if side > corners => {
+                        let label = merged.raw.element_labels[place as usize];
+                        merged.faults.add(Violation::new(
+                            "",
+                            Reason::UnknownEdge,
+                            format!("side {side} of the triangle {label} in `{name:.60}`"),
+                            "sides 1 … 3 of a triangle",
+                            "Name the sides of triangles and of quadrilaterals in sets of their own.",
+                        ));
+                        break;
+                    }
+                    Sides::Number(side) => lines.push(between(side - 1)),
+                    Sides::Outer => {
+                        let twice = self.twice.get_or_insert_with(|| sides_of_two(&merged.raw));
+                        let outer = |ends: &[u32; 2]| twice.binary_search(&key(*ends)).is_err();
+                        lines.extend((0..corners).map(between).filter(outer));
+                    }
+                }
+            }
+        }
+        Some(lines)
+    }
+}
+
+/// Corners of the sides that two elements share, in order.
+pub(super) fn sides_of_two(raw: &RawMesh) -> Vec<(u32, u32)> {
+    let mut sides: Vec<(u32, u32)> = raw
+        .elements
+        .iter()
+        .flat_map(|element| {
+            let corners = element.family().corners();
+            (0..corners).map(move |k| key([element[k], element[(k + 1) % corners]]))
+        })
+        .collect();
+    sides.sort_unstable();
+    let mut last = None;
+    sides.retain(|side| last.replace(*side) == Some(*side));
+    sides.dedup();
+    sides
+}
+
+/// A side by its corners, whatever their order.
+pub(super) fn key([a, b]: [u32; 2]) -> (u32, u32) {
+    (a.min(b), a.max(b))
+}
+
+/// Sets under their names in the mesh. One of an instance has two: with that of the instance, and without it where no
+/// other set has that name.
+fn exported(
+    names: &Names<'_>,
+    sets: BTreeMap<Key, Vec<u32>>,
+    faults: &mut Findings,
+) -> BTreeMap<String, Vec<u32>> {
+    let mut exported: BTreeMap<String, Vec<u32>> = BTreeMap::new();
+    let mut short: BTreeMap<Name, Option<Vec<u32>>> = BTreeMap::new();
+    for ((scope, name), set) in sets {
+        if scope > 0 {
+            let known = short.entry(name.clone());
+            known
+                .and_modify(|other| *other = None)
+                .or_insert_with(|| Some(set.clone()));
+        }
+        let full = names.full(scope, &name);
+        if exported.contains_key(&full) {
+            faults.add(Violation::new(
+                "",
+                Reason::DuplicateName,
+                format!("`{full:.120}` of the assembly and of an instance"),
+                "different names",
+                "Rename the set of the assembly.",
+            ));
+        }
+        exported.insert(full, set);
+    }
+    for (name, set) in short {
+        if let Some(set) = set {
+            exported.entry(name.to_string()).or_insert(set);
+        }
+    }
+    exported
+}
+
+/// A target as it is written.
+fn word(target: &Target) -> String {
+    match target {
+        Target::Label(label) => label.to_string(),
+        Target::Set(name) => name.to_string(),
+        Target::Range(range) => format!("{}-{}:{}", range[0], range[1], range[2]),
+    }
+}
+
+/// Adds a list to another, without a copy where that is empty.
+fn join<T>(all: &mut Vec<T>, mut more: Vec<T>) {
+    if all.is_empty() {
+        *all = more;
+    } else {
+        all.append(&mut more);
+    }
+}

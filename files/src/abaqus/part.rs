@@ -1,0 +1,143 @@
+//! A part of a deck, with numbers and names of its own, and where an instance of it is.
+
+use std::collections::BTreeMap;
+
+use super::element::Mechanics;
+use super::written::{Force, Incomplete, Name, Prescribed, Pressure, Section, Set, Surface};
+use crate::source::Labels;
+use solver::element::Element;
+use solver::error::{Findings, Violation};
+
+/// What an element is, by its place among all of its part.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Numbered {
+    /// Its place among the plane elements.
+    Plane(u32),
+    /// Its place among the lines.
+    Line(u32),
+    /// Of no use to a plane mesh.
+    Other,
+}
+
+/// What a part defines, or an instance of it, or the assembly: in a deck without parts all of it.
+#[derive(Clone, Default)]
+pub(super) struct Part {
+    pub(super) nodes: Vec<[f64; 2]>,
+    /// The third coordinates.
+    pub(super) heights: Vec<f64>,
+    pub(super) node_labels: Vec<u64>,
+    pub(super) node_places: Labels,
+    pub(super) elements: Vec<Element>,
+    pub(super) element_labels: Vec<u64>,
+    /// The nodes of line elements, of which the last may be missing.
+    pub(super) lines: Vec<[u32; 3]>,
+    /// All elements with a number.
+    pub(super) numbered: Vec<Numbered>,
+    pub(super) element_places: Labels,
+    /// Quadrilaterals with a node in their centre.
+    pub(super) with_centre: usize,
+    /// The first type of element that is of no use to a plane mesh, and its line.
+    pub(super) unused_type: Option<(u64, String)>,
+    pub(super) types: Vec<Mechanics>,
+    pub(super) node_sets: BTreeMap<Name, Set>,
+    pub(super) element_sets: BTreeMap<Name, Set>,
+    /// Surfaces of nodes.
+    pub(super) node_surfaces: BTreeMap<Name, Set>,
+    pub(super) surfaces: BTreeMap<Name, Surface>,
+    pub(super) sections: Vec<Section>,
+    pub(super) prescribed: Vec<Prescribed>,
+    pub(super) pressures: Vec<Pressure>,
+    pub(super) forces: Vec<Force>,
+    /// What of it is not all known, since a line could not be read.
+    pub(super) incomplete: Incomplete,
+    /// Violations of its mesh.
+    pub(super) faults: Found,
+    /// What a problem cannot have.
+    pub(super) doubts: Found,
+}
+
+/// Violations that go with a part: those of a part that is not used are of no interest.
+#[derive(Clone, Default)]
+pub(super) struct Found {
+    listed: Vec<Violation>,
+    more: usize,
+}
+
+impl Found {
+    /// Violations that are kept, of one part.
+    const MOST: usize = 100;
+
+    pub(super) fn add(&mut self, violation: impl FnOnce() -> Violation) {
+        if self.listed.len() < Self::MOST {
+            self.listed.push(violation());
+        } else {
+            self.more += 1;
+        }
+    }
+
+    pub(super) fn add_to(self, findings: &mut Findings) {
+        findings.extend(self.listed);
+        findings.count(self.more);
+    }
+}
+
+impl Part {
+    pub(super) fn size(&self) -> u64 {
+        let sets = self.node_sets.values().chain(self.element_sets.values());
+        let members: usize = sets.map(Set::written).sum();
+        let sides: usize = self.surfaces.values().map(|s| s.sides.len()).sum();
+        let names = self.node_sets.len() + self.element_sets.len() + self.surfaces.len();
+        (self.nodes.len() + self.numbered.len() + members + sides + names) as u64
+    }
+
+    /// Moves it, then turns it by an angle (radians) about a point of the plane.
+    pub(super) fn put(&mut self, moved: [f64; 3], turned: Option<([f64; 2], f64)>) {
+        for node in &mut self.nodes {
+            *node = [node[0] + moved[0], node[1] + moved[1]];
+        }
+        for height in &mut self.heights {
+            *height += moved[2];
+        }
+        if let Some(([a, b], angle)) = turned {
+            let (sin, cos) = exact(angle);
+            for node in &mut self.nodes {
+                let [x, y] = [node[0] - a, node[1] - b];
+                *node = [a + cos * x - sin * y, b + sin * x + cos * y];
+            }
+        }
+    }
+}
+
+/// Sine and cosine, exact for quarters of a turn: what was straight along an axis stays so.
+fn exact(angle: f64) -> (f64, f64) {
+    let quarters = angle / std::f64::consts::FRAC_PI_2;
+    if (quarters - quarters.round()).abs() > 1e-12 {
+        return angle.sin_cos();
+    }
+    match (quarters.round() as i64).rem_euclid(4) {
+        0 => (0.0, 1.0),
+        1 => (1.0, 0.0),
+        2 => (0.0, -1.0),
+        _ => (-1.0, 0.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_instance_is_moved_and_then_turned() {
+        let mut part = Part {
+            nodes: vec![[1.0, 0.0], [3.0, 0.5]],
+            heights: vec![0.0, 0.0],
+            ..Part::default()
+        };
+        part.put(
+            [1.0, 2.0, 0.5],
+            Some(([1.0, 2.0], std::f64::consts::FRAC_PI_2)),
+        );
+        assert_eq!(part.nodes, [[1.0, 3.0], [0.5, 5.0]]);
+        assert_eq!(part.heights, [0.5, 0.5]);
+    }
+}

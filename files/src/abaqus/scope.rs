@@ -1,0 +1,98 @@
+//! The assembly or an instance of a part, with its own numbers and names.
+
+use std::collections::BTreeMap;
+
+use super::written::{Incomplete, Name, Set, Surface};
+use crate::source::Labels;
+
+/// Kinds of things with numbers, in sets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Kind {
+    Nodes,
+    Elements,
+    /// Surfaces of nodes.
+    NodeSurfaces,
+}
+
+impl Kind {
+    pub(super) fn what(self) -> &'static str {
+        match self {
+            Kind::Elements => "element",
+            _ => "node",
+        }
+    }
+
+    /// The kind of sets that are named in one: surfaces of nodes name sets of nodes.
+    pub(super) fn named(self) -> Kind {
+        match self {
+            Kind::Elements => Kind::Elements,
+            _ => Kind::Nodes,
+        }
+    }
+
+    pub(super) fn keyword(self) -> &'static str {
+        match self {
+            Kind::Elements => "ELSET",
+            _ => "NSET",
+        }
+    }
+}
+
+/// The assembly or an instance: its names, and the places of its nodes and elements in the mesh.
+pub(super) struct Scope {
+    /// None of the assembly.
+    pub(super) name: Option<Name>,
+    pub(super) incomplete: Incomplete,
+    pub(super) node_places: Labels,
+    pub(super) nodes_from: u32,
+    pub(super) element_places: Labels,
+    pub(super) elements_from: u32,
+    pub(super) node_sets: BTreeMap<Name, Set>,
+    pub(super) element_sets: BTreeMap<Name, Set>,
+    pub(super) node_surfaces: BTreeMap<Name, Set>,
+    pub(super) surfaces: BTreeMap<Name, Surface>,
+}
+
+impl Scope {
+    pub(super) fn sets(&self, kind: Kind) -> &BTreeMap<Name, Set> {
+        match kind {
+            Kind::Nodes => &self.node_sets,
+            Kind::Elements => &self.element_sets,
+            Kind::NodeSurfaces => &self.node_surfaces,
+        }
+    }
+
+    fn labels(&self, kind: Kind) -> (&Labels, u32) {
+        match kind {
+            Kind::Elements => (&self.element_places, self.elements_from),
+            _ => (&self.node_places, self.nodes_from),
+        }
+    }
+
+    /// The place of a number.
+    pub(super) fn place(&self, kind: Kind, label: u64) -> Option<u32> {
+        let (labels, from) = self.labels(kind);
+        Some(labels.get(label)? + from)
+    }
+
+    /// The places of a range of numbers, and how many numbers were looked at.
+    pub(super) fn range(
+        &self,
+        kind: Kind,
+        (first, last, step): (u64, u64, u64),
+        most: u64,
+    ) -> (Vec<u32>, u64) {
+        let (labels, from) = self.labels(kind);
+        let (mut places, visited) = labels.range(first, last, step, most);
+        places.iter_mut().for_each(|place| *place += from);
+        (places, visited)
+    }
+
+    /// A missing number may be on a line that could not be read.
+    pub(super) fn incomplete_numbers(&self, kind: Kind) -> bool {
+        match kind {
+            Kind::Elements => self.incomplete.elements,
+            _ => self.incomplete.nodes,
+        }
+    }
+}

@@ -1,0 +1,216 @@
+//! What a deck says, as it is written: rows, sets, sections and materials, with their lines; and how a line is read.
+
+use std::rc::Rc;
+
+use solver::error::{Reason, Violation};
+
+/// A name of a set, surface or material, stored once however often the deck uses it.
+pub(super) type Name = Rc<str>;
+
+/// Characters of a name; Abaqus and CalculiX allow 80. A line may be a million times as long, and every entry of a
+/// set is compared with names.
+pub(super) const LONGEST_NAME: usize = 256;
+
+/// Names of sets and surfaces: each takes hundreds of bytes, and is compared with the whole surface of the mesh.
+pub(super) const MOST_NAMES: usize = 1 << 16;
+
+/// Constants of a material.
+pub(super) const MOST_CONSTANTS: usize = 10;
+
+/// The target of a set or a load.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Target {
+    Label(u64),
+    /// First, last, step; in a box, since labels are many and ranges few.
+    Range(Box<[u64; 3]>),
+    /// A set, or `INSTANCE.SET`, or `INSTANCE.7`.
+    Set(Name),
+}
+
+/// `*ELASTIC`.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Elastic {
+    pub(super) line: u64,
+    /// The form of the constants.
+    pub(super) kind: String,
+    pub(super) values: Vec<f64>,
+    /// A line of the constants could not be read, and a violation says so.
+    pub(super) unreadable: bool,
+}
+
+/// `*MATERIAL`.
+#[derive(Clone, Debug, Default)]
+pub(super) struct MaterialDefinition {
+    pub(super) elastic: Option<Elastic>,
+    /// Lines and keywords that a linear elastic material does not have.
+    pub(super) other: Vec<(u64, String)>,
+    /// The first line of `*EXPANSION`.
+    pub(super) expansion: Option<u64>,
+}
+
+/// `*SOLID SECTION`.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Section {
+    pub(super) line: u64,
+    pub(super) elements: Name,
+    pub(super) material: Name,
+    pub(super) thickness: Option<f64>,
+    pub(super) orientation: Option<Name>,
+}
+
+/// `*ORIENTATION`: the angle of the first direction of the material (degrees), or why there is none.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Orientation {
+    /// The system is not one of straight axes.
+    pub(super) curved: bool,
+    pub(super) lines: Vec<Vec<f64>>,
+}
+
+/// `*AMPLITUDE`: factors by time.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Amplitude {
+    pub(super) line: u64,
+    /// It is not a table of factors.
+    pub(super) other: bool,
+    pub(super) values: Vec<f64>,
+}
+
+/// A row of `*BOUNDARY`: components first … last (1: x, 2: y) have a value.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Prescribed {
+    pub(super) line: u64,
+    pub(super) target: Target,
+    pub(super) components: (u64, u64),
+    pub(super) value: f64,
+    pub(super) amplitude: Option<Name>,
+}
+
+/// A row of `*DLOAD` or `*DSLOAD`: a pressure on sides, or on a surface.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Pressure {
+    pub(super) line: u64,
+    pub(super) target: Target,
+    /// Number of the side from 1; none: `target` is a surface.
+    pub(super) side: Option<usize>,
+    pub(super) value: f64,
+    pub(super) amplitude: Option<Name>,
+}
+
+/// A row of `*CLOAD`.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Force {
+    pub(super) line: u64,
+    pub(super) target: Target,
+    pub(super) component: u64,
+    pub(super) value: f64,
+    pub(super) amplitude: Option<Name>,
+}
+
+/// A set as it is written.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Set {
+    /// The line that begins it.
+    pub(super) line: u64,
+    pub(super) members: Vec<Target>,
+    /// Members that are those of an instance.
+    pub(super) of_instances: Vec<(Name, Vec<Target>)>,
+    /// Sets of elements whose nodes belong to it, and their instances.
+    pub(super) of_elements: Vec<(Option<Name>, Name)>,
+}
+
+impl Set {
+    /// The number of members as they are written.
+    pub(super) fn written(&self) -> usize {
+        let inner = self.of_instances.iter().map(|(_, members)| members.len());
+        self.members.len() + inner.sum::<usize>() + self.of_elements.len()
+    }
+}
+
+/// Which sides of its elements belong to a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Sides {
+    /// One side, by its number from 1.
+    Number(usize),
+    /// All that lie on the surface of the body.
+    Outer,
+    /// Faces that plane elements do not have, or their own plane.
+    None,
+}
+
+/// A surface as it is written: sides by element or set and number.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Surface {
+    /// The line that begins it.
+    pub(super) line: u64,
+    pub(super) sides: Vec<(Target, Sides)>,
+}
+
+/// Which parts of a deck are not all known, since a line of them could not be read.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Incomplete {
+    pub(super) nodes: bool,
+    pub(super) elements: bool,
+    /// Names of sets, surfaces and materials.
+    pub(super) names: bool,
+}
+
+impl Incomplete {
+    pub(super) const ALL: Incomplete = Incomplete {
+        nodes: true,
+        elements: true,
+        names: true,
+    };
+
+    pub(super) fn add(&mut self, other: Incomplete) {
+        self.nodes |= other.nodes;
+        self.elements |= other.elements;
+        self.names |= other.names;
+    }
+}
+
+pub(super) fn on_line(
+    line: u64,
+    reason: Reason,
+    got: String,
+    expected: &str,
+    hint: &str,
+) -> Violation {
+    Violation::new("", reason, format!("line {line}: {got}"), expected, hint)
+}
+
+/// The values of a line, between commas and without blanks around them; one in quotation marks may contain commas.
+/// Those that are left out at the end are not listed.
+pub(super) fn fields(text: &str) -> Vec<&str> {
+    let mut quoted = false;
+    let mut fields: Vec<&str> = text
+        .split(|c: char| {
+            quoted ^= c == '"';
+            c == ',' && !quoted
+        })
+        .map(|field| field.trim().trim_matches('"'))
+        .collect();
+    while fields.last().is_some_and(|field| field.is_empty()) {
+        fields.pop();
+    }
+    fields
+}
+
+/// A number; Fortran writes exponents with D.
+pub(super) fn number(word: &str) -> Option<f64> {
+    let parsed = word
+        .parse()
+        .or_else(|_| word.replace(['d', 'D'], "e").parse());
+    parsed.ok().filter(|value: &f64| value.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_split_at_commas_outside_of_quotation_marks() {
+        assert_eq!(fields(" RIGHT,1,,2 , ,"), ["RIGHT", "1", "", "2"]);
+        assert_eq!(fields("\"a, b\", S1"), ["a, b", "S1"]);
+        assert_eq!(fields(","), Vec::<&str>::new());
+    }
+}
