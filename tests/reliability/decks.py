@@ -69,6 +69,16 @@ def decks():
     yield "surfaces of a large set", lambda: strip(SIZE // 60) + fill(lambda k: "*SURFACE, NAME=S%d\nALL,S1" % k, size=SIZE // 3)
     yield "a surface of the same set, often", lambda: strip(SIZE // 60) + "*SURFACE, NAME=S\n" + fill(lambda _: "ALL,S1", size=SIZE // 3)
     yield "pressures on a large set", lambda: strip(SIZE // 60) + "*DLOAD\n" + fill(lambda _: "ALL,P1,5", size=SIZE // 3)
+    parts = "*PART, NAME=P\n%s*END PART\n"
+    instances = lambda: fill(lambda k: "*INSTANCE, NAME=I%d, PART=P\n*END INSTANCE" % k, size=SIZE // 2)
+    yield "instances without end", lambda: parts % "" + instances()
+    yield "instances of a part", lambda: parts % strip(SIZE // 500) + instances()
+    yield "names of many instances", lambda: parts % "" + "".join(
+        "*INSTANCE, NAME=I%d, PART=P\n*END INSTANCE\n" % k for k in range(250)) + SQUARE + "*NSET, NSET=A\n" + fill(lambda k: "w.%d.x" % k)
+    yield "nodes of a large set of elements, often", lambda: strip(SIZE // 200) + fill(lambda _: "*NSET, NSET=S, ELSET=ALL")
+    yield "nodes of a large set of elements", lambda: strip(SIZE // 200) + fill(lambda k: "*NSET, NSET=S%d, ELSET=ALL" % k)
+    yield "the surface of a large set", lambda: strip(SIZE // 200) + fill(lambda k: "*SURFACE, NAME=S%d\nALL" % k)
+    yield "forces on a large set without elements", lambda: nodes() + "*NSET, NSET=N\n" + labels() + "*CLOAD\n" + fill(lambda _: "N,1,2", size=SIZE // 3)
     yield "conditions on a large set", lambda: nodes() + "*NSET, NSET=N\n" + labels() + "*BOUNDARY\n" + fill(lambda _: "N,1,2", size=SIZE // 3)
     yield "a name of a whole line at every node", lambda: SQUARE + "*NODE, NSET=" + "N" * 500_000 + "\n" + fill(
         lambda k: "%d,0,0" % (k + 10), size=half)

@@ -434,6 +434,7 @@ fn what_a_row_names_must_exist_and_have_something() {
     for (model, step, got) in [
         ("", "*CLOAD\nX, 1, 2.\n", "`X`"),
         ("", "*CLOAD\n99, 1, 2.\n", "`99`"),
+        ("*NSET, NSET=N\n", "*BOUNDARY\nN, 1\n", "a displacement of `N`"),
         (
             "*NSET, NSET=N\n",
             "*CLOAD\nN, 1, 2.\n",

@@ -169,6 +169,7 @@ impl Names<'_> {
                     found: Vec::new(),
                     open: Vec::new(),
                     seen: BTreeSet::from([(scope, name.clone())]),
+                    seen_elements: BTreeSet::new(),
                 };
                 members.open(scope, set, &nodes_of, room, faults);
                 members.visit(&nodes_of, room, faults);
@@ -193,6 +194,8 @@ struct Members<'a> {
     /// Lists that are being gone through, their scopes, and how many sets they are inside of.
     open: Vec<(usize, std::slice::Iter<'a, Target>, usize)>,
     seen: BTreeSet<Key>,
+    /// Sets of elements whose nodes were found.
+    seen_elements: BTreeSet<Key>,
 }
 
 impl<'a> Members<'a> {
@@ -213,17 +216,20 @@ impl<'a> Members<'a> {
             };
             let target = Target::Set(elements.clone());
             let meant = scope.and_then(|scope| self.names.meant(Kind::Elements, scope, &target));
-            let before = self.found.len();
             let known = match meant {
-                Some(Meant::Set(key)) => nodes_of(&key, &mut self.found),
+                Some(Meant::Set(key)) if self.seen_elements.contains(&key) => true,
+                Some(Meant::Set(key)) => {
+                    let before = self.found.len();
+                    let known = nodes_of(&key, &mut self.found);
+                    let count = (self.found.len() - before) as u64;
+                    if !room.take(count, self.line, &self.name, faults) {
+                        return;
+                    }
+                    self.seen_elements.insert(key);
+                    known
+                }
                 _ => false,
             };
-            room.take(
-                (self.found.len() - before) as u64,
-                self.line,
-                &self.name,
-                faults,
-            );
             if !known && depth == 0 && !self.names.scopes[0].incomplete.names {
                 let got = format!("`{elements:.60}` in the set `{:.60}`", self.name);
                 unknown(faults, &got, "a set of elements (*ELSET)", || {

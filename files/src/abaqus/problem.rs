@@ -1,6 +1,6 @@
 //! A deck as a whole problem: a part that is not supported is a violation with its line.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::build::{Built, Row, key, sides_of_two};
 use super::element::{Mechanics, Theory};
@@ -314,12 +314,17 @@ fn loads(built: &mut Built, analysis: &Analysis) -> Vec<Load> {
         true => Vec::new(),
         false => sides_of_two(&built.raw),
     };
+    // a deck may load the same sides many times
+    let mut counted: BTreeMap<String, (usize, usize)> = BTreeMap::new();
     for Row { row, name } in pressures {
-        let sides = built.raw.lines.get(&name).map_or(&[][..], |sides| sides);
-        let inside = sides
-            .iter()
-            .filter(|ends| inner.binary_search(&key(**ends)).is_ok());
-        match (sides.len(), inside.count()) {
+        let count = || {
+            let sides = built.raw.lines.get(&name).map_or(&[][..], |sides| sides);
+            let inside = sides
+                .iter()
+                .filter(|ends| inner.binary_search(&key(**ends)).is_ok());
+            (sides.len(), inside.count())
+        };
+        match *counted.entry(name.clone()).or_insert_with(count) {
             (0, _) => built.doubt(
                 row.line,
                 format!("a pressure on `{name:.60}`, which has no side"),
@@ -335,13 +340,14 @@ fn loads(built: &mut Built, analysis: &Analysis) -> Vec<Load> {
             ),
         }
     }
+    let mut used: BTreeMap<String, bool> = BTreeMap::new();
     for Row { row, name } in std::mem::take(&mut built.forces) {
-        let nodes = built
-            .raw
-            .node_sets
-            .get(&name)
-            .map_or(&[][..], |nodes| nodes);
-        if !nodes.iter().any(|node| built.used[*node as usize]) {
+        let count = || {
+            let nodes = built.raw.node_sets.get(&name);
+            let mut nodes = nodes.into_iter().flatten();
+            nodes.any(|node| built.used[*node as usize])
+        };
+        if !*used.entry(name.clone()).or_insert_with(count) {
             built.doubt(
                 row.line,
                 format!("a force on `{name:.60}`, which has no node of an element"),

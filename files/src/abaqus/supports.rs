@@ -22,7 +22,7 @@ pub(super) struct Supports {
     pub(super) sets: BTreeMap<String, Vec<u32>>,
     /// Sets that show that these supports are used, and for each a sentence.
     pub(super) overlaps: Vec<(String, String)>,
-    /// Lines that prescribe a displacement other than 0 of nodes of no element, and their targets.
+    /// Lines that prescribe displacements of no node, or other than 0 of nodes of no element, and their targets.
     pub(super) of_no_element: Vec<(u64, String)>,
 }
 
@@ -49,7 +49,8 @@ pub(super) fn supports(built: &Built) -> Supports {
             .filter(|node| built.used[*node as usize])
             .collect();
         if nodes.is_empty() {
-            if entry.value != 0.0 {
+            // a reference point may be held
+            if all.is_empty() || entry.value != 0.0 {
                 found.of_no_element.push((entry.line, entry.set.to_owned()));
             }
             continue;
