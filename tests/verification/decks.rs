@@ -86,6 +86,14 @@ fn a_set_of_the_part_and_one_of_the_assembly_are_two() {
         mesh.boundaries["Surf-1"][0],
         mesh.boundaries["Plate-1.Surf-1"][0]
     );
+    // a set of another kind in the assembly: the part's is not meant
+    let other = assembly("*ELSET, ELSET=Set-1, INSTANCE=Plate-1\n2\n", "Set-1");
+    let found = refused(&other);
+    assert!(
+        found.len() == 1 && found[0].ends_with("`Set-1`"),
+        "{found:?}"
+    );
+    assert!(!read(&other).node_sets.contains_key("Set-1"));
     // in the part alone its set is meant, in the assembly too if that has none
     let alone = read(&assembly("", "Set-1"));
     assert_eq!(alone.node_sets["Set-1"], alone.node_sets["Plate-1.Set-1"]);
@@ -434,7 +442,11 @@ fn what_a_row_names_must_exist_and_have_something() {
     for (model, step, got) in [
         ("", "*CLOAD\nX, 1, 2.\n", "`X`"),
         ("", "*CLOAD\n99, 1, 2.\n", "`99`"),
-        ("*NSET, NSET=N\n", "*BOUNDARY\nN, 1\n", "a displacement of `N`"),
+        (
+            "*NSET, NSET=N\n",
+            "*BOUNDARY\nN, 1\n",
+            "a displacement of `N`",
+        ),
         (
             "*NSET, NSET=N\n",
             "*CLOAD\nN, 1, 2.\n",

@@ -462,6 +462,7 @@ impl Merged {
                 .or_insert(Some(*scope).filter(|scope| *scope > 0));
         }
         for (name, scope) in short {
+            let scope = scope.filter(|_| !names.scopes[0].defines(name));
             let full = scope.map(|scope| names.full(scope, name));
             if let Some(lines) = full.and_then(|full| self.raw.lines.get(&full)).cloned() {
                 self.raw.lines.insert(name.to_string(), lines);
@@ -665,7 +666,7 @@ fn exported(
         exported.insert(full, set);
     }
     for (name, set) in short {
-        if let Some(set) = set {
+        if let Some(set) = set.filter(|_| !names.scopes[0].defines(&name)) {
             exported.entry(name.to_string()).or_insert(set);
         }
     }

@@ -3,7 +3,7 @@
 //! A part, each instance of it and the assembly have numbers and names of their own. In the assembly and in steps
 //! `INSTANCE.SET` and `INSTANCE.7` are those of an instance; a name alone is one of the assembly, or else of the only
 //! instance that has it. The mesh has the same names: `SET` of the assembly, `INSTANCE.SET`, and `SET` where only one
-//! instance has that.
+//! instance has that, and the assembly nothing of that name.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -90,6 +90,10 @@ impl Names<'_> {
         if let Some((instance, rest)) = self.dotted(scope, word) {
             let name = self.deck.known(rest)?;
             return has(instance, name).then(|| (instance, name.clone()));
+        }
+        // what has this name in the assembly is of another kind: the instance's is not meant
+        if scope == 0 && self.scopes[0].defines(word) {
+            return None;
         }
         let found = self.in_scopes(scope, |scope| has(scope, word))?;
         Some((found, word.clone()))

@@ -62,6 +62,14 @@ impl Scope {
         }
     }
 
+    /// Whether it has a set or surface of this name.
+    pub(super) fn defines(&self, name: &Name) -> bool {
+        self.node_sets.contains_key(name)
+            || self.element_sets.contains_key(name)
+            || self.node_surfaces.contains_key(name)
+            || self.surfaces.contains_key(name)
+    }
+
     fn labels(&self, kind: Kind) -> (&Labels, u32) {
         match kind {
             Kind::Elements => (&self.element_places, self.elements_from),
