@@ -114,10 +114,7 @@ impl Verification {
         if let Some(most) = &self.most {
             too_many(4 * mesh.elements.len(), most.elements, "")?;
         }
-        let model = match problem.mesh.refine {
-            Refine::Times(_) => Model::split(problem, mesh),
-            Refine::Adaptive(_) => Model::on_mesh(problem, ExternalMesh::from(refine(mesh))),
-        };
+        let model = Model::on_mesh(problem, ExternalMesh::from(refine(mesh)));
         let model = model.map_err(|violations| {
             let first = violations.first().map_or(String::new(), |v| v.to_string());
             format!("the mesh split in two is refused: {first}")

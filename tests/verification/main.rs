@@ -22,6 +22,7 @@ mod disc_pressure;
 mod element_errors;
 mod even_profiles;
 mod examples;
+mod first_mesh;
 mod flat_punch;
 mod free_bodies;
 mod gmsh_files;

@@ -76,6 +76,7 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
             format!("{reversed} elements were numbered clockwise and have been reversed."),
         );
     }
+    let of_file = raw.nodes.len();
     let raised = second_order(&mut raw);
     if raised > 0 {
         note(
@@ -85,7 +86,7 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
             ),
         );
     }
-    drop_unused(&mut raw);
+    let of_file = drop_unused(&mut raw, of_file);
     let owners = Owners::new(&raw, found)?;
     let surface = surface(&raw.elements, &owners.count);
     let by_corners = by_corners(&surface, &owners, &raw, found)?;
@@ -158,6 +159,8 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
         boundaries,
         groups: raw.groups,
         node_sets: raw.node_sets,
+        added_midsides: (raised > 0).then_some(of_file),
+        ..Mesh::default()
     };
     let mut all = AllChecks::default();
     for (e, place, det) in mesh.inverted_elements(true) {
@@ -282,12 +285,15 @@ fn second_order(raw: &mut RawMesh) -> usize {
     lacking
 }
 
-/// Removes the nodes that belong to no element: points of the geometry, centres of 9-node elements.
-fn drop_unused(raw: &mut RawMesh) {
+/// Removes the nodes that belong to no element: points of the geometry, centres of 9-node elements. Returns how many of
+/// the first `of_file` nodes remain.
+fn drop_unused(raw: &mut RawMesh, of_file: usize) -> u32 {
     let mut number = vec![NO_NODE; raw.nodes.len()];
     for &node in raw.elements.iter().flat_map(|e| e.iter()) {
         number[node as usize] = 0;
     }
+    let first = number.iter().take(of_file);
+    let remaining = first.filter(|number| **number != NO_NODE).count();
     let mut used = 0;
     for node in 0..number.len() {
         if number[node] != NO_NODE {
@@ -312,6 +318,7 @@ fn drop_unused(raw: &mut RawMesh) {
         set.dedup();
     }
     raw.node_sets.retain(|_, set| !set.is_empty());
+    remaining as u32
 }
 
 /// The elements on each side, known by its midside node.

@@ -36,6 +36,7 @@ pub struct GradedMesh {
     /// Elements of the first mesh by group.
     groups: BTreeMap<String, Vec<u32>>,
     set_names: Vec<String>,
+    added_midsides: Option<u32>,
 }
 
 /// A part of an element of the first mesh.
@@ -64,6 +65,7 @@ impl GradedMesh {
             boundaries: mesh.boundaries.clone(),
             groups: mesh.groups.clone(),
             set_names: mesh.node_sets.keys().cloned().collect(),
+            added_midsides: mesh.added_midsides,
         }
     }
 
@@ -131,6 +133,8 @@ impl GradedMesh {
                 .map(|(name, group)| (name.clone(), group))
                 .collect(),
             node_sets: finer.sets.into_named(self.set_names.iter()),
+            added_midsides: self.added_midsides,
+            lineage: finer.lineage,
         };
         (mesh, parts)
     }

@@ -88,8 +88,7 @@ pub fn grid_mesh(grid: &Grid) -> Mesh {
         nodes,
         elements,
         boundaries,
-        groups: Default::default(),
-        node_sets: Default::default(),
+        ..Mesh::default()
     }
 }
 

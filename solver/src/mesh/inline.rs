@@ -38,6 +38,7 @@ fn check(input: InlineMesh, found: &mut Findings) -> Checked<Mesh> {
         boundaries,
         groups: input.groups,
         node_sets: input.node_sets,
+        ..Mesh::default()
     })
 }
 
@@ -103,14 +104,26 @@ fn numbers(input: &InlineMesh, found: &mut Findings) -> Checked<Vec<bool>> {
         }
     }
     for (name, set) in &input.node_sets {
-        for (i, node) in set.iter().enumerate().filter(|(_, n)| **n >= count) {
-            all.fail(found.report(
-                format!("/node_sets/{}/{i}", escape(name)),
-                Reason::UnknownNode,
-                node,
-                format!("a node below {count}"),
-                "Nodes are numbered from 0.",
-            ));
+        let mut members = HashSet::with_capacity(set.len());
+        for (i, node) in set.iter().enumerate() {
+            let place = format!("/node_sets/{}/{i}", escape(name));
+            if *node >= count {
+                all.fail(found.report(
+                    place,
+                    Reason::UnknownNode,
+                    node,
+                    format!("a node below {count}"),
+                    "Nodes are numbered from 0.",
+                ));
+            } else if !members.insert(*node) {
+                all.fail(found.report(
+                    place,
+                    Reason::RepeatedNode,
+                    node,
+                    "each node once",
+                    "A force on the set would act on it twice.",
+                ));
+            }
         }
     }
     for (name, edges) in &input.boundaries {

@@ -7,6 +7,7 @@ mod grid;
 mod halving;
 mod inline;
 mod inverted;
+mod lineage;
 mod refine;
 
 pub use build::{NO_NODE, RawMesh, build};
@@ -15,9 +16,10 @@ pub use graded::GradedMesh;
 pub use grid::{check_grid, grid_mesh, largest_cut};
 pub use inline::inline_mesh;
 pub use inverted::check_inverted;
+pub use lineage::{FirstSide, Lineage, Part};
 pub use refine::refine;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use serde::{Deserialize, Serialize};
 
@@ -37,12 +39,20 @@ pub struct Mesh {
     pub nodes: Vec<[f64; 2]>,
     /// Quadrilaterals and triangles.
     pub elements: Vec<Element>,
-    /// Surface edges by name.
+    /// Surface edges by name, in runs from start to end ([`Mesh::order_boundaries`]).
     pub boundaries: BTreeMap<String, Vec<Edge>>,
     /// Elements by the name of their group.
     pub groups: BTreeMap<String, Vec<u32>>,
-    /// Nodes by the name of their set.
+    /// Nodes by the name of their set: those of the first mesh, and later ones on sides and in elements that it holds
+    /// all nodes of.
     pub node_sets: BTreeMap<String, Vec<u32>>,
+    /// The first of the midside nodes that were added to elements with corners only, if there are any: they are the last
+    /// nodes of the first mesh. A stored mesh has it after the rest.
+    #[serde(skip)]
+    pub added_midsides: Option<u32>,
+    /// How it was made from the first mesh, which is the one that is stored.
+    #[serde(skip)]
+    pub lineage: Lineage,
 }
 
 /// A mesh that a problem only names or quotes, read or fetched by its caller.
@@ -67,6 +77,13 @@ impl From<Mesh> for ExternalMesh {
 }
 
 impl Mesh {
+    /// Brings the edges of all boundaries into their one order: run after run, each from its start to its end.
+    pub fn order_boundaries(&mut self) {
+        for edges in self.boundaries.values_mut() {
+            *edges = runs(edges).concat();
+        }
+    }
+
     /// Node positions of an element.
     pub fn element_nodes(&self, element: &Element) -> [[f64; 2]; 8] {
         element.gather(|n| self.nodes[n as usize])
@@ -187,26 +204,44 @@ fn find(parent: &mut [u32], node: u32) -> u32 {
     root
 }
 
-/// Edges sorted into runs, each from its start to its end; a closed loop starts at its first edge.
+/// Edges sorted into runs, each from its start to its end, whatever their order. Where a boundary meets itself at a node,
+/// runs end; a closed loop has no start, and begins at its first edge.
 pub fn runs(edges: &[Edge]) -> Vec<Vec<Edge>> {
-    let by_start: BTreeMap<u32, usize> = edges.iter().enumerate().map(|(i, e)| (e[0], i)).collect();
-    let ends: std::collections::BTreeSet<u32> = edges.iter().map(|e| e[1]).collect();
+    // the edges that start at a node: how many, and one of them; and how many end there
+    let mut at: HashMap<u32, (usize, usize, usize)> = HashMap::with_capacity(edges.len() + 1);
+    for (i, [start, end, _]) in edges.iter().enumerate() {
+        let starting = at.entry(*start).or_default();
+        (starting.0, starting.1) = (starting.0 + 1, i);
+        at.entry(*end).or_default().2 += 1;
+    }
+    let through = |node: &u32| match at.get(node) {
+        Some((1, next, 1)) => Some(*next),
+        _ => None,
+    };
     let mut used = vec![false; edges.len()];
     let mut runs = Vec::new();
-    let heads = (0..edges.len()).filter(|&i| !ends.contains(&edges[i][0]));
+    let heads = (0..edges.len()).filter(|&i| through(&edges[i][0]).is_none());
     for first in heads.chain(0..edges.len()) {
         let mut run = Vec::new();
         let mut next = Some(first);
         while let Some(i) = next.filter(|&i| !used[i]) {
             used[i] = true;
             run.push(edges[i]);
-            next = by_start.get(&edges[i][1]).copied();
+            next = through(&edges[i][1]);
         }
         if !run.is_empty() {
             runs.push(run);
         }
     }
     runs
+}
+
+/// Whether a run ends where it starts.
+pub fn is_closed(run: &[Edge]) -> bool {
+    match (run.first(), run.last()) {
+        (Some(first), Some(last)) => first[0] == last[1],
+        _ => false,
+    }
 }
 
 #[cfg(test)]
@@ -258,6 +293,29 @@ mod tests {
 
     #[test]
     fn a_closed_loop_is_one_run() {
-        assert_eq!(runs(&[[0, 2, 1], [2, 4, 3], [4, 0, 5]]).len(), 1);
+        let loops = runs(&[[0, 2, 1], [2, 4, 3], [4, 0, 5]]);
+        assert_eq!((loops.len(), is_closed(&loops[0])), (1, true));
+        assert!(!is_closed(&runs(&[[0, 2, 1], [2, 4, 3]])[0]));
+    }
+
+    /// Two squares that share a corner: which side follows there is not a matter of numbers.
+    #[test]
+    fn runs_end_where_a_boundary_meets_itself() {
+        let mut edges = vec![
+            [0, 1, 20],
+            [1, 2, 21],
+            [2, 0, 22],
+            [2, 3, 23],
+            [3, 4, 24],
+            [4, 2, 25],
+        ];
+        for turn in 0..edges.len() {
+            let mut found = runs(&edges);
+            found.sort();
+            let first = vec![[2, 0, 22], [0, 1, 20], [1, 2, 21]];
+            let second = vec![[2, 3, 23], [3, 4, 24], [4, 2, 25]];
+            assert_eq!(found, [first, second], "turned by {turn}");
+            edges.rotate_left(1);
+        }
     }
 }

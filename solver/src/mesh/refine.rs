@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 
 use crate::element::{Element, edge3, quad8, tri6};
-use crate::mesh::{Edge, Mesh};
+use crate::mesh::{Edge, Lineage, Mesh};
 
 /// New nodes lie half-way between the old ones, in master coordinates.
 const STEP: f64 = 0.5;
@@ -38,6 +38,8 @@ pub fn refine(mesh: &Mesh) -> Mesh {
         boundaries,
         groups,
         node_sets: finer.sets.into_named(mesh.node_sets.keys()),
+        added_midsides: mesh.added_midsides,
+        lineage: finer.lineage,
     }
 }
 
@@ -48,6 +50,7 @@ pub(super) struct Finer {
     /// A side is known by its midside node: start corner, midside of the first half, of the second.
     halves: Vec<Option<(u32, u32, u32)>>,
     pub(super) sets: Sets,
+    pub(super) lineage: Lineage,
 }
 
 impl Finer {
@@ -56,6 +59,7 @@ impl Finer {
             nodes: mesh.nodes.clone(),
             halves: vec![None; mesh.nodes.len()],
             sets: Sets::new(mesh),
+            lineage: Lineage::of_finer(mesh),
         }
     }
 
@@ -83,6 +87,7 @@ impl Finer {
                 self.nodes.push(edge3::map(&ends, -STEP).0);
                 self.nodes.push(edge3::map(&ends, STEP).0);
                 self.sets.inherit(&[a, b, mid], number..number + 2);
+                self.lineage.split(&[a, b, mid], [number, number + 1]);
                 *self.halves[mid as usize].insert((a, number, number + 1))
             }
         };

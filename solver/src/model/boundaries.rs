@@ -19,13 +19,15 @@ const MOST_REFINEMENTS: u32 = 20;
 const LEAST_TOLERANCE: f64 = 1e-4;
 
 impl Checks {
-    /// The refined mesh.
+    /// The mesh with all its names, which mean parts of the first one; and then refined. A fault of a name alone is left in
+    /// `all`.
     pub(super) fn mesh(
         &mut self,
         input: &MeshInput,
         external: Option<External>,
         analysis: &Analysis,
         contacts: usize,
+        all: &mut AllChecks,
     ) -> Checked<Mesh> {
         let mesh = self.source(&input.source, external);
         let refine = match input.refine {
@@ -58,6 +60,8 @@ impl Checks {
         if input.grid().is_none() {
             self.unmerged = mesh::coincident_nodes(&mesh);
         }
+        all.check(self.names(&mut mesh, input));
+        mesh.order_boundaries();
         for _ in 0..refine {
             mesh = mesh::refine(&mesh);
         }
@@ -70,7 +74,7 @@ impl Checks {
     }
 
     /// Further names for parts of boundaries and groups of elements.
-    pub(super) fn names(&mut self, mesh: &mut Mesh, input: &MeshInput) -> Checked {
+    fn names(&mut self, mesh: &mut Mesh, input: &MeshInput) -> Checked {
         let mut all = AllChecks::default();
         all.check(self.parts(mesh, input));
         all.check(self.groups(mesh, input));
@@ -365,38 +369,37 @@ impl Checks {
         ))
     }
 
-    /// A boundary value at start, end and midside of every edge.
+    /// Whether a boundary has a start and an end, so that something can be given from one to the other.
+    pub(super) fn chain(&mut self, edges: &[Edge], pointer: String, hint: &str) -> Checked {
+        let runs = mesh::runs(edges);
+        let got = match &runs[..] {
+            [run] if !mesh::is_closed(run) => return Ok(()),
+            [_] => "a closed loop".to_owned(),
+            runs => format!("a boundary of {} pieces", runs.len()),
+        };
+        let expected = "one chain of edges with two ends";
+        Err(self.report(pointer, Reason::NotAChain, got, expected, hint))
+    }
+
+    /// A boundary value at start, end and midside of each of its edges.
     pub(super) fn along(
         &mut self,
         mesh: &Mesh,
         edges: &[Edge],
         value: BoundaryValue,
         pointer: String,
-    ) -> Checked<Vec<(Edge, [f64; 3])>> {
+    ) -> Checked<Vec<[f64; 3]>> {
         let [start, end] = match value {
-            BoundaryValue::Constant(value) => {
-                return Ok(edges.iter().map(|edge| (*edge, [value; 3])).collect());
-            }
+            BoundaryValue::Constant(value) => return Ok(vec![[value; 3]; edges.len()]),
             BoundaryValue::Linear(ends) => ends,
         };
-        let runs = mesh::runs(edges);
-        let [run] = &runs[..] else {
-            return Err(self.report(
-                pointer,
-                Reason::NotAChain,
-                format!("a boundary of {} pieces", runs.len()),
-                "one chain of edges",
-                "A value from start to end needs a connected boundary.",
-            ));
-        };
-        let s = crate::contact::arc_lengths(mesh, run);
+        let hint = "A value from start to end needs a connected boundary with both; name a part of it under /mesh/boundaries.";
+        self.chain(edges, pointer, hint)?;
+        let s = crate::contact::arc_lengths(mesh, edges);
         let length = s[s.len() - 1];
         let at = |node: usize| start + (end - start) * s[node] / length;
-        Ok(run
-            .iter()
-            .enumerate()
-            .map(|(k, edge)| (*edge, [at(2 * k), at(2 * k + 2), at(2 * k + 1)]))
-            .collect())
+        let on_edge = |k: usize| crate::contact::edge_nodes(k).map(at);
+        Ok((0..edges.len()).map(on_edge).collect())
     }
 }
 

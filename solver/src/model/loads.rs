@@ -1,9 +1,10 @@
 //! Loads on the mesh.
 
 use super::checks::Checks;
+use super::nodes::{FirstSides, Forces};
 use crate::elasticity::{EdgeLoad, LoadAxes, Loads, Section};
 use crate::error::{AllChecks, Checked, Reason};
-use crate::mesh::{self, Edge, Mesh};
+use crate::mesh::{Edge, Mesh};
 use crate::problem::{BoundaryValue, Load};
 
 /// A stress on a boundary.
@@ -20,18 +21,22 @@ impl Checks {
     pub(super) fn loads(
         &mut self,
         mesh: &Mesh,
+        sides: &FirstSides<'_>,
         section: &Section,
         loads: &[Load],
     ) -> Checked<Loads> {
         let mut all = AllChecks::default();
         let mut found = Loads::default();
+        let mut at_nodes = Vec::new();
         for (i, load) in loads.iter().enumerate() {
-            all.check(self.load(mesh, section, load, &format!("/loads/{i}"), &mut found));
+            let pointer = format!("/loads/{i}");
+            all.check(self.load(mesh, section, load, &pointer, &mut found, &mut at_nodes));
         }
+        found.nodal.extend(sides.carried(at_nodes));
         all.finish(found)
     }
 
-    /// Adds one load to those `found`.
+    /// Adds one load to those `found`, or to those `at_nodes` of the first mesh.
     fn load(
         &mut self,
         mesh: &Mesh,
@@ -39,6 +44,7 @@ impl Checks {
         load: &Load,
         pointer: &str,
         found: &mut Loads,
+        at_nodes: &mut Vec<Forces>,
     ) -> Checked {
         let ring = section.circumference();
         let zero = BoundaryValue::Constant(0.0);
@@ -48,18 +54,23 @@ impl Checks {
                 found.body_force[1] += y;
                 return Ok(());
             }
-            Load::Force(nodes, [x, y]) => {
-                let nodes = self.node_set(mesh, nodes, format!("{pointer}/nodes"))?;
-                let force = [x / ring, y / ring];
-                found.nodal.extend(nodes.iter().map(|node| (*node, force)));
+            Load::Force(nodes, force) => {
+                let set = self.node_set(mesh, nodes, format!("{pointer}/nodes"))?;
+                let force = force.map(|f| f / ring);
+                let given = mesh.given_nodes(set).into_iter();
+                at_nodes.push(given.map(|node| (node, force)).collect());
                 return Ok(());
             }
             Load::Nodal(boundary, forces) => {
                 let edges = self.boundary(mesh, boundary, format!("{pointer}/boundary"))?;
-                let nodes =
-                    self.nodes_in_order(edges, forces.len(), &format!("{pointer}/nodal"))?;
-                let forces = forces.iter().map(|[x, y]| [x / ring, y / ring]);
-                found.nodal.extend(nodes.into_iter().zip(forces));
+                let (nodes, first) =
+                    self.nodes_in_order(mesh, edges, forces.len(), format!("{pointer}/nodal"))?;
+                let forces = forces.iter().map(|force| force.map(|f| f / ring));
+                let forces = nodes.into_iter().zip(forces);
+                match first {
+                    true => at_nodes.push(forces.collect()),
+                    false => found.nodal.extend(forces),
+                }
                 return Ok(());
             }
             Load::Pressure(boundary, pressure) => (
@@ -116,38 +127,41 @@ impl Checks {
             let place = format!("{pointer}/{}", stress.fields[k]);
             self.along(mesh, edges, stress.values[k], place)
         });
-        for ((edge, a), (_, b)) in first?.into_iter().zip(second?) {
+        for ((edge, a), b) in edges.iter().zip(first?).zip(second?) {
             let values = [0, 1, 2].map(|k| [stress.sign * a[k], b[k]]);
-            let axes = stress.axes;
+            let (edge, axes) = (*edge, stress.axes);
             found.edges.push(EdgeLoad { edge, axes, values });
         }
         Ok(())
     }
 
-    /// The nodes of a boundary from its start; there must be `count` of them.
-    fn nodes_in_order(&mut self, edges: &[Edge], count: usize, pointer: &str) -> Checked<Vec<u32>> {
-        let runs = mesh::runs(edges);
-        let [run] = &runs[..] else {
-            return Err(self.report(
-                pointer,
-                Reason::NotAChain,
-                format!("a boundary of {} pieces", runs.len()),
-                "one chain of edges",
-                "Forces at nodes need a connected boundary.",
-            ));
-        };
-        let mut nodes = vec![run[0][0]];
-        run.iter()
-            .for_each(|[_, end, mid]| nodes.extend([*mid, *end]));
-        if nodes.len() != count {
-            return Err(self.report(
-                pointer,
-                Reason::WrongLength,
-                format!("{count} forces"),
-                format!("{}, one for each node of the refined boundary", nodes.len()),
-                "Corner, midside, corner, … from the boundary's start.",
-            ));
+    /// The nodes of a boundary from its start; there must be `count` of them, on the first mesh (`true`) or on this one.
+    fn nodes_in_order(
+        &mut self,
+        mesh: &Mesh,
+        edges: &[Edge],
+        count: usize,
+        pointer: String,
+    ) -> Checked<(Vec<u32>, bool)> {
+        let hint = "Forces at nodes need a connected boundary with a start and an end.";
+        self.chain(edges, pointer.clone(), hint)?;
+        let parts = edges.iter().filter_map(|edge| mesh.part(edge));
+        let mut first: Vec<Edge> = parts.map(|part| part.side).collect();
+        first.dedup();
+        for (edges, is_first) in [(&first[..], true), (edges, false)] {
+            if 2 * edges.len() + 1 == count {
+                let start = edges.first().map(|edge| edge[0]);
+                let others = edges.iter().flat_map(|[_, end, mid]| [*mid, *end]);
+                return Ok((start.into_iter().chain(others).collect(), is_first));
+            }
         }
-        Ok(nodes)
+        let expected = 2 * first.len() + 1;
+        Err(self.report(
+            pointer,
+            Reason::WrongLength,
+            format!("{count} forces"),
+            format!("{expected}, one for each node of the boundary before it is refined"),
+            "Corner, midside, corner, … from the boundary's start.",
+        ))
     }
 }

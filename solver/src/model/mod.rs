@@ -14,6 +14,7 @@ mod laws;
 mod level;
 mod loads;
 mod materials;
+mod nodes;
 mod numbers;
 mod sliding;
 mod supports;
@@ -30,11 +31,12 @@ pub use variable::VariableModel;
 use std::collections::BTreeMap;
 
 use checks::Checks;
+use nodes::FirstSides;
 
 use crate::elasticity::{self, Loads, Section};
 use crate::error::{AllChecks, Checked, Violation};
-use crate::mesh::{self, External, ExternalMesh, Mesh};
-use crate::problem::{MeshInput, Problem, SolverControls, Step};
+use crate::mesh::{External, ExternalMesh, Mesh};
+use crate::problem::{Problem, SolverControls, Step};
 use crate::solution::Warning;
 
 /// A problem that can be solved.
@@ -75,21 +77,14 @@ impl Model {
         checks.found.conclude(model)
     }
 
-    /// The same problem on another mesh of the body, with all boundaries, groups and node sets of its own mesh:
-    /// adaptive refinement makes one after the other.
+    /// The same problem on a refined mesh, which has all names of the first one: adaptive refinement makes one after the
+    /// other, and verification splits the last in two.
     pub fn on_mesh(problem: &Problem, given: ExternalMesh) -> Result<Model, Vec<Violation>> {
         let mut checks = Checks {
             warnings: given.warnings,
             ..Checks::default()
         };
         let model = checks.model(problem, Source::Ready(given.mesh));
-        checks.found.conclude(model)
-    }
-
-    /// The same problem with every element of its mesh split in two in each direction: that of one more `refine`.
-    pub fn split(problem: &Problem, mesh: &Mesh) -> Result<Model, Vec<Violation>> {
-        let mut checks = Checks::default();
-        let model = checks.model(problem, Source::Split(mesh::refine(mesh)));
         checks.found.conclude(model)
     }
 
@@ -116,8 +111,6 @@ enum Source {
     Given(Option<External>),
     /// An earlier model of the problem, refined.
     Ready(Mesh),
-    /// The same, with parts of boundaries and groups to be named anew: more sides and elements may lie in their ranges.
-    Split(Mesh),
 }
 
 impl Checks {
@@ -142,20 +135,11 @@ impl Checks {
         }
         let mesh = match source {
             Source::Given(external) => {
-                let mut mesh =
-                    self.mesh(&problem.mesh, external, &analysis, problem.contacts.len())?;
-                all.check(self.names(&mut mesh, &problem.mesh));
-                mesh
+                let contacts = problem.contacts.len();
+                self.mesh(&problem.mesh, external, &analysis, contacts, &mut all)?
             }
-            Source::Ready(mesh) => mesh,
-            Source::Split(mut mesh) => {
-                let MeshInput {
-                    boundaries, groups, ..
-                } = &problem.mesh;
-                mesh.boundaries
-                    .retain(|name, _| !boundaries.contains_key(name));
-                mesh.groups.retain(|name, _| !groups.contains_key(name));
-                all.check(self.names(&mut mesh, &problem.mesh));
+            Source::Ready(mut mesh) => {
+                mesh.order_boundaries();
                 mesh
             }
         };
@@ -165,9 +149,10 @@ impl Checks {
             .check(self.section(analysis, &problem.materials, &mesh))
             .unwrap_or_else(|| Section::uniform(analysis, Default::default()));
         let axis = Axis::new(&section, &mesh);
-        let (fixed, supported) = self.supports(&mesh, &axis, &problem.supports);
+        let sides = FirstSides::new(&mesh);
+        let (fixed, supported) = self.supports(&mesh, &sides, &axis, &problem.supports);
         all.check(supported);
-        let loads = self.loads(&mesh, &section, &problem.loads);
+        let loads = self.loads(&mesh, &sides, &section, &problem.loads);
         let (contacts, sound) = self.contacts(&mesh, &section, &axis, problem, numbers, &fixed);
         all.check(sound);
         let held_by_contact = self.freedom(&mesh, &section, &fixed, &contacts);

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::axis::Axis;
 use super::checks::{ALIGNED, Checks};
+use super::nodes::FirstSides;
 use crate::error::{AllChecks, Checked, Reason};
 use crate::mesh::{Edge, Mesh};
 use crate::problem::{BoundaryValue, Support};
@@ -77,6 +78,7 @@ impl Checks {
     pub(super) fn supports(
         &mut self,
         mesh: &Mesh,
+        sides: &FirstSides<'_>,
         axis: &Axis,
         supports: &[Support],
     ) -> (BTreeMap<u32, Held>, Checked) {
@@ -96,6 +98,20 @@ impl Checks {
         for (i, support) in supports.iter().enumerate() {
             let pointer = format!("/supports/{i}");
             all.check(self.support(mesh, support, &pointer, ALIGNED * size, &mut fixed));
+        }
+        for (direction, field) in [([1.0, 0.0], "ux"), ([0.0, 1.0], "uy")] {
+            let prescribed = at_given_nodes(mesh, supports, field);
+            for (node, value) in sides.between(&prescribed) {
+                let held = fixed.get(&node).copied();
+                let held = match held {
+                    None => Held::Along { direction, value },
+                    Some(held) if held.along(direction).is_none() => {
+                        held.and(direction, value, 0.0).unwrap_or(held)
+                    }
+                    Some(held) => held,
+                };
+                fixed.insert(node, held);
+            }
         }
         (fixed, all.finish(()))
     }
@@ -231,11 +247,13 @@ impl Checks {
         pointer: &str,
     ) -> Checked<Vec<(u32, f64)>> {
         match (place, value) {
-            (Place::Edges(edges), _) => Ok(self
-                .along(mesh, edges, value, pointer.to_owned())?
-                .into_iter()
-                .flat_map(|(edge, values)| edge.into_iter().zip(values))
-                .collect()),
+            (Place::Edges(edges), _) => {
+                let values = self.along(mesh, edges, value, pointer.to_owned())?;
+                let pairs = edges.iter().zip(values);
+                Ok(pairs
+                    .flat_map(|(edge, values)| edge.iter().copied().zip(values))
+                    .collect())
+            }
             (Place::Nodes(nodes), BoundaryValue::Constant(value)) => {
                 Ok(nodes.iter().map(|node| (*node, value)).collect())
             }
@@ -289,6 +307,24 @@ impl Checks {
         }
         Ok(normals)
     }
+}
+
+/// What supports of sets prescribe along x or y at nodes of the first mesh.
+fn at_given_nodes(mesh: &Mesh, supports: &[Support], field: &str) -> BTreeMap<u32, f64> {
+    let mut prescribed = BTreeMap::new();
+    for support in supports {
+        let value = match field {
+            "ux" => support.ux,
+            _ => support.uy,
+        };
+        let set = support.nodes.as_ref();
+        let set = set.and_then(|name| mesh.node_sets.get(name));
+        if let (Some(BoundaryValue::Constant(value)), Some(set)) = (value, set) {
+            let nodes = mesh.given_nodes(set).into_iter();
+            prescribed.extend(nodes.map(|node| (node, value)));
+        }
+    }
+    prescribed
 }
 
 fn largest(value: BoundaryValue) -> f64 {

@@ -23,10 +23,10 @@ pub enum Load {
     Normal(String, BoundaryValue, Option<BoundaryValue>),
     /// A stress along t on a boundary.
     Tangential(String, BoundaryValue),
-    /// Forces on the nodes of a boundary (corner, midside, corner, …) from its start; in axisymmetry on the
-    /// whole ring.
+    /// Forces on the nodes of a boundary (corner, midside, corner, …) from its start, before it is refined; in
+    /// axisymmetry on the whole ring.
     Nodal(String, Vec<[f64; 2]>),
-    /// A force on each node of a set; in axisymmetry on the whole ring.
+    /// A force on each node of a set, before the mesh is refined; in axisymmetry on the whole ring.
     Force(String, [f64; 2]),
     /// A force per volume on the whole body.
     BodyForce([f64; 2]),
@@ -104,11 +104,12 @@ pub struct LoadFields {
     /// Stress along t, the outward normal turned clockwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tangential: Option<BoundaryValue>,
-    /// Forces `[fx, fy]` on the boundary's nodes (corner, midside, corner, …) from its start; in
+    /// Forces `[fx, fy]` on the boundary's nodes (corner, midside, corner, …) from its start, before it is refined; in
     /// axisymmetry on the whole ring.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nodal: Option<Vec<[f64; 2]>>,
-    /// Force `[fx, fy]` on each node of the set; in axisymmetry on the whole ring.
+    /// Force `[fx, fy]` on each node of the set, before the mesh is refined: forces on all nodes of a side become a
+    /// traction on it; in axisymmetry on the whole ring.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force: Option<[f64; 2]>,
     /// Force per volume along x and y.

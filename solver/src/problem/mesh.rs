@@ -201,7 +201,7 @@ pub struct AdaptiveRefine {
     pub tolerance: f64,
 }
 
-/// The elements whose nodes all lie within a range of x and of y, ends included.
+/// The elements whose nodes all lie within a range of x and of y, ends included, before the mesh is refined.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ElementRange {
@@ -249,7 +249,7 @@ pub struct InlineMesh {
     pub node_sets: BTreeMap<String, Vec<u32>>,
 }
 
-/// The sides of the body's surface that meet every given condition, ends included.
+/// The sides of the body's surface that meet every given condition, ends included, before the mesh is refined.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BoundaryPart {

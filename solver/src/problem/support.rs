@@ -22,7 +22,7 @@ pub struct Support {
     /// Name of the boundary.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub boundary: Option<String>,
-    /// Name of a set of nodes instead.
+    /// Name of a set of nodes instead; a side is held where all its nodes are, before the mesh is refined.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nodes: Option<String>,
     /// Displacement along x (length).

@@ -166,7 +166,7 @@ Box = Annotated[Union[Sequence[Pair], NDArray[Any]], ListOf(Pair, 2, 2)]
 
 @dataclass(kw_only=True, repr=False)
 class BoundaryPart(Part):
-    """The sides of the body's surface that meet every given condition, ends included.
+    """The sides of the body's surface that meet every given condition, ends included, before the mesh is refined.
 
     angle: Largest angle between a side's normal and `normal`; 1 when absent (degrees).
     box: All three nodes of a side lie within this box, `[[x, y], [x, y]]`: two opposite corners.
@@ -211,7 +211,7 @@ class Grid(Part):
 
 @dataclass(kw_only=True, repr=False)
 class ElementRange(Part):
-    """The elements whose nodes all lie within a range of x and of y, ends included.
+    """The elements whose nodes all lie within a range of x and of y, ends included, before the mesh is refined.
 
     x: Range of x.
     y: Range of y.
@@ -712,9 +712,10 @@ class Load(Part):
 
     body_force: Force per volume along x and y.
     boundary: Name of the boundary; absent for `force` and `body_force`.
-    force: Force `[fx, fy]` on each node of the set; in axisymmetry on the whole ring.
-    nodal: Forces `[fx, fy]` on the boundary's nodes (corner, midside, corner, …) from its start; in axisymmetry on
-        the whole ring.
+    force: Force `[fx, fy]` on each node of the set, before the mesh is refined: forces on all nodes of a side
+        become a traction on it; in axisymmetry on the whole ring.
+    nodal: Forces `[fx, fy]` on the boundary's nodes (corner, midside, corner, …) from its start, before it is
+        refined; in axisymmetry on the whole ring.
     nodes: Name of a set of nodes, for `force`.
     normal: Stress along the outward normal: positive pulls.
     pressure: Stress against the outward normal: positive pushes into the body.
@@ -845,7 +846,7 @@ class Support(Part):
     tangent; other displacements stay free.
 
     boundary: Name of the boundary.
-    nodes: Name of a set of nodes instead.
+    nodes: Name of a set of nodes instead; a side is held where all its nodes are, before the mesh is refined.
     un: Displacement along the outward normal (length).
     ut: Displacement along t, the outward normal turned clockwise (length).
     ux: Displacement along x (length).
