@@ -531,6 +531,46 @@ impl Shuffled {
         json!({"inline": {"nodes": self.nodes(), "elements": self.elements(), "boundaries": sides, "node_sets": {"right": set}}})
     }
 
+    /// The same as a file of Gmsh, with physical curves and points.
+    fn gmsh(&mut self) -> Value {
+        let places = self.nodes();
+        let names = ["bottom", "left", "right", "top"];
+        let mut elements = Vec::new();
+        for (name, edges) in self.sides() {
+            let tag = 1 + names.iter().position(|n| *n == name).unwrap();
+            for edge in edges {
+                elements.push((LINE, tag, edge.map(|n| self.number[n]).to_vec()));
+            }
+        }
+        let mut set = self.sides()["right"].concat();
+        set.sort_unstable();
+        set.dedup();
+        elements.extend(set.iter().map(|n| (POINT, 9, vec![self.number[*n]])));
+        self.dice.shuffle(&mut elements);
+        let quads = self.elements().into_iter();
+        elements.extend(quads.map(|nodes| (QUAD, 7, nodes.to_vec())));
+        let mut file = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n5\n".to_owned();
+        for (k, name) in names.iter().enumerate() {
+            writeln!(file, "1 {} \"{name}\"", k + 1).unwrap();
+        }
+        write!(
+            file,
+            "0 9 \"right\"\n$EndPhysicalNames\n$Nodes\n{}\n",
+            places.len()
+        )
+        .unwrap();
+        for (n, [x, y]) in places.iter().enumerate() {
+            writeln!(file, "{} {x} {y} 0", n + 1).unwrap();
+        }
+        write!(file, "$EndNodes\n$Elements\n{}\n", elements.len()).unwrap();
+        for (e, (kind, tag, nodes)) in elements.iter().enumerate() {
+            let numbers: Vec<String> = nodes.iter().map(|n| (n + 1).to_string()).collect();
+            writeln!(file, "{} {kind} 2 {tag} {tag} {}", e + 1, numbers.join(" ")).unwrap();
+        }
+        file += "$EndElements\n";
+        json!({"gmsh": file})
+    }
+
     /// The same as a deck, with surfaces by numbers of sides.
     fn deck(&mut self) -> Value {
         let mut nodes: Vec<usize> = (0..self.number.len()).collect();
@@ -570,6 +610,11 @@ impl Shuffled {
         json!({"abaqus": deck})
     }
 }
+
+/// Gmsh's numbers of a point, a line, and a quadrilateral of second order.
+const POINT: usize = 15;
+const LINE: usize = 8;
+const QUAD: usize = 16;
 
 /// Displacements in the order of places.
 fn by_place(f: &Fields) -> Vec<[f64; 4]> {
@@ -632,10 +677,11 @@ fn numbers_and_orders_of_lists_change_nothing() {
             let size = places
                 .iter()
                 .fold(0.0f64, |m, row| m.max(row[2].hypot(row[3])));
-            for order in 1..=3 {
+            for order in 1..=4 {
                 let mut shuffled = Shuffled::new(body, 100 * body + order);
                 let mesh = match order {
                     3 => shuffled.deck(),
+                    4 => shuffled.gmsh(),
                     _ => shuffled.inline(),
                 };
                 let other = solved(&text(mesh, refine));

@@ -145,6 +145,8 @@ impl Mesh {
                 continue;
             }
             let first = side.parts.first().map_or(part.side, |first| first.side);
+            // most have one: a mesh that is not refined has no others
+            side.parts.reserve_exact(1);
             side.parts.push(part.of(&first));
         }
         sides

@@ -149,7 +149,7 @@ impl Checks {
             .check(self.section(analysis, &problem.materials, &mesh))
             .unwrap_or_else(|| Section::uniform(analysis, Default::default()));
         let axis = Axis::new(&section, &mesh);
-        let sides = FirstSides::new(&mesh);
+        let sides = FirstSides::new(&mesh, problem);
         let (fixed, supported) = self.supports(&mesh, &sides, &axis, &problem.supports);
         all.check(supported);
         let loads = self.loads(&mesh, &sides, &section, &problem.loads);

@@ -10,6 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::contact::edge_length;
 use crate::element::edge3;
 use crate::mesh::{Edge, FirstSide, Mesh};
+use crate::problem::{Load, Problem};
 
 /// Forces by node of the first mesh.
 pub(super) type Forces = BTreeMap<u32, [f64; 2]>;
@@ -22,8 +23,15 @@ pub(super) struct FirstSides<'a> {
 }
 
 impl<'a> FirstSides<'a> {
-    pub(super) fn new(mesh: &'a Mesh) -> Self {
-        let sides = match mesh.has_later_nodes() {
+    /// Only those of a problem that gives anything at nodes are looked for.
+    pub(super) fn new(mesh: &'a Mesh, problem: &Problem) -> Self {
+        let at_nodes = |load: &Load| matches!(load, Load::Force(..) | Load::Nodal(..));
+        let given = problem.loads.iter().any(at_nodes)
+            || problem
+                .supports
+                .iter()
+                .any(|support| support.nodes.is_some());
+        let sides = match given && mesh.has_later_nodes() {
             true => mesh.first_sides(),
             false => BTreeMap::new(),
         };
