@@ -10,7 +10,7 @@ use solver::{
     contact::edge_length,
     element::Family,
     mesh::{Edge, Mesh},
-    solution::Warning,
+    solution::{Warning, WarningCode},
 };
 
 use crate::time::Time;
@@ -46,6 +46,20 @@ pub struct MeshInfo {
     pub warnings: Vec<Warning>,
     /// When it was stored.
     pub created_at: Time,
+}
+
+/// Writes the stored form of a mesh: the mesh, and after it which of its midsides were added.
+pub fn write_stored<W: std::io::Write>(mesh: &Mesh, to: W) -> postcard::Result<W> {
+    postcard::to_io(&(mesh, mesh.added_midsides), to)
+}
+
+/// A mesh from its stored form; that of earlier versions ends with the mesh.
+pub fn read_stored(bytes: &[u8]) -> postcard::Result<Mesh> {
+    let (mut mesh, rest): (Mesh, &[u8]) = postcard::take_from_bytes(bytes)?;
+    if !rest.is_empty() {
+        mesh.added_midsides = postcard::from_bytes(rest)?;
+    }
+    Ok(mesh)
 }
 
 /// A named boundary of a stored mesh.
@@ -110,6 +124,12 @@ impl MeshInfo {
         }
     }
 
+    /// Whether an earlier version has stored the mesh without the number of its added midsides, which are in its sets.
+    pub fn lacks_added_midsides(&self, mesh: &Mesh) -> bool {
+        let raised = |warning: &Warning| warning.code == WarningCode::RaisedToSecondOrder;
+        mesh.added_midsides.is_none() && self.warnings.iter().any(raised)
+    }
+
     /// The numbers that an estimate needs.
     pub fn size(&self) -> MeshSize {
         let edges = |(name, info): (&String, &BoundaryInfo)| (name.clone(), info.edges);
@@ -122,8 +142,25 @@ impl MeshInfo {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
     use solver::element::Element;
+
+    #[test]
+    fn stored_meshes_are_read_also_as_earlier_versions_wrote_them() {
+        let mesh = Mesh {
+            nodes: vec![[0.0, 1.0]; 9],
+            node_sets: BTreeMap::from([("top".to_owned(), vec![2, 3])]),
+            added_midsides: Some(4),
+            ..Mesh::default()
+        };
+        let stored = write_stored(&mesh, Vec::new()).unwrap();
+        assert_eq!(read_stored(&stored).unwrap(), mesh);
+        let earlier = postcard::to_io(&mesh, Vec::new()).unwrap();
+        let read = read_stored(&earlier).unwrap();
+        assert_eq!(read.added_midsides, None);
+        assert_eq!((read.nodes, read.node_sets), (mesh.nodes, mesh.node_sets));
+    }
 
     /// One square whose upper side bulges: a parabola over 2 with rise 1.
     #[test]

@@ -41,7 +41,7 @@ pub(super) fn stored_mesh(store: &Store, hash: &str) -> Result<Vec<u8>, NoSoluti
 
 /// A mesh from its stored form.
 pub(super) fn read_mesh(body: &[u8]) -> Result<Mesh, NoSolution> {
-    postcard::from_bytes(body)
+    crate::mesh::read_stored(body)
         .map_err(|error| NoSolution::Internal(format!("a stored mesh cannot be read: {error}")))
 }
 

@@ -149,7 +149,7 @@ fn parse(
     let (format, mesh, warnings) = files::read_mesh(reader).map_err(refused)?;
     let info = MeshInfo::new(hash, bytes, (format, &mesh, warnings));
     let out = BufWriter::with_capacity(PIECE_BYTES, encoded);
-    let out = postcard::to_io(&mesh, out).map_err(ApiError::internal)?;
+    let out = crate::mesh::write_stored(&mesh, out).map_err(ApiError::internal)?;
     let mut encoded = out
         .into_inner()
         .map_err(|error| unwritten(error.into_error()))?;
@@ -263,7 +263,7 @@ pub(super) async fn load(
         found.ok_or_else(|| ApiError::InvalidProblem(vec![missing(hash)]))
     };
     let read = |(info, body): (MeshInfo, Vec<u8>)| {
-        let mesh = postcard::from_bytes(&body).map_err(ApiError::internal)?;
+        let mesh = crate::mesh::read_stored(&body).map_err(ApiError::internal)?;
         Ok((info, mesh))
     };
     service.work_on(load, read).await?

@@ -6,7 +6,7 @@ use solver::{
     Checked, Estimate,
     error::{Reason, Violation},
     mesh::Mesh,
-    problem::{Problem, Refine},
+    problem::{Load, Problem, Refine},
     solution::Warning,
 };
 
@@ -197,6 +197,18 @@ fn estimate(problem: &Problem, stored: Option<&(MeshInfo, Mesh)>) -> Result<Esti
 }
 
 fn check(problem: &Problem, stored: Option<(MeshInfo, Mesh)>) -> Result<Checked, Vec<Violation>> {
+    let by_set = |load: &Load| matches!(load, Load::Force(..));
+    let lacks = |(info, mesh): &(MeshInfo, Mesh)| info.lacks_added_midsides(mesh);
+    if stored.as_ref().is_some_and(lacks) && problem.loads.iter().any(by_set) {
+        let violation = Violation::new(
+            "/mesh/stored",
+            Reason::UnknownMesh,
+            "a mesh that an earlier version has stored, with added midsides in its sets of nodes",
+            "one whose sets have the nodes of its file, for a force on each of them",
+            "Delete the mesh, and upload its file again.",
+        );
+        return Err(prefixed(PROBLEM, vec![violation]));
+    }
     let external = files::external_mesh(problem, stored.map(|(_, mesh)| mesh));
     solver::check(problem, external).map_err(|violations| prefixed(PROBLEM, violations))
 }
