@@ -33,6 +33,7 @@ fn main() {
     text += &table::nearly_incompressible(&records);
     text += &table::robustness(&records);
     text += &table::dragged_sheet(&records);
+    text += &table::overlaps(&records);
     text += &accuracy::section(&records);
     text += &table::adaptive(&records);
     text += &examples::section(&figures);

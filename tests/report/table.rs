@@ -204,6 +204,27 @@ pub(crate) fn dragged_sheet(records: &Path) -> String {
     out + "\n"
 }
 
+/// Overlaps, each against the same problem given in another way.
+pub(crate) fn overlaps(records: &Path) -> String {
+    let text = std::fs::read_to_string(records.join("overlaps.jsonl")).unwrap();
+    let kept: Value = serde_json::from_str(text.lines().last().unwrap()).unwrap();
+    let mut out = String::from(
+        "## Overlaps\n\nRandom bodies (discs, ellipses, blobs, blocks, holes and fillets; sides curved and straight, of quadrilaterals and triangles;\nturned and shifted at random) that overlap a line or a polyline from the start, each solved also as another problem with the\nsame answer (`tests/verification/overlaps.rs`): the body moved onto an obstacle that it just touches, the obstacle pushed into\nit with distances by the formula of the circle or polygon, or the circle as a profile. *Largest*: difference of the forces in\nparts of the normal force. *Open*: nothing touches in both.\n\n| obstacle, and the other problem | pairs | largest | open | refused in both |\n|---|---|---|---|---|\n",
+    );
+    for (words, row) in kept["rows"].as_object().unwrap() {
+        writeln!(
+            out,
+            "| {words} | {} | {:.0e} | {} | {} |",
+            row["pairs"],
+            row["largest"].as_f64().unwrap(),
+            row["open"],
+            row["refused"],
+        )
+        .unwrap();
+    }
+    out + "\n"
+}
+
 /// Adaptive refinement: whether a tolerance holds, and what it costs.
 pub(crate) fn adaptive(records: &Path) -> String {
     let last = |name: &str| -> Value {

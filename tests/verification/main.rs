@@ -39,6 +39,7 @@ mod nearly_incompressible;
 mod oblique;
 mod obstacle_normals;
 mod obstacle_points;
+mod overlaps;
 mod pairs;
 mod patch;
 mod profiles;

@@ -283,6 +283,52 @@ fn an_obstacle_behind_the_body_is_not_in_contact() {
     );
 }
 
+/// A top that falls from x = 1 on, and an obstacle along one of its two parts that ends at the corner between them: the
+/// contact ends there, with the normal of its own edge, and gaps are measured along that. Obstacles parallel to the part
+/// press on it as a flat does, as overlaps and pushed, whatever they are made of. 68.519 of an independent program.
+#[test]
+fn an_obstacle_that_ends_at_a_corner_is_measured_along_the_normal_of_its_contact() {
+    let force = |mut obstacle: Value, end: Value, indentation: f64, normal: &str| {
+        for (key, value) in end.as_object().unwrap() {
+            obstacle[key] = value.clone();
+        }
+        let text = json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {"grid": {"x": [0, 0.5, 1, 1.5, 2], "y": [0, 0.5, 1], "top": [[0, 1], [1, 1], [2, 0.64]]}, "refine": 1},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
+            "contacts": [{"boundary": "top", "obstacle": obstacle, "indentation": indentation, "normal": normal}],
+        });
+        solve(&problem(&text.to_string())).summary.normal_force
+    };
+    let fall = f64::atan2(-0.36, 1.0);
+    let parts = [
+        ([0.0, 1.0], 0.0, 1.0, json!({"to": 1})),
+        ([1.0, 1.0], fall, 0.36f64.hypot(1.0), json!({"from": 1})),
+    ];
+    for ([x, y], angle, length, end) in parts {
+        let flat = force(json!({"kind": "flat"}), end.clone(), 0.05, "body");
+        if angle == 0.0 {
+            crate::support::close(flat, 68.51903584687838, 1e-9);
+        }
+        for distance in [0.2, 0.0, -0.05] {
+            let (s, c) = angle.sin_cos();
+            let at = |along: f64| [x + along * c - distance * s, y + along * s + distance * c];
+            let line = json!({"kind": "line", "point": at(0.3), "angle": angle.to_degrees()});
+            let longer = json!({"kind": "polyline", "points": [at(-1.0), at(3.0)]});
+            let smooth = json!({"kind": "polyline", "points": [at(3.0), at(0.4), at(-1.0)], "interpolation": "cubic"});
+            let as_long = json!({"kind": "polyline", "points": [at(0.0), at(length)]});
+            let ended = [line, longer, smooth].map(|obstacle| (obstacle, end.clone()));
+            for (obstacle, end) in ended.into_iter().chain([(as_long, json!({}))]) {
+                for normal in ["body", "obstacle"] {
+                    let own = force(obstacle.clone(), end.clone(), distance + 0.05, normal);
+                    crate::support::close(own, flat, 1e-9);
+                }
+            }
+        }
+    }
+}
+
 /// The indentation that a warning names is the obstacle's own, not its part along a turned normal.
 #[test]
 fn the_indentation_that_engages_a_sloping_obstacle_is_measured_along_its_push() {

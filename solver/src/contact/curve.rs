@@ -27,19 +27,34 @@ pub(super) struct Block {
 /// Pieces in a block.
 const BLOCK: usize = 32;
 
-/// Where a normal meets a curve in space.
+/// A side of a curve in space, as one goes along it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Side {
+    Left,
+    Right,
+}
+
+/// The place of a curve in space that a normal of the body faces.
 pub(super) struct Hit {
     pub(super) profile: Profile,
     /// The first and the last of the pieces that meet there.
     pub(super) pieces: [usize; 2],
 }
 
-/// A normal of the body: its foot n, t, and how far the body reaches along −n.
+/// A place where the straight line through a normal of the body crosses a curve in space.
+pub(super) struct Crossing {
+    /// The distance is negative behind the surface.
+    profile: Profile,
+    piece: usize,
+    /// The side of the curve that one enters there in the direction of the normal.
+    entered: Side,
+}
+
+/// A normal of the body: its foot, n, and t.
 pub(super) struct Ray {
     pub(super) place: [f64; 2],
     pub(super) n: [f64; 2],
     pub(super) t: [f64; 2],
-    pub(super) depth: f64,
 }
 
 impl<'a> Curve<'a> {
@@ -64,44 +79,98 @@ impl<'a> Curve<'a> {
         Curve::Line(point, [point[0] + cosine, point[1] + sine])
     }
 
-    /// Where a normal of the body meets a curve in space.
-    pub(super) fn met_by(&self, ray: &Ray, rounding: f64) -> Option<Hit> {
-        let mut hits: Vec<Hit> = Vec::new();
+    /// Where the straight line through a normal of the body crosses the curve.
+    pub(super) fn crossings(&self, ray: &Ray, rounding: f64) -> Vec<Crossing> {
+        let mut found: Vec<Crossing> = Vec::new();
         match self {
             Curve::Segments(points, blocks) => {
                 for k in near(blocks, ray, rounding) {
                     let (start, end) = (points[k], points[k + 1]);
-                    hits.extend(on_segment(ray, start, end, [0.0, 1.0], k, rounding));
+                    found.extend(on_segment(ray, start, end, [0.0, 1.0], k, rounding));
                 }
             }
             Curve::Line(start, end) => {
                 let endless = [f64::NEG_INFINITY, f64::INFINITY];
-                hits.extend(on_segment(ray, *start, *end, endless, 0, rounding));
+                found.extend(on_segment(ray, *start, *end, endless, 0, rounding));
             }
             Curve::Smooth(cubics, blocks) => {
                 for k in near(blocks, ray, rounding) {
-                    on_cubic(ray, &cubics[k], k, rounding, &mut hits);
+                    on_cubic(ray, &cubics[k], k, rounding, &mut found);
                 }
             }
         }
-        // an obstacle behind the body faces its other side
-        hits.retain(|hit| hit.profile.distance >= -ray.depth);
-        let nearest = hits
-            .iter()
-            .map(|hit| hit.profile.distance.abs())
-            .fold(f64::INFINITY, f64::min);
+        found
+    }
+
+    /// The place of the curve that a normal of the body faces, if the obstacle is rigid on the side `rigid` of it.
+    ///
+    /// What is ahead of the surface is faced. What is behind it is faced by a surface that lies inside the obstacle: the
+    /// normal enters the rigid side there, and did not leave it since. Where it leaves that side, it is a face for another
+    /// side of the body.
+    pub(super) fn faced_by(&self, ray: &Ray, rigid: Side, rounding: f64) -> Option<Hit> {
+        let mut crossings = self.crossings(ray, rounding);
+        let [ahead, behind] = nearest(&crossings, rounding);
+        let behind = behind.filter(|crossing| crossing.entered == rigid);
+        let at = |crossing: &Crossing, distance: f64| {
+            (crossing.profile.distance - distance).abs() <= rounding
+        };
+        let distance = match [ahead, behind].map(|one| one.map(|one| one.profile.distance)) {
+            [Some(ahead), Some(behind)] => {
+                let enters = |crossing: &Crossing| at(crossing, ahead) && crossing.entered == rigid;
+                if ahead <= -behind && crossings.iter().any(enters) {
+                    ahead
+                } else {
+                    behind
+                }
+            }
+            [ahead, behind] => ahead.or(behind)?,
+        };
+        crossings.retain(|crossing| at(crossing, distance));
+        // at the edge of an overhanging face the normal meets that too, from inside
+        if crossings.iter().any(|crossing| crossing.entered == rigid) {
+            crossings.retain(|crossing| crossing.entered == rigid);
+        }
         // two segments meet in a kink: the mean of their slopes
-        hits.retain(|hit| hit.profile.distance.abs() <= nearest + rounding);
-        let count = hits.len() as f64;
-        let slope = hits.iter().map(|hit| hit.profile.slope).sum::<f64>() / count;
-        let (first, last) = (hits.first()?, hits.last()?);
+        let count = crossings.len() as f64;
+        let slopes = crossings.iter().map(|crossing| crossing.profile.slope);
+        let slope = slopes.sum::<f64>() / count;
+        let (first, last) = (crossings.first()?, crossings.last()?);
         Some(Hit {
             profile: Profile {
                 slope,
                 ..first.profile
             },
-            pieces: [first.pieces[0], last.pieces[0]],
+            pieces: [first.piece, last.piece],
         })
+    }
+
+    /// The side of the curve that is rigid, as it looks along one normal; none if it does not cross the curve. `reach`: how
+    /// far the body extends along −n (length).
+    pub(super) fn rigid_side(&self, ray: &Ray, reach: f64, rounding: f64) -> Option<Side> {
+        let crossings = self.crossings(ray, rounding);
+        match nearest(&crossings, rounding) {
+            [None, None] => None,
+            [Some(ahead), None] => Some(ahead.entered),
+            [None, Some(behind)] => {
+                // behind the body it faces another side of it
+                let inside = behind.profile.distance >= -reach;
+                Some(if inside {
+                    behind.entered
+                } else {
+                    behind.entered.other()
+                })
+            }
+            [Some(ahead), Some(behind)] => {
+                // the surface lies inside the obstacle, or between two parts of it
+                let overlap = -behind.profile.distance;
+                let inside = overlap < ahead.profile.distance && overlap <= 0.5 * reach;
+                Some(if inside {
+                    behind.entered
+                } else {
+                    ahead.entered
+                })
+            }
+        }
     }
 
     /// The point between piece `k − 1` and piece `k` of a curve in space, and the change of the profile's slope there,
@@ -132,6 +201,36 @@ impl<'a> Curve<'a> {
     }
 }
 
+impl Side {
+    fn other(self) -> Side {
+        match self {
+            Side::Left => Side::Right,
+            Side::Right => Side::Left,
+        }
+    }
+
+    /// The side of a curve that is entered along n, by the part of the curve's direction along t.
+    fn entered(across: f64) -> Side {
+        if across > 0.0 {
+            Side::Left
+        } else {
+            Side::Right
+        }
+    }
+}
+
+/// The nearest crossings ahead of the surface or on it, and behind it.
+fn nearest(crossings: &[Crossing], rounding: f64) -> [Option<&Crossing>; 2] {
+    let size = |crossing: &&Crossing| crossing.profile.distance.abs();
+    let least = |ahead: bool| {
+        let own = crossings
+            .iter()
+            .filter(|crossing| (crossing.profile.distance >= -rounding) == ahead);
+        own.min_by(|a, b| size(a).total_cmp(&size(b)))
+    };
+    [least(true), least(false)]
+}
+
 /// Where a normal meets the straight line from `start` to `end`, if the parameter between them is in its range.
 fn on_segment(
     ray: &Ray,
@@ -140,8 +239,8 @@ fn on_segment(
     [least, most]: [f64; 2],
     piece: usize,
     rounding: f64,
-) -> Option<Hit> {
-    let Ray { place, n, t, .. } = *ray;
+) -> Option<Crossing> {
+    let Ray { place, n, t } = *ray;
     let direction = [end[0] - start[0], end[1] - start[1]];
     let length = direction[0].hypot(direction[1]);
     let across = direction[0] * t[0] + direction[1] * t[1];
@@ -158,12 +257,13 @@ fn on_segment(
         start[0] + part * direction[0] - place[0],
         start[1] + part * direction[1] - place[1],
     ];
-    Some(Hit {
+    Some(Crossing {
         profile: Profile {
             distance: meet[0] * n[0] + meet[1] * n[1],
             slope: (direction[0] * n[0] + direction[1] * n[1]) / across,
         },
-        pieces: [piece; 2],
+        piece,
+        entered: Side::entered(across),
     })
 }
 
@@ -240,8 +340,8 @@ const PARTS: usize = 8;
 const STEPS: usize = 60;
 
 /// Where a normal meets one cubic of a curve.
-fn on_cubic(ray: &Ray, cubic: &Bezier, k: usize, rounding: f64, hits: &mut Vec<Hit>) {
-    let Ray { place, n, t, .. } = *ray;
+fn on_cubic(ray: &Ray, cubic: &Bezier, k: usize, rounding: f64, found: &mut Vec<Crossing>) {
+    let Ray { place, n, t } = *ray;
     let part_along = |axis: [f64; 2]| cubic.map(|p| dot([p[0] - place[0], p[1] - place[1]], axis));
     // a cubic lies between its Bézier points
     let beside = part_along(t);
@@ -263,9 +363,10 @@ fn on_cubic(ray: &Ray, cubic: &Bezier, k: usize, rounding: f64, hits: &mut Vec<H
                 slope if slope.abs() <= FLAT => 0.0,
                 slope => slope,
             };
-            hits.push(Hit {
+            found.push(Crossing {
                 profile: Profile { distance, slope },
-                pieces: [k; 2],
+                piece: k,
+                entered: Side::entered(across),
             });
         }
     };

@@ -1,6 +1,8 @@
 //! Rigid obstacles: the part of a boundary that faces one, its distance at the nodes, and what lies between them.
 
-use super::curve::{Curve, Hit, Ray};
+use std::ops::Range;
+
+use super::curve::{Curve, Hit, Ray, Side};
 use super::shape::{Corner, Shape};
 use super::{ContactBoundary, Profile, ROUNDING, edge_nodes};
 use crate::element::edge3;
@@ -58,7 +60,7 @@ const MOST_PLACES: usize = 32;
 
 /// Finds the part of `boundary` (edges that follow one another) that faces the obstacle.
 pub fn facing(mesh: &Mesh, boundary: &[Edge], obstacle: &Obstacle) -> Facing {
-    let view = View::new(mesh, boundary, obstacle);
+    let mut view = View::new(mesh, boundary, obstacle);
     let (from, to, _) = obstacle.span();
     let [first, last] = view.shape.ends();
     let (low, high) = (
@@ -71,50 +73,30 @@ pub fn facing(mesh: &Mesh, boundary: &[Edge], obstacle: &Obstacle) -> Facing {
         cut: Vec::new(),
         cut_edges: Vec::new(),
     };
-    let mut continues = false;
+    let ranges: Vec<[f64; 2]> = (0..boundary.len()).map(|k| view.range(k)).collect();
+    let within = |k: usize| ranges[k][0] >= low - rounding && ranges[k][1] <= high + rounding;
+    let runs = view.runs(boundary, &within);
     for (k, edge) in boundary.iter().enumerate() {
-        let nodes = edge_nodes(k);
-        let c = nodes.map(|node| view.coordinate(node));
-        let (least, most) = (
-            c.iter().fold(f64::INFINITY, |a, &b| a.min(b)),
-            c.iter().fold(f64::NEG_INFINITY, |a, &b| a.max(b)),
-        );
-        let within = least >= low - rounding && most <= high + rounding;
+        let [least, most] = ranges[k];
         let touches = most > low + rounding && least < high - rounding;
-        let seen = nodes.map(|node| view.seen_from_node(node));
-        if touches && (!within || view.ends_inside(k, &seen)) {
+        let in_run = runs.iter().any(|run| run.contains(&k));
+        if touches && !in_run && (!within(k) || view.ends_inside(k, edge)) {
             found.cut.push([least, most]);
             found
                 .cut_edges
                 .push((*edge, most.min(high) - least.max(low)));
         }
-        match seen {
-            [Some(a), Some(b), Some(m)] if within => {
-                if !continues {
-                    found.runs.push(FacingRun {
-                        profile: vec![a.profile],
-                        start: view.whole.s[nodes[0]],
-                        coordinate: vec![c[0]],
-                        ..FacingRun::default()
-                    });
-                }
-                if let Some(run) = found.runs.last_mut() {
-                    let places = view.places(k, [a, b, m]).into_iter();
-                    let edge_of_run = run.chain.len();
-                    run.places.extend(places.map(|place| Place {
-                        edge: edge_of_run,
-                        ..place
-                    }));
-                    run.chain.push(*edge);
-                    run.profile.extend([m.profile, b.profile]);
-                    run.coordinate.extend([c[2], c[1]]);
-                }
-                continues = true;
-            }
-            _ => continues = false,
-        }
+    }
+    for run in runs {
+        view.end_at(run.clone(), &boundary[run.clone()]);
+        found.runs.extend(view.run(run.clone(), &boundary[run]));
     }
     found
+}
+
+/// Γ_C along edges; its geometry only: the depth of the section does not matter.
+fn along(mesh: &Mesh, chain: &[Edge]) -> ContactBoundary {
+    ContactBoundary::new(mesh, chain, 0.0, |_| 1.0)
 }
 
 /// A boundary and the obstacle as seen from it.
@@ -122,10 +104,9 @@ struct View<'a> {
     mesh: &'a Mesh,
     shape: Shape<'a>,
     along: Along,
-    /// Geometry only: the depth of the section does not matter.
     whole: ContactBoundary,
-    /// The body's surface, for curves in space.
-    surface: Vec<Edge>,
+    /// The side of a curve in space on which it is rigid.
+    rigid: Side,
     corners: Vec<Corner>,
     rounding: f64,
 }
@@ -141,19 +122,98 @@ struct Seen {
 impl<'a> View<'a> {
     fn new(mesh: &'a Mesh, boundary: &[Edge], obstacle: &'a Obstacle) -> Self {
         let shape = Shape::new(obstacle);
-        let whole = ContactBoundary::new(mesh, boundary, 0.0, |_| 1.0);
+        let whole = along(mesh, boundary);
+        let rounding = ROUNDING * whole.s[whole.s.len() - 1];
         View {
             mesh,
             along: obstacle.span().2,
-            surface: match shape.in_space() {
-                Some(_) => mesh.surface(),
-                None => Vec::new(),
+            rigid: match shape.in_space() {
+                Some(curve) => rigid_side(curve, mesh, &whole, rounding),
+                None => Side::Left,
             },
             corners: shape.corners(),
-            rounding: ROUNDING * whole.s[whole.s.len() - 1],
+            rounding,
             shape,
             whole,
         }
+    }
+
+    /// The coordinates c between which an edge lies.
+    fn range(&self, edge: usize) -> [f64; 2] {
+        let c = edge_nodes(edge).map(|node| self.coordinate(node));
+        [
+            c.iter().fold(f64::INFINITY, |a, &b| a.min(b)),
+            c.iter().fold(f64::NEG_INFINITY, |a, &b| a.max(b)),
+        ]
+    }
+
+    /// The runs of edges of which every node faces the obstacle along the normal that it has in a contact of this run: that
+    /// of its own edge at an end, else the mean of both edges. `within`: edges that `from` and `to` allow.
+    fn runs(&self, boundary: &[Edge], within: &dyn Fn(usize) -> bool) -> Vec<Range<usize>> {
+        let mut runs: Vec<Range<usize>> = Vec::new();
+        for k in (0..boundary.len()).filter(|k| within(*k)) {
+            let [start, _, middle] = edge_nodes(k);
+            if self.seen_from_node(middle).is_none() {
+                continue;
+            }
+            match runs.last_mut() {
+                Some(run) if run.end == k && self.seen_from_node(start).is_some() => run.end += 1,
+                _ => runs.push(k..k + 1),
+            }
+        }
+        for run in &mut runs {
+            let seen = |k: usize| self.seen_along_own_normals(k, &boundary[k]);
+            while run.start < run.end && !seen(run.start)[0] {
+                run.start += 1;
+            }
+            while run.start < run.end && !seen(run.end - 1)[1] {
+                run.end -= 1;
+            }
+        }
+        runs.retain(|run| run.start < run.end);
+        runs
+    }
+
+    /// The normals of an edge's nodes if it is a contact alone.
+    fn own_normals(&self, edge: &Edge) -> [[f64; 2]; 3] {
+        let own = along(self.mesh, &[*edge]);
+        edge_nodes(0).map(|i| own.normals[i])
+    }
+
+    /// From which nodes of an edge the obstacle is seen along its own normals.
+    fn seen_along_own_normals(&self, k: usize, edge: &Edge) -> [bool; 3] {
+        let (nodes, normals) = (edge_nodes(k), self.own_normals(edge));
+        std::array::from_fn(|i| {
+            let node = nodes[i];
+            let place = self.whole.positions[node];
+            let seen = self.seen_from_place(place, normals[i], self.coordinate(node));
+            seen.is_some()
+        })
+    }
+
+    /// From now on the normals at the ends of a run are those of a contact that ends there. `chain`: its edges.
+    fn end_at(&mut self, run: Range<usize>, chain: &[Edge]) {
+        let normals = along(self.mesh, chain).normals;
+        self.whole.normals[2 * run.start..=2 * run.end].copy_from_slice(&normals);
+    }
+
+    /// The obstacle along a run of edges; none if a node does not face it.
+    fn run(&self, run: Range<usize>, chain: &[Edge]) -> Option<FacingRun> {
+        let nodes = 2 * run.start..2 * run.end + 1;
+        let seen: Option<Vec<Seen>> = nodes.clone().map(|i| self.seen_from_node(i)).collect();
+        let seen = seen?;
+        let mut places = Vec::new();
+        for (edge, k) in run.clone().enumerate() {
+            let found = self.places(k, edge_nodes(edge).map(|i| seen[i]));
+            places.extend(found.into_iter().map(|place| Place { edge, ..place }));
+        }
+        Some(FacingRun {
+            chain: chain.to_vec(),
+            profile: seen.iter().map(|seen| seen.profile).collect(),
+            start: self.whole.s[nodes.start],
+            coordinate: nodes.map(|i| self.coordinate(i)).collect(),
+            places,
+        })
     }
 
     /// The coordinate c of a node.
@@ -172,9 +232,8 @@ impl<'a> View<'a> {
     fn seen_from_place(&self, place: [f64; 2], n: [f64; 2], c: f64) -> Option<Seen> {
         let t = tangent(n);
         if let Some(curve) = self.shape.in_space() {
-            let depth = depth(self.mesh, &self.surface, place, n, self.rounding);
-            let ray = Ray { place, n, t, depth };
-            let Hit { profile, pieces } = curve.met_by(&ray, self.rounding)?;
+            let ray = Ray { place, n, t };
+            let Hit { profile, pieces } = curve.faced_by(&ray, self.rigid, self.rounding)?;
             return Some(Seen { profile, pieces });
         }
         let (distance, slope) = self.shape.at(c, self.rounding)?;
@@ -198,9 +257,20 @@ impl<'a> View<'a> {
 
     /// Position, normal and coordinate c at a place of an edge.
     fn place(&self, edge: usize, xi: f64) -> ([f64; 2], [f64; 2], f64) {
+        let normals = edge_nodes(edge).map(|i| self.whole.normals[i]);
+        self.place_between(edge, xi, &normals)
+    }
+
+    /// The same with these normals at the edge's nodes.
+    fn place_between(
+        &self,
+        edge: usize,
+        xi: f64,
+        normals: &[[f64; 2]; 3],
+    ) -> ([f64; 2], [f64; 2], f64) {
         let (h, nodes) = (edge3::shape(xi), edge_nodes(edge));
         let along = |f: &dyn Fn(usize) -> f64| edge3::interpolate(&h, &nodes.map(f));
-        let n = [0, 1].map(|a| along(&|i| self.whole.normals[i][a]));
+        let n = [0, 1].map(|a| edge3::interpolate(&h, &normals.map(|n| n[a])));
         let length = n[0].hypot(n[1]);
         (
             [0, 1].map(|a| along(&|i| self.whole.positions[i][a])),
@@ -215,15 +285,20 @@ impl<'a> View<'a> {
     }
 
     /// Whether a curve in space ends inside an edge: some of its nodes face it and others do not. Where it ends exactly
-    /// at a node, nothing of it is seen beside that node.
-    fn ends_inside(&self, edge: usize, seen: &[Option<Seen>; 3]) -> bool {
+    /// at a node, nothing of it is seen beside that node. A straight line has no end: the body turns away from it.
+    fn ends_inside(&self, k: usize, edge: &Edge) -> bool {
         const BESIDE: f64 = 1.0 / 64.0;
-        if self.shape.in_space().is_none() || seen.iter().all(Option::is_some) {
-            return false;
-        }
-        let [start, end, middle] = seen.map(|seen| seen.is_some());
-        let beside = |is_seen: bool, xi: f64| is_seen && self.seen_from_edge(edge, xi).is_some();
-        middle || beside(start, -1.0 + BESIDE) || beside(end, 1.0 - BESIDE)
+        let normals = self.own_normals(edge);
+        let [start, end, middle] = self.seen_along_own_normals(k, edge);
+        let ends = match self.shape.in_space() {
+            Some(Curve::Line(..)) | None => false,
+            Some(Curve::Segments(..) | Curve::Smooth(..)) => !(start && end && middle),
+        };
+        let beside = |is_seen: bool, xi: f64| {
+            let (place, n, c) = self.place_between(k, xi, &normals);
+            is_seen && self.seen_from_place(place, n, c).is_some()
+        };
+        ends && (middle || beside(start, -1.0 + BESIDE) || beside(end, 1.0 - BESIDE))
     }
 
     /// The obstacle between the nodes of an edge, and at its corners there, in order of s. `nodes`: as seen from its
@@ -387,24 +462,46 @@ fn tangent([x, y]: [f64; 2]) -> [f64; 2] {
     [y, -x]
 }
 
-/// How far the body reaches from a place of its surface along −n (length), by the chords of its sides.
-fn depth(mesh: &Mesh, surface: &[Edge], place: [f64; 2], n: [f64; 2], rounding: f64) -> f64 {
-    let across = |edge: &Edge| {
-        let [p, q, _] = mesh.edge_nodes(edge);
-        let (along, to) = (
-            [q[0] - p[0], q[1] - p[1]],
-            [place[0] - p[0], place[1] - p[1]],
-        );
-        // place − λ n = p + μ (q − p)
-        let det = along[0] * n[1] - along[1] * n[0];
-        let mu = (to[0] * n[1] - to[1] * n[0]) / det;
-        let lambda = (along[0] * to[1] - along[1] * to[0]) / det;
-        ((0.0..=1.0).contains(&mu) && lambda > rounding).then_some(lambda)
-    };
-    surface
-        .iter()
-        .filter_map(across)
-        .fold(f64::INFINITY, f64::min)
+/// The side of a curve in space on which it is rigid: that which most of the boundary sees so.
+fn rigid_side(curve: &Curve<'_>, mesh: &Mesh, boundary: &ContactBoundary, rounding: f64) -> Side {
+    let surface = mesh.surface();
+    let mut left = 0.0;
+    for (i, &place) in boundary.positions.iter().enumerate() {
+        let n = boundary.normals[i];
+        let ray = Ray {
+            place,
+            n,
+            t: tangent(n),
+        };
+        let reach = depth(mesh, &surface, &ray, rounding);
+        match curve.rigid_side(&ray, reach, rounding) {
+            Some(Side::Left) => left += boundary.weights[i],
+            Some(Side::Right) => left -= boundary.weights[i],
+            None => {}
+        }
+    }
+    if left >= 0.0 { Side::Left } else { Side::Right }
+}
+
+/// How far the body reaches from a place of its surface along −n (length).
+fn depth(mesh: &Mesh, surface: &[Edge], ray: &Ray, rounding: f64) -> f64 {
+    let Ray { place, n, t } = *ray;
+    let mut least = f64::INFINITY;
+    for edge in surface {
+        let nodes = mesh.edge_nodes(edge);
+        let part = |axis: [f64; 2]| {
+            nodes.map(|[x, y]| (x - place[0]) * axis[0] + (y - place[1]) * axis[1])
+        };
+        let (beside, ahead) = (part(t), part(n));
+        for xi in edge3::zeros(&beside) {
+            let behind = -edge3::interpolate(&edge3::shape(xi), &ahead);
+            // the side that the place lies on is left there
+            if behind > rounding {
+                least = least.min(behind);
+            }
+        }
+    }
+    least
 }
 
 #[cfg(test)]

@@ -43,6 +43,21 @@ pub fn invert(v: &[f64; 3], value: f64) -> f64 {
     xi.clamp(-1.0, 1.0)
 }
 
+/// ξ in [−1, 1] with Σ h_i(ξ) v_i = 0, up to two; to rounding also at the ends. None if all v are 0.
+pub fn zeros(v: &[f64; 3]) -> impl Iterator<Item = f64> {
+    const ROUNDING: f64 = 1e-9;
+    // a ξ² + b ξ + c = 0, without cancellation
+    let a = 0.5 * (v[0] + v[1]) - v[2];
+    let b = 0.5 * (v[1] - v[0]);
+    let c = v[2];
+    let q = -0.5 * (b + b.signum() * (b * b - 4.0 * a * c).sqrt());
+    let roots = [q / a, c / q].into_iter();
+    // what is not a number is no root
+    roots
+        .filter(|xi| xi.abs() <= 1.0 + ROUNDING)
+        .map(|xi| xi.clamp(-1.0, 1.0))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -56,6 +71,26 @@ mod tests {
         }
         assert!((shape(0.3).iter().sum::<f64>() - 1.0).abs() < 1e-15);
         assert!(derivative(0.3).iter().sum::<f64>().abs() < 1e-15);
+    }
+
+    #[test]
+    fn zeros_of_a_parabola_are_found_on_the_edge() {
+        let of = |f: &dyn Fn(f64) -> f64| {
+            let mut found: Vec<f64> = zeros(&[f(-1.0), f(1.0), f(0.0)]).collect();
+            found.sort_by(f64::total_cmp);
+            found
+        };
+        let close = |found: Vec<f64>, exact: &[f64]| {
+            assert_eq!(found.len(), exact.len(), "{found:?}");
+            assert!(found.iter().zip(exact).all(|(a, b)| (a - b).abs() < 1e-14));
+        };
+        close(of(&|x| x * x - 0.25), &[-0.5, 0.5]);
+        close(of(&|x| (x - 0.3) * (x - 4.0)), &[0.3]);
+        close(of(&|x| x - 0.7), &[0.7]);
+        close(of(&|x| (x + 1.0) * 3.0), &[-1.0]);
+        close(of(&|x| x * x + 0.1), &[]);
+        close(of(&|_| 2.0), &[]);
+        close(of(&|_| 0.0), &[]);
     }
 
     #[test]
