@@ -57,7 +57,7 @@ impl Origins {
         }
     }
 
-    /// Adds a place of a contact at which the obstacle reaches between the nodes: no error is known before there are nodes.
+    /// Adds a place of a contact at which the obstacle between the nodes is not resolved: no error is known before there are nodes.
     pub fn add_place(&mut self, model: &Model, patch: usize, s: f64) {
         let boundary = &model.contacts[patch].boundary;
         let covers = |edge: &usize| boundary.edge_arc(*edge)[1] >= s;

@@ -360,6 +360,99 @@ fn the_edges_of_a_stamp_drawn_in_space_are_kinks() {
     }
 }
 
+/// Waves of an obstacle with the length of the spacing of the nodes, and a crest at every node: 0.025 long, on a parabola.
+fn ripples(kind: &str, interpolation: &str, height: f64) -> Value {
+    let x: Vec<f64> = (-240..=240).map(|k| f64::from(k) / 240.0).collect();
+    let wave = |x: f64| 0.5 * height * (1.0 - (80.0 * std::f64::consts::PI * x).cos());
+    let gap = x.iter().map(|x| parabola(*x) + wave(*x));
+    match kind {
+        "table" => {
+            json!({"kind": kind, "x": x, "gap": gap.collect::<Vec<f64>>(), "interpolation": interpolation})
+        }
+        _ => {
+            let points: Vec<[f64; 2]> = x
+                .iter()
+                .copied()
+                .zip(gap)
+                .map(|(x, gap)| [x, gap])
+                .collect();
+            json!({"kind": kind, "points": points, "interpolation": interpolation})
+        }
+    }
+}
+
+/// An obstacle of which the nodes see the crests alone is as smooth for them as the parabola through these: it recedes between
+/// them, which is told whatever it is given by, and no error is stated. Nodes in its hollows see it.
+#[test]
+fn an_obstacle_that_recedes_between_nodes_is_told() {
+    let smooth = solve(&block(
+        &lines(0.05, &[]),
+        ripples("table", "cubic", 0.0),
+        0.04,
+    ));
+    assert_eq!(
+        smooth.summary.accuracy.as_ref().unwrap().verdict,
+        Verdict::Good
+    );
+    assert_eq!(warning(&smooth, WarningCode::ObstacleBetweenNodes), None);
+    for kind in ["table", "polyline"] {
+        for interpolation in ["linear", "cubic"] {
+            let obstacle = ripples(kind, interpolation, 0.004);
+            let solution = solve(&block(&lines(0.05, &[]), obstacle, 0.04));
+            close(peak(&solution), peak(&smooth), 1e-4);
+            let between = warning(&solution, WarningCode::ObstacleBetweenNodes).unwrap();
+            for part in ["recedes by 4.000e-3", "2.500e-2 apart"] {
+                assert!(between.message.contains(part), "{}", between.message);
+            }
+            let accuracy = solution.summary.accuracy.as_ref().unwrap();
+            assert_eq!(accuracy.verdict, Verdict::Poor);
+            assert!(accuracy.quantities.iter().all(|q| q.error.is_none()));
+        }
+    }
+}
+
+/// Waves too low for that are in the error of the peak, and what they take from the indentation in those of the forces: by a
+/// mesh that resolves them. Adaptive refinement does, where it began with a mesh that saw nothing of them.
+#[test]
+fn low_waves_between_nodes_are_in_the_errors() {
+    for height in [4e-4, 4e-5] {
+        let with = |refine: u32| {
+            let mut problem = block(&lines(0.05, &[]), ripples("table", "cubic", height), 0.04);
+            problem.mesh.refine = Refine::Times(refine);
+            solve(&problem)
+        };
+        let (coarse, fine) = (with(0), with(3));
+        assert!(peak(&fine) > 1.02 * peak(&coarse));
+        for (name, value) in [
+            (QuantityName::PeakNormalStress, peak(&fine)),
+            (QuantityName::NormalForce, fine.summary.normal_force),
+        ] {
+            let accuracy = coarse.summary.accuracy.as_ref().unwrap();
+            let own = accuracy
+                .quantities
+                .iter()
+                .find(|q| q.quantity == name)
+                .unwrap();
+            let off = (own.value.abs() - value).abs();
+            assert!(off <= own.error.unwrap(), "{height}: off {off} of {own:?}");
+        }
+    }
+    let mut adaptive = block(&lines(0.05, &[]), ripples("table", "cubic", 0.004), 0.04);
+    adaptive.mesh.refine = serde_json::from_value(json!({"tolerance": 0.05})).unwrap();
+    let solution = solve(&adaptive);
+    assert!(solution.summary.refinements.len() > 2);
+    assert_eq!(warning(&solution, WarningCode::ObstacleBetweenNodes), None);
+    assert!(
+        peak(&solution)
+            > 3.0
+                * peak(&solve(&block(
+                    &lines(0.05, &[]),
+                    ripples("table", "cubic", 0.0),
+                    0.04
+                )))
+    );
+}
+
 /// A smooth tooth in space, between the nodes of the upright side of a body: places are found along any boundary.
 #[test]
 fn a_curve_in_space_is_seen_between_nodes() {

@@ -18,6 +18,7 @@ use crate::algorithm::{Estimable, Finished, Quantity, Reported, System, influenc
 use crate::body::{AXIS_SHARE, ElasticBody};
 use crate::contact::edge_nodes;
 use crate::elasticity::Dof;
+use crate::element::edge3;
 use crate::linear::{Breaks, Stopped};
 use crate::model::Model;
 use crate::origins::{Added, Origins};
@@ -46,6 +47,8 @@ struct Parts {
     between: f64,
     /// [`Quantity::cut`].
     cut: f64,
+    /// [`Quantity::unseen`], and what the same shape of the obstacle changes by its mean.
+    unseen: f64,
     /// The quantity itself: rounding, and what no other part sees.
     value: f64,
 }
@@ -71,6 +74,7 @@ impl Parts {
             + spacing * self.spacing
             + between * self.between
             + of_cut(name) * self.cut
+            + self.unseen
             + value * self.value
     }
 }
@@ -192,6 +196,7 @@ fn bounds(
             spacing: quantity.spacing,
             between: quantity.between,
             cut: quantity.cut,
+            unseen: quantity.unseen,
             value: quantity.value.abs(),
             ..Parts::default()
         };
@@ -204,6 +209,9 @@ fn bounds(
             parts.absolute = quantity.factor.abs() * errors.iter().map(|e| e.abs()).sum::<f64>();
             parts.consistency = (quantity.factor * moved.map(|(a, b)| a * b).sum::<f64>()).abs();
             parts.gap = quantity.factor * gap_between_nodes(system, finished, &force);
+            if !quantity.unseen_at.is_empty() {
+                parts.unseen += (quantity.factor * unseen_gap(system, finished, &force)).abs();
+            }
             if origins.is_some() {
                 added = by_weight(quantity, system, &errors, &smoothing);
             }
@@ -299,6 +307,7 @@ fn by_spacing(quantity: &Quantity, all: &[Quantity], parts: &Parts, added: &mut 
     added.spread(gap * parts.gap.abs() + ends * parts.ends, &at_ends);
     added.spread(spacing * parts.spacing, &quantity.spacing_at);
     added.spread(between * parts.between, &quantity.between_at);
+    added.spread(parts.unseen, &quantity.unseen_at);
 }
 
 /// Whether a quantity is an end of the contact.
@@ -351,15 +360,52 @@ fn smoothing_of_reactions(system: &System<'_>, finished: &Finished) -> Vec<f64> 
     change
 }
 
-/// ∫ p_z (gap − u_n) over edges with a node in contact, p_z the pressure of the dual solution under `force`.
-fn gap_between_nodes(system: &System<'_>, finished: &Finished, force: &[f64]) -> f64 {
-    let state = &finished.state;
+/// p_z at the contact nodes: the pressure of the dual solution under `force`.
+fn dual_pressures(system: &System<'_>, finished: &Finished, force: &[f64]) -> Vec<f64> {
     let reaction = |node: usize| match system.nodes[node].normal {
-        Dof::Free(dof) if state.active[node] => force[dof],
+        Dof::Free(dof) if finished.state.active[node] => force[dof],
         _ => 0.0,
     };
     let reactions: Vec<f64> = (0..system.nodes.len()).map(reaction).collect();
-    let pressures = system.pressures(&reactions);
+    system.pressures(&reactions)
+}
+
+/// ∫ p_z (gap − parabola through the gap at the nodes) over edges that touch with all nodes, by the trapezoidal rule
+/// between the places at which the obstacle is known.
+fn unseen_gap(system: &System<'_>, finished: &Finished, force: &[f64]) -> f64 {
+    let pressures = dual_pressures(system, finished, force);
+    let mut sum = 0.0;
+    for patch in &system.patches {
+        let contact = patch.contact;
+        let friction_points = &contact.boundary.friction_points;
+        for places in contact.places.chunk_by(|a, b| a.edge == b.edge) {
+            let edge = places[0].edge;
+            let nodes = edge_nodes(edge).map(|i| patch.first + i);
+            if !nodes.iter().all(|n| finished.state.active[*n]) {
+                continue;
+            }
+            let weights = friction_points[3 * edge..3 * edge + 3].iter();
+            let half: f64 = 0.5 * weights.map(|point| point.weight).sum::<f64>();
+            let at_nodes = [-1.0, 0.0, 1.0].map(|xi| (xi, 0.0));
+            let mut values: Vec<(f64, f64)> = at_nodes.to_vec();
+            values.extend(places.iter().map(|place| {
+                let pressure = nodes.map(|n| pressures[n]);
+                let pressure = edge3::interpolate(&edge3::shape(place.xi), &pressure);
+                (place.xi, -place.nearer * pressure)
+            }));
+            values.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let trapezoid =
+                |pair: &[(f64, f64)]| 0.5 * (pair[1].0 - pair[0].0) * (pair[0].1 + pair[1].1);
+            sum += half * values.windows(2).map(trapezoid).sum::<f64>();
+        }
+    }
+    sum
+}
+
+/// ∫ p_z (gap − u_n) over edges with a node in contact, p_z the pressure of the dual solution under `force`.
+fn gap_between_nodes(system: &System<'_>, finished: &Finished, force: &[f64]) -> f64 {
+    let state = &finished.state;
+    let pressures = dual_pressures(system, finished, force);
     let opening = |node: usize| system.opening(&state.v, node);
     let mut sum = 0.0;
     for patch in &system.patches {

@@ -188,7 +188,7 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
         }
         (None, ..) => match doubt {
             Some(Doubt::Unseen) => {
-                unknown("the obstacle reaches into the body between the nodes".to_owned())
+                unknown("the shape of the obstacle between the nodes is not resolved".to_owned())
             }
             Some(Doubt::Unestimated) => unknown(format!(
                 "there is no estimate of it, and that it is {finer:.5e} with every element split in two is no bound by itself"

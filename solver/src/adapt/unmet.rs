@@ -15,8 +15,8 @@ const MOST_MESHES: usize = 30;
 const PATIENCE: usize = 8;
 const FEWEST_MESHES: usize = 12;
 
-/// Most meshes in a row of which no error is known: none is while an obstacle reaches between the nodes, and each mesh halves
-/// the distance of these there.
+/// Most meshes in a row of which no error is known: none is while the obstacle between the nodes is not resolved, and each
+/// mesh halves the distance of these there.
 const MOST_UNKNOWN: usize = 8;
 
 /// Why there is no finer mesh.
@@ -31,7 +31,7 @@ pub(super) enum Unmet {
     Meshes,
     /// Finer meshes make the errors smaller too slowly, or not at all.
     Stalled,
-    /// The linearised problem has no unique solution, or the obstacle reaches between the nodes.
+    /// The linearised problem has no unique solution, or the obstacle between the nodes is not resolved.
     Unknown,
     /// The finer mesh, of so many unknowns, would need so much memory (bytes).
     Memory { unknowns: u64, bytes: u64 },
@@ -129,7 +129,7 @@ pub(super) fn unfinished(
             Unmet::Stalled => {
                 format!("the last {PATIENCE} have made it so little smaller that no more are tried")
             }
-            Unmet::Unknown => "the linearised problem has no unique solution, or the obstacle still reaches between the nodes".to_owned(),
+            Unmet::Unknown => "the linearised problem has no unique solution, or the obstacle between the nodes is still not resolved".to_owned(),
             Unmet::Folded => {
                 "an element of the first mesh is so curved or crooked that its parts would be folded"
                     .to_owned()

@@ -48,14 +48,15 @@ pub struct Place {
     pub profile: Profile,
     /// The change of its slope along t; positive at a kink that points at the body, 0 where it is smooth.
     pub kink: f64,
-    /// How much nearer it is than the parabola through the profile at the edge's nodes (length, either sign).
+    /// How much nearer it is than the parabola through the profile at the edge's nodes; negative: farther (length).
     pub nearer: f64,
 }
 
 /// Where an edge is looked at between its nodes.
 const BETWEEN: [f64; 6] = [-0.75, -0.5, -0.25, 0.25, 0.5, 0.75];
 
-/// Most places that are kept of one edge: those where the obstacle is nearest, and the sharpest kinks.
+/// Most places that are kept of one edge: a quarter where the obstacle is nearest, a quarter where it is farthest, and the
+/// sharpest kinks.
 const MOST_PLACES: usize = 32;
 
 /// Finds the part of `boundary` (edges that follow one another) that faces the obstacle.
@@ -345,10 +346,12 @@ impl<'a> View<'a> {
             }
         }
         if found.len() > MOST_PLACES {
-            let half = MOST_PLACES / 2;
+            const QUARTER: usize = MOST_PLACES / 4;
             found.sort_by(|a, b| b.nearer.total_cmp(&a.nearer));
-            found[half..].sort_by(|a, b| b.kink.total_cmp(&a.kink));
-            found.truncate(MOST_PLACES);
+            let farthest = found.split_off(found.len() - QUARTER);
+            found[QUARTER..].sort_by(|a, b| b.kink.total_cmp(&a.kink));
+            found.truncate(MOST_PLACES - QUARTER);
+            found.extend(farthest);
         }
         found.sort_by(|a, b| a.xi.total_cmp(&b.xi));
         found

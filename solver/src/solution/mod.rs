@@ -322,7 +322,7 @@ pub enum WarningCode {
     ContactReachesObstacleEnd,
     /// An averaged pressure, and friction with it, that reaches beyond an end of the contact boundary and is lost.
     FrictionLostAtEnd,
-    /// An obstacle that reaches into the body between two nodes.
+    /// An obstacle that reaches into the body between two nodes, or recedes from it.
     ObstacleBetweenNodes,
     /// A kink of the obstacle in the contact.
     KinkInContact,

@@ -1,5 +1,5 @@
-//! What the nodes of a contact do not see: an obstacle that reaches into the body between them, and kinks at which the
-//! pressure has no limit.
+//! What the nodes of a contact do not see: an obstacle that reaches into the body between them or recedes from it, and
+//! kinks at which the pressure has no limit.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{LN_2, PI};
@@ -12,25 +12,32 @@ use crate::element::edge3;
 use crate::problem::{Condition, NormalOf};
 use crate::solution::{Outcome, Warning, WarningCode};
 
-/// A place between nodes at which the obstacle reaches into the body, and nothing resists it: a node is needed there.
+/// A place between nodes at which the obstacle reaches into the body, and nothing resists it, or recedes from a body that
+/// touches it on both sides: a node is needed there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Missed {
     /// The contact, by its place in the model.
     pub patch: usize,
     /// Arc length from the start of the named boundary.
     pub s: f64,
-    /// How far the obstacle reaches into the body there (length).
+    /// How far the obstacle reaches into the body there; negative: how far it recedes (length).
     pub penetration: f64,
     /// Distance between the nodes on either side (length).
     pub spacing: f64,
-    /// The force that would push a node out of the obstacle there / largest nodal reaction; infinite where nothing
-    /// touches.
+    /// The force that would push a node to the obstacle there / largest nodal reaction; infinite where nothing touches.
     pub severity: f64,
 }
 
 /// Severity from which a place is reported. A kink that points at the body between the nodes of a contact that is
 /// resolved has up to 0.4, a smooth obstacle up to 0.11 (the random problems of `tests/verification`).
 const SERIOUS: f64 = 0.5;
+
+/// What crests add where the hollows between them do not touch, in amplitudes of full contact: 1.1 where they almost do.
+const PARTIAL: f64 = 1.5;
+
+/// What the obstacle does between the nodes counts if it adds more than this part to the peak of the pressure. A circle adds
+/// less on any mesh that resolves its contact.
+const SLIGHT: f64 = 1e-3;
 
 /// Most places that are reported of one contact.
 const MOST_MISSED: usize = 20;
@@ -56,9 +63,9 @@ pub(super) struct Kink {
 }
 
 impl PatchView<'_> {
-    /// Where the obstacle reaches into the body between the nodes, at most one place for each edge, the deepest
-    /// first. Only of what the nodes do not see: a smooth obstacle is a parabola between them, and what that leaves open
-    /// at the ends of contact belongs to the errors of the mesh.
+    /// Where the obstacle reaches into the body between the nodes or recedes from it, at most one place for each edge, the
+    /// deepest first. Only of what the nodes do not see: a smooth obstacle is a parabola between them, and what that leaves
+    /// open at the ends of contact belongs to the errors of the mesh.
     pub(in crate::algorithm) fn missed(&self) -> Vec<Missed> {
         let contact = self.patch.contact;
         let mut found: Vec<(usize, Missed)> = Vec::new();
@@ -74,11 +81,19 @@ impl PatchView<'_> {
             // it counts by the nearer of the two, and one of them is known
             let stiffness = self.stiffness(place.edge);
             let slight = |unseen: f64| unseen <= least || stiffness * unseen / largest < SERIOUS;
-            if slight(place.nearer) {
+            if slight(place.nearer.abs()) {
                 continue;
             }
-            let penetration = self.penetration(place);
-            let unseen = penetration.min(place.nearer);
+            let penetration = match place.nearer > 0.0 {
+                true => self.penetration(place),
+                // nodes that do not touch say nothing of the obstacle between them
+                false if self.touched_beside(place) => place.nearer,
+                false => continue,
+            };
+            let unseen = match place.nearer > 0.0 {
+                true => penetration.min(place.nearer),
+                false => -penetration,
+            };
             if slight(unseen) {
                 continue;
             }
@@ -92,7 +107,7 @@ impl PatchView<'_> {
             };
             match found.last_mut() {
                 Some((edge, deepest)) if *edge == place.edge => {
-                    if deepest.penetration < penetration {
+                    if deepest.penetration.abs() < penetration.abs() {
                         *deepest = missed;
                     }
                 }
@@ -100,9 +115,45 @@ impl PatchView<'_> {
             }
         }
         let mut found: Vec<Missed> = found.into_iter().map(|(_, missed)| missed).collect();
-        found.sort_by(|a, b| b.penetration.total_cmp(&a.penetration));
+        let depth = |missed: &Missed| missed.penetration.abs();
+        found.sort_by(|a, b| depth(b).total_cmp(&depth(a)));
         found.truncate(MOST_MISSED);
         found
+    }
+
+    /// The pressure that the obstacle between the nodes of an edge may add and that they do not see, at the edges where there
+    /// is one (stress). A wave of height h = |nearer| whose length λ is the distance of the nodes presses with the amplitude
+    /// π E* h/(2 λ) on a half-plane in full contact; where it touches with its crests only, with more.
+    pub(super) fn unseen_pressures(&self) -> Vec<(usize, f64)> {
+        let contact = self.patch.contact;
+        if contact.condition != Condition::Unilateral {
+            return Vec::new();
+        }
+        let s = &contact.boundary.s;
+        let least = ROUNDING * s[s.len() - 1];
+        let touched = |place: &&Place| place.nearer.abs() > least && self.touched_beside(place);
+        let mut found: Vec<(usize, f64)> = Vec::new();
+        for place in contact.places.iter().filter(touched) {
+            let steepness = place.nearer.abs() / self.spacing(place);
+            match found.last_mut() {
+                Some((edge, most)) if *edge == place.edge => *most = most.max(steepness),
+                _ => found.push((place.edge, steepness)),
+            }
+        }
+        if found.is_empty() {
+            return found;
+        }
+        let moduli = self.contact_moduli();
+        let pressure =
+            |(edge, steepness): (usize, f64)| (edge, PARTIAL * 0.5 * PI * moduli[edge] * steepness);
+        let mut pressures: Vec<(usize, f64)> = found.into_iter().map(pressure).collect();
+        pressures.retain(|(_, pressure)| *pressure > SLIGHT * self.largest);
+        pressures
+    }
+
+    /// Whether the nodes on either side of a place are in contact.
+    fn touched_beside(&self, place: &Place) -> bool {
+        self.beside(place).iter().all(|&i| self.active(i))
     }
 
     pub(super) fn warn_of_missed(&self, warnings: &mut Vec<Warning>) {
@@ -119,12 +170,19 @@ impl PatchView<'_> {
             spacing,
             ..
         } = worst;
+        let message = match *penetration > 0.0 {
+            true => format!(
+                "The obstacle reaches {penetration:.3e} into the body between two nodes, at s = {s:.4}{others}: they are {spacing:.3e} apart, and nothing resists it there. Forces and peaks are not those of this obstacle. Put a grid line there, or refine the mesh until the nodes see it."
+            ),
+            false => format!(
+                "The obstacle recedes by {:.3e} between two nodes that touch it, at s = {s:.4}{others}: they are {spacing:.3e} apart, and the body presses there as if it were smooth. Forces and peaks are not those of this obstacle. Refine the mesh until the nodes see it.",
+                -penetration
+            ),
+        };
         warnings.push(Warning {
             code: WarningCode::ObstacleBetweenNodes,
             pointer: self.patch.contact.pointer.clone(),
-            message: format!(
-                "The obstacle reaches {penetration:.3e} into the body between two nodes, at s = {s:.4}{others}: they are {spacing:.3e} apart, and nothing resists it there. Forces and peaks are not those of this obstacle. Put a grid line there, or refine the mesh until the nodes see it."
-            ),
+            message,
         });
     }
 

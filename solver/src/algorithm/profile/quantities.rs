@@ -29,10 +29,14 @@ pub struct Quantity {
     /// What the part of the contact beyond its last node means, where an end of the obstacle lies inside an edge and that edge
     /// is left out: its length for extents, else the quantity times that length in lengths of the contact.
     pub cut: f64,
+    /// Of a peak: the pressure of a shape of the obstacle between the nodes that they do not see.
+    pub unseen: f64,
     /// The edges of the contact that `spacing` comes from, with their parts in any unit.
     pub spacing_at: Vec<(usize, f64)>,
     /// The edges that `between` comes from, likewise.
     pub between_at: Vec<(usize, f64)>,
+    /// The edges between whose nodes the obstacle has a shape of its own, likewise.
+    pub unseen_at: Vec<(usize, f64)>,
     /// Whether an error can be stated.
     pub estimable: Estimable,
 }
@@ -46,7 +50,7 @@ pub enum Estimable {
     NoLimit,
     /// It is an end of stick, of which there are more than are followed.
     TooMany,
-    /// The obstacle reaches into the body between the nodes: what that changes is not known.
+    /// The obstacle reaches into the body between the nodes or recedes from it: what that changes is not known.
     Unseen,
 }
 
@@ -92,6 +96,7 @@ impl PatchView<'_> {
         found.extend(self.peaks());
         found.extend(self.ends());
         self.add_cuts(&mut found);
+        self.add_unseen(&mut found);
         if !self.missed().is_empty() {
             for quantity in &mut found {
                 if quantity.estimable == Estimable::Yes {
@@ -122,6 +127,23 @@ impl PatchView<'_> {
         }
     }
 
+    /// What the shape of the obstacle between the nodes means for the peaks. An average over ρ hardly feels it.
+    fn add_unseen(&self, quantities: &mut [Quantity]) {
+        let by_edge = self.unseen_pressures();
+        let most = by_edge.iter().fold(0.0f64, |most, (_, p)| most.max(*p));
+        let local = self.averages_nothing();
+        for quantity in quantities {
+            quantity.unseen = match quantity.name {
+                QuantityName::PeakNormalStress => most,
+                QuantityName::PeakTangentialStress if local && self.largest > 0.0 => {
+                    most * quantity.value.abs() / self.largest
+                }
+                _ => 0.0,
+            };
+            quantity.unseen_at.clone_from(&by_edge);
+        }
+    }
+
     /// The length that the obstacle covers beyond the first or the last node.
     fn left_out(&self, node: usize) -> f64 {
         let contact = &self.patch.contact;
@@ -143,8 +165,10 @@ impl PatchView<'_> {
             spacing: 0.0,
             between: 0.0,
             cut: 0.0,
+            unseen: 0.0,
             spacing_at: Vec::new(),
             between_at: Vec::new(),
+            unseen_at: Vec::new(),
             estimable: Estimable::Yes,
         }
     }
