@@ -13,10 +13,12 @@ pub mod phase;
 // Violations, and errors that end a solution.
 pub mod error;
 
-// Pure maths on numbers: master elements and rules; matrices (the one room that names faer); NaN and infinity.
+// Pure maths on numbers: master elements and rules; matrices (the one room that names faer); NaN and infinity; curves
+// through points.
 pub mod element;
 pub mod finite;
 pub mod linear;
+pub mod spline;
 
 // Plain data: the question and the answer.
 pub mod problem;

@@ -1,8 +1,8 @@
 //! Curves in space that are met along the body's normal.
 
-use super::spline::Spline;
 use super::{Profile, ROUNDING};
 use crate::problem::Interpolation;
+use crate::spline::Spline;
 
 /// A curve in space.
 pub(super) enum Curve<'a> {

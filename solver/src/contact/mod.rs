@@ -4,7 +4,6 @@
 mod curve;
 pub mod obstacle;
 mod shape;
-mod spline;
 
 use crate::element::edge3;
 use crate::element::gauss::GAUSS_3;

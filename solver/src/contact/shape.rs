@@ -2,8 +2,8 @@
 
 use super::ROUNDING;
 use super::curve::Curve;
-use super::spline::{Spline, smoothed};
 use crate::problem::{Interpolation, Obstacle};
+use crate::spline::{Spline, smoothed};
 
 /// A place where an obstacle may be nearer to the body than beside it, or has a kink.
 #[derive(Clone, Copy, Debug, PartialEq)]

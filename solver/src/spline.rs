@@ -4,7 +4,7 @@
 /// natural ends its curvature would be 0 there, and so would the pressure of a contact that begins at the first point,
 /// as every half model does.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Spline {
+pub struct Spline {
     x: Vec<f64>,
     y: Vec<f64>,
     /// Slope at every point.
@@ -18,7 +18,7 @@ const FLAT: f64 = 1e-12;
 
 impl Spline {
     /// Through at least two points with strictly increasing x: a line through two, a parabola through three.
-    pub(super) fn new(x: Vec<f64>, y: Vec<f64>) -> Self {
+    pub fn new(x: Vec<f64>, y: Vec<f64>) -> Self {
         let steps: Vec<f64> = x.windows(2).map(|x| x[1] - x[0]).collect();
         let chords: Vec<f64> = y
             .windows(2)
@@ -45,17 +45,17 @@ impl Spline {
     }
 
     /// Value and slope at `at`, between the first and the last point.
-    pub(super) fn at(&self, at: f64) -> [f64; 2] {
+    pub fn at(&self, at: f64) -> [f64; 2] {
         self.on_piece(self.piece(at), at)
     }
 
     /// Number of pieces between points.
-    pub(super) fn pieces(&self) -> usize {
+    pub fn pieces(&self) -> usize {
         self.x.len() - 1
     }
 
     /// The ends of a piece.
-    pub(super) fn ends(&self, piece: usize) -> [f64; 2] {
+    pub fn ends(&self, piece: usize) -> [f64; 2] {
         [self.x[piece], self.x[piece + 1]]
     }
 
@@ -64,7 +64,7 @@ impl Spline {
     }
 
     /// Value and slope of the cubic of one piece, by Hermite's formula.
-    pub(super) fn on_piece(&self, k: usize, at: f64) -> [f64; 2] {
+    pub fn on_piece(&self, k: usize, at: f64) -> [f64; 2] {
         let step = self.x[k + 1] - self.x[k];
         let part = (at - self.x[k]) / step;
         let chord = (self.y[k + 1] - self.y[k]) / step;
@@ -117,7 +117,7 @@ fn not_a_knot(steps: &[f64], chords: &[f64]) -> Vec<f64> {
 /// ∫f‴² (Reinsch's criterion, with the third derivative and by differences). The pressure follows the curvature of a
 /// profile: the usual penalty on the curvature itself would flatten it, most at the ends, while a parabola costs
 /// nothing here and is found exactly under the noise. Where a parabola is near enough, it is the result.
-pub(super) fn smoothed(x: &[f64], y: &[f64], deviation: f64) -> Vec<f64> {
+pub fn smoothed(x: &[f64], y: &[f64], deviation: f64) -> Vec<f64> {
     let count = x.len();
     let parabola = parabola(x, y);
     let rest: Vec<f64> = y.iter().zip(&parabola).map(|(y, p)| y - p).collect();
