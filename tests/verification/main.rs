@@ -50,6 +50,7 @@ mod robustness;
 mod rounding;
 mod sliding;
 mod small_strain;
+mod smooth;
 mod stick;
 mod stick_ends;
 mod support;

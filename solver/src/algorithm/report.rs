@@ -10,7 +10,7 @@ use crate::algorithm::system::System;
 use crate::body::ElasticBody;
 use crate::elasticity::{Dof, Recovered, StressDifference, recover};
 use crate::error::SolveError;
-use crate::model::Model;
+use crate::model::{Hold, Model};
 use crate::solution::{
     ContactProfile, ContactSummary, Fields, GaussFields, NodeState, Outcome, Phase, Residuals,
     Summary, Warning, WarningCode, at_all_points,
@@ -241,10 +241,10 @@ fn held(model: &Model, system: &System<'_>, finished: &Finished) -> Result<(), S
         for (i, node) in system.range(patch).enumerate() {
             let state = &system.nodes[node];
             if finished.state.active[node] {
-                hindered.push((boundary.nodes[i], boundary.normals[i]));
+                hindered.push(Hold::along_normal(boundary, i));
             }
             if state.held_tangent.is_some() {
-                hindered.push((boundary.nodes[i], boundary.tangent(i)));
+                hindered.push(Hold::along_tangent(boundary, i));
             }
         }
     }
@@ -254,7 +254,7 @@ fn held(model: &Model, system: &System<'_>, finished: &Finished) -> Result<(), S
         let moved = point.nodes.into_iter().zip(point.shape);
         for (node, _) in moved.filter(|(_, shape)| *shape != 0.0) {
             let (boundary, i) = (&patch.contact.boundary, node - patch.first);
-            hindered.push((boundary.nodes[i], boundary.tangent(i)));
+            hindered.push(Hold::along_tangent(boundary, i));
         }
     }
     match model.free_motion(&hindered) {

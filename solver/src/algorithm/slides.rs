@@ -6,7 +6,7 @@ use crate::algorithm::track::Measured;
 use crate::elasticity::Dof;
 use crate::error::rounded;
 use crate::friction::{BoundLaw, Source};
-use crate::model::RigidMotion;
+use crate::model::{Hold, RigidMotion};
 use crate::problem::Condition;
 
 /// Push and friction that differ by less are equal: by rounding, and by what iterations leave.
@@ -117,10 +117,10 @@ fn motions(system: &System<'_>, touches: impl Fn(usize) -> bool) -> Vec<RigidMot
         let boundary = &patch.contact.boundary;
         for (i, node) in system.range(patch).enumerate() {
             if patch.contact.condition != Condition::None && touches(node) {
-                hindered.push((boundary.nodes[i], boundary.normals[i]));
+                hindered.push(Hold::along_normal(boundary, i));
             }
             if system.nodes[node].held_tangent.is_some() {
-                hindered.push((boundary.nodes[i], boundary.tangent(i)));
+                hindered.push(Hold::along_tangent(boundary, i));
             }
         }
     }
@@ -180,8 +180,9 @@ impl Moved {
             let boundary = &patch.contact.boundary;
             let in_the_way = |i: usize| {
                 let moved = self.of(boundary.nodes[i]);
+                let error = boundary.normal_errors[i] * moved[0].hypot(moved[1]);
                 !active[patch.first + i]
-                    && push.signum() * dot(boundary.normals[i], moved) > ALIGNED
+                    && push.signum() * dot(boundary.normals[i], moved) > ALIGNED + error
             };
             patch.contact.condition != Condition::None && (0..boundary.nodes.len()).any(in_the_way)
         })
@@ -260,7 +261,10 @@ impl Moved {
             let boundary = &patch.contact.boundary;
             for (i, &node) in boundary.nodes.iter().enumerate() {
                 if system.nodes[patch.first + i].bonded {
-                    bonded.extend([(node, boundary.normals[i]), (node, boundary.tangent(i))]);
+                    bonded.extend([
+                        Hold::along_normal(boundary, i),
+                        Hold::along_tangent(boundary, i),
+                    ]);
                 }
                 if self.0[node as usize].is_none() || patch.contact.condition == Condition::None {
                     continue;

@@ -4,6 +4,9 @@
 mod curve;
 pub mod obstacle;
 mod shape;
+pub mod smooth;
+
+use std::collections::BTreeMap;
 
 use crate::element::edge3;
 use crate::element::gauss::GAUSS_3;
@@ -11,6 +14,9 @@ use crate::mesh::{Edge, Mesh};
 
 /// Positions count as equal within this part of a length: they coincide with grid lines only up to rounding.
 const ROUNDING: f64 = 1e-9;
+
+/// The directions (unit vectors, with their errors as angles) along which supports hold nodes.
+pub type HeldDirections = BTreeMap<u32, ([f64; 2], f64)>;
 
 /// Distance and slope of an obstacle at a place on the boundary.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -36,8 +42,11 @@ pub struct ContactBoundary {
     pub positions: Vec<[f64; 2]>,
     /// Arc length from the start of the named boundary, whatever part of it faces the obstacle.
     pub s: Vec<f64>,
-    /// Unit outward normal; at a corner between two edges the mean of theirs.
+    /// Unit outward normal; at a corner between two edges the mean of theirs, also at an end where the surface goes on
+    /// smoothly.
     pub normals: Vec<[f64; 2]>,
+    /// How far each normal may be off that of the surface (angle).
+    pub normal_errors: Vec<f64>,
     /// ∫ h_i, with the depth of the section: from a nodal force to a pressure.
     pub weights: Vec<f64>,
     /// Three Gauss points per edge.
@@ -58,21 +67,32 @@ pub struct FrictionPoint {
 }
 
 impl ContactBoundary {
-    /// From edges that follow one another, the first node at arc length `start`; `depth` as in `elasticity::Section`.
-    pub fn new(mesh: &Mesh, chain: &[Edge], start: f64, depth: impl Fn(f64) -> f64) -> Self {
+    /// From edges that follow one another, the first node at arc length `start`; `depth` as in `elasticity::Section`. `held`:
+    /// where the direction along which supports hold a node is normal or tangent but for such errors, as on a line of symmetry, it exactly is.
+    pub fn new(
+        mesh: &Mesh,
+        chain: &[Edge],
+        start: f64,
+        held: &HeldDirections,
+        depth: impl Fn(f64) -> f64,
+    ) -> Self {
         let count = 2 * chain.len() + 1;
         let mut boundary = ContactBoundary {
             nodes: vec![0; count],
             positions: vec![[0.0; 2]; count],
             s: arc_lengths(mesh, chain).iter().map(|s| start + s).collect(),
             normals: vec![[0.0; 2]; count],
+            normal_errors: vec![0.0; count],
             weights: vec![0.0; count],
             friction_points: Vec::with_capacity(3 * chain.len()),
         };
         for (k, edge) in chain.iter().enumerate() {
             let local = edge_nodes(k);
             let positions = mesh.edge_nodes(edge);
+            let error = smooth::direction_error(&positions);
             for (i, [x, y]) in edge_normals(&positions).into_iter().enumerate() {
+                let known = &mut boundary.normal_errors[local[i]];
+                *known = error.max(*known);
                 boundary.nodes[local[i]] = edge[i];
                 boundary.positions[local[i]] = positions[i];
                 boundary.normals[local[i]][0] += x;
@@ -92,10 +112,19 @@ impl ContactBoundary {
                 });
             }
         }
-        for [x, y] in &mut boundary.normals {
-            let length = x.hypot(*y);
+        let beyond = smooth::normals_beyond(mesh, chain);
+        for i in 0..count {
+            let (node, [mut x, mut y]) = (boundary.nodes[i], boundary.normals[i]);
+            if let Some([a, b]) = beyond.get(&node) {
+                (x, y) = (x + a, y + b);
+            }
+            let length = x.hypot(y);
+            let mut normal = [x / length, y / length];
+            if let Some((direction, error)) = held.get(&node) {
+                normal = aligned(normal, *direction, boundary.normal_errors[i] + error);
+            }
             // + 0.0 turns −0 into 0, so that an axis-parallel normal is exactly that
-            (*x, *y) = (*x / length + 0.0, *y / length + 0.0);
+            boundary.normals[i] = normal.map(|n| n + 0.0);
         }
         boundary
     }
@@ -116,9 +145,30 @@ impl ContactBoundary {
         [y, -x]
     }
 
+    /// The angle by which the body's surface turns at a node between two edges: 0 where it is smooth, positive at a corner
+    /// that points at the obstacle.
+    pub fn corner(&self, node: usize) -> f64 {
+        let side = |edge: usize| edge_nodes(edge).map(|i| self.positions[i]);
+        match node % 2 == 0 && node > 0 && node + 1 < self.nodes.len() {
+            true => smooth::corner(&side(node / 2 - 1), &side(node / 2)),
+            false => 0.0,
+        }
+    }
+
     /// Arc lengths of an edge's nodes (start, end, midside).
     pub fn edge_arc(&self, edge: usize) -> [f64; 3] {
         edge_nodes(edge).map(|i| self.s[i])
+    }
+}
+
+/// A normal (unit vector), or the direction that is normal or tangent instead of it but for an error (angle).
+fn aligned(normal: [f64; 2], direction: [f64; 2], error: f64) -> [f64; 2] {
+    let ([a, b], [x, y]) = (normal, direction);
+    let (sine, cosine) = (a * y - b * x, a * x + b * y);
+    match error.sin() {
+        error if sine.abs() <= error => [x, y].map(|d| cosine.signum() * d),
+        error if cosine.abs() <= error => [y, -x].map(|d| sine.signum() * d),
+        _ => normal,
     }
 }
 
@@ -186,7 +236,7 @@ mod tests {
     #[test]
     fn a_top_edge_has_its_normal_up_and_its_tangent_along_x() {
         let (mesh, chain) = top(&[[0.0, 1.0], [1.0, 1.0], [2.0, 1.0], [2.5, 1.0], [3.0, 1.0]]);
-        let boundary = ContactBoundary::new(&mesh, &chain, 0.0, |_| 1.0);
+        let boundary = ContactBoundary::new(&mesh, &chain, 0.0, &BTreeMap::new(), |_| 1.0);
         assert_eq!(boundary.s, [0.0, 1.0, 2.0, 2.5, 3.0]);
         for i in 0..5 {
             assert_eq!(
@@ -213,7 +263,7 @@ mod tests {
     #[test]
     fn a_node_on_the_axis_has_no_weight() {
         let (mesh, chain) = top(&[[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]]);
-        let boundary = ContactBoundary::new(&mesh, &chain, 0.0, |r| r);
+        let boundary = ContactBoundary::new(&mesh, &chain, 0.0, &BTreeMap::new(), |r| r);
         assert!(boundary.weights[0].abs() < 1e-16);
         assert!((boundary.weights.iter().sum::<f64>() - 0.5).abs() < 1e-15);
     }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::curve::{Curve, Hit, Ray, Side};
 use super::shape::{Corner, Shape};
-use super::{ContactBoundary, Profile, ROUNDING, edge_nodes};
+use super::{ContactBoundary, HeldDirections, Profile, ROUNDING, edge_nodes};
 use crate::element::edge3;
 use crate::mesh::{Edge, Mesh};
 use crate::problem::{Along, Obstacle};
@@ -59,9 +59,15 @@ const BETWEEN: [f64; 6] = [-0.75, -0.5, -0.25, 0.25, 0.5, 0.75];
 /// sharpest kinks.
 const MOST_PLACES: usize = 32;
 
-/// Finds the part of `boundary` (edges that follow one another) that faces the obstacle.
-pub fn facing(mesh: &Mesh, boundary: &[Edge], obstacle: &Obstacle) -> Facing {
-    let mut view = View::new(mesh, boundary, obstacle);
+/// Finds the part of `boundary` (edges that follow one another) that faces the obstacle. `held`: as in
+/// [`ContactBoundary::new`].
+pub fn facing(
+    mesh: &Mesh,
+    boundary: &[Edge],
+    held: &HeldDirections,
+    obstacle: &Obstacle,
+) -> Facing {
+    let mut view = View::new(mesh, boundary, held, obstacle);
     let (from, to, _) = obstacle.span();
     let [first, last] = view.shape.ends();
     let (low, high) = (
@@ -96,13 +102,14 @@ pub fn facing(mesh: &Mesh, boundary: &[Edge], obstacle: &Obstacle) -> Facing {
 }
 
 /// Γ_C along edges; its geometry only: the depth of the section does not matter.
-fn along(mesh: &Mesh, chain: &[Edge]) -> ContactBoundary {
-    ContactBoundary::new(mesh, chain, 0.0, |_| 1.0)
+fn along(mesh: &Mesh, chain: &[Edge], held: &HeldDirections) -> ContactBoundary {
+    ContactBoundary::new(mesh, chain, 0.0, held, |_| 1.0)
 }
 
 /// A boundary and the obstacle as seen from it.
 struct View<'a> {
     mesh: &'a Mesh,
+    held: &'a HeldDirections,
     shape: Shape<'a>,
     along: Along,
     whole: ContactBoundary,
@@ -121,12 +128,18 @@ struct Seen {
 }
 
 impl<'a> View<'a> {
-    fn new(mesh: &'a Mesh, boundary: &[Edge], obstacle: &'a Obstacle) -> Self {
+    fn new(
+        mesh: &'a Mesh,
+        boundary: &[Edge],
+        held: &'a HeldDirections,
+        obstacle: &'a Obstacle,
+    ) -> Self {
         let shape = Shape::new(obstacle);
-        let whole = along(mesh, boundary);
+        let whole = along(mesh, boundary, held);
         let rounding = ROUNDING * whole.s[whole.s.len() - 1];
         View {
             mesh,
+            held,
             along: obstacle.span().2,
             rigid: match shape.in_space() {
                 Some(curve) => rigid_side(curve, mesh, &whole, rounding),
@@ -177,7 +190,7 @@ impl<'a> View<'a> {
 
     /// The normals of an edge's nodes if it is a contact alone.
     fn own_normals(&self, edge: &Edge) -> [[f64; 2]; 3] {
-        let own = along(self.mesh, &[*edge]);
+        let own = along(self.mesh, &[*edge], self.held);
         edge_nodes(0).map(|i| own.normals[i])
     }
 
@@ -194,7 +207,7 @@ impl<'a> View<'a> {
 
     /// From now on the normals at the ends of a run are those of a contact that ends there. `chain`: its edges.
     fn end_at(&mut self, run: Range<usize>, chain: &[Edge]) {
-        let normals = along(self.mesh, chain).normals;
+        let normals = along(self.mesh, chain, self.held).normals;
         self.whole.normals[2 * run.start..=2 * run.end].copy_from_slice(&normals);
     }
 
@@ -520,7 +533,7 @@ mod tests {
             top: None,
             bottom: None,
         });
-        facing(&mesh, &mesh.boundaries["top"], obstacle)
+        facing(&mesh, &mesh.boundaries["top"], &BTreeMap::new(), obstacle)
     }
 
     #[test]

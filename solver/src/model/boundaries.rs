@@ -415,7 +415,10 @@ fn faces(part: &BoundaryPart, nodes: &[[f64; 2]; 3]) -> bool {
     let Some([x, y]) = part.normal else {
         return true;
     };
-    let least = part.angle.unwrap_or(SAME_DIRECTION).to_radians().cos();
+    let angle = part.angle.unwrap_or(SAME_DIRECTION).to_radians();
+    let least = (angle + crate::contact::smooth::direction_error(nodes))
+        .min(std::f64::consts::PI)
+        .cos();
     crate::contact::edge_normals(nodes)
         .iter()
         .all(|[nx, ny]| (nx * x + ny * y) / x.hypot(y) >= least - ALIGNED)

@@ -20,15 +20,18 @@ use crate::solution::WarningCode;
 /// The friction law of a contact; none: frictionless.
 pub(super) type Law = Option<FrictionLaw<Average>>;
 
-/// Cosine of the sharpest turn between two contact edges without a warning: 20°.
-const SHARPEST_TURN: f64 = 0.94;
+/// The sharpest corner between two contact edges without a warning: 20° (angle).
+const SHARPEST_TURN: f64 = 0.35;
 
-/// Cosine of the sharpest turn that is accepted: 45°.
-const SHARPEST_CORNER: f64 = 0.7;
+/// The sharpest that is accepted: 45° (angle).
+const SHARPEST_CORNER: f64 = 0.795;
 
 /// Largest nonlocal radius, in lengths of the contact boundary. Beyond it the average hardly depends
 /// on the contact, and between two lines of symmetry its cost grows with the radius.
 const LARGEST_RADIUS: f64 = 10.0;
+
+/// Slopes of obstacles above this are none that printed digits leave.
+const NO_SLOPE: f64 = 1e-3;
 
 /// Sine of the least angle between two normals at a common node, or a normal and a support: 6°. Below it the two
 /// directions are hardly independent.
@@ -48,8 +51,9 @@ impl Checks {
     ) -> (Vec<ContactModel>, Checked) {
         let mut all = AllChecks::default();
         let mut models: Vec<ContactModel> = Vec::new();
+        let held = along_one_direction(fixed);
         for (i, numbers) in numbers.into_iter().enumerate() {
-            let contact = self.contact(mesh, section, axis, &problem.contacts, i, numbers);
+            let contact = self.contact(mesh, section, axis, &problem.contacts, &held, i, numbers);
             let Some(model) = all.check(contact) else {
                 continue;
             };
@@ -63,12 +67,14 @@ impl Checks {
     }
 
     /// Contact number i, without regard to the others.
+    #[allow(clippy::too_many_arguments)] // all that a contact is made from
     fn contact(
         &mut self,
         mesh: &Mesh,
         section: &Section,
         axis: &Axis,
         contacts: &[Contact],
+        held: &BTreeMap<u32, ([f64; 2], f64)>,
         i: usize,
         (obstacle, friction): (Checked, Option<FrictionLaw<Average>>),
     ) -> Checked<ContactModel> {
@@ -85,11 +91,12 @@ impl Checks {
         }
         let edges = self.boundary(mesh, &contact.boundary, format!("{pointer}/boundary"))?;
         obstacle?;
-        let (run, cut) = self.facing_run(mesh, edges, contact, &pointer)?;
-        let mut boundary = ContactBoundary::new(mesh, &run.chain, run.start, |x| section.depth(x));
+        let (run, cut) = self.facing_run(mesh, edges, held, contact, &pointer)?;
+        let mut boundary =
+            ContactBoundary::new(mesh, &run.chain, run.start, held, |x| section.depth(x));
         let radius = friction.as_ref().and_then(|law| law.bound.radius());
         self.sound(&boundary, axis, contact, radius, &run, &pointer)?;
-        let push = turn_normals(&mut boundary, &run, contact.normal);
+        let push = turn_normals(&mut boundary, &run, contact.normal, held);
         let end_slopes = [0, run.profile.len() - 1].map(|i| run.profile[i].slope);
         let along = |(profile, push): (&Profile, &[f64; 2])| profile.distance * push[0];
         let profile: Vec<f64> = run.profile.iter().zip(&push).map(along).collect();
@@ -223,16 +230,14 @@ impl Checks {
                 "Choose another boundary; keep midsides near the middle of their sides.",
             ));
         }
-        if let Some(corner) = (2..last)
-            .step_by(2)
-            .find(|&corner| turn(boundary, corner) < SHARPEST_CORNER)
-        {
+        let turn = |i: &usize| boundary.corner(*i).abs();
+        if let Some(corner) = (2..last).find(|i| turn(i) > SHARPEST_CORNER) {
             all.fail(self.report(
                 format!("{pointer}/boundary"),
                 Reason::TurnsCorner,
                 format!(
                     "a boundary that turns by {:.0}° at {:?}",
-                    turn(boundary, corner).acos().to_degrees(),
+                    turn(&corner).to_degrees(),
                     at(corner)
                 ),
                 "a boundary without corners, where the normal is not defined",
@@ -285,6 +290,7 @@ impl Checks {
         &mut self,
         mesh: &Mesh,
         edges: &[Edge],
+        held: &BTreeMap<u32, ([f64; 2], f64)>,
         contact: &Contact,
         pointer: &str,
     ) -> Checked<(FacingRun, Vec<(Edge, f64)>)> {
@@ -310,7 +316,7 @@ impl Checks {
                 "Name a part of it.",
             ));
         }
-        let mut facing = obstacle::facing(mesh, run, &contact.obstacle);
+        let mut facing = obstacle::facing(mesh, run, held, &contact.obstacle);
         for [low, high] in &facing.cut {
             self.warn(
                 WarningCode::ObstacleCutsEdge,
@@ -440,10 +446,10 @@ impl Checks {
     /// At a corner between two edges the normal is not unique.
     fn corners(&mut self, contact: &ContactModel) {
         let boundary = &contact.boundary;
-        for corner in (2..boundary.nodes.len() - 1).step_by(2) {
-            let cosine = turn(boundary, corner);
-            if cosine < SHARPEST_TURN {
-                let ([x, y], angle) = (boundary.positions[corner], cosine.acos().to_degrees());
+        for corner in 0..boundary.nodes.len() {
+            let angle = boundary.corner(corner).abs();
+            if angle > SHARPEST_TURN {
+                let ([x, y], angle) = (boundary.positions[corner], angle.to_degrees());
                 self.warn(
                     WarningCode::ContactTurns,
                     &format!("{}/boundary", contact.pointer),
@@ -472,6 +478,17 @@ impl Checks {
             );
         }
     }
+}
+
+/// The directions, with their errors, of nodes that supports hold along one.
+fn along_one_direction(fixed: &BTreeMap<u32, Held>) -> BTreeMap<u32, ([f64; 2], f64)> {
+    let one = |(node, held): (&u32, &Held)| match *held {
+        Held::Along {
+            direction, error, ..
+        } => Some((*node, (direction, error))),
+        Held::Both(_) => None,
+    };
+    fixed.iter().filter_map(one).collect()
 }
 
 /// The contact nodes with oblique axes: where two contacts meet their normals, else the normal and the direction of a
@@ -512,13 +529,19 @@ fn turn_normals(
     boundary: &mut ContactBoundary,
     run: &FacingRun,
     normal: NormalOf,
+    held: &BTreeMap<u32, ([f64; 2], f64)>,
 ) -> Vec<[f64; 2]> {
     let mut push = vec![[1.0, 0.0]; boundary.nodes.len()];
     if normal == NormalOf::Body {
         return push;
     }
     for (i, push) in push.iter_mut().enumerate() {
-        let slope = run.profile[i].slope;
+        // where a support holds the tangent, what its direction may be off by is no slope
+        let off = held.get(&boundary.nodes[i]).map(|(_, error)| *error);
+        let slope = match (run.profile[i].slope, off) {
+            (slope, Some(error)) if slope.abs() <= error.clamp(ALIGNED, NO_SLOPE) => 0.0,
+            (slope, _) => slope,
+        };
         let cosine = 1.0 / slope.hypot(1.0);
         let (n, t) = (boundary.normals[i], boundary.tangent(i));
         // + 0.0 turns −0 into 0, so that an axis-parallel normal is exactly that
@@ -541,15 +564,4 @@ fn power(obstacle: &Obstacle) -> Option<f64> {
         | Obstacle::Polyline { .. }
         | Obstacle::Line { .. } => None,
     }
-}
-
-/// Cosine of the angle by which a boundary turns at a corner node.
-fn turn(boundary: &ContactBoundary, corner: usize) -> f64 {
-    let chord = |from: usize, to: usize| {
-        let ([x0, y0], [x1, y1]) = (boundary.positions[from], boundary.positions[to]);
-        let length = (x1 - x0).hypot(y1 - y0);
-        [(x1 - x0) / length, (y1 - y0) / length]
-    };
-    let (before, after) = (chord(corner - 1, corner), chord(corner, corner + 1));
-    before[0] * after[0] + before[1] * after[1]
 }

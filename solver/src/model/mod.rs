@@ -23,7 +23,7 @@ mod variable;
 
 pub use axis::Axis;
 pub use contact_model::ContactModel;
-pub use freedom::RigidMotion;
+pub use freedom::{Hold, RigidMotion};
 pub use level::Level;
 pub use supports::Held;
 pub use variable::VariableModel;
@@ -93,14 +93,14 @@ impl Model {
         self.loads.body_force.map(|f| level.loads * f)
     }
 
-    /// A rigid motion that neither the supports nor the given nodes and directions prevent, in words, and a node
+    /// A rigid motion that neither the supports nor the given holds prevent, in words, and a node
     /// that moves.
-    pub fn free_motion(&self, hindered: &[(u32, [f64; 2])]) -> Option<(String, u32)> {
+    pub fn free_motion(&self, hindered: &[Hold]) -> Option<(String, u32)> {
         freedom::motion_left(&self.mesh, &self.section, &self.fixed, hindered)
     }
 
-    /// All rigid motions that neither the supports nor the given nodes and directions prevent, but those that bend hinges.
-    pub fn free_motions(&self, hindered: &[(u32, [f64; 2])]) -> Vec<RigidMotion> {
+    /// All rigid motions that neither the supports nor the given holds prevent, but those that bend hinges.
+    pub fn free_motions(&self, hindered: &[Hold]) -> Vec<RigidMotion> {
         freedom::free_motions(&self.mesh, &self.section, &self.fixed, hindered)
     }
 }

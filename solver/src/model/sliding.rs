@@ -14,6 +14,9 @@ use crate::solution::WarningCode;
 /// Cosine of the angle between two sides up to which the surface goes on straight: 20°.
 const STRAIGHT_ON: f64 = 0.94;
 
+/// The largest angle between normals of a straight side, whose nodes are printed with some digits: 0.06°.
+const STRAIGHT: f64 = 1e-3;
+
 impl Checks {
     /// Warns of an obstacle that is dragged along a contact with a line of symmetry at its end: the other half, which is
     /// not modelled, would be dragged the opposite way.
@@ -70,10 +73,11 @@ pub(super) fn endless(
     let unbounded = matches!(obstacle.span(), (None, None, _));
     let straight = matches!(obstacle, Obstacle::Flat { .. } | Obstacle::Line { .. });
     let [a, b] = boundary.normals[0];
-    let even = boundary
-        .normals
-        .iter()
-        .all(|[c, d]| (a * d - b * c).abs() <= ALIGNED);
+    let errors = &boundary.normal_errors;
+    let same = |([c, d], error): (&[f64; 2], &f64)| {
+        (a * d - b * c).abs() <= (error + errors[0]).min(STRAIGHT)
+    };
+    let even = boundary.normals.iter().zip(errors).all(same);
     let parallel = profile
         .iter()
         .all(|p| (p - profile[0]).abs() <= ALIGNED * boundary.length());

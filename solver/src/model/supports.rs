@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::axis::Axis;
 use super::checks::{ALIGNED, Checks};
 use super::nodes::FirstSides;
+use crate::contact::smooth;
 use crate::error::{AllChecks, Checked, Reason};
 use crate::mesh::{Edge, Mesh};
 use crate::problem::{BoundaryValue, Support};
@@ -26,6 +27,9 @@ pub enum Held {
         direction: [f64; 2],
         /// Displacement along it (length).
         value: f64,
+        /// How far the direction may be off that of the surface (angle); 0 along x and y.
+        #[serde(skip)]
+        error: f64,
     },
     /// The whole displacement along x and y.
     Both([f64; 2]),
@@ -36,31 +40,47 @@ impl Held {
     pub fn along(&self, along: [f64; 2]) -> Option<f64> {
         match *self {
             Held::Both(u) => Some(u[0] * along[0] + u[1] * along[1]),
-            Held::Along { direction, value } => {
+            Held::Along {
+                direction, value, ..
+            } => {
                 let cosine = direction[0] * along[0] + direction[1] * along[1];
                 parallel(direction, along).then(|| value * cosine.signum())
             }
         }
     }
 
-    /// Adds a prescribed displacement; `Err`: a different value is prescribed already.
-    fn and(self, along: [f64; 2], value: f64, rounding: f64) -> Result<Self, f64> {
-        if let Some(known) = self.along(along) {
-            return if (known - value).abs() <= rounding {
-                Ok(self)
-            } else {
-                Err(known)
-            };
-        }
-        let Held::Along {
-            direction: [a, b],
-            value: first,
-        } = self
-        else {
-            return Ok(self);
+    /// Adds a displacement prescribed along a direction with an error; `Err`: a different value is prescribed already. Directions
+    /// that differ by no more than their errors are one.
+    fn and(self, along: [f64; 2], value: f64, error: f64, rounding: f64) -> Result<Self, f64> {
+        let ([a, b], first, own) = match self {
+            Held::Along {
+                direction,
+                value,
+                error,
+            } => (direction, value, error),
+            Held::Both([x, y]) => {
+                let known = x * along[0] + y * along[1];
+                return match (known - value).abs() <= rounding {
+                    true => Ok(self),
+                    false => Err(known),
+                };
+            }
         };
         let [c, d] = along;
         let det = a * d - b * c;
+        if det.abs() <= (own + error).sin().max(ALIGNED) {
+            let known = first * (a * c + b * d).signum();
+            let exact = Held::Along {
+                direction: along,
+                value,
+                error,
+            };
+            return match (known - value).abs() <= rounding {
+                true if error < own => Ok(exact),
+                true => Ok(self),
+                false => Err(known),
+            };
+        }
         Ok(Held::Both([
             (first * d - value * b) / det,
             (value * a - first * c) / det,
@@ -85,8 +105,13 @@ impl Checks {
         let mut fixed: BTreeMap<u32, Held> = BTreeMap::new();
         let on_axis = |n: &u32| axis.holds(mesh.nodes[*n as usize]);
         for node in (0..mesh.nodes.len() as u32).filter(on_axis) {
-            let (direction, value) = ([1.0, 0.0], 0.0);
-            fixed.insert(node, Held::Along { direction, value });
+            let (direction, value, error) = ([1.0, 0.0], 0.0, 0.0);
+            let held = Held::Along {
+                direction,
+                value,
+                error,
+            };
+            fixed.insert(node, held);
         }
         let size = supports
             .iter()
@@ -176,16 +201,20 @@ impl Checks {
                 continue;
             };
             for (node, value) in values {
-                let direction = match (field, normals.get(&node)) {
-                    ("ux", _) => [1.0, 0.0],
-                    ("uy", _) => [0.0, 1.0],
-                    ("un", Some(n)) => *n,
-                    ("ut", Some([x, y])) => [*y, -x],
+                let (direction, error) = match (field, normals.get(&node)) {
+                    ("ux", _) => ([1.0, 0.0], 0.0),
+                    ("uy", _) => ([0.0, 1.0], 0.0),
+                    ("un", Some((n, error))) => (*n, *error),
+                    ("ut", Some(([x, y], error))) => ([*y, -x], *error),
                     _ => continue,
                 };
                 let held = match fixed.get(&node) {
-                    None => Ok(Held::Along { direction, value }),
-                    Some(held) => held.and(direction, value, rounding),
+                    None => Ok(Held::Along {
+                        direction,
+                        value,
+                        error,
+                    }),
+                    Some(held) => held.and(direction, value, error, rounding),
                 };
                 match held {
                     Ok(held) => drop(fixed.insert(node, held)),
@@ -267,33 +296,49 @@ impl Checks {
         }
     }
 
-    /// Unit outward normals at the nodes of a boundary; the mean of both edges at a slight corner.
+    /// Unit outward normals at the nodes of a boundary, and how far they may be off (angle); the mean of both edges at a slight
+    /// corner, also at an end where the surface goes on smoothly.
     fn normals(
         &mut self,
         mesh: &Mesh,
         edges: &[Edge],
         pointer: &str,
-    ) -> Checked<BTreeMap<u32, [f64; 2]>> {
+    ) -> Checked<BTreeMap<u32, ([f64; 2], f64)>> {
         /// |n₁ + n₂|/2 at a turn of 45°.
         const SHARPEST: f64 = 0.923;
-        let mut sums: BTreeMap<u32, ([f64; 2], f64)> = BTreeMap::new();
+        #[derive(Default)]
+        struct Sum {
+            normals: [f64; 2],
+            count: f64,
+            error: f64,
+        }
+        let mut sums: BTreeMap<u32, Sum> = BTreeMap::new();
+        let mut add = |node: u32, [x, y]: [f64; 2], error: f64| {
+            let sum = sums.entry(node).or_default();
+            sum.normals = [sum.normals[0] + x, sum.normals[1] + y];
+            sum.count += 1.0;
+            sum.error = error.max(sum.error);
+        };
         for edge in edges {
-            let normals = crate::contact::edge_normals(&mesh.edge_nodes(edge));
-            for (node, [x, y]) in edge.iter().zip(normals) {
-                let (sum, count) = sums.entry(*node).or_default();
-                *sum = [sum[0] + x, sum[1] + y];
-                *count += 1.0;
-            }
+            let side = mesh.edge_nodes(edge);
+            let error = smooth::direction_error(&side);
+            let normals = crate::contact::edge_normals(&side).into_iter();
+            (edge.iter().zip(normals)).for_each(|(node, normal)| add(*node, normal, error));
+        }
+        for (node, normal) in smooth::normals_beyond(mesh, edges) {
+            add(node, normal, 0.0);
         }
         let mut normals = BTreeMap::new();
         let mut corner = None;
-        for (node, ([x, y], count)) in sums {
+        for (node, sum) in sums {
+            let [x, y] = sum.normals;
             let length = x.hypot(y);
-            if length < SHARPEST * count {
+            if length < SHARPEST * sum.count {
                 corner = Some(node);
             }
             // + 0.0 turns −0 into 0, so that an axis-parallel normal is exactly that
-            normals.insert(node, [x / length + 0.0, y / length + 0.0]);
+            let normal = [x / length + 0.0, y / length + 0.0];
+            normals.insert(node, (normal, sum.error));
         }
         if let Some(node) = corner {
             let [x, y] = mesh.nodes[node as usize];

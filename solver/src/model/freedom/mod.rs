@@ -5,7 +5,7 @@ mod words;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-pub(super) use parts::Hold;
+pub use parts::Hold;
 
 use super::checks::{ALIGNED, Checks};
 use super::contact_model::ContactModel;
@@ -153,12 +153,18 @@ fn held_on_one_side(moves: &BTreeMap<u32, [f64; 2]>, contacts: &[ContactModel]) 
                 continue;
             };
             let along = |[x, y]: [f64; 2]| x * moved[0] + y * moved[1];
+            let error = boundary.normal_errors[i] * moved[0].hypot(moved[1]);
             if contact.condition == Condition::Unilateral {
                 let normal = along(boundary.normals[i]);
-                (away, towards) = (away.max(-normal), towards.max(normal));
+                if normal.abs() > error {
+                    (away, towards) = (away.max(-normal), towards.max(normal));
+                }
             }
             // friction may hold it, also where there is no obstacle
-            tangential = tangential.max(along(boundary.tangent(i)).abs());
+            let along_surface = along(boundary.tangent(i)).abs();
+            if along_surface > error {
+                tangential = tangential.max(along_surface);
+            }
         }
     }
     away.max(towards) > ALIGNED && away.min(towards) <= ALIGNED && tangential <= ALIGNED
@@ -261,9 +267,19 @@ pub(super) fn free_motions(
 fn directions(fixed: &BTreeMap<u32, Held>) -> Vec<Hold> {
     let mut held = Vec::new();
     for (&node, what) in fixed {
-        match what {
-            Held::Along { direction, .. } => held.push((node, *direction)),
-            Held::Both(_) => held.extend([(node, [1.0, 0.0]), (node, [0.0, 1.0])]),
+        match *what {
+            Held::Along {
+                direction, error, ..
+            } => held.push(Hold {
+                node,
+                direction,
+                error,
+            }),
+            Held::Both(_) => held.extend([[1.0, 0.0], [0.0, 1.0]].map(|direction| Hold {
+                node,
+                direction,
+                error: 0.0,
+            })),
         }
     }
     held
@@ -277,12 +293,12 @@ fn hindered(contact: &ContactModel) -> Vec<Hold> {
         contact.condition == Condition::Bonded || contact.friction.as_ref().is_some_and(holds);
     let boundary = &contact.boundary;
     let mut hindered = Vec::new();
-    for (i, &node) in boundary.nodes.iter().enumerate() {
+    for i in 0..boundary.nodes.len() {
         if normal {
-            hindered.push((node, boundary.normals[i]));
+            hindered.push(Hold::along_normal(boundary, i));
         }
         if tangent {
-            hindered.push((node, boundary.tangent(i)));
+            hindered.push(Hold::along_tangent(boundary, i));
         }
     }
     hindered

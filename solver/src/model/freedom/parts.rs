@@ -11,6 +11,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::super::checks::ALIGNED;
+use crate::contact::ContactBoundary;
 use crate::mesh::Mesh;
 
 /// Parts in one mechanism that are examined: the elimination is cubic in them.
@@ -23,8 +24,35 @@ pub(super) const MOST_IN_MECHANISMS: usize = 10 * MOST_HINGED;
 /// four rows at most; each part has two of its own.
 const MOST_ROWS: usize = 14;
 
-/// A node and a direction (unit vector) it is held along.
-pub(in crate::model) type Hold = (u32, [f64; 2]);
+/// A node and a direction that it is held along.
+#[derive(Clone, Copy, Debug)]
+pub struct Hold {
+    /// The node.
+    pub node: u32,
+    /// Unit vector.
+    pub direction: [f64; 2],
+    /// How far the direction may be off, where it is that of a curved surface (angle).
+    pub error: f64,
+}
+
+impl Hold {
+    /// A contact node, held along the normal.
+    pub fn along_normal(boundary: &ContactBoundary, i: usize) -> Hold {
+        Hold {
+            node: boundary.nodes[i],
+            direction: boundary.normals[i],
+            error: boundary.normal_errors[i],
+        }
+    }
+
+    /// The same along the tangent.
+    pub fn along_tangent(boundary: &ContactBoundary, i: usize) -> Hold {
+        Hold {
+            direction: boundary.tangent(i),
+            ..Hold::along_normal(boundary, i)
+        }
+    }
+}
 
 /// What is found of parts that nothing holds.
 pub(super) enum Unheld {
@@ -107,15 +135,21 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Makes a row orthonormal to others and adds it; a row that they contain adds nothing.
-pub(super) fn add(rows: &mut Vec<Motion>, mut row: Motion, tolerance: f64) {
+/// What others, which are orthonormal, leave of a row.
+fn rest(rows: &[Motion], mut row: Motion) -> Motion {
     // twice is enough
     for _ in 0..2 {
-        for other in rows.iter() {
+        for other in rows {
             let part = dot(other, &row);
             (0..3).for_each(|i| row[i] -= part * other[i]);
         }
     }
+    row
+}
+
+/// Makes a row orthonormal to others and adds it; a row that they contain adds nothing.
+pub(super) fn add(rows: &mut Vec<Motion>, row: Motion, tolerance: f64) {
+    let row = rest(rows, row);
     let length = dot(&row, &row).sqrt();
     if rows.len() < 3 && length > tolerance {
         rows.push(row.map(|v| v / length));
@@ -202,9 +236,23 @@ impl<'a> Parts<'a> {
             let row = part.row(self.mesh.nodes[node as usize], direction);
             add(rows, row, part.tolerance);
         };
-        for &(node, direction) in held {
-            for &part in self.of(node).iter().filter(|part| **part != u32::MAX) {
-                hold(&mut rows, part, node, direction);
+        let mut inexact: BTreeMap<u32, Vec<&Hold>> = BTreeMap::new();
+        for one in held {
+            for &part in self.of(one.node).iter().filter(|part| **part != u32::MAX) {
+                hold(&mut rows, part, one.node, one.direction);
+                if one.error > 0.0 {
+                    inexact.entry(part).or_default().push(one);
+                }
+            }
+        }
+        for (part, inexact) in inexact {
+            if rows[part as usize].len() == 3 {
+                let of_part = |one: &&Hold| self.of(one.node).contains(&part);
+                let exact = held.iter().filter(|one| one.error == 0.0).filter(of_part);
+                let exact: Vec<&Hold> = exact.collect();
+                if let Some(firm) = self.firm(&self.parts[part as usize], &exact, &inexact) {
+                    rows[part as usize] = firm;
+                }
             }
         }
         let mut settled: Vec<u32> = (0..self.parts.len() as u32)
@@ -229,6 +277,37 @@ impl<'a> Parts<'a> {
             }
         }
         rows
+    }
+
+    /// The two rows of a part that are all that holds it, where the third is nothing but errors of directions: as those of a ring
+    /// that turns in a sleeve, whose sides are no circle.
+    fn firm(&self, part: &Part, exact: &[&Hold], inexact: &[&Hold]) -> Option<Vec<Motion>> {
+        let at = |one: &Hold| self.mesh.nodes[one.node as usize];
+        let row = |one: &Hold| part.row(at(one), one.direction);
+        let mut rows = self.never.to_vec();
+        for one in exact {
+            add(&mut rows, row(one), part.tolerance);
+        }
+        while rows.len() < 2 {
+            // that which adds most hides least behind the errors of the others
+            let rests = inexact.iter().map(|one| rest(&rows, row(one)));
+            let most = rests.max_by(|a, b| dot(a, a).total_cmp(&dot(b, b)))?;
+            let before = rows.len();
+            add(&mut rows, most, part.tolerance);
+            if rows.len() == before {
+                return None;
+            }
+        }
+        let [[a, b, c], [d, e, f]] = rows[..] else {
+            return None;
+        };
+        let motion = [b * f - c * e, c * d - a * f, a * e - b * d];
+        let in_error = |one: &&Hold| {
+            let [x, y] = part.displacement(at(one), &motion);
+            let along = x * one.direction[0] + y * one.direction[1];
+            along.abs() <= one.error * x.hypot(y) + part.tolerance
+        };
+        inexact.iter().all(in_error).then_some(rows)
     }
 
     /// Parts that are not held, those hinged to one another together.
