@@ -123,7 +123,7 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
             (
                 0.0,
                 format!(
-                    "`{name}` of contact `{contact}` grows without limit as the mesh is refined, at an edge, a tip or a kink of the obstacle: its value means nothing. The verdict is about the other quantities: forces have a limit, and so has the averaged pressure."
+                    "`{name}` of contact `{contact}` grows without limit as the mesh is refined, at an edge, a tip or a kink of the obstacle or a corner of the body: its value means nothing. The verdict is about the other quantities: forces have a limit, and so has the averaged pressure."
                 ),
             ),
         )),

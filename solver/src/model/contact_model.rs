@@ -21,6 +21,8 @@ pub struct ContactModel {
     pub profile: Vec<f64>,
     /// The obstacle between the nodes and at its corners, in order of s.
     pub places: Vec<Place>,
+    /// The obstacle is a curve in space, whatever the shape of the body; else it follows the body's surface at a distance.
+    pub in_space: bool,
     /// Slope of the obstacle along the body's t at the first and at the last node.
     pub end_slopes: [f64; 2],
     /// Edges that an end of the obstacle cuts, which are no part of Γ_C, and the length of each that it covers.

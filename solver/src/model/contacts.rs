@@ -108,6 +108,10 @@ impl Checks {
             cut,
             profile,
             places: run.places,
+            in_space: matches!(
+                contact.obstacle,
+                Obstacle::Line { .. } | Obstacle::Polyline { .. }
+            ),
             end_slopes,
             indentation: contact.indentation,
             push,

@@ -324,7 +324,7 @@ pub enum WarningCode {
     FrictionLostAtEnd,
     /// An obstacle that reaches into the body between two nodes, or recedes from it.
     ObstacleBetweenNodes,
-    /// A kink of the obstacle in the contact.
+    /// A kink of the obstacle, or a corner of the body, in the contact.
     KinkInContact,
     /// A nonlocal radius larger than the contact.
     RadiusExceedsContact,

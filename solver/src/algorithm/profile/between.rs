@@ -1,5 +1,5 @@
-//! What the nodes of a contact do not see: an obstacle that reaches into the body between them or recedes from it, and
-//! kinks at which the pressure has no limit.
+//! What the nodes of a contact do not see: an obstacle that reaches into the body between them or recedes from it; and
+//! kinks of the obstacle and corners of the body, at which the pressure has no limit.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{LN_2, PI};
@@ -48,12 +48,14 @@ const ROUNDING: f64 = 1e-9;
 /// A kink shapes the pressure if each halving of the mesh adds more than this part to its peak.
 const SHAPING: f64 = 0.01;
 
-/// A kink of the obstacle in contact.
+/// A kink of the obstacle in contact, or a corner of the body.
 pub(super) struct Kink {
     pub(super) edge: usize,
     s: f64,
-    /// Change of slope, > 0; infinite at an edge.
+    /// Change of slope of the gap, > 0; infinite at an edge of the obstacle.
     change: f64,
+    /// The angle by which the body's surface turns there; 0 where it is smooth.
+    turn: f64,
     /// What each halving of the mesh adds to the pressure there (stress).
     growth: f64,
     /// Distance between the nodes on either side (length).
@@ -187,6 +189,7 @@ impl PatchView<'_> {
     }
 
     pub(super) fn warn_of_kinks(&self, warnings: &mut Vec<Warning>) {
+        self.warn_of_notches(warnings);
         let kinks = self.kinks();
         let Some(sharpest) = kinks.iter().max_by(|a, b| a.growth.total_cmp(&b.growth)) else {
             return;
@@ -194,6 +197,7 @@ impl PatchView<'_> {
         let Kink {
             s,
             change,
+            turn,
             growth,
             spacing,
             mirrored,
@@ -210,7 +214,10 @@ impl PatchView<'_> {
         };
         let (size, growth) = match change.is_finite() {
             true => (
-                format!("its slope changes by {change:.3e}"),
+                match turn {
+                    0.0 => format!("its slope changes by {change:.3e}"),
+                    turn => format!("its surface turns by {:.2}°", turn.to_degrees()),
+                },
                 format!(
                     "each halving of the mesh, whose nodes are {spacing:.3e} apart there, adds about {growth:.3e}, {part}"
                 ),
@@ -229,16 +236,76 @@ impl PatchView<'_> {
             ),
             false => ("", ""),
         };
+        let message = match turn {
+            0.0 => format!(
+                "The obstacle has a kink in the contact, at s = {s:.4}{mirrored}: {size}{count}. The pressure has no limit at a kink: {growth}. If the kinks only come from the points of a table or a polyline, choose \"interpolation\": \"cubic\", with `smoothing` if they were measured; else round the edge.{symmetric}"
+            ),
+            _ => format!(
+                "The body has a corner in the contact, at s = {s:.4}: {size}{count}. The pressure has no limit at a corner: {growth}; and friction changes from side to side. If the corners only come from straight sides of elements on a curve, mesh it with elements of second order, or name the curve under /mesh/curves; else round the corner."
+            ),
+        };
+        warnings.push(Warning {
+            code: WarningCode::KinkInContact,
+            pointer: self.patch.contact.pointer.clone(),
+            message,
+        });
+    }
+
+    /// Corners of the body in contact or beside it, where the obstacle has none: the node, the angle of the turn, and by how much
+    /// the slope of the gap changes. An obstacle that follows the body's surface has its corners.
+    fn body_corners(&self) -> Vec<(usize, f64, f64)> {
+        let contact = self.patch.contact;
+        if !contact.in_space || contact.condition != Condition::Unilateral {
+            return Vec::new();
+        }
+        let near = |i: &usize| (i - 1..=i + 1).any(|i| self.active(i));
+        let corner = |i: usize| {
+            let turn = contact.boundary.corner(i);
+            let own = contact.places.iter();
+            let own = own.filter(|place| place.kink != 0.0 && self.beside(place) == [i; 2]);
+            let change = 2.0 * (0.5 * turn).tan() + own.map(|place| place.kink).sum::<f64>();
+            (turn != 0.0).then_some((i, turn, change))
+        };
+        let corners = (2..self.count() - 1).step_by(2).filter(near);
+        corners.filter_map(corner).collect()
+    }
+
+    /// What each halving of the mesh adds to the pressure where the slope of the gap changes (stress).
+    fn growth(moduli: &[f64], edge: usize, change: f64) -> f64 {
+        0.5 / PI * LN_2 * moduli[edge] * change
+    }
+
+    /// Corners that point into the body keep the obstacle off: what the nodes show as one contact is one on each side of them.
+    fn warn_of_notches(&self, warnings: &mut Vec<Warning>) {
+        let mut notches = self.body_corners();
+        notches.retain(|(_, _, change)| *change < 0.0);
+        let peak = match self.highest_pressure() {
+            Some((peak, _, _)) if !notches.is_empty() && peak > 0.0 => peak,
+            _ => return,
+        };
+        let moduli = self.contact_moduli();
+        notches
+            .retain(|(i, _, change)| Self::growth(&moduli, i / 2, change.abs()) > SHAPING * peak);
+        let Some((i, turn, _)) = notches.iter().min_by(|a, b| a.2.total_cmp(&b.2)) else {
+            return;
+        };
+        let s = self.patch.contact.boundary.s[*i];
+        let count = match notches.len() {
+            1 => String::new(),
+            count => format!("; it is the sharpest of {count}"),
+        };
         warnings.push(Warning {
             code: WarningCode::KinkInContact,
             pointer: self.patch.contact.pointer.clone(),
             message: format!(
-                "The obstacle has a kink in the contact, at s = {s:.4}{mirrored}: {size}{count}. The pressure has no limit at a kink: {growth}. If the kinks only come from the points of a table or a polyline, choose \"interpolation\": \"cubic\", with `smoothing` if they were measured; else round the edge.{symmetric}"
+                "The body has a corner in the contact that points into it, at s = {s:.4}: its surface turns by {:.2}°{count}. The obstacle does not reach into it, and on finer meshes the contact is one on each side of it, with other peaks. If the corners only come from straight sides of elements on a curve, mesh it with elements of second order, or name the curve under /mesh/curves.",
+                turn.to_degrees()
             ),
         });
     }
 
-    /// Kinks in contact that shape the pressure, those of an obstacle that is mirrored at a line of symmetry included.
+    /// Kinks in contact that shape the pressure: of the obstacle, also where it is mirrored at a line of symmetry, and corners of
+    /// the body.
     /// Beside a kink with the change of slope Δ the pressure of a half-plane with the contact modulus E* grows like
     /// E* Δ/(2π) · ln(1/distance); on the axis of a cone like E* Δ/4 · ln(1/distance).
     pub(super) fn kinks(&self) -> Vec<Kink> {
@@ -247,12 +314,27 @@ impl PatchView<'_> {
             return Vec::new();
         }
         let last = self.count() - 1;
-        let mut found: Vec<(Place, f64)> = Vec::new();
+        let mut found: Vec<(Place, f64, f64)> = Vec::new();
+        let corners = self.body_corners();
         for place in contact.places.iter().filter(|place| place.kink > 0.0) {
             let nodes = self.beside(place);
             let at_end = nodes == [0; 2] || nodes == [last; 2];
-            if !at_end && nodes.iter().any(|&i| self.active(i)) {
-                found.push((*place, place.kink));
+            let at_corner = corners.iter().any(|(i, ..)| nodes == [*i; 2]);
+            if !at_end && !at_corner && nodes.iter().any(|&i| self.active(i)) {
+                found.push((*place, place.kink, 0.0));
+            }
+        }
+        let at = |node: usize, edge: usize, xi: f64, kink: f64| Place {
+            edge,
+            xi,
+            normal: contact.boundary.normals[node],
+            profile: Default::default(),
+            kink,
+            nearer: 0.0,
+        };
+        for (node, turn, change) in corners {
+            if change > 0.0 {
+                found.push((at(node, node / 2, -1.0, change), change, turn));
             }
         }
         for (end, slope) in [(0, contact.end_slopes[0]), (last, -contact.end_slopes[1])] {
@@ -263,15 +345,7 @@ impl PatchView<'_> {
             });
             let change = 2.0 * slope + own.map(|place| place.kink).sum::<f64>();
             if change > 0.0 && self.symmetric(end) && self.active(end) {
-                let place = Place {
-                    edge,
-                    xi,
-                    normal: contact.boundary.normals[end],
-                    profile: Default::default(),
-                    kink: change,
-                    nearer: 0.0,
-                };
-                found.push((place, change));
+                found.push((at(end, edge, xi, change), change, 0.0));
             }
         }
         let peak = match self.highest_pressure() {
@@ -279,15 +353,16 @@ impl PatchView<'_> {
             _ => return Vec::new(),
         };
         let moduli = self.contact_moduli();
-        let kink = |(place, change): (Place, f64)| {
+        let kink = |(place, change, turn): (Place, f64, f64)| {
             let node = self.patch.first + self.beside(&place)[0];
             let on_axis = place.xi.abs() == 1.0 && self.system.nodes[node].on_axis;
-            let part = if on_axis { 0.25 } else { 0.5 / PI };
+            let growth = Self::growth(&moduli, place.edge, change);
             Kink {
                 edge: place.edge,
                 s: self.arc(&place),
                 change,
-                growth: part * LN_2 * moduli[place.edge] * change,
+                turn,
+                growth: if on_axis { 0.5 * PI * growth } else { growth },
                 spacing: self.spacing(&place),
                 mirrored: [0, last].contains(&self.beside(&place)[0]),
             }
