@@ -467,6 +467,7 @@ mod tests {
             "inline" => serde_json::json!({"nodes": [], "elements": [], "boundaries": {}}),
             "refine" => serde_json::json!(1),
             "boundaries" => serde_json::json!({"a": {"side": "top"}}),
+            "curves" => serde_json::json!({"a": {"kind": "spline"}}),
             _ => serde_json::json!("text"),
         };
         for mesh in subsets(
@@ -478,6 +479,7 @@ mod tests {
                 "stored",
                 "refine",
                 "boundaries",
+                "curves",
             ],
             &source,
         ) {

@@ -49,6 +49,8 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     kinds("Analysis", "problem::Analysis"),
     fields("AdaptiveRefine", "problem::AdaptiveRefine"),
     fields("ElementRange", "problem::ElementRange"),
+    fields("Curve", "problem::Curve"),
+    names("CurveKind", "problem::CurveKind"),
     fields("Grid", "problem::Grid"),
     fields("InlineMesh", "problem::InlineMesh"),
     fields("BoundaryPart", "problem::BoundaryPart").renamed("box", "corners"),

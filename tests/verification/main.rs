@@ -16,6 +16,7 @@ mod conserving;
 mod contact_patch;
 mod cook;
 mod corner;
+mod curves;
 mod cylinder;
 mod decks;
 mod disc_pressure;

@@ -20,6 +20,7 @@ impl FromMessage<pb::Mesh> for MeshInput {
             refinement,
             boundaries,
             groups,
+            curves,
         } = message;
         let source = match source {
             Some(mesh::Source::Grid(grid)) => read.field("grid", grid).map(MeshSource::Grid),
@@ -40,11 +41,13 @@ impl FromMessage<pb::Mesh> for MeshInput {
         };
         let boundaries = read.field("boundaries", boundaries);
         let groups = read.field("groups", groups);
+        let curves = read.field("curves", curves);
         Some(MeshInput {
             source: source?,
             refine: refine?,
             boundaries: boundaries?,
             groups: groups?,
+            curves: curves?,
         })
     }
 }
@@ -56,6 +59,7 @@ impl From<MeshInput> for pb::Mesh {
             refine,
             boundaries,
             groups,
+            curves,
         } = ours;
         let source = match source {
             MeshSource::Grid(grid) => mesh::Source::Grid(grid.into()),
@@ -73,6 +77,7 @@ impl From<MeshInput> for pb::Mesh {
             refinement: Some(refinement),
             boundaries: boundaries.into_message(),
             groups: groups.into_message(),
+            curves: curves.into_message(),
         }
     }
 }

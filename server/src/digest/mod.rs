@@ -164,6 +164,7 @@ impl Hash {
     fn mesh(&mut self, mesh: &MeshInput) -> serde_json::Result<()> {
         let MeshInput {
             boundaries: parts,
+            curves,
             groups: ranges,
             refine,
             source,
@@ -174,6 +175,10 @@ impl Hash {
         self.text_of("{");
         if !parts.is_empty() {
             self.text_of(r#""boundaries":"#).json(parts)?;
+            self.text_of(",");
+        }
+        if !curves.is_empty() {
+            self.text_of(r#""curves":"#).json(curves)?;
             self.text_of(",");
         }
         if !ranges.is_empty() {
@@ -350,7 +355,7 @@ mod tests {
 
     use crate::fake;
     use solver::{
-        problem::{BoundaryPart, Elasticity, ElementRange},
+        problem::{BoundaryPart, Curve, CurveKind, Elasticity, ElementRange},
         solution::StepSolution,
     };
 
@@ -464,6 +469,12 @@ mod tests {
                 let (part, range) = (BoundaryPart::default(), ElementRange::default());
                 problem.mesh.boundaries.insert("part".into(), part);
                 problem.mesh.groups.insert("range".into(), range);
+                let curve = Curve {
+                    kind: CurveKind::Circle,
+                    center: Some([0.0, 1.0]),
+                    radius: Some(4.0),
+                };
+                problem.mesh.curves.insert("part".into(), curve);
             }
             assert_eq!(input_hash(&problem).unwrap(), canonical(&problem));
             inline.groups.insert("group".into(), vec![0, 1]);

@@ -296,6 +296,10 @@ fn finer(
             divided[*part as usize] = true;
         }
         graded.refine(&divided);
+        // those of divisions to come are made from them
+        for (boundary, curve) in &problem.mesh.curves {
+            graded.put_on_curve(boundary, curve);
+        }
         let (finer, of) = graded.closed();
         *parts = of;
         finer

@@ -15,10 +15,12 @@
 
 use std::collections::BTreeMap;
 
+use super::curved::put_on_curve;
 use super::halving::{Halving, halvings, must_divide};
 use super::refine::Finer;
 use super::{Edge, Mesh};
 use crate::element::Element;
+use crate::problem::Curve;
 
 /// So often folded closures are replaced by divisions; those of an element that is all but folded itself remain.
 const MOST_UNFOLDING: u32 = 4;
@@ -99,6 +101,13 @@ impl GradedMesh {
                 pieces(&self.finer, *edge, &mut finer);
             }
             *edges = finer;
+        }
+    }
+
+    /// Moves the nodes of a boundary onto its curve; where they are too far off it, they stay.
+    pub fn put_on_curve(&mut self, boundary: &str, curve: &Curve) {
+        if let Some(edges) = self.boundaries.get(boundary) {
+            let _ = put_on_curve(&mut self.finer.nodes, edges, curve);
         }
     }
 

@@ -2,6 +2,7 @@
 
 mod build;
 mod coincident;
+mod curved;
 mod graded;
 mod grid;
 mod halving;
@@ -12,6 +13,7 @@ mod refine;
 
 pub use build::{NO_NODE, RawMesh, build};
 pub use coincident::coincident_nodes;
+pub use curved::OffCurve;
 pub use graded::GradedMesh;
 pub use grid::{check_grid, grid_mesh, largest_cut};
 pub use inline::inline_mesh;

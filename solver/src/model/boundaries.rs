@@ -62,8 +62,10 @@ impl Checks {
         }
         all.check(self.names(&mut mesh, input));
         mesh.order_boundaries();
+        self.curves(&mut mesh, input, "")?;
         for _ in 0..refine {
             mesh = mesh::refine(&mesh);
+            self.curves(&mut mesh, input, " of the refined mesh")?;
         }
         if input.grid().is_none() && refine > 0 {
             let whole = |_| "/mesh".to_owned();

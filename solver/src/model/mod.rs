@@ -8,6 +8,7 @@ mod boundaries;
 mod checks;
 mod contact_model;
 mod contacts;
+mod curves;
 pub mod estimate;
 mod freedom;
 mod laws;
@@ -140,6 +141,7 @@ impl Checks {
             }
             Source::Ready(mut mesh) => {
                 mesh.order_boundaries();
+                self.curves(&mut mesh, &problem.mesh, " of the refined mesh")?;
                 mesh
             }
         };

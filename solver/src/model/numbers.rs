@@ -40,6 +40,7 @@ impl Checks {
             ("/steps", problem.steps.len()),
             ("/mesh/boundaries", problem.mesh.boundaries.len()),
             ("/mesh/groups", problem.mesh.groups.len()),
+            ("/mesh/curves", problem.mesh.curves.len()),
         ] {
             if count > MOST {
                 all.fail(self.report(

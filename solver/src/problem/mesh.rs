@@ -29,6 +29,8 @@ pub struct MeshInput {
     pub boundaries: BTreeMap<String, BoundaryPart>,
     /// Names for groups of elements.
     pub groups: BTreeMap<String, ElementRange>,
+    /// Curves that boundaries lie on.
+    pub curves: BTreeMap<String, Curve>,
 }
 
 /// The source of the elements.
@@ -54,6 +56,7 @@ impl MeshInput {
             refine: Refine::default(),
             boundaries: BTreeMap::new(),
             groups: BTreeMap::new(),
+            curves: BTreeMap::new(),
         }
     }
 
@@ -113,6 +116,11 @@ struct MeshFields {
     /// Names for groups of elements, e.g. `{"inclusion": {"x": [1, 2], "y": [-1, 0]}}`.
     #[serde(default)]
     groups: BTreeMap<String, ElementRange>,
+    /// Curves that boundaries lie on, by their names, e.g. `{"arc": {"kind": "circle", "center": [0, 0], "radius": 4}}`:
+    /// their nodes are put there, also those that refinement adds. Elements that only have corners have straight sides, and a
+    /// body made of them has corners that no curve has.
+    #[serde(default)]
+    curves: BTreeMap<String, Curve>,
 }
 
 impl TryFrom<MeshFields> for MeshInput {
@@ -120,7 +128,7 @@ impl TryFrom<MeshFields> for MeshInput {
 
     #[rustfmt::skip] // a source in a row
     fn try_from(fields: MeshFields) -> Result<MeshInput, Violation> {
-        let MeshFields { grid, inline, gmsh, abaqus, stored, refine, boundaries, groups } = fields;
+        let MeshFields { grid, inline, gmsh, abaqus, stored, refine, boundaries, groups, curves } = fields;
         let given = [
             ("grid", grid.is_some()),
             ("inline", inline.is_some()),
@@ -142,7 +150,7 @@ impl TryFrom<MeshFields> for MeshInput {
                 "Give the mesh in one form.",
             )),
         };
-        Ok(MeshInput { source, refine, boundaries, groups })
+        Ok(MeshInput { source, refine, boundaries, groups, curves })
     }
 }
 
@@ -154,8 +162,14 @@ impl Serialize for MeshInput {
             refine,
             boundaries,
             groups,
+            curves,
         } = self;
-        let count = 2 + usize::from(!boundaries.is_empty()) + usize::from(!groups.is_empty());
+        let named = [
+            !boundaries.is_empty(),
+            !groups.is_empty(),
+            !curves.is_empty(),
+        ];
+        let count = 2 + named.into_iter().map(usize::from).sum::<usize>();
         let mut fields = serializer.serialize_struct("MeshInput", count)?;
         match source {
             MeshSource::Grid(grid) => fields.serialize_field("grid", grid)?,
@@ -170,6 +184,9 @@ impl Serialize for MeshInput {
         }
         if !groups.is_empty() {
             fields.serialize_field("groups", groups)?;
+        }
+        if !curves.is_empty() {
+            fields.serialize_field("curves", curves)?;
         }
         fields.end()
     }
@@ -211,6 +228,32 @@ pub struct ElementRange {
     /// Range of y.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub y: Option<[f64; 2]>,
+}
+
+/// A curve that a boundary lies on.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Curve {
+    /// What it is.
+    pub kind: CurveKind,
+    /// Center `[x, y]` of a circle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub center: Option<[f64; 2]>,
+    /// Radius of a circle, > 0 (length).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radius: Option<f64>,
+}
+
+/// Kinds of curves that boundaries lie on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CurveKind {
+    /// A circle with `center` and `radius`. The corners of the boundary's elements have to lie on it to 1e-4 of the radius;
+    /// all nodes of the boundary are put there.
+    Circle,
+    /// A smooth curve through the corners of the boundary's elements (a cubic spline), which stay where they are. The
+    /// boundary must not turn by 45° or more at a node.
+    Spline,
 }
 
 /// Grid lines; with `top` or `bottom` a strip between two polylines.

@@ -18,7 +18,8 @@ pub use contact::{
 pub use load::{Load, LoadFields};
 pub use material::{Elasticity, Material, MaterialFields, Orthotropic};
 pub use mesh::{
-    AdaptiveRefine, BoundaryPart, ElementRange, Grid, InlineMesh, MeshInput, MeshSource, Refine,
+    AdaptiveRefine, BoundaryPart, Curve, CurveKind, ElementRange, Grid, InlineMesh, MeshInput,
+    MeshSource, Refine,
 };
 pub use solver::{
     AccuracyMode, Algorithm, SolverControls, Spacing, Step, ThesisOptions, ThesisPressure,

@@ -32,6 +32,8 @@ __all__ = [
     "Condition",
     "Cone",
     "Contact",
+    "Curve",
+    "CurveKind",
     "Element",
     "ElementRange",
     "Elements",
@@ -184,6 +186,30 @@ class BoundaryPart(Part):
     y: Pair | None = None
 
 
+CurveKind = Literal["circle", "spline"]
+"""Kinds of curves that boundaries lie on.
+
+`circle`: A circle with `center` and `radius`. The corners of the boundary's elements have to lie on it to 1e-4 of
+the radius; all nodes of the boundary are put there.
+
+`spline`: A smooth curve through the corners of the boundary's elements (a cubic spline), which stay where they are.
+The boundary must not turn by 45° or more at a node."""
+
+
+@dataclass(kw_only=True, repr=False)
+class Curve(Part):
+    """A curve that a boundary lies on.
+
+    kind: What it is.
+    center: Center `[x, y]` of a circle.
+    radius: Radius of a circle, > 0 (length).
+    """
+
+    kind: CurveKind
+    center: Pair | None = None
+    radius: float | None = None
+
+
 Numbers = Annotated[Union[Sequence[float], NDArray[Any]], ListOf(float)]
 """A list of numbers."""
 
@@ -283,6 +309,9 @@ class MeshInput(Part):
     abaqus: The text of an Abaqus or CalculiX deck: surfaces and, where their nodes span edges, node sets become
         boundaries, element sets groups, node sets node sets. Its analysis is not used.
     boundaries: Further names for parts of boundaries, e.g. `{"taper": {"side": "top", "x": [1, 3]}}`.
+    curves: Curves that boundaries lie on, by their names, e.g. `{"arc": {"kind": "circle", "center": [0, 0],
+        "radius": 4}}`: their nodes are put there, also those that refinement adds. Elements that only have corners
+        have straight sides, and a body made of them has corners that no curve has.
     gmsh: The text of a Gmsh mesh (MSH 2.2 or 4.1, ASCII): physical curves become boundaries, physical surfaces
         groups, physical points node sets.
     grid: A grid of lines, with the boundaries `left`, `right`, `bottom`, `top`.
@@ -295,6 +324,7 @@ class MeshInput(Part):
 
     abaqus: str | None = None
     boundaries: dict[str, BoundaryPart] = field(default_factory=dict)
+    curves: dict[str, Curve] = field(default_factory=dict)
     gmsh: str | None = None
     grid: Grid | None = None
     groups: dict[str, ElementRange] = field(default_factory=dict)

@@ -1,0 +1,230 @@
+//! Bodies whose sides are straight though they stand for curves: corners are told, and `mesh.curves` removes them.
+
+use serde_json::{Value, json};
+use solver::error::Reason;
+use solver::model::Model;
+use solver::solution::{ErrorMethod, QuantityName, Solution, WarningCode};
+
+use crate::smooth::Sector;
+use crate::support::{close, problem, solve};
+
+/// A third of a hollow cylinder, R = 4, pressed on a rigid plane: in elements of 2° or others.
+fn cylinder(sector: Sector, changes: &[(&str, Value)]) -> Value {
+    let mut text = json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": sector.mesh(),
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "inner", "ux": 0, "uy": 0}],
+        "contacts": [{
+            "boundary": "outer", "indentation": 0.08, "normal": "obstacle",
+            "obstacle": {"kind": "line", "point": [0, -4], "angle": 0}
+        }]
+    });
+    for (key, value) in changes {
+        text["mesh"][key] = value.clone();
+    }
+    text
+}
+
+fn facets(around: usize) -> Sector {
+    let mut sector = Sector::new([1.0, 4.0], [-150.0, -30.0], around);
+    (sector.across, sector.straight) = (20, true);
+    sector
+}
+
+fn circle() -> (&'static str, Value) {
+    let on = json!({"outer": {"kind": "circle", "center": [0, 0], "radius": 4}});
+    ("curves", on)
+}
+
+fn peak(solution: &Solution) -> (f64, ErrorMethod) {
+    let known = solution.summary.accuracy.as_ref().unwrap();
+    let peak = known
+        .quantities
+        .iter()
+        .find(|q| q.quantity == QuantityName::PeakNormalStress)
+        .unwrap();
+    (peak.value, peak.method)
+}
+
+fn kinks(solution: &Solution) -> Vec<&str> {
+    let warnings = solution.summary.warnings.iter();
+    warnings
+        .filter(|w| w.code == WarningCode::KinkInContact)
+        .map(|w| &w.message[..])
+        .collect()
+}
+
+/// Corners of 2°: each halving of the mesh adds E*·δ/(2π)·ln 2 = 4.2 to the peak. It has no limit, and the warning says why.
+#[test]
+fn the_peak_of_a_body_of_straight_facets_has_no_limit() {
+    let mut before = None;
+    for refine in 0..3 {
+        let text = cylinder(facets(60), &[("refine", json!(refine))]);
+        let solution = solve(&problem(&text.to_string()));
+        let (value, method) = peak(&solution);
+        assert_eq!(method, ErrorMethod::NoLimit);
+        let told = kinks(&solution);
+        assert!(
+            told.len() == 1 && told[0].contains("its surface turns by 2.00°"),
+            "{told:?}"
+        );
+        if let Some(before) = before {
+            let growth: f64 = before - value;
+            assert!((3.0..6.5).contains(&growth), "{growth}");
+        }
+        before = Some(value);
+    }
+}
+
+/// Put on its circle it is the same as with sides that were curved from the start, on every mesh, and its peak is that of the
+/// circle: 62.36 on much finer meshes.
+#[test]
+fn facets_on_their_circle_are_the_curved_body() {
+    for refine in [0, 1] {
+        let mut curved = facets(60);
+        curved.straight = false;
+        let [on_circle, curved] = [
+            cylinder(facets(60), &[("refine", json!(refine)), circle()]),
+            cylinder(curved, &[("refine", json!(refine)), circle()]),
+        ]
+        .map(|text| solve(&problem(&text.to_string())));
+        assert_eq!(kinks(&on_circle), Vec::<&str>::new());
+        assert_ne!(peak(&on_circle).1, ErrorMethod::NoLimit);
+        // inner nodes of straight and of curved elements differ
+        close(peak(&on_circle).0, peak(&curved).0, 2e-3);
+        close(
+            on_circle.summary.normal_force,
+            curved.summary.normal_force,
+            2e-4,
+        );
+        close(peak(&on_circle).0, -62.36, 0.02);
+    }
+}
+
+/// Nodes of adaptive refinement, and of verification, lie on the circle too.
+#[test]
+fn all_later_nodes_lie_on_the_circle() {
+    let mut coarse = facets(24);
+    coarse.across = 4;
+    let text = cylinder(coarse, &[("refine", json!({"tolerance": 0.03})), circle()]);
+    let problem_ = problem(&text.to_string());
+    let (solution, mesh) =
+        solver::solve_with_mesh(&problem_, None, &mut crate::support::quiet).unwrap();
+    assert!(solution.summary.refinements.len() > 2);
+    for edge in &mesh.boundaries["outer"] {
+        for [x, y] in mesh.edge_nodes(edge) {
+            assert!((x.hypot(y) - 4.0).abs() < 1e-12, "({x}, {y})");
+        }
+    }
+    close(peak(&solution).0, -62.36, 0.03);
+    let mut verified = cylinder(coarse, &[circle()]);
+    verified["solver"] = json!({"accuracy": "verify"});
+    let solution = solve(&problem(&verified.to_string()));
+    let known = solution.summary.accuracy.unwrap();
+    assert_eq!(known.verified, Some(true), "{known:#?}");
+}
+
+/// A spline through the corners is as good as the circle.
+#[test]
+fn facets_on_a_spline_have_no_corners() {
+    let spline = json!({"outer": {"kind": "spline"}});
+    let text = cylinder(facets(60), &[("curves", spline), ("refine", json!(1))]);
+    let solution = solve(&problem(&text.to_string()));
+    assert_eq!(kinks(&solution), Vec::<&str>::new());
+    close(peak(&solution).0, -62.36, 0.02);
+}
+
+/// The smooth body itself has no corners: nothing is said, whatever its elements.
+#[test]
+fn a_curved_body_has_no_corners() {
+    for (around, triangles) in [(12, false), (30, true), (60, false)] {
+        let mut sector = facets(around);
+        (sector.straight, sector.triangles) = (false, triangles);
+        let solution = solve(&problem(&cylinder(sector, &[]).to_string()));
+        assert_eq!(kinks(&solution), Vec::<&str>::new());
+        assert_ne!(peak(&solution).1, ErrorMethod::NoLimit);
+    }
+}
+
+/// A node off the circle, and what else cannot be put on a curve, is refused by name.
+#[test]
+fn what_does_not_lie_on_its_curve_is_refused() {
+    let refused = |curves: Value, around: usize, across: usize| {
+        let mut sector = facets(around);
+        sector.across = across;
+        let text = cylinder(sector, &[("curves", curves)]);
+        let mut found = Model::new(&problem(&text.to_string()), None).unwrap_err();
+        found.remove(0)
+    };
+    let circle =
+        |radius: f64| json!({"outer": {"kind": "circle", "center": [0, 0], "radius": radius}});
+    let off = refused(circle(4.01), 60, 8);
+    assert_eq!(
+        (off.reason, &off.pointer[..]),
+        (Reason::Conflict, "/mesh/curves/outer")
+    );
+    assert!(off.got.contains("1.000e-2 off the circle"), "{}", off.got);
+    assert!(off.expected.contains("4.010e-4"), "{}", off.expected);
+    let unknown = refused(json!({"other": {"kind": "spline"}}), 60, 8);
+    assert_eq!(unknown.reason, Reason::UnknownBoundary);
+    let half = refused(json!({"outer": {"kind": "circle", "radius": 4}}), 60, 8);
+    assert_eq!(half.reason, Reason::Missing);
+    let none = refused(circle(0.0), 60, 8);
+    assert_eq!(none.reason, Reason::OutOfRange);
+    let spline = refused(json!({"outer": {"kind": "spline", "radius": 4}}), 60, 8);
+    assert_eq!(spline.reason, Reason::NotUsed);
+    // sides of 60° turn too sharply for a spline
+    let turns = refused(json!({"outer": {"kind": "spline"}}), 2, 1);
+    assert_eq!(turns.reason, Reason::TurnsCorner);
+    // the inner circle moves into the first row of elements: 2 of them around, thinner than its bow
+    let mut thin = Sector::new([3.9, 4.0], [-150.0, -30.0], 2);
+    (thin.straight, thin.across) = (true, 1);
+    let inner = json!({"outer": {"kind": "circle", "center": [0, 0], "radius": 4}, "inner": {"kind": "circle", "center": [0, 0], "radius": 3.9}});
+    assert!(
+        Model::new(
+            &problem(&cylinder(thin, &[("curves", inner)]).to_string()),
+            None
+        )
+        .is_ok()
+    );
+    // an inner boundary that bows outwards, alone
+    let inner = json!({"inner": {"kind": "circle", "center": [0, 0], "radius": 3.9}});
+    let found = Model::new(
+        &problem(&cylinder(thin, &[("curves", inner)]).to_string()),
+        None,
+    )
+    .unwrap_err();
+    assert_eq!(found[0].reason, Reason::InvertedElement);
+}
+
+/// A bore of straight facets around a pin: its corners point into the body, where the pin does not reach. They are told; on the
+/// circle there are none. And an obstacle that follows the body's surface at a distance has the body's corners: none counts.
+#[test]
+fn corners_that_point_into_the_body_are_told() {
+    let pin: Vec<[f64; 2]> = (0..=120)
+        .map(|k| (k as f64 - 150.0).to_radians())
+        .map(|angle| [3.9 * angle.cos(), 3.9 * angle.sin() - 0.1])
+        .collect();
+    let mut bore = Sector::new([4.0, 8.0], [-150.0, -30.0], 30);
+    (bore.across, bore.straight) = (10, true);
+    let told = |obstacle: Value, indentation: f64, changes: &[(&str, Value)]| {
+        let mut text = cylinder(bore, changes);
+        text["supports"] = json!([{"boundary": "outer", "ux": 0, "uy": 0}]);
+        text["contacts"][0]["boundary"] = json!("inner");
+        text["contacts"][0]["obstacle"] = obstacle;
+        text["contacts"][0]["indentation"] = json!(indentation);
+        let solution = solve(&problem(&text.to_string()));
+        assert!(solution.summary.normal_force > 0.0);
+        kinks(&solution).join("\n")
+    };
+    let round = json!({"kind": "polyline", "points": pin, "interpolation": "cubic"});
+    let facets = told(round.clone(), 0.05, &[]);
+    assert!(
+        facets.contains("points into it") && facets.contains("-4.00°"),
+        "{facets}"
+    );
+    let circle = json!({"inner": {"kind": "circle", "center": [0, 0], "radius": 4}});
+    assert_eq!(told(round, 0.05, &[("curves", circle)]), "");
+    assert_eq!(told(json!({"kind": "flat"}), 0.05, &[]), "");
+}
