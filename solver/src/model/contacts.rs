@@ -9,7 +9,7 @@ use super::level::Level;
 use super::sliding;
 use super::supports::Held;
 use crate::contact::obstacle::{self, FacingRun};
-use crate::contact::{ContactBoundary, Profile};
+use crate::contact::{ContactBoundary, HeldDirections, Profile};
 use crate::elasticity::Section;
 use crate::error::{AllChecks, Checked, Reason};
 use crate::friction::{Average, FrictionLaw};
@@ -74,7 +74,7 @@ impl Checks {
         section: &Section,
         axis: &Axis,
         contacts: &[Contact],
-        held: &BTreeMap<u32, ([f64; 2], f64)>,
+        held: &HeldDirections,
         i: usize,
         (obstacle, friction): (Checked, Option<FrictionLaw<Average>>),
     ) -> Checked<ContactModel> {
@@ -294,7 +294,7 @@ impl Checks {
         &mut self,
         mesh: &Mesh,
         edges: &[Edge],
-        held: &BTreeMap<u32, ([f64; 2], f64)>,
+        held: &HeldDirections,
         contact: &Contact,
         pointer: &str,
     ) -> Checked<(FacingRun, Vec<(Edge, f64)>)> {
@@ -485,7 +485,7 @@ impl Checks {
 }
 
 /// The directions, with their errors, of nodes that supports hold along one.
-fn along_one_direction(fixed: &BTreeMap<u32, Held>) -> BTreeMap<u32, ([f64; 2], f64)> {
+fn along_one_direction(fixed: &BTreeMap<u32, Held>) -> HeldDirections {
     let one = |(node, held): (&u32, &Held)| match *held {
         Held::Along {
             direction, error, ..
@@ -533,7 +533,7 @@ fn turn_normals(
     boundary: &mut ContactBoundary,
     run: &FacingRun,
     normal: NormalOf,
-    held: &BTreeMap<u32, ([f64; 2], f64)>,
+    held: &HeldDirections,
 ) -> Vec<[f64; 2]> {
     let mut push = vec![[1.0, 0.0]; boundary.nodes.len()];
     if normal == NormalOf::Body {

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::axis::Axis;
 use super::checks::{ALIGNED, Checks};
 use super::nodes::FirstSides;
-use crate::contact::smooth;
+use crate::contact::{HeldDirections, smooth};
 use crate::error::{AllChecks, Checked, Reason};
 use crate::mesh::{Edge, Mesh};
 use crate::problem::{BoundaryValue, Support};
@@ -298,12 +298,7 @@ impl Checks {
 
     /// Unit outward normals at the nodes of a boundary, and how far they may be off (angle); the mean of both edges at a slight
     /// corner, also at an end where the surface goes on smoothly.
-    fn normals(
-        &mut self,
-        mesh: &Mesh,
-        edges: &[Edge],
-        pointer: &str,
-    ) -> Checked<BTreeMap<u32, ([f64; 2], f64)>> {
+    fn normals(&mut self, mesh: &Mesh, edges: &[Edge], pointer: &str) -> Checked<HeldDirections> {
         /// |n₁ + n₂|/2 at a turn of 45°.
         const SHARPEST: f64 = 0.923;
         #[derive(Default)]
