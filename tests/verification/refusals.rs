@@ -164,6 +164,35 @@ fn groups_have_a_unique_name_and_an_element() {
     );
 }
 
+/// A range holds an element if all of its nodes lie there, whatever their number, and wherever the origin is.
+#[test]
+fn a_group_by_ranges_holds_triangles() {
+    let square = json!({
+        "nodes": [[2,5],[3,5],[3,6],[2,6],[2.5,5],[3,5.5],[2.5,6],[2,5.5],[2.5,5.5]],
+        "elements": [[0,1,2,4,5,8], [0,2,3,8,6,7]],
+        "boundaries": {"left": [[3,0,7]], "right": [[1,2,5]]},
+    });
+    let stiff = json!([{"youngs_modulus": 3000, "poissons_ratio": 0, "group": "stiff"}]);
+    let supports =
+        json!([{"boundary": "left", "ux": 0, "uy": 0}, {"boundary": "right", "ux": 0.01, "uy": 0}]);
+    let fields = solve(&with(&[
+        (
+            "/mesh",
+            json!({"inline": square, "groups": {"stiff": {"x": [2, 3], "y": [4, 7]}}}),
+        ),
+        ("/materials", stiff),
+        ("/supports", supports),
+    ]))
+    .fields;
+    assert!(
+        fields
+            .gauss
+            .stress_xx
+            .iter()
+            .all(|s| (s - 30.0).abs() < 1e-10)
+    );
+}
+
 /// Refinement gives every group the children of its elements: a stiff half stays that half.
 #[test]
 fn refinement_keeps_groups() {

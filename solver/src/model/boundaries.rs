@@ -155,10 +155,9 @@ impl Checks {
                 continue;
             }
             let holds = |e: &u32| {
-                let nodes = mesh.element_nodes(&mesh.elements[*e as usize]);
-                nodes
+                mesh.elements[*e as usize]
                     .iter()
-                    .all(|place| within(&[range.x, range.y], place, size))
+                    .all(|n| within(&[range.x, range.y], &mesh.nodes[*n as usize], size))
             };
             let elements: Vec<u32> = (0..mesh.elements.len() as u32).filter(holds).collect();
             if elements.is_empty() {
