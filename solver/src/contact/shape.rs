@@ -148,8 +148,11 @@ fn formula(obstacle: &Obstacle, c: f64, rounding: f64) -> Option<(f64, f64)> {
         let slope = x / root.max(ROUNDING * radius);
         (x.abs() <= radius + rounding).then_some((radius - root, slope))
     };
-    // 0 at 0: the mean of both sides
-    let sign = |x: f64| if x == 0.0 { 0.0 } else { x.signum() };
+    // 0 at 0: the mean of both sides. A node lies at a kink only up to rounding.
+    let sign = |x: f64| match x.abs() <= rounding {
+        true => 0.0,
+        false => x.signum(),
+    };
     match *obstacle {
         Obstacle::Flat { .. } => Some((0.0, 0.0)),
         Obstacle::Circle { radius, center, .. } => round(radius, c - center),
@@ -195,7 +198,7 @@ fn tabulated(x: &[f64], y: &[f64], at: f64, rounding: f64) -> Option<(f64, f64)>
         return None;
     }
     let slope = |k: usize| (y[k + 1] - y[k]) / (x[k + 1] - x[k]);
-    let k = (x.partition_point(|x| *x <= at).max(1) - 1).min(last - 1);
+    let k = (x.partition_point(|x| *x <= at + rounding).max(1) - 1).min(last - 1);
     let distance = y[k] + slope(k) * (at - x[k]);
     let mean = if k > 0 && at - x[k] <= rounding {
         0.5 * (slope(k - 1) + slope(k))
@@ -309,12 +312,20 @@ mod tests {
             along,
         };
         assert_eq!(profile(&wedge, 1.0, 0.0), Some((0.0, 0.0)));
+        for beside in [1.0 - 1e-15, 1.0 + 1e-15] {
+            let slope = profile(&wedge, beside, 1e-12).map(|(_, slope)| slope);
+            assert_eq!(slope, Some(0.0));
+        }
     }
 
     #[test]
     fn a_table_has_ends_and_the_mean_slope_at_kinks() {
         let (x, y) = ([0.0, 1.0, 3.0], [1.0, 0.0, 4.0]);
         assert_eq!(tabulated(&x, &y, 1.0, 1e-12), Some((0.0, 0.5)));
+        for beside in [1.0 - 1e-15, 1.0 + 1e-15] {
+            let slope = tabulated(&x, &y, beside, 1e-12).map(|(_, slope)| slope);
+            assert_eq!(slope, Some(0.5));
+        }
         assert_eq!(tabulated(&x, &y, 3.0, 1e-12), Some((4.0, 2.0)));
         assert_eq!(tabulated(&x, &y, 3.1, 1e-12), None);
     }
