@@ -531,7 +531,9 @@ class Generator:
             found.append({"nodes": "some", "force": [draw.round(-2, 2), draw.round(-2, 2)]})
             self.has("force on a node set")
         whole = self.mesh.node_sets.get("sides", [])
-        if whole and not pressed and draw.chance(0.5) and all(self.mesh.nodes[n][0] > 0 or self.kind != "axisymmetric" for n in whole):
+        # what two sets name together is not what each names
+        forced = any("force" in load for load in found)
+        if whole and not pressed and not forced and draw.chance(0.6) and all(self.mesh.nodes[n][0] > 0 or self.kind != "axisymmetric" for n in whole):
             found.append({"nodes": "sides", "force": [draw.round(-1, 1), draw.round(-1, 1)]})
             self.has("force on a node set of whole sides")
         self.problem["loads"] = found

@@ -19,7 +19,8 @@ def profile(obstacle, c):
         return x * x / (2 * obstacle["radius"]), x / obstacle["radius"]
     if kind in ("wedge", "cone"):
         rise = np.tan(np.radians(obstacle["angle"]))
-        return abs(x) * rise, np.sign(x) * rise
+        # at the kink, if only up to rounding, the mean of both sides
+        return abs(x) * rise, (np.sign(x) if abs(x) > 1e-9 else 0.0) * rise
     if kind == "tilted":
         return obstacle["slope"] * x, obstacle["slope"]
     if kind == "power":
