@@ -10,6 +10,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
 use super::moments::{moments_up_to, shape};
+use super::rings;
 use crate::element::{edge3, gauss};
 use crate::problem::{Kernel, Measure, Normalization};
 
@@ -23,6 +24,12 @@ const BUMP_DISC: f64 = 2.143_565_775_8;
 static FULL_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss::rule(40));
 static SHORT_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss::rule(12));
 const SHORT: f64 = 0.1;
+
+/// Over rings, where a value takes longer, they are also enough on a piece that is farther from the kernel's ends than this
+/// many times half its length, and a few more on one that is not long: to 10⁻¹³, away from the axis.
+const FAR: f64 = 3.0;
+static MIDDLE_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss::rule(24));
+const MIDDLE: f64 = 0.25;
 
 /// The midside node of an edge is in its middle within this part of its length: rounding of arc length.
 const STRAIGHT: f64 = 1e-12;
@@ -247,6 +254,10 @@ impl Averaging {
         if rest <= 0.0 || ring <= 0.0 {
             return 0.0;
         }
+        if rest <= rings::LARGEST * product {
+            let b = rest / (self.radius * self.radius);
+            return self.scale * ring * rings::around(self.kernel, b, rest / product);
+        }
         // the ring lies within the kernel up to this angle, or altogether
         let half_sine = (rest / product).sqrt().min(1.0);
         let most = 2.0 * half_sine.asin();
@@ -265,6 +276,7 @@ impl Averaging {
     /// where the centre's distance from the axis is given.
     fn integrate(&self, centre: f64, ring: Option<f64>, add: &mut impl FnMut(usize, [f64; 3])) {
         let (low, high) = (centre - self.radius, centre + self.radius);
+        let few = ring.is_some_and(|r| r > 2.0 * self.radius) && !self.conserving;
         for edge in self.edge_at(low)..self.chain.s.len() / 2 {
             let arc = self.arc(edge);
             if arc[0] >= high {
@@ -282,10 +294,17 @@ impl Averaging {
                 if length <= 0.0 {
                     continue;
                 }
-                let rule = if length < SHORT * self.radius {
-                    &SHORT_RULE
-                } else {
-                    &FULL_RULE
+                let rule = match length / self.radius {
+                    part if part < SHORT => &SHORT_RULE,
+                    _ if !few => &FULL_RULE,
+                    part => {
+                        let to_end = 1.0 - (0.5 * (a + b) - centre).abs() / self.radius;
+                        match () {
+                            () if to_end >= 0.5 * FAR * part => &SHORT_RULE,
+                            () if part <= MIDDLE => &MIDDLE_RULE,
+                            () => &FULL_RULE,
+                        }
+                    }
                 };
                 for (xi, w) in rule.iter() {
                     let y = a + 0.5 * length * (1.0 + xi);
@@ -539,6 +558,86 @@ mod tests {
         let line = averaging_of_line(rho, &s).row(2.1).apply(&p);
         let difference = averaging.row(2.1).apply(&p) - line;
         assert!(difference.abs() > 1e-4 && difference.abs() < rho * rho);
+    }
+
+    /// The same weights as by many points in both directions, on edges shorter and longer than ρ, and near the axis.
+    #[test]
+    fn rows_over_rings_are_integrals_over_the_surface() {
+        let rule = gauss::rule(40);
+        let corners: [&[f64]; 3] = [
+            &[0.0, 0.1, 0.25, 0.6, 1.1, 1.7, 2.5],
+            &[2.0, 2.04, 2.1, 2.17, 2.25, 2.3, 2.38, 2.45, 2.5, 2.7],
+            &[1.0, 3.0, 3.5],
+        ];
+        for (kernel, corners) in [Kernel::Bump, Kernel::Bump, Kernel::Parabola]
+            .into_iter()
+            .zip(corners)
+        {
+            let s = with_midsides(corners);
+            for rho in [0.11, 0.3, 0.7] {
+                let average = Average {
+                    kernel,
+                    measure: Measure::Surface,
+                    ..average(rho)
+                };
+                let chain = Chain {
+                    radius: s.clone(),
+                    ..Chain::plain(s.clone())
+                };
+                let averaging = Averaging::new(&average, chain);
+                for place in [0.02, 0.3, 0.52, 0.97] {
+                    let at = s[0] + place * (s[s.len() - 1] - s[0]);
+                    let ring = |y: f64| {
+                        let rest = rho * rho - (y - at) * (y - at);
+                        let half_sine = (rest / (4.0 * at * y)).sqrt().min(1.0);
+                        let most = 2.0 * half_sine.asin();
+                        let quarters = (0..4).flat_map(|k| {
+                            rule.iter().map(move |(xi, w)| {
+                                (0.25 * (f64::from(k) + 0.5 + 0.5 * xi), 0.125 * w)
+                            })
+                        });
+                        quarters
+                            .map(|(part, w)| {
+                                let sine = (0.5 * part * most).sin();
+                                let squared = (y - at) * (y - at) + 4.0 * at * y * sine * sine;
+                                2.0 * y * w * most * averaging.omega(squared.sqrt())
+                            })
+                            .sum::<f64>()
+                    };
+                    let mut exact = vec![0.0; s.len()];
+                    for edge in 0..corners.len() - 1 {
+                        let arc = [s[2 * edge], s[2 * edge + 2], s[2 * edge + 1]];
+                        let (from, to) = (arc[0].max(at - rho), arc[1].min(at + rho));
+                        for piece in 0..8 {
+                            let length = (to - from) / 8.0;
+                            for (xi, w) in rule.iter().filter(|_| length > 0.0) {
+                                let y = from + length * (f64::from(piece) + 0.5 + 0.5 * xi);
+                                let h = edge3::shape(edge3::invert(&arc, y));
+                                let factor = 0.5 * length * w * ring(y);
+                                for (node, h) in
+                                    [2 * edge, 2 * edge + 2, 2 * edge + 1].into_iter().zip(h)
+                                {
+                                    exact[node] += factor * h;
+                                }
+                            }
+                        }
+                    }
+                    let row = averaging.row(at);
+                    let size: f64 = exact.iter().map(|w| w.abs()).sum();
+                    for (node, exact) in exact.iter().enumerate() {
+                        let found = node
+                            .checked_sub(row.first)
+                            .and_then(|i| row.weights.get(i))
+                            .unwrap_or(&0.0);
+                        // what forty points leave of a kernel under one long edge
+                        assert!(
+                            (found - exact).abs() <= 2e-11 * size,
+                            "{kernel:?} {rho} {at} {node}: {found} {exact}"
+                        );
+                    }
+                }
+            }
+        }
     }
 
     fn averaging_of_line(radius: f64, s: &[f64]) -> Averaging {

@@ -3,6 +3,7 @@
 mod bound;
 mod kernel;
 mod moments;
+mod rings;
 mod transition;
 
 pub use bound::{BoundLaw, Source, largest_pressure};

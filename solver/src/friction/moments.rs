@@ -64,14 +64,9 @@ static BUMP: LazyLock<Vec<Known>> = LazyLock::new(|| {
     table
 });
 
-/// Between the ends of a cell the polynomial of degree five with the moments, and their first two derivatives, at both.
-fn of_bump(x: f64) -> [f64; 3] {
-    let place = (x + 1.0) / CELL;
-    let cell = (place as usize).min(CELLS - 1);
-    let r = place - cell as f64;
-    let ends = [&BUMP[cell], &BUMP[cell + 1]];
-    let at = [cell as f64 * CELL - 1.0, (cell + 1) as f64 * CELL - 1.0];
-    // Hermite's polynomials of the value, the slope and the curvature at an end, r away from it
+/// Hermite's polynomials of degree five on a cell of length 1, at r from its start: the weights of value, slope and
+/// curvature at its start, and at its end, where the slope counts with the opposite sign.
+pub(super) fn hermite(r: f64) -> ([f64; 3], [f64; 3]) {
     let own = |r: f64| {
         let rest = (1.0 - r).powi(3);
         [
@@ -80,7 +75,17 @@ fn of_bump(x: f64) -> [f64; 3] {
             rest * 0.5 * r * r,
         ]
     };
-    let (near, far) = (own(r), own(1.0 - r));
+    (own(r), own(1.0 - r))
+}
+
+/// Between the ends of a cell the polynomial of degree five with the moments, and their first two derivatives, at both.
+fn of_bump(x: f64) -> [f64; 3] {
+    let place = (x + 1.0) / CELL;
+    let cell = (place as usize).min(CELLS - 1);
+    let r = place - cell as f64;
+    let ends = [&BUMP[cell], &BUMP[cell + 1]];
+    let at = [cell as f64 * CELL - 1.0, (cell + 1) as f64 * CELL - 1.0];
+    let (near, far) = hermite(r);
     std::array::from_fn(|k| {
         let derivatives = |end: usize| {
             let (Known { omega, slope, .. }, t) = (ends[end], at[end]);
