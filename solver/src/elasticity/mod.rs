@@ -7,6 +7,7 @@ mod mixed;
 mod recovery;
 mod shapes;
 mod stress_difference;
+mod wedges;
 
 pub use assembly::{
     Axes, Dof, DofMap, EdgeLoad, ElementStiffness, LoadAxes, Loads, assemble_element,
@@ -17,3 +18,4 @@ pub use material::{COMPONENTS, Moduli, Section, inverse, isotropic, orthotropic,
 pub use mixed::Mixed;
 pub use recovery::{Deformed, Recovered, recover};
 pub use stress_difference::StressDifference;
+pub use wedges::{Growth, Side, Wedge, growth};

@@ -11,6 +11,7 @@ mod fronts;
 mod halves;
 mod multifrontal;
 mod parallel;
+mod spectrum;
 mod substitution;
 
 pub use breaks::{Breaks, Stopped};
@@ -19,3 +20,4 @@ pub use dissection::{Cells, Dissection};
 pub use eliminated::Eliminated;
 pub use fronts::Fronts;
 pub use multifrontal::{ElementMatrix, Factor, FactorError};
+pub use spectrum::{Rows, near_null, quadratic_eigenvalues};
