@@ -127,3 +127,86 @@ fn the_axis_stays_closed_under_a_flat_punch_and_open_under_a_hollow_one() {
     only_presses(&hollow, "a hollow obstacle");
     assert_eq!(hollow.node_profiles["top"].state[0], NodeState::Open);
 }
+
+/// 2π ∫ p r dr by the parabolas through the nodes, on straight edges of one height; exact by Simpson's rule.
+fn integral(solution: &Solution, boundary: &str) -> f64 {
+    let profile = &solution.node_profiles[boundary];
+    let force = |i: usize| -profile.normal_stress[i] * profile.x[i];
+    let edges = (0..profile.s.len() / 2).map(|k| 2 * k);
+    let edge = |i: usize| {
+        (profile.s[i + 2] - profile.s[i]) / 6.0 * (force(i) + 4.0 * force(i + 1) + force(i + 2))
+    };
+    2.0 * std::f64::consts::PI * edges.map(edge).sum::<f64>()
+}
+
+/// The profile of a contact that reaches the axis adds up to its force, whatever the obstacle and the mesh: also under a
+/// flat punch of one element, where it was 0.3 % off, and where two contacts reach the axis.
+#[test]
+fn profiles_that_reach_the_axis_add_up_to_the_force() {
+    let obstacles = [
+        json!({"kind": "flat"}),
+        json!({"kind": "flat", "to": 2}),
+        json!({"kind": "parabola", "radius": 8}),
+        json!({"kind": "circle", "radius": 9}),
+        cone(3.0),
+        json!({"kind": "table", "x": [0, 0.5, 2, 4], "gap": [0.05, 0, 0, 0.1]}),
+    ];
+    let friction = json!({"coefficient": 0.4, "nonlocal_radius": 0.2, "elastic_slip": 1e-4});
+    for obstacle in obstacles {
+        for lines in [vec![0.0, 4.0], vec![0.0, 0.3, 1.0, 2.0, 4.0]] {
+            for refine in [0, 1, 2] {
+                for law in [None, Some(&friction)] {
+                    let to = obstacle.get("to").and_then(Value::as_f64);
+                    if to.is_some_and(|to| !lines.contains(&to)) {
+                        continue;
+                    }
+                    let mut text = json!({
+                        "analysis": {"kind": "axisymmetric"},
+                        "mesh": {"grid": {"x": lines, "y": [0, 2, 3, 4]}, "refine": refine},
+                        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+                        "supports": [{"boundary": "right", "ux": 0}],
+                        "contacts": [
+                            {"boundary": "top", "obstacle": obstacle, "indentation": 0.1},
+                            {"boundary": "bottom", "obstacle": {"kind": "flat"}},
+                        ],
+                    });
+                    if let Some(law) = law {
+                        text["contacts"][0]["friction"] = law.clone();
+                    }
+                    let solution = solve(&problem(&text.to_string()));
+                    for boundary in ["top", "bottom"] {
+                        // the node on the axis alone has no area to show its force on
+                        let profile = &solution.node_profiles[boundary];
+                        let open = |i: usize| profile.state[i] == NodeState::Open;
+                        if !open(0) && open(1) {
+                            continue;
+                        }
+                        let force = solution.summary.contacts[boundary].normal_force;
+                        let sum = integral(&solution, boundary);
+                        assert!(
+                            force > 0.0 && (sum / force - 1.0).abs() < 1e-10,
+                            "{obstacle} on {lines:?}, refine {refine}, {boundary}: {sum} for {force}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The sphere of Hertz: the pressures beside the axis are as near to his as those elsewhere.
+#[test]
+fn pressures_beside_the_axis_are_those_of_hertz() {
+    let solution = pressed(json!({"kind": "parabola", "radius": 8}), 0.05, false, None);
+    let profile = &solution.node_profiles["top"];
+    let pressure = |i: usize| -profile.normal_stress[i];
+    let force = solution.summary.normal_force;
+    let a = (0.75 * force * 8.0 / E_STAR).cbrt();
+    let exact =
+        |r: f64| 1.5 * force / (std::f64::consts::PI * a * a) * (1.0 - r * r / (a * a)).sqrt();
+    let parts: Vec<f64> = (0..5).map(|i| pressure(i) / exact(profile.x[i])).collect();
+    let (least, most) = parts
+        .iter()
+        .fold((f64::MAX, f64::MIN), |(a, b), p| (a.min(*p), b.max(*p)));
+    assert!(most - least < 0.03, "{parts:?}");
+}

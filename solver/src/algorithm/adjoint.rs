@@ -69,7 +69,9 @@ impl Gradient {
 
     /// Adds `factor` times the derivatives of a node's pressure.
     pub(super) fn add_pressure(&mut self, system: &System<'_>, node: usize, factor: f64) {
-        self.reaction[node] += factor / system.nodes[node].weight;
+        for (other, weight) in system.pressure_weights(node, factor) {
+            self.reaction[other] += weight;
+        }
     }
 }
 

@@ -240,14 +240,15 @@ impl Moved {
             if let Source::Average(row) = &point.source {
                 let moved = point.weight * self.at(system, point).abs();
                 for (i, weight) in row.weights.iter().enumerate() {
-                    let [all, positive] = &mut sums[row.first + i];
-                    *all += moved * weight;
-                    *positive += moved * weight.max(0.0);
+                    for (node, moved) in system.pressure_weights(row.first + i, moved * weight) {
+                        let [all, positive] = &mut sums[node];
+                        *all += moved;
+                        *positive += moved.max(0.0);
+                    }
                 }
             }
         }
-        let nodes = system.range(&system.patches[p]);
-        let gains = nodes.map(|i| sums[i].map(|sum| sum / system.nodes[i].weight));
+        let gains = system.range(&system.patches[p]).map(|i| sums[i]);
         gains.fold([0.0; 2], |[a, b], [c, d]| [a.max(c), b.max(d)])
     }
 

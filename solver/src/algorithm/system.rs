@@ -589,12 +589,36 @@ impl<'a> System<'a> {
             .fold([0.0; 2], |[sum, size], f| [sum + f, size + f.abs()])
     }
 
-    /// Nodal pressures p = R / ∫h.
+    /// Nodal pressures: p = R / ∫h, and beside the axis what makes the profile add up to the reactions (formulation 3.5);
+    /// exactly 0 where there is no reaction.
     pub fn pressures(&self, reactions: &[f64]) -> Vec<f64> {
         let nodes = self.nodes.iter().zip(reactions);
-        nodes
+        let mut pressures: Vec<f64> = nodes
             .map(|(node, reaction)| reaction / node.weight)
-            .collect()
+            .collect();
+        for (i, node) in self.nodes.iter().enumerate() {
+            if let Some(end) = node.beside_axis
+                && reactions[i] != 0.0
+            {
+                pressures[i] += AXIS_SHARE * (pressures[end] - pressures[i]);
+            }
+        }
+        pressures
+    }
+
+    /// `factor` times the pressure of a node in contact as a sum over reactions: nodes and their weights.
+    pub fn pressure_weights(
+        &self,
+        node: usize,
+        factor: f64,
+    ) -> impl Iterator<Item = (usize, f64)> + use<> {
+        let area = self.nodes[node].weight;
+        let (own, beside) = match self.nodes[node].beside_axis {
+            // what is taken from the node goes to the one on the axis, whose area is that part of its own
+            Some(end) => (1.0 - AXIS_SHARE, Some((end, factor / area))),
+            None => (1.0, None),
+        };
+        std::iter::once((node, own * factor / area)).chain(beside)
     }
 
     /// The averaged pressure of a point as a sum over reactions, W P: nodes in contact and their weights.
@@ -606,7 +630,8 @@ impl<'a> System<'a> {
         for (i, &weight) in row.weights.iter().enumerate().filter(|(_, w)| **w != 0.0) {
             let node = row.first + i;
             if state.active[node] {
-                weights.push((node, weight / self.nodes[node].weight));
+                let parts = self.pressure_weights(node, weight);
+                weights.extend(parts.filter(|(other, _)| state.active[*other]));
             }
         }
         weights
