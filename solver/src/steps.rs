@@ -4,10 +4,10 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use crate::accuracy;
+use crate::accuracy::{self, Increments};
 use crate::algorithm::{
-    self, Averages, Extent, Finished, Place, Region, Reported, Rounding, System, report, run_near,
-    settle_near,
+    self, Averages, EndForces, Extent, Finished, Place, Quantity, Region, Reported, Rounding,
+    System, report, run_near, settle_near,
 };
 use crate::body::ElasticBody;
 use crate::error::SolveError;
@@ -15,8 +15,8 @@ use crate::model::{Level, Model};
 use crate::origins::Origins;
 use crate::problem::{Algorithm, Spacing, Step};
 use crate::solution::{
-    Comparison, ContactSummary, Fields, Iteration, Observer, Outcome, Phase, Progress, Solution,
-    StepSolution, Summary, Warning, WarningCode,
+    ContactSummary, Fields, Iteration, Observer, Outcome, Phase, Progress, Solution, StepSolution,
+    Summary, Warning, WarningCode,
 };
 
 /// An increment that does not converge is halved this often before the step ends there.
@@ -33,26 +33,37 @@ pub fn run(
     let steps = &steps_of(model);
     let mut load_history = LoadHistory::new(model, System::new(model, body, observe)?);
     let mut so_far: Option<Solution> = None;
+    let mut more = Again::default();
     let mut fields = Fields::default();
     for (number, step) in steps.iter().enumerate() {
         if let Some(solution) = &so_far {
             let _ = observe(Progress::Step(solution));
         }
         let _ = observe(Progress::Phase(Phase::Iterate));
-        let (finished, rows) = load_history.step(number as u32, step, 1, observe);
+        let (finished, rows) = load_history.step(number as u32, step, observe);
         // a stopped solution is reported too: the answer of the observer no longer matters
         let _ = observe(Progress::Phase(Phase::Recover));
         load_history.system.threads = body.threads(observe);
         let reported = report(model, body, &load_history.system, &finished)?;
-        let last = number + 1 == steps.len() || !can_continue(reported.summary.outcome);
+        let outcome = reported.summary.outcome;
+        let last = number + 1 == steps.len() || !can_continue(outcome);
         let assessed = last && !model.contacts.is_empty();
+        if last && outcome == Outcome::Converged && model.depends_on_path() {
+            let finer = Increments::more(steps);
+            (load_history, more) = again_in(load_history, &finer, observe);
+        }
         let accuracy = assessed.then(|| {
             let (system, mut origins) = (&load_history.system, origins.take());
             if let Some(origins) = origins.as_deref_mut() {
                 let places = reported.missed.iter();
                 places.for_each(|place| origins.add_place(model, place.patch, place.s));
             }
-            accuracy::assess(model, body, system, &finished, &reported, origins, observe)
+            let increments = model.depends_on_path().then(|| {
+                let quantities = std::mem::take(&mut more.quantities);
+                Increments::new(steps, &Increments::more(steps), quantities)
+            });
+            let known = (&finished, &reported, increments.as_ref());
+            accuracy::assess(model, body, system, known, origins, observe)
         });
         let mut summary = reported.summary;
         summary.accuracy = accuracy;
@@ -64,7 +75,6 @@ pub fn run(
         summary.increments = load_history.increments;
         summary.cut_backs = load_history.cut_backs;
         summary.iterations = rows.len() as u32;
-        let outcome = summary.outcome;
         let (mut history, mut ends) = match so_far.take() {
             Some(solution) => (solution.history, solution.steps),
             None => (Vec::new(), Vec::new()),
@@ -99,10 +109,13 @@ pub fn run(
     let Some(mut solution) = so_far else {
         unreachable!("there is at least one step: a problem without steps is one step")
     };
+    // those of the last step are a part of its errors
+    let earlier = solution.steps.len().saturating_sub(1);
+    for (step, forces) in solution.steps.iter_mut().take(earlier).zip(&more.forces) {
+        algorithm::warn_of_increments(step, forces);
+    }
     if model.controls.check_increments && solution.summary.converged {
-        let summary = &mut solution.summary;
-        let second = doubled(model, load_history, steps, summary, observe);
-        algorithm::note_doubled_increments(summary, second);
+        note_doubled(model, load_history, steps, &mut solution.summary, observe);
     }
     tell_of_earlier_steps(&mut solution);
     if model.steps.is_empty() {
@@ -187,7 +200,7 @@ pub fn run_to_numbers(
         Some(near) => near,
         None => {
             std::mem::swap(&mut load_history.region, region);
-            let followed = load_history.follow(&steps_of(model), 1, observe);
+            let followed = load_history.follow(&steps_of(model), observe);
             std::mem::swap(&mut load_history.region, region);
             let Some(finished) = followed else {
                 unreachable!("there is at least one step: a problem without steps is one step")
@@ -220,22 +233,26 @@ pub fn run_to_numbers(
     Ok((numbers, left))
 }
 
-/// Adds to the end of the path what was told of an earlier step alone and the end rests on: kinematics that were not small.
+/// Adds to the end of the path what was told of an earlier step alone and the end rests on: kinematics that were not small, and
+/// increments that were too few.
 fn tell_of_earlier_steps(solution: &mut Solution) {
     let Some((_, earlier)) = solution.steps.split_last() else {
         return;
     };
     for step in earlier {
         for warning in &step.summary.warnings {
-            let kinematic = matches!(
+            let lasting = matches!(
                 warning.code,
-                WarningCode::LargeSlip | WarningCode::LargeStrain | WarningCode::LargeDisplacement
+                WarningCode::LargeSlip
+                    | WarningCode::LargeStrain
+                    | WarningCode::LargeDisplacement
+                    | WarningCode::IncrementsMatter
             );
             let told = &mut solution.summary.warnings;
             let known = told
                 .iter()
                 .any(|other| other.code == warning.code && other.pointer == warning.pointer);
-            if kinematic && !known {
+            if lasting && !known {
                 told.push(Warning {
                     message: format!("In load step {:?}: {}", step.name, warning.message),
                     ..warning.clone()
@@ -253,7 +270,7 @@ pub fn run_to_compare(
     observe: &mut Observer<'_>,
 ) -> Result<Reported, SolveError> {
     let mut load_history = LoadHistory::new(model, System::new(model, body, observe)?);
-    let last = load_history.follow(&steps_of(model), 1, observe);
+    let last = load_history.follow(&steps_of(model), observe);
     match last {
         Some(finished) if finished.outcome != Outcome::Canceled => {
             load_history.system.threads = body.threads(observe);
@@ -271,22 +288,64 @@ fn steps_of(model: &Model) -> Cow<'_, [Step]> {
     }
 }
 
-/// The forces after twice the increments, without reporting to the observer.
-fn doubled(
+/// What the same path in other increments comes to.
+#[derive(Default)]
+struct Again {
+    /// The quantities of its end; none if it did not converge.
+    quantities: Vec<Quantity>,
+    /// At the end of every step.
+    forces: Vec<EndForces>,
+    rounding: Option<Rounding>,
+}
+
+/// The same path in these steps, without reporting to the observer. The first history is then as it was.
+fn again_in<'a>(
+    first: LoadHistory<'a>,
+    steps: &[Step],
+    observe: &mut Observer<'_>,
+) -> (LoadHistory<'a>, Again) {
+    let quiet: &mut Observer<'_> = &mut algorithm::quiet(observe);
+    let mut system = first.system;
+    let path = system.restart();
+    let mut second = LoadHistory::new(first.model, system);
+    let mut again = Again::default();
+    for (number, step) in steps.iter().enumerate() {
+        let (finished, _) = second.step(number as u32, step, quiet);
+        again.forces.push(EndForces::new(&second.system, &finished));
+        if number + 1 == steps.len() && finished.outcome == Outcome::Converged {
+            again.quantities = algorithm::quantities(&second.system, &finished);
+        }
+        if !can_continue(finished.outcome) {
+            break;
+        }
+    }
+    again.rounding = second.rounding;
+    system = second.system;
+    system.resume(path);
+    (LoadHistory { system, ..first }, again)
+}
+
+/// Notes how much twice the increments change the forces.
+fn note_doubled(
     model: &Model,
     first: LoadHistory<'_>,
     steps: &[Step],
-    solution: &Summary,
+    summary: &mut Summary,
     observe: &mut Observer<'_>,
-) -> Comparison {
-    let quiet: &mut Observer<'_> = &mut algorithm::quiet(observe);
-    let (mut system, rounding) = (first.system, first.rounding);
-    system.restart();
-    let mut load_history = LoadHistory::new(model, system);
-    let last = load_history.follow(steps, 2, quiet);
-    let rounding = algorithm::rounding_of_forces([rounding, load_history.rounding]);
+) {
+    let twice = |step: &Step| Step {
+        increments: 2 * step.increments,
+        ..step.clone()
+    };
+    let twice: Vec<Step> = steps.iter().map(twice).collect();
+    let rounding = first.rounding;
+    let (_, second) = again_in(first, &twice, observe);
+    let rounding = algorithm::rounding_of_forces([rounding, second.rounding]);
     let tolerance = model.controls.tolerance.max(rounding);
-    algorithm::compared(&load_history.system, solution, last.as_ref(), tolerance)
+    if let Some(forces) = second.forces.last() {
+        let second = forces.compared(summary, tolerance);
+        algorithm::note_doubled_increments(summary, second);
+    }
 }
 
 /// Whether a next increment can start from this end: the thesis's own iteration settles in false states and
@@ -332,16 +391,11 @@ impl<'a> LoadHistory<'a> {
         }
     }
 
-    /// Solves one step after the other, each in `multiple` times its increments, until one does not converge: the last end.
-    fn follow(
-        &mut self,
-        steps: &[Step],
-        multiple: u32,
-        observe: &mut Observer<'_>,
-    ) -> Option<Finished> {
+    /// Solves one step after the other until one does not converge: the last end.
+    fn follow(&mut self, steps: &[Step], observe: &mut Observer<'_>) -> Option<Finished> {
         let mut last = None;
         for (number, step) in steps.iter().enumerate() {
-            let (finished, _) = self.step(number as u32, step, multiple, observe);
+            let (finished, _) = self.step(number as u32, step, observe);
             let hopeful = can_continue(finished.outcome);
             last = Some(finished);
             if !hopeful {
@@ -351,12 +405,11 @@ impl<'a> LoadHistory<'a> {
         last
     }
 
-    /// Solves one step in `multiple` times its increments: its end, and its rows.
+    /// Solves one step: its end, and its rows.
     fn step(
         &mut self,
         number: u32,
         step: &Step,
-        multiple: u32,
         observe: &mut Observer<'_>,
     ) -> (Finished, Vec<Iteration>) {
         let path = StepPath {
@@ -364,7 +417,7 @@ impl<'a> LoadHistory<'a> {
             step,
             power: self.model.contacts.iter().find_map(|c| c.power),
         };
-        let count = multiple * step.increments;
+        let count = step.increments;
         let mut increment = 0;
         for k in 1..=count {
             let (from, to) = (

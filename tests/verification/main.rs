@@ -30,6 +30,7 @@ mod gmsh_files;
 mod graded;
 mod held_by_contact;
 mod hertz_sphere;
+mod increments;
 mod input;
 mod invariance;
 mod lift_off;

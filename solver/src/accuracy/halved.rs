@@ -86,7 +86,7 @@ pub fn verified(
         let mut quantity = own.clone();
         let too_many = there.iter().any(|q| q.estimable == Estimable::TooMany);
         if too_many || own.method == ErrorMethod::TooMany {
-            (quantity.error, quantity.relative) = (None, None);
+            (quantity.error, quantity.relative, quantity.increments) = (None, None, None);
             quantity.method = ErrorMethod::TooMany;
             quantities.push(quantity);
             doubts.push(None);
@@ -174,21 +174,22 @@ fn compare(
         .map(|before| (before / difference).log2());
     if quantity.method == ErrorMethod::NoLimit || finer.estimable == Estimable::NoLimit {
         quantity.method = ErrorMethod::NoLimit;
-        (quantity.error, quantity.relative) = (None, None);
+        (quantity.error, quantity.relative, quantity.increments) = (None, None, None);
         return None;
     }
-    let estimate = match quantity.error {
+    let estimate = match quantity.of_mesh() {
         Some(estimate) if finer.estimable != Estimable::Unseen => estimate,
         _ => {
             quantity.method = ErrorMethod::Unknown;
-            (quantity.error, quantity.relative) = (None, None);
+            (quantity.error, quantity.relative, quantity.increments) = (None, None, None);
             return Some(match finer.estimable {
                 Estimable::Unseen => Doubt::Unseen,
                 _ => Doubt::Unestimated,
             });
         }
     };
-    let error = bound(quantity.quantity, difference, quantity.order, estimate);
+    let error = bound(quantity.quantity, difference, quantity.order, estimate)
+        + quantity.increments.unwrap_or(0.0);
     quantity.method = ErrorMethod::MeshHalved;
     quantity.error = Some(error);
     quantity.relative = relative(error, scale);

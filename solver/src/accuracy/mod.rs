@@ -10,9 +10,11 @@
 //! `tests/verification/calibration.rs`, which also says how often the bound holds.
 
 mod halved;
+mod increments;
 mod verdict;
 
 pub use halved::{OnOtherMesh, unverified, verified};
+pub use increments::Increments;
 
 use crate::algorithm::{Estimable, Finished, Quantity, Reported, System, influences};
 use crate::body::{AXIS_SHARE, ElasticBody};
@@ -106,13 +108,12 @@ fn of_cut(name: QuantityName) -> f64 {
     }
 }
 
-/// The errors of all quantities, and the verdict.
+/// The errors of all quantities, and the verdict. `increments`: what more of them come to, where the end depends on the path.
 pub fn assess(
     model: &Model,
     body: &ElasticBody,
     system: &System<'_>,
-    finished: &Finished,
-    reported: &Reported,
+    (finished, reported, increments): (&Finished, &Reported, Option<&Increments>),
     origins: Option<&mut Origins>,
     observe: &mut Observer<'_>,
 ) -> Accuracy {
@@ -139,6 +140,9 @@ pub fn assess(
             _ => (None, ErrorMethod::Unknown),
         };
         let scale = scale_of(quantity, quantities);
+        // without a counterpart in more increments nothing is known of it
+        let open = increments.map(|more| more.left_open(quantity, quantities).unwrap_or(scale));
+        let error = error.map(|error| error + open.unwrap_or(0.0));
         found.push(EstimatedQuantity {
             quantity: quantity.name,
             contact: system.patches[quantity.patch].contact.name.clone(),
@@ -147,6 +151,7 @@ pub fn assess(
             difference: None,
             order: None,
             error,
+            increments: error.and(open),
             relative: error.and_then(|error| relative(error, scale)),
             method,
         });

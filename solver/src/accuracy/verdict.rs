@@ -138,6 +138,21 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
         )),
         // nothing acts, and nothing is wrong
         (Some(error), None, _) if q.value == 0.0 && error == 0.0 => None,
+        (Some(error), relative, _) if q.increments.is_some_and(|part| part > 0.5 * error) => {
+            let relative = relative.unwrap_or(f64::INFINITY);
+            Some((
+                judged(relative),
+                (
+                    relative / good,
+                    format!(
+                        "`{name}` of contact `{contact}`, {:.5e}, may be off by {}{}, that is {error:.1e}, most of it because the load grows in too few increments: give `steps` more `increments` (without `steps` there is one).",
+                        q.value,
+                        percent(relative),
+                        if end { " of the length of the contact" } else { "" },
+                    ),
+                ),
+            ))
+        }
         (Some(error), relative, ErrorMethod::NodeSpacing) => {
             let relative = relative.unwrap_or(f64::INFINITY);
             Some((

@@ -95,11 +95,15 @@ pub(super) fn largest_error(solution: &Solution) -> f64 {
     quantities.map(relative_error).fold(0.0, f64::max)
 }
 
-/// The relative error of a quantity: 0 if it has no limit or is one of too many, infinite if nothing is known.
+/// The relative error of a quantity that the mesh causes: 0 if it has no limit or is one of too many, infinite if nothing
+/// is known.
 pub(super) fn relative_error(quantity: &EstimatedQuantity) -> f64 {
     match (quantity.method, quantity.error, quantity.relative) {
         (ErrorMethod::NoLimit | ErrorMethod::TooMany, ..) | (_, Some(0.0), _) => 0.0,
-        (_, _, Some(relative)) => relative,
+        (_, Some(error), Some(relative)) => match quantity.of_mesh() {
+            Some(of_mesh) => relative * (of_mesh / error),
+            None => relative,
+        },
         _ => f64::INFINITY,
     }
 }

@@ -27,13 +27,14 @@ pub use convex::{Minimum, minimise};
 pub use finished::Finished;
 pub use near::{Extent, Region, run_near, settle_near};
 pub use profile::{Estimable, Missed, Quantity};
-pub use report::{Reported, numbers, report};
+pub use report::{Reported, numbers, quantities, report};
 pub use rounding::Rounding;
 pub use slides::Slide;
-pub use system::{Averages, ContactNode, Patch, Point, State, System};
+pub use system::{Averages, ContactNode, Patch, Path, Point, State, System};
 pub use track::{Cycle, Place};
 pub use uniqueness::{
-    compared, note_doubled_increments, note_uniqueness, other_solution, rounding_of_forces,
+    EndForces, note_doubled_increments, note_uniqueness, other_solution, rounding_of_forces,
+    warn_of_increments,
 };
 
 use std::ops::ControlFlow;

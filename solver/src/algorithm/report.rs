@@ -74,6 +74,14 @@ pub fn numbers(
     (contacts, warnings)
 }
 
+/// The forces, peaks and extents of a final state, without the displacements of the whole body.
+pub fn quantities(system: &System<'_>, finished: &Finished) -> Vec<Quantity> {
+    let forces = Forces::new(system, finished);
+    let views = (0..system.patches.len())
+        .map(|p| PatchView::new(system, p, finished, &forces).quantities());
+    views.flatten().collect()
+}
+
 /// The results of a final state: forces, extents, profiles, fields and warnings.
 pub fn report(
     model: &Model,

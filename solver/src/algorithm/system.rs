@@ -104,6 +104,14 @@ pub struct Oblique {
     pub shared: bool,
 }
 
+/// Where increments have led to.
+pub struct Path {
+    /// g of every friction point.
+    anchors: Vec<f64>,
+    dissipated: f64,
+    level: Level,
+}
+
 /// One friction point.
 #[derive(Clone, Debug)]
 pub struct Point {
@@ -367,11 +375,24 @@ impl<'a> System<'a> {
         }
     }
 
-    /// Forgets the increments so far: anchors and work.
-    pub fn restart(&mut self) {
-        self.dissipated = 0.0;
-        for point in &mut self.points {
-            point.anchor = 0.0;
+    /// Forgets the increments so far, anchors and work: what is forgotten, with the level.
+    pub fn restart(&mut self) -> Path {
+        let anchors = self.points.iter_mut();
+        Path {
+            anchors: anchors
+                .map(|point| std::mem::take(&mut point.anchor))
+                .collect(),
+            dissipated: std::mem::take(&mut self.dissipated),
+            level: self.level,
+        }
+    }
+
+    /// Is again where it was forgotten.
+    pub fn resume(&mut self, path: Path) {
+        self.set_level(path.level);
+        self.dissipated = path.dissipated;
+        for (point, anchor) in self.points.iter_mut().zip(path.anchors) {
+            point.anchor = anchor;
         }
     }
 

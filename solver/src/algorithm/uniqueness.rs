@@ -1,11 +1,11 @@
-//! A test of uniqueness: the solution is computed once more, from the bonded state.
+//! Solutions that are compared with a second one: from the bonded state, a test of uniqueness, and in twice the increments.
 
 use crate::algorithm::rounding::Rounding;
 use crate::algorithm::system::System;
 use crate::algorithm::track::{Measured, Track};
 use crate::algorithm::{End, Finished, Place, bonded_state, both, fixed_point, quiet};
 use crate::problem::SolverControls;
-use crate::solution::{Comparison, Observer, Outcome, Summary, Warning, WarningCode};
+use crate::solution::{Comparison, Observer, Outcome, StepSolution, Summary, Warning, WarningCode};
 
 /// Adds a comparison with a second solution to the summary, and a warning if the two differ.
 pub fn note_uniqueness(summary: &mut Summary, second: Comparison) {
@@ -58,32 +58,67 @@ pub fn note_doubled_increments(summary: &mut Summary, second: Comparison) {
     summary.doubled_increments = Some(second);
 }
 
-/// Compares the forces of a second state with those of a solution, which are to agree to `tolerance`.
-pub fn compared(
-    system: &System<'_>,
-    solution: &Summary,
-    second: Option<&Finished>,
-    tolerance: f64,
-) -> Comparison {
-    let converged = second.is_some_and(|second| second.outcome == Outcome::Converged);
-    let first = [
-        solution.normal_force,
-        solution.tangential_force,
-        solution.friction_force,
-    ];
-    let second = second.map_or([0.0; 3], |second| {
-        let (state, bound) = (second.state.clone(), second.bound.clone());
-        forces(system, &Measured::new(system, state, bound))
-    });
-    let change = force_change(first, second);
-    Comparison {
-        agrees: converged && change <= tolerance,
-        converged,
-        normal_force: second[0],
-        tangential_force: second[1],
-        friction_force: second[2],
-        change,
+/// ∫p, ∫σ_t and ∫|σ_t| at the end of a step.
+pub struct EndForces {
+    forces: [f64; 3],
+    converged: bool,
+}
+
+impl EndForces {
+    /// Of an end, with the anchors that led to it.
+    pub fn new(system: &System<'_>, finished: &Finished) -> Self {
+        let (state, bound) = (finished.state.clone(), finished.bound.clone());
+        EndForces {
+            forces: forces(system, &Measured::new(system, state, bound)),
+            converged: finished.outcome == Outcome::Converged,
+        }
     }
+
+    /// Compares them with those of a solution, which are to agree to `tolerance`.
+    pub fn compared(&self, solution: &Summary, tolerance: f64) -> Comparison {
+        let first = [
+            solution.normal_force,
+            solution.tangential_force,
+            solution.friction_force,
+        ];
+        let change = force_change(first, self.forces);
+        let [normal_force, tangential_force, friction_force] = self.forces;
+        Comparison {
+            agrees: self.converged && change <= tolerance,
+            converged: self.converged,
+            normal_force,
+            tangential_force,
+            friction_force,
+            change,
+        }
+    }
+}
+
+/// Forces at the end of a step count as known if more increments change them by no more than this part: they are then off
+/// by less than twice that, and `good` promises 1 %.
+const KNOWN: f64 = 0.004;
+
+/// Adds a warning to an earlier step whose forces depend on the number of increments; of the end errors are stated.
+/// `more`: at the end of that step in at least twice as many.
+pub fn warn_of_increments(step: &mut StepSolution, more: &EndForces) {
+    let compared = more.compared(&step.summary, KNOWN);
+    if compared.agrees {
+        return;
+    }
+    let found = match compared.converged {
+        true => format!(
+            "more of them change its forces by {:.1} %",
+            100.0 * compared.change
+        ),
+        false => "with more of them the iterations do not converge".to_owned(),
+    };
+    step.summary.warnings.push(Warning {
+        code: WarningCode::IncrementsMatter,
+        pointer: "/steps".to_owned(),
+        message: format!(
+            "The increments are too few for the incremental law at the end of this step: {found}. Give this step and those before it more `increments`."
+        ),
+    });
 }
 
 /// A sum of forces may be off by this many times the largest residual, which is that of one node.

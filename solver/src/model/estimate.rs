@@ -204,7 +204,9 @@ impl Model {
             weights: all.weights + one.weights,
         });
         let controls = &self.controls;
-        let again = u32::from(controls.check_uniqueness) + 2 * u32::from(controls.check_increments);
+        let again = u32::from(controls.check_uniqueness)
+            + 2 * u32::from(controls.check_increments)
+            + 2 * u32::from(self.depends_on_path());
         let increments: f64 = self.steps.iter().map(|s| f64::from(s.increments)).sum();
         Size {
             nodes: match adaptive {

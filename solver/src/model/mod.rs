@@ -37,7 +37,7 @@ use nodes::FirstSides;
 use crate::elasticity::{self, Loads, Section};
 use crate::error::{AllChecks, Checked, Violation};
 use crate::mesh::{External, ExternalMesh, Mesh};
-use crate::problem::{Problem, SolverControls, Step};
+use crate::problem::{History, Problem, SolverControls, Step};
 use crate::solution::Warning;
 
 /// A problem that can be solved.
@@ -92,6 +92,13 @@ impl Model {
     /// Force per volume along x and y at a load level.
     pub fn body_force(&self, level: &Level) -> [f64; 2] {
         self.loads.body_force.map(|f| level.loads * f)
+    }
+
+    /// Whether the end depends on the increments that lead to it: some friction is incremental.
+    pub fn depends_on_path(&self) -> bool {
+        let laws = self.contacts.iter().filter_map(|c| c.friction.as_ref());
+        let mut acting = laws.filter(|law| law.bound.acts());
+        acting.any(|law| law.history == History::Incremental)
     }
 
     /// A rigid motion that neither the supports nor the given holds prevent, in words, and a node

@@ -4,7 +4,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use strum::IntoStaticStr;
 
-/// How far the numbers of a solution can be trusted: what the mesh may have done to each, and a verdict.
+/// How far the numbers of a solution can be trusted: what the mesh, and too few increments, may have done to each, and a
+/// verdict.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Accuracy {
     /// The verdict on the whole.
@@ -46,6 +47,13 @@ pub enum Verdict {
     Poor,
 }
 
+impl EstimatedQuantity {
+    /// The part of the error that the mesh causes.
+    pub fn of_mesh(&self) -> Option<f64> {
+        Some(self.error? - self.increments.unwrap_or(0.0))
+    }
+}
+
 impl Verdict {
     /// What it says, for people.
     pub fn in_words(self) -> &'static str {
@@ -79,9 +87,12 @@ pub struct EstimatedQuantity {
     /// there is no such mesh (`refine` of 0 or by a tolerance), or a difference is only rounding.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub order: Option<f64>,
-    /// The error that the mesh causes, in the unit of the value; absent where the quantity has no limit, or nothing is
-    /// known.
+    /// The error that the mesh causes, and under the incremental law the number of increments, in the unit of the value;
+    /// absent where the quantity has no limit, or nothing is known.
     pub error: Option<f64>,
+    /// The part of `error` that the increments cause; absent where nothing depends on them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub increments: Option<f64>,
     /// The error as a part: of the value; of the friction force for a tangential one; of the length of the contact for
     /// an extent.
     pub relative: Option<f64>,
