@@ -129,9 +129,13 @@ impl Checks {
             for (node, value) in sides.between(&prescribed) {
                 let held = fixed.get(&node).copied();
                 let held = match held {
-                    None => Held::Along { direction, value },
+                    None => Held::Along {
+                        direction,
+                        value,
+                        error: 0.0,
+                    },
                     Some(held) if held.along(direction).is_none() => {
-                        held.and(direction, value, 0.0).unwrap_or(held)
+                        held.and(direction, value, 0.0, 0.0).unwrap_or(held)
                     }
                     Some(held) => held,
                 };
