@@ -472,6 +472,7 @@ mod tests {
     fn missing_midsides_are_added_and_unused_nodes_removed() {
         let (mesh, notes) = build(two_squares()).unwrap();
         assert_eq!(mesh.nodes.len(), 13);
+        assert_eq!(mesh.added_midsides, Some(6));
         assert_eq!(mesh.connected_parts().len(), 1);
         // one of its lines lies inside
         assert!(!mesh.boundaries.contains_key("top"));
