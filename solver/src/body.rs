@@ -14,7 +14,7 @@ use crate::elasticity::{
 use crate::error::SolveError;
 use crate::linear::{Breaks, Cells, Dense, Dissection, ElementMatrix, Factor, FactorError, Fronts};
 use crate::mesh::Mesh;
-use crate::model::{Held, Level, Model};
+use crate::model::{Alone, Held, Level, Model};
 use crate::solution::{Observer, Phase, Progress};
 
 /// A body, assembled, supported and condensed onto its contact boundaries.
@@ -26,7 +26,8 @@ pub struct ElasticBody {
     /// f̂ of the prescribed displacements.
     load_of_supports: Vec<f64>,
     /// Normal and tangential displacement of every contact node, all contacts in a row; free ones
-    /// count from 0 in Ŝ. Where the node's axes are oblique: u_n and its other component.
+    /// count from 0 in Ŝ. Where the node's axes are oblique: u_n and its other component; at a common end of two contacts
+    /// that is of one alone, those of that one.
     pub contact_dofs: Vec<[Dof; 2]>,
     /// Where the axes of a contact node are oblique: the coefficients of these two in u_t.
     pub tangents: Vec<Option<[f64; 2]>>,
@@ -52,6 +53,7 @@ pub struct Source<'a> {
     quadrature: u32,
     fixed: &'a BTreeMap<u32, Held>,
     loads: &'a Loads,
+    alone: &'a Alone,
     /// Nodes and normals of each contact.
     contacts: Vec<(&'a [u32], &'a [[f64; 2]])>,
 }
@@ -66,6 +68,7 @@ impl<'a> Source<'a> {
             quadrature: model.quadrature,
             fixed: &model.fixed,
             loads: &model.loads,
+            alone: &model.alone,
             contacts: boundaries
                 .map(|boundary| (&boundary.nodes[..], &boundary.normals[..]))
                 .collect(),
@@ -306,8 +309,11 @@ fn number(model: &Model, elements: Elements<'_>) -> Result<(DofMap, Fronts), Sol
     }
     let mut in_contact = vec![false; count];
     let mut contact_nodes = Vec::new();
-    for contact in &model.contacts {
+    for (c, contact) in model.contacts.iter().enumerate() {
         for (i, &node) in contact.boundary.nodes.iter().enumerate() {
+            if model.alone.get(&node).is_some_and(|owner| *owner != c) {
+                continue;
+            }
             let (n, t) = (contact.boundary.normals[i], contact.boundary.tangent(i));
             axes[node as usize] = Some(match model.oblique.get(&node) {
                 Some(along) => Axes::oblique(*along),

@@ -156,7 +156,10 @@ impl Family {
             warnings: vec![],
         };
         let mut model = Model::on_mesh(problem, mesh).map_err(SolveError::Invalid)?;
-        if !ElasticBody::same(own, &model) {
+        // its own mesh would have nodes where its obstacles end
+        let cuts =
+            |model: &Model| -> Vec<_> { model.contacts.iter().map(|c| c.cut.clone()).collect() };
+        if !ElasticBody::same(own, &model) || cuts(own) != cuts(&model) {
             return Err(SolveError::OtherBody);
         }
         // those of the mesh come first, once

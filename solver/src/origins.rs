@@ -57,6 +57,11 @@ impl Origins {
         }
     }
 
+    /// Forgets what was added.
+    pub fn forget(&mut self) {
+        self.elements.fill(0.0);
+    }
+
     /// Adds a place of a contact at which the obstacle between the nodes is not resolved: no error is known before there are nodes.
     pub fn add_place(&mut self, model: &Model, patch: usize, s: f64) {
         let boundary = &model.contacts[patch].boundary;

@@ -2,7 +2,7 @@
 //! history for both laws.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::accuracy::{self, Increments};
 use crate::algorithm::{
@@ -11,7 +11,7 @@ use crate::algorithm::{
 };
 use crate::body::ElasticBody;
 use crate::error::SolveError;
-use crate::model::{Level, Model};
+use crate::model::{Alone, Level, Model};
 use crate::origins::Origins;
 use crate::problem::{Algorithm, Spacing, Step};
 use crate::solution::{
@@ -30,8 +30,82 @@ pub fn run(
     mut origins: Option<&mut Origins>,
     observe: &mut Observer<'_>,
 ) -> Result<Solution, SolveError> {
+    if model.common_nodes().is_empty() {
+        let load_history = LoadHistory::new(model, System::new(model, body, observe)?);
+        let (solution, _) = run_steps(load_history, body, origins, observe)?;
+        return Ok(solution);
+    }
+    let solved = with_corners(
+        (model, body),
+        observe,
+        &mut |load_history, body, observe| {
+            if let Some(origins) = origins.as_deref_mut() {
+                origins.forget();
+            }
+            // which contacts the nodes are of may change, and with it the solution
+            let tentative: &mut Observer<'_> = &mut |progress| match progress {
+                Progress::Iteration(row) => observe(Progress::Tentative(row)),
+                Progress::Step(_) => observe(Progress::Pulse),
+                other => observe(other),
+            };
+            run_steps(load_history, body, origins.as_deref_mut(), tentative)
+        },
+    )?;
+    for row in &solved.history {
+        let _ = observe(Progress::Iteration(row));
+    }
+    Ok(solved)
+}
+
+/// Solves with the common ends of contacts as the model has them, and again while the solution shows that they are of other
+/// contacts: each is tried as one contact's or the other's, and in the end as that of both.
+fn with_corners<T>(
+    (model, body): (&Model, &ElasticBody),
+    observe: &mut Observer<'_>,
+    solve: &mut dyn for<'a> FnMut(
+        LoadHistory<'a>,
+        &ElasticBody,
+        &mut Observer<'_>,
+    ) -> Result<(T, LoadHistory<'a>), SolveError>,
+) -> Result<T, SolveError> {
+    let mut tried = vec![model.alone.clone()];
+    let mut both: BTreeSet<u32> = BTreeSet::new();
+    let mut other: Option<(Model, ElasticBody)> = None;
+    loop {
+        let (model, body) = match &other {
+            Some((model, body)) => (model, body),
+            None => (model, body),
+        };
+        let (solved, next) = {
+            let load_history = LoadHistory::new(model, System::new(model, body, observe)?);
+            let (solved, mut load_history) = solve(load_history, body, observe)?;
+            let wrong = !load_history.of_both.is_empty();
+            both.append(&mut load_history.of_both);
+            let end = load_history.last.as_ref().map(|last| &last.state);
+            let next = algorithm::better(&load_history.system, end, &both);
+            // what does not come to rest is of both in the end
+            let of_both = wrong.then(Alone::new);
+            let next = [next, of_both].into_iter().flatten();
+            (solved, next.into_iter().find(|next| !tried.contains(next)))
+        };
+        let Some(next) = next else {
+            return Ok(solved);
+        };
+        tried.push(next.clone());
+        let next = model.with_alone(next);
+        let body = ElasticBody::new(&next, observe)?;
+        other = Some((next, body));
+    }
+}
+
+fn run_steps<'a>(
+    mut load_history: LoadHistory<'a>,
+    body: &ElasticBody,
+    mut origins: Option<&mut Origins>,
+    observe: &mut Observer<'_>,
+) -> Result<(Solution, LoadHistory<'a>), SolveError> {
+    let model = load_history.model;
     let steps = &steps_of(model);
-    let mut load_history = LoadHistory::new(model, System::new(model, body, observe)?);
     let mut so_far: Option<Solution> = None;
     let mut more = Again::default();
     let mut fields = Fields::default();
@@ -115,14 +189,22 @@ pub fn run(
         algorithm::warn_of_increments(step, forces);
     }
     if model.controls.check_increments && solution.summary.converged {
-        note_doubled(model, load_history, steps, &mut solution.summary, observe);
+        let summary = &mut solution.summary;
+        load_history = note_doubled(model, load_history, steps, summary, observe);
     }
     tell_of_earlier_steps(&mut solution);
+    if solution.has_second() {
+        solution
+            .summary
+            .accuracy
+            .iter_mut()
+            .for_each(accuracy::doubt_choice);
+    }
     if model.steps.is_empty() {
         solution.steps.clear();
     }
     solution.fields = fields;
-    Ok(solution)
+    Ok((solution, load_history))
 }
 
 /// What problems on one body share.
@@ -174,6 +256,14 @@ pub fn run_to_numbers(
     start: Start<'_>,
     observe: &mut Observer<'_>,
 ) -> Result<(Numbers, Option<End>), SolveError> {
+    if !model.common_nodes().is_empty() {
+        let numbers = with_corners(
+            (model, body),
+            observe,
+            &mut |mut load_history, _, observe| Ok((load_history.numbers(observe)?, load_history)),
+        )?;
+        return Ok((numbers, None));
+    }
     let system = System::with_averages(model, body, &mut shared.averages, observe)?;
     let mut load_history = LoadHistory::new(model, system);
     let region = &mut shared.region;
@@ -269,15 +359,21 @@ pub fn run_to_compare(
     body: &ElasticBody,
     observe: &mut Observer<'_>,
 ) -> Result<Reported, SolveError> {
-    let mut load_history = LoadHistory::new(model, System::new(model, body, observe)?);
-    let last = load_history.follow(&steps_of(model), observe);
-    match last {
-        Some(finished) if finished.outcome != Outcome::Canceled => {
-            load_history.system.threads = body.threads(observe);
-            report(model, body, &load_history.system, &finished)
-        }
-        _ => Err(SolveError::Stopped),
-    }
+    with_corners(
+        (model, body),
+        observe,
+        &mut |mut load_history, body, observe| {
+            let model = load_history.model;
+            match load_history.follow(&steps_of(model), observe) {
+                Some(finished) if finished.outcome != Outcome::Canceled => {
+                    load_history.system.threads = body.threads(observe);
+                    let reported = report(model, body, &load_history.system, &finished)?;
+                    Ok((reported, load_history))
+                }
+                _ => Err(SolveError::Stopped),
+            }
+        },
+    )
 }
 
 /// The load steps; a problem without steps is one step.
@@ -298,7 +394,8 @@ struct Again {
     rounding: Option<Rounding>,
 }
 
-/// The same path in these steps, without reporting to the observer. The first history is then as it was.
+/// The same path in these steps, without reporting to the observer. The first history is then as it was, but for the common
+/// ends that the second has found to be of both contacts.
 fn again_in<'a>(
     first: LoadHistory<'a>,
     steps: &[Step],
@@ -322,30 +419,33 @@ fn again_in<'a>(
     again.rounding = second.rounding;
     system = second.system;
     system.resume(path);
-    (LoadHistory { system, ..first }, again)
+    let mut first = LoadHistory { system, ..first };
+    first.of_both.append(&mut second.of_both);
+    (first, again)
 }
 
-/// Notes how much twice the increments change the forces.
-fn note_doubled(
+/// Notes how much twice the increments change the forces. The history is then as it was.
+fn note_doubled<'a>(
     model: &Model,
-    first: LoadHistory<'_>,
+    first: LoadHistory<'a>,
     steps: &[Step],
     summary: &mut Summary,
     observe: &mut Observer<'_>,
-) {
+) -> LoadHistory<'a> {
     let twice = |step: &Step| Step {
         increments: 2 * step.increments,
         ..step.clone()
     };
     let twice: Vec<Step> = steps.iter().map(twice).collect();
     let rounding = first.rounding;
-    let (_, second) = again_in(first, &twice, observe);
+    let (first, second) = again_in(first, &twice, observe);
     let rounding = algorithm::rounding_of_forces([rounding, second.rounding]);
     let tolerance = model.controls.tolerance.max(rounding);
     if let Some(forces) = second.forces.last() {
         let second = forces.compared(summary, tolerance);
         algorithm::note_doubled_increments(summary, second);
     }
+    first
 }
 
 /// Whether a next increment can start from this end: the thesis's own iteration settles in false states and
@@ -370,6 +470,8 @@ struct LoadHistory<'a> {
     row_count: u32,
     increments: u32,
     cut_backs: u32,
+    /// Common ends of contacts that were taken to be of one alone, and that both touch in some increment.
+    of_both: BTreeSet<u32>,
     /// Of the increment so far that rounding leaves the largest residual of.
     rounding: Option<Rounding>,
 }
@@ -387,8 +489,24 @@ impl<'a> LoadHistory<'a> {
             row_count: 0,
             increments: 0,
             cut_backs: 0,
+            of_both: BTreeSet::new(),
             rounding: None,
         }
+    }
+
+    /// Solves all steps for the numbers of their end.
+    fn numbers(&mut self, observe: &mut Observer<'_>) -> Result<Numbers, SolveError> {
+        let finished = self.follow(&steps_of(self.model), observe);
+        let Some(finished) = finished.filter(|end| end.outcome != Outcome::Canceled) else {
+            return Err(SolveError::Stopped);
+        };
+        let (contacts, warnings) = algorithm::numbers(self.model, &self.system, &finished);
+        Ok(Numbers {
+            finished,
+            contacts,
+            iterations: self.row_count,
+            warnings,
+        })
     }
 
     /// Solves one step after the other until one does not converge: the last end.
@@ -507,6 +625,10 @@ impl<'a> LoadHistory<'a> {
         let residual = |rounding: &Option<Rounding>| rounding.map_or(0.0, |r| r.residual);
         if residual(&finished.rounding) > residual(&self.rounding) {
             self.rounding = finished.rounding;
+        }
+        if finished.outcome != Outcome::Canceled {
+            let both = algorithm::touched_by_both(&self.system, &finished.state);
+            self.of_both.extend(both);
         }
         if can_continue(finished.outcome) {
             self.increments += 1;

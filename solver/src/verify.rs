@@ -51,6 +51,7 @@ impl Verification {
         observe: &mut Observer<'_>,
     ) {
         let converged = solution.summary.outcome == Outcome::Converged;
+        let second = solution.has_second();
         let Some(estimated) = &mut solution.summary.accuracy else {
             return;
         };
@@ -62,6 +63,9 @@ impl Verification {
             Ok(verified) => verified,
             Err(why) => accuracy::unverified(estimated.clone(), &why),
         };
+        if second {
+            accuracy::doubt_choice(estimated);
+        }
     }
 
     /// The errors by comparison; or why there are none, in words.

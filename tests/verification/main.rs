@@ -61,4 +61,5 @@ mod thick_cylinder;
 mod tolerance;
 mod traps;
 mod unmerged;
+mod verdicts;
 mod verify;

@@ -89,6 +89,7 @@ fn gravity(code: WarningCode) -> u8 {
         | FrictionLostAtEnd
         | ObstacleBetweenNodes
         | SymmetricDrag
+        | RadialDrag
         | BoundBeyondContact
         | RefinementUnfinished
         | IncrementsMatter
@@ -98,8 +99,8 @@ fn gravity(code: WarningCode) -> u8 {
         | MeshTooCoarseForRadius => 1,
         LinesInside | SupportsOverlap | CentreNodesDropped | ElementsReversed
         | RaisedToSecondOrder | StripCutsPolyline | ObstacleCutsEdge | SmoothingFlattens
-        | ContactTurns | KinkInContact | RadiusExceedsContact | CohesionJumps
-        | OscillatingStick | SlowContraction => 2,
+        | ContactTurns | KinkInContact | MaterialJunction | RadiusExceedsContact
+        | CohesionJumps | OscillatingStick | SlowContraction => 2,
     }
 }
 

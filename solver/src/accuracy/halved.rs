@@ -38,6 +38,8 @@ pub struct OnOtherMesh {
     contact: String,
     value: f64,
     estimable: Estimable,
+    /// [`Quantity::images`].
+    images: f64,
 }
 
 impl OnOtherMesh {
@@ -48,6 +50,7 @@ impl OnOtherMesh {
             contact: contact.to_owned(),
             value: quantity.value,
             estimable: quantity.estimable,
+            images: quantity.images,
         }
     }
 }
@@ -97,7 +100,8 @@ pub fn verified(
             let coarser = coarser.map(|coarser| of_kind(own.quantity, &own.contact, coarser));
             let coarser = coarser.filter(|coarser| coarser.len() == here);
             let coarser = coarser.map(|coarser| coarser[before]);
-            compare(&mut quantity, there[before], coarser, scale_of(own, all))
+            let scale = scale_of(own, all, there[before].images);
+            compare(&mut quantity, there[before], coarser, scale)
         } else {
             Some(Doubt::Alone)
         });
@@ -143,14 +147,14 @@ fn of_kind<'a>(
     others.iter().filter(same).collect()
 }
 
-fn scale_of(quantity: &EstimatedQuantity, all: &[EstimatedQuantity]) -> f64 {
+fn scale_of(quantity: &EstimatedQuantity, all: &[EstimatedQuantity], images: f64) -> f64 {
     let own = |name: QuantityName| {
         let same = all
             .iter()
             .filter(|q| q.contact == quantity.contact && q.quantity == name);
         same.map(|q| q.value).collect()
     };
-    scale(quantity.quantity, quantity.value, own)
+    scale(quantity.quantity, quantity.value, own, images)
 }
 
 /// Gives a quantity what the other meshes say of it.

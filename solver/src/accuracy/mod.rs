@@ -15,6 +15,7 @@ mod verdict;
 
 pub use halved::{OnOtherMesh, unverified, verified};
 pub use increments::Increments;
+pub use verdict::doubt_choice;
 
 use crate::algorithm::{Estimable, Finished, Quantity, Reported, System, influences};
 use crate::body::{AXIS_SHARE, ElasticBody};
@@ -98,15 +99,19 @@ fn factors(name: QuantityName) -> [f64; 8] {
 }
 
 /// The factor of [`Parts::cut`]: twice what flat punches show, whose force grows by a quarter to 0.3 of the part by which
-/// they are longer (`tests/verification/obstacle_points.rs`).
+/// they are longer (`tests/verification/obstacle_points.rs`). Friction with a prescribed bound grows by all of it.
 fn of_cut(name: QuantityName) -> f64 {
     use QuantityName::*;
     match name {
-        NormalForce | TangentialForce | FrictionForce => 0.5,
-        PeakNormalStress | PeakTangentialStress | ContactStart | ContactEnd => 1.0,
+        NormalForce => 0.5,
+        TangentialForce | FrictionForce | PeakNormalStress | PeakTangentialStress
+        | ContactStart | ContactEnd => 1.0,
         StickEnd => 1.5,
     }
 }
+
+/// Friction acts one way if its sum is its size but for this part.
+const ONE_WAY: f64 = 1e-9;
 
 /// The errors of all quantities, and the verdict. `increments`: what more of them come to, where the end depends on the path.
 pub fn assess(
@@ -170,7 +175,7 @@ fn scale_of(quantity: &Quantity, all: &[Quantity]) -> f64 {
             .filter(|q| q.patch == quantity.patch && q.name == name);
         same.map(|q| q.value).collect()
     };
-    scale(quantity.name, quantity.value, own)
+    scale(quantity.name, quantity.value, own, quantity.images)
 }
 
 /// The bounds of the errors of all quantities; none if the linearised problem has no unique solution, or the observer
@@ -233,7 +238,21 @@ fn bounds(
         }
         bounds.push(bound);
     }
-    Some(bounds)
+    let one_way = |(quantity, bound): (&Quantity, f64)| match quantity.name {
+        // all friction acts the same way: its sum and its size are one quantity
+        QuantityName::TangentialForce => quantities
+            .iter()
+            .zip(&bounds)
+            .find(|(other, _)| {
+                other.patch == quantity.patch
+                    && other.name == QuantityName::FrictionForce
+                    && quantity.value.abs() >= (1.0 - ONE_WAY) * other.value
+            })
+            .map_or(bound, |(_, other)| bound.min(*other)),
+        _ => bound,
+    };
+    let of_quantities = quantities.iter().zip(bounds.iter().copied());
+    Some(of_quantities.map(one_way).collect())
 }
 
 /// ∫ (σ* − σ_h) : C⁻¹ (σ_z* − σ_z,h) of every element, for every dual; none if the observer stops.
@@ -329,10 +348,11 @@ fn end_spacing(quantity: &Quantity, all: &[Quantity]) -> f64 {
         let ends = ends.iter().filter(move |q| q.name == name);
         ends.map(|q| q.value)
     };
-    let length = length(
-        values(QuantityName::ContactStart),
-        values(QuantityName::ContactEnd),
-    );
+    let length = quantity.images
+        * length(
+            values(QuantityName::ContactStart),
+            values(QuantityName::ContactEnd),
+        );
     let spacing = ends.iter().fold(0.0f64, |most, q| most.max(q.spacing));
     // a contact of one node is not resolved at all
     if length > 0.0 {

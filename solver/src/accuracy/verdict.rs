@@ -36,20 +36,29 @@ pub(super) struct Unpaired {
 type Reason = (f64, String);
 
 /// What the error of a quantity is compared with, as a size: of a force or a peak its own; of a tangential force the friction
-/// force; of an end the length of the contact. `own`: values of that kind of the same contact.
-pub(super) fn scale(name: QuantityName, value: f64, own: impl Fn(QuantityName) -> Vec<f64>) -> f64 {
+/// force; of an end the length of the contact. `own`: values of that kind of the same contact, which has `images` parts like
+/// the one that is modelled.
+pub(super) fn scale(
+    name: QuantityName,
+    value: f64,
+    own: impl Fn(QuantityName) -> Vec<f64>,
+    images: f64,
+) -> f64 {
     let scale = match name {
         QuantityName::TangentialForce => own(QuantityName::FrictionForce).iter().sum(),
-        QuantityName::ContactStart | QuantityName::ContactEnd | QuantityName::StickEnd => length(
-            own(QuantityName::ContactStart).into_iter(),
-            own(QuantityName::ContactEnd).into_iter(),
-        ),
+        QuantityName::ContactStart | QuantityName::ContactEnd | QuantityName::StickEnd => {
+            images
+                * length(
+                    own(QuantityName::ContactStart).into_iter(),
+                    own(QuantityName::ContactEnd).into_iter(),
+                )
+        }
         _ => value,
     };
     f64::abs(scale)
 }
 
-/// From the first start of contact to its last end.
+/// From the first start of contact to its last end; of what is modelled.
 pub(super) fn length(starts: impl Iterator<Item = f64>, ends: impl Iterator<Item = f64>) -> f64 {
     ends.fold(f64::NEG_INFINITY, f64::max) - starts.fold(f64::INFINITY, f64::min)
 }
@@ -94,6 +103,15 @@ pub(super) fn conclude(
     }
 }
 
+/// Lowers the verdict on one of several solutions: errors of the mesh do not tell which of them occurs.
+pub fn doubt_choice(accuracy: &mut Accuracy) {
+    let reason = "There is a second solution, with other forces: the errors say nothing of which of the two occurs.";
+    accuracy.verdict = Verdict::Poor;
+    if accuracy.reasons.iter().all(|known| known != reason) {
+        accuracy.reasons.insert(0, reason.to_owned());
+    }
+}
+
 /// What the error of a quantity, or that there is none, says against it.
 fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Reason)> {
     let (name, contact) = (<&str>::from(q.quantity), &q.contact);
@@ -123,7 +141,7 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
             (
                 0.0,
                 format!(
-                    "`{name}` of contact `{contact}` grows without limit as the mesh is refined, at an edge, a tip or a kink of the obstacle or a corner of the body: its value means nothing. The verdict is about the other quantities: forces have a limit, and so has the averaged pressure."
+                    "`{name}` of contact `{contact}` grows without limit as the mesh is refined, at an edge, a tip or a kink of the obstacle, at a corner of the body or where materials meet: its value means nothing. The verdict is about the other quantities: forces have a limit, and so has the averaged pressure."
                 ),
             ),
         )),

@@ -336,8 +336,13 @@ fn cut_edges(contacts: &[ContactModel], solution: &Solution, mesh: &Mesh, tolera
         let (nodes, s) = (&contact.boundary.nodes, &contact.boundary.s);
         let end = s.len() - 1;
         for (edge, covered) in &contact.cut {
-            // a contact that ends before the obstacle does is not changed by it
-            let pressed = (edge.contains(&nodes[0]) && first[0] <= s[0])
+            // a contact that ends before the obstacle does is not changed by it, but for a friction bound that is given
+            let given = contact
+                .friction
+                .as_ref()
+                .is_some_and(|law| law.bound.radius().is_none());
+            let pressed = given
+                || (edge.contains(&nodes[0]) && first[0] <= s[0])
                 || (edge.contains(&nodes[end]) && last[1] >= s[end]);
             let part = covered / (last[1] - first[0]);
             if !pressed || part <= tolerance {

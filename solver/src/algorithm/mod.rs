@@ -5,6 +5,7 @@
 
 mod adjoint;
 mod convex;
+mod corners;
 mod factors;
 mod finished;
 mod fixed_point;
@@ -24,6 +25,7 @@ mod uniqueness;
 
 pub use adjoint::{Gradient, influences};
 pub use convex::{Minimum, minimise};
+pub use corners::{better, touched_by_both};
 pub use finished::Finished;
 pub use near::{Extent, Region, run_near, settle_near};
 pub use profile::{Estimable, Missed, Quantity};

@@ -8,11 +8,13 @@
 
 use std::sync::Arc;
 
+use crate::algorithm::convex::minimise;
 use crate::algorithm::factors::{Factors, dense};
 use crate::algorithm::finished::Finished;
+use crate::algorithm::fixed_point::stuck;
 use crate::algorithm::rounding;
 use crate::algorithm::settle::settle;
-use crate::algorithm::system::{ContactNode, Oblique, Patch, State, System};
+use crate::algorithm::system::{ContactNode, Follows, Oblique, Patch, State, System};
 use crate::algorithm::track::{Measured, Place};
 use crate::elasticity::Dof;
 use crate::friction::{BoundLaw, FrictionLaw, Source};
@@ -147,16 +149,55 @@ pub fn settle_near(
         pairs.for_each(|(v, before)| *v += *v - before);
     }
     let Some(near) = near else {
-        return settle(system, controls, &start, factors, observe);
+        return settle_as_alone(system, controls, &start, factors, observe);
     };
     let (part, load) = near.part(system);
     let start = near.state_on_part(&start);
-    let (found, steps) = settle(&part, controls, &start, factors, observe)?;
+    let (found, steps) = settle_as_alone(&part, controls, &start, factors, observe)?;
     let (finished, outside) = near.on_whole(system, controls, load, found);
     let settled = outside.is_empty()
         && finished.rounding.is_none()
         && finished.residuals.within(controls.tolerance);
     settled.then_some((finished, steps))
+}
+
+/// The solution near a start, if it is that which the problem has on its own: steps from its own frictionless state lead there
+/// too. Beyond a fold friction and pressure may hold each other in a state that nothing leads to but a neighbour.
+fn settle_as_alone(
+    system: &System<'_>,
+    controls: &SolverControls,
+    start: &State,
+    factors: &mut Factors,
+    observe: &mut Observer<'_>,
+) -> Option<(Finished, u32)> {
+    /// Friction bounds of one solution agree to this part, far above what the tolerance leaves of them.
+    const AGREES: f64 = 1e-5;
+    let (found, steps) = settle(system, controls, start, factors, observe)?;
+    let given = |source: &Source| matches!(source, Source::Given(_));
+    // a convex problem has one solution
+    if system.points.iter().all(|point| given(&point.source)) {
+        return Some((found, steps));
+    }
+    let none = vec![0.0; system.points.len()];
+    let free = minimise(system, &none, &found.state, controls.tolerance, observe);
+    let pressures = system.pressures(&system.reactions_of(&free.state, &free.elastic_force));
+    let implied = system.friction_bound(&pressures);
+    // without a pressure there is no friction: that is the solution
+    let own = match implied.iter().all(|tau| *tau == 0.0) {
+        true => implied,
+        false => {
+            let start = stuck(system, &free.state);
+            let own = settle(system, controls, &start, &mut Factors::default(), observe)?;
+            own.0.bound
+        }
+    };
+    let most = own
+        .iter()
+        .chain(&found.bound)
+        .fold(0.0f64, |a, b| a.max(*b));
+    let mut pairs = own.iter().zip(&found.bound);
+    let agree = pairs.all(|(a, b)| (a - b).abs() <= AGREES * most);
+    agree.then_some((found, steps))
 }
 
 impl Region {
@@ -386,6 +427,10 @@ impl Near {
             oblique: node.oblique.map(|oblique| Oblique {
                 other: renumbered(oblique.other),
                 ..oblique
+            }),
+            follows: node.follows.map(|follows| Follows {
+                dofs: follows.dofs.map(renumbered),
+                ..follows
             }),
             gap: if *kept { node.gap } else { f64::INFINITY },
             ..*node

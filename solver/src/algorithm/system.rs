@@ -55,6 +55,8 @@ pub struct ContactNode {
     pub tangent: Dof,
     /// Present where the axes of the node are oblique.
     pub oblique: Option<Oblique>,
+    /// Present where the node is of another contact alone: then `normal` and `tangent` are no unknowns.
+    pub follows: Option<Follows>,
     /// `normal` ≤ gap; infinite where there is no obstacle.
     pub gap: f64,
     /// u_n = gap, whatever the reaction.
@@ -110,6 +112,23 @@ pub struct Path {
     anchors: Vec<f64>,
     dissipated: f64,
     level: Level,
+}
+
+/// u_n and u_t of a common end of two contacts, where the node is of the other one alone.
+#[derive(Clone, Copy, Debug)]
+pub struct Follows {
+    /// The displacements along the normal and the tangent of that one.
+    pub dofs: [Dof; 2],
+    /// u_n by these.
+    pub(super) normal: [f64; 2],
+    /// u_t by these.
+    pub(super) tangent: [f64; 2],
+}
+
+impl Follows {
+    fn along([a, b]: [f64; 2], dofs: [Dof; 2], v: &[f64]) -> f64 {
+        a * value(dofs[0], v) + b * value(dofs[1], v)
+    }
 }
 
 /// One friction point.
@@ -241,6 +260,10 @@ impl<'a> System<'a> {
         self.nodes.reserve(count);
         for i in 0..count {
             let [normal, tangent] = self.body.contact_dofs[first + i];
+            if let Some(node) = self.following(model, contact, i, [normal, tangent]) {
+                self.nodes.push(node);
+                continue;
+            }
             let oblique = self.body.tangents[first + i].map(|part| {
                 let node = boundary.nodes[i];
                 let with_it = |contact: &&ContactModel| contact.boundary.nodes.contains(&node);
@@ -262,6 +285,7 @@ impl<'a> System<'a> {
                     Some(_) => Dof::Fixed(0.0),
                 },
                 oblique,
+                follows: None,
                 gap: 0.0,
                 bonded: contact.condition == Condition::Bonded,
                 drag: 0.0,
@@ -351,6 +375,48 @@ impl<'a> System<'a> {
         Ok(())
     }
 
+    /// A node of a contact that is of another one alone. `dofs`: along the normal and the tangent of that one.
+    fn following(
+        &self,
+        model: &Model,
+        contact: &ContactModel,
+        i: usize,
+        dofs: [Dof; 2],
+    ) -> Option<ContactNode> {
+        let node = contact.boundary.nodes[i];
+        let owner = &model.contacts[*model.alone.get(&node)?].boundary;
+        let there = owner.nodes.iter().position(|n| *n == node)?;
+        if model.contacts[model.alone[&node]].name == contact.name {
+            return None;
+        }
+        let axes = [owner.normals[there], owner.tangent(there)];
+        let by_axes = |[x, y]: [f64; 2]| axes.map(|[a, b]| x * a + y * b);
+        let held = Dof::Fixed(0.0);
+        Some(ContactNode {
+            normal: held,
+            tangent: held,
+            // slip is continued to it, as to a common end that both touch
+            oblique: Some(Oblique {
+                other: held,
+                part: [0.0; 2],
+                symmetric: false,
+                shared: true,
+            }),
+            follows: Some(Follows {
+                dofs,
+                normal: by_axes(contact.boundary.normals[i]),
+                tangent: by_axes(contact.boundary.tangent(i)),
+            }),
+            gap: 0.0,
+            bonded: false,
+            drag: 0.0,
+            held_tangent: None,
+            weight: contact.boundary.weights[i],
+            on_axis: false,
+            beside_axis: None,
+        })
+    }
+
     /// A friction point beside those of the solution, without a weight in it.
     pub(super) fn probe(
         &self,
@@ -411,10 +477,10 @@ impl<'a> System<'a> {
                         Dof::Fixed(value) => Dof::Fixed(level.supports * value),
                         free => free,
                     });
-                node.normal = normal;
-                match &mut node.oblique {
-                    None => node.tangent = tangent,
-                    Some(oblique) => oblique.other = tangent,
+                match (&mut node.follows, &mut node.oblique) {
+                    (Some(follows), _) => follows.dofs = [normal, tangent],
+                    (None, None) => (node.normal, node.tangent) = (normal, tangent),
+                    (None, Some(oblique)) => (node.normal, oblique.other) = (normal, tangent),
                 }
                 node.gap = match contact.condition {
                     Condition::None => f64::INFINITY,
@@ -490,6 +556,9 @@ impl<'a> System<'a> {
 
     /// u_n of a node.
     pub fn normal_displacement(&self, v: &[f64], node: usize) -> f64 {
+        if let Some(follows) = &self.nodes[node].follows {
+            return Follows::along(follows.normal, follows.dofs, v);
+        }
         let own = |node: usize| value(self.nodes[node].normal, v);
         match self.nodes[node].beside_axis {
             Some(end) => own(node) + AXIS_SHARE * own(end),
@@ -499,6 +568,9 @@ impl<'a> System<'a> {
 
     /// How far a node is from the obstacle: gap − u_n.
     pub fn opening(&self, v: &[f64], node: usize) -> f64 {
+        if self.nodes[node].follows.is_some() {
+            return self.nodes[node].gap - self.normal_displacement(v, node);
+        }
         let own = |node: usize| self.nodes[node].gap - value(self.nodes[node].normal, v);
         match self.nodes[node].beside_axis {
             Some(end) => own(node) + AXIS_SHARE * own(end),
@@ -509,6 +581,9 @@ impl<'a> System<'a> {
     /// u_t of a node.
     pub fn tangential_displacement(&self, v: &[f64], node: usize) -> f64 {
         let node = &self.nodes[node];
+        if let Some(follows) = &node.follows {
+            return Follows::along(follows.tangent, follows.dofs, v);
+        }
         match node.oblique {
             None => value(node.tangent, v),
             Some(Oblique { other, part, .. }) => {

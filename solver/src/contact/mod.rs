@@ -203,13 +203,22 @@ pub fn edge_length(mesh: &Mesh, edge: &Edge) -> f64 {
     first + second
 }
 
+/// Arc length of an edge through these points: its start, end and midside.
+pub(crate) fn length_through(positions: &[[f64; 2]; 3]) -> f64 {
+    let [first, second] = halves_through(positions);
+    first + second
+}
+
 /// Arc lengths of an edge from its start to its midside, and on to its end.
 fn halves(mesh: &Mesh, edge: &Edge) -> [f64; 2] {
-    let positions = mesh.edge_nodes(edge);
+    halves_through(&mesh.edge_nodes(edge))
+}
+
+fn halves_through(positions: &[[f64; 2]; 3]) -> [f64; 2] {
     // each half by three points: exact for a straight edge, enough for a gently curved one
     [-0.5, 0.5].map(|centre| {
         let part = |(xi, w): &(f64, f64)| {
-            let [dx, dy] = edge3::map(&positions, centre + 0.5 * xi).1;
+            let [dx, dy] = edge3::map(positions, centre + 0.5 * xi).1;
             0.5 * w * dx.hypot(dy)
         };
         GAUSS_3.iter().map(part).sum()

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::curve::{Curve, Hit, Ray, Side};
 use super::shape::{Corner, Shape};
-use super::{ContactBoundary, HeldDirections, Profile, ROUNDING, edge_nodes};
+use super::{ContactBoundary, HeldDirections, Profile, ROUNDING, edge_nodes, length_through};
 use crate::element::edge3;
 use crate::mesh::{Edge, Mesh};
 use crate::problem::{Along, Obstacle};
@@ -68,12 +68,7 @@ pub fn facing(
     obstacle: &Obstacle,
 ) -> Facing {
     let mut view = View::new(mesh, boundary, held, obstacle);
-    let (from, to, _) = obstacle.span();
-    let [first, last] = view.shape.ends();
-    let (low, high) = (
-        from.unwrap_or(f64::NEG_INFINITY).max(first),
-        to.unwrap_or(f64::INFINITY).min(last),
-    );
+    let [low, high] = view.limits(obstacle);
     let rounding = view.rounding;
     let mut found = Facing {
         runs: Vec::new(),
@@ -104,6 +99,23 @@ pub fn facing(
 /// Γ_C along edges; its geometry only: the depth of the section does not matter.
 fn along(mesh: &Mesh, chain: &[Edge], held: &HeldDirections) -> ContactBoundary {
     ContactBoundary::new(mesh, chain, 0.0, held, |_| 1.0)
+}
+
+/// Where an obstacle ends inside edges of `boundary` (edges that follow one another): those edges, with the place of the
+/// end on each, −1 … 1.
+pub fn ends_inside_edges(mesh: &Mesh, boundary: &[Edge], obstacle: &Obstacle) -> Vec<(Edge, f64)> {
+    // supports turn a normal by rounding only
+    let free = HeldDirections::new();
+    let view = View::new(mesh, boundary, &free, obstacle);
+    let limits = view.limits(obstacle);
+    let mut found = Vec::new();
+    for (k, edge) in boundary.iter().enumerate() {
+        for end in limits.into_iter().filter(|end| end.is_finite()) {
+            found.extend(view.place_of(k, end).map(|xi| (*edge, xi)));
+        }
+        found.extend(view.ends_of_sight(k, edge).map(|xi| (*edge, xi)));
+    }
+    found
 }
 
 /// A boundary and the obstacle as seen from it.
@@ -228,6 +240,62 @@ impl<'a> View<'a> {
             coordinate: nodes.map(|i| self.coordinate(i)).collect(),
             places,
         })
+    }
+
+    /// The ends of the obstacle in the coordinate c.
+    fn limits(&self, obstacle: &Obstacle) -> [f64; 2] {
+        let (from, to, _) = obstacle.span();
+        let [first, last] = self.shape.ends();
+        [
+            from.unwrap_or(f64::NEG_INFINITY).max(first),
+            to.unwrap_or(f64::INFINITY).min(last),
+        ]
+    }
+
+    /// Where on an edge the coordinate c is, if that lies between the edge's ends.
+    fn place_of(&self, edge: usize, c: f64) -> Option<f64> {
+        let ends = edge_nodes(edge).map(|node| self.coordinate(node));
+        let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+        if c <= low + self.rounding || c >= high - self.rounding {
+            return None;
+        }
+        let sign = (ends[1] - ends[0]).signum();
+        let guess = edge3::invert(&ends.map(|end| sign * end), sign * c);
+        if self.along == Along::X {
+            return Some(guess);
+        }
+        // arc length to a new node is that of the part of the edge before it
+        let positions = edge_nodes(edge).map(|node| self.whole.positions[node]);
+        let length = |xi: f64| {
+            let part = [-1.0, xi, 0.5 * (xi - 1.0)].map(|xi| edge3::map(&positions, xi).0);
+            ends[0] + length_through(&part)
+        };
+        bisected(|xi| length(xi) < c, -1.0, 1.0)
+    }
+
+    /// Where on an edge a curve in space comes into sight or is lost along the edge's own normals, between nodes that see it and
+    /// nodes that do not. A straight line has no end: the body turns away from it.
+    fn ends_of_sight(&self, k: usize, edge: &Edge) -> impl Iterator<Item = f64> {
+        let normals = self.own_normals(edge);
+        let sees = |xi: f64| {
+            let (place, n, c) = self.place_between(k, xi, &normals);
+            self.seen_from_place(place, n, c).is_some()
+        };
+        let halves = match self.shape.in_space() {
+            Some(Curve::Segments(..) | Curve::Smooth(..)) => vec![[-1.0, 0.0], [0.0, 1.0]],
+            Some(Curve::Line(..)) | None => Vec::new(),
+        };
+        let end_in = |[first, last]: [f64; 2]| {
+            let [from, to] = match [sees(first), sees(last)] {
+                [true, false] => [first, last],
+                [false, true] => [last, first],
+                _ => return None,
+            };
+            // the last place from which it is seen
+            bisected(sees, from, to)
+        };
+        let ends: Vec<f64> = halves.into_iter().filter_map(end_in).collect();
+        ends.into_iter()
     }
 
     /// The coordinate c of a node.
@@ -471,6 +539,21 @@ impl<'a> View<'a> {
         }
         Some(0.5 * (low + high))
     }
+}
+
+/// The last place from `from` on, towards `to`, that something is true of; none if that is `from` itself.
+fn bisected(holds: impl Fn(f64) -> bool, from: f64, to: f64) -> Option<f64> {
+    let (mut inside, mut outside) = (from, to);
+    // to rounding
+    for _ in 0..60 {
+        let middle = 0.5 * (inside + outside);
+        if holds(middle) {
+            inside = middle;
+        } else {
+            outside = middle;
+        }
+    }
+    (inside != from).then_some(inside)
 }
 
 /// n turned clockwise.

@@ -60,6 +60,11 @@ impl Part {
 }
 
 impl Lineage {
+    /// From now on the mesh is no longer the first one.
+    pub(super) fn leave_first(&mut self, nodes: usize) {
+        self.first_nodes.get_or_insert(nodes as u32);
+    }
+
     /// Of the mesh to be made from this one.
     pub(super) fn of_finer(mesh: &Mesh) -> Lineage {
         Lineage {
@@ -82,10 +87,16 @@ impl Lineage {
             .or_else(|| first.then(whole))
     }
 
-    /// A side is split; `halves`: the midsides of its two halves, from its start on.
+    /// A side is split at its middle; `halves`: the midsides of its two halves, from its start on.
     pub(super) fn split(&mut self, edge: &Edge, halves: [u32; 2]) {
+        self.split_at(edge, 0.0, halves);
+    }
+
+    /// A side is split at the place ξ of it, −1 … 1, where its midside node then is.
+    pub(super) fn split_at(&mut self, edge: &Edge, xi: f64, halves: [u32; 2]) {
         let Some(part) = self.part(edge) else { return };
-        let [start, end, middle] = part.places();
+        let [start, end, _] = part.places();
+        let middle = 0.5 * ((1.0 - xi) * start + (1.0 + xi) * end);
         let [a, b, mid] = *edge;
         let (first, second) = ([a, mid, halves[0]], [mid, b, halves[1]]);
         for (edge, range) in [(first, [start, middle]), (second, [middle, end])] {

@@ -3,6 +3,7 @@
 mod build;
 mod coincident;
 mod curved;
+mod divide;
 mod graded;
 mod grid;
 mod halving;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::axis::Axis;
 use super::checks::{ALIGNED, Checks};
 use super::contact_model::ContactModel;
+use super::corners::Alone;
 use super::level::Level;
 use super::sliding;
 use super::supports::Held;
@@ -172,7 +173,7 @@ impl Checks {
         problem: &Problem,
     ) -> Checked {
         let mut all = AllChecks::default();
-        let oblique = oblique(contacts, fixed);
+        let oblique = oblique(contacts, fixed, &Alone::new());
         for contact in contacts {
             let boundary = &contact.boundary;
             for (i, node) in boundary.nodes.iter().enumerate() {
@@ -495,17 +496,46 @@ fn along_one_direction(fixed: &BTreeMap<u32, Held>) -> HeldDirections {
     fixed.iter().filter_map(one).collect()
 }
 
-/// The contact nodes with oblique axes: where two contacts meet their normals, else the normal and the direction of a
+/// Divides sides of contacts at the ends of their obstacles, so that these lie on nodes and no edge is left out; the
+/// obstacles that are not `sound` are passed over, since all else is refused with them.
+pub(super) fn put_nodes_at_ends<'a>(
+    mesh: &mut Mesh,
+    contacts: impl Iterator<Item = (&'a Contact, bool)>,
+) {
+    /// Ends inside edges: two of an obstacle, and where a curve in space is hidden.
+    const MOST_ENDS: usize = 16;
+    for (contact, _) in contacts.filter(|(_, sound)| *sound) {
+        for _ in 0..MOST_ENDS {
+            let Some(edges) = mesh.boundaries.get(&contact.boundary) else {
+                break;
+            };
+            let runs = mesh::runs(edges);
+            let [run] = &runs[..] else { break };
+            // one at a time: an edge may have two, and of a divided edge the places are new
+            let ends = obstacle::ends_inside_edges(mesh, run, &contact.obstacle);
+            let mut ends = ends.into_iter();
+            if !ends.any(|(edge, xi)| mesh.divide_side(edge, xi)) {
+                break;
+            }
+        }
+    }
+}
+
+/// The contact nodes with oblique axes: where two contacts meet that both touch their normals, else the normal and the direction of a
 /// support that is neither normal nor tangent.
 pub(super) fn oblique(
     contacts: &[ContactModel],
     fixed: &BTreeMap<u32, Held>,
+    alone: &Alone,
 ) -> BTreeMap<u32, [[f64; 2]; 2]> {
     let mut first: BTreeMap<u32, [f64; 2]> = BTreeMap::new();
     let mut axes = BTreeMap::new();
-    for contact in contacts {
+    for (c, contact) in contacts.iter().enumerate() {
         let boundary = &contact.boundary;
         for (&node, &n) in boundary.nodes.iter().zip(&boundary.normals) {
+            if alone.get(&node).is_some_and(|owner| *owner != c) {
+                continue;
+            }
             if let Some(other) = first.insert(node, n) {
                 axes.insert(node, [other, n]);
             }

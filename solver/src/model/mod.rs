@@ -8,6 +8,7 @@ mod boundaries;
 mod checks;
 mod contact_model;
 mod contacts;
+mod corners;
 mod curves;
 pub mod estimate;
 mod freedom;
@@ -24,6 +25,7 @@ mod variable;
 
 pub use axis::Axis;
 pub use contact_model::ContactModel;
+pub use corners::Alone;
 pub use freedom::{Hold, RigidMotion};
 pub use level::Level;
 pub use supports::Held;
@@ -37,7 +39,7 @@ use nodes::FirstSides;
 use crate::elasticity::{self, Loads, Section};
 use crate::error::{AllChecks, Checked, Violation};
 use crate::mesh::{External, ExternalMesh, Mesh};
-use crate::problem::{History, Problem, SolverControls, Step};
+use crate::problem::{Algorithm, History, Problem, SolverControls, Step};
 use crate::solution::Warning;
 
 /// A problem that can be solved.
@@ -60,6 +62,8 @@ pub struct Model {
     /// Contact nodes whose displacement is measured along two directions that are not perpendicular: the normals of two
     /// contacts that meet there, or the normal and the direction of a support.
     pub oblique: BTreeMap<u32, [[f64; 2]; 2]>,
+    /// Common ends of two contacts that are of one of them alone, since the other one does not touch there.
+    pub alone: Alone,
     /// The supports leave a rigid motion free, which contact must prevent.
     pub held_by_contact: bool,
     /// Load steps; none: one step to the values as given.
@@ -144,7 +148,14 @@ impl Checks {
         let mesh = match source {
             Source::Given(external) => {
                 let contacts = problem.contacts.len();
-                self.mesh(&problem.mesh, external, &analysis, contacts, &mut all)?
+                let mut mesh = self.mesh(&problem.mesh, external, &analysis, contacts, &mut all)?;
+                // the thesis's own iteration does not know triangles
+                if problem.solver.algorithm != Algorithm::Thesis {
+                    let sound = numbers.iter().map(|(obstacle, _)| obstacle.is_ok());
+                    let contacts = problem.contacts.iter().zip(sound);
+                    contacts::put_nodes_at_ends(&mut mesh, contacts);
+                }
+                mesh
             }
             Source::Ready(mut mesh) => {
                 mesh.order_boundaries();
@@ -173,13 +184,18 @@ impl Checks {
         }
         self.warn_about_contacts(&contacts);
         self.warn_of_dragged_symmetry(&contacts, &fixed, &axis, &problem.steps);
+        if section.axisymmetric() {
+            self.warn_of_radial_drag(&contacts, &axis, &problem.steps);
+        }
         self.warn_of_unmerged(&mesh, &contacts);
+        let alone = corners::guess(&contacts, &fixed, &problem.steps);
         Ok(Model {
             mesh,
             section,
             axis,
             quadrature: problem.quadrature,
-            oblique: contacts::oblique(&contacts, &fixed),
+            oblique: contacts::oblique(&contacts, &fixed, &alone),
+            alone,
             fixed,
             loads,
             contacts,

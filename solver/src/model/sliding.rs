@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::axis::Axis;
 use super::checks::{ALIGNED, Checks};
 use super::contact_model::ContactModel;
+use super::level::Level;
 use super::supports::Held;
 use crate::contact::ContactBoundary;
 use crate::mesh::Mesh;
@@ -57,6 +58,58 @@ impl Checks {
                 WarningCode::SymmetricDrag,
                 &format!("{}/tangential_displacement", contact.pointer),
                 format!("The contact ends on {what}, at ({x}, {y}), and its obstacle is displaced along it by {d}: beyond that end it would be dragged the opposite way. {instead}"),
+            );
+        }
+    }
+}
+
+/// A drag is radial if its radial part is more than this part of it.
+const RADIAL: f64 = 1e-6;
+
+impl Checks {
+    /// Warns of an obstacle of revolution that is dragged away from the axis, or towards it: what is rigid can only move along
+    /// its axis. Along a cone that is a drag together with an indentation, whose radial parts cancel.
+    pub(super) fn warn_of_radial_drag(
+        &mut self,
+        contacts: &[ContactModel],
+        axis: &Axis,
+        steps: &[Step],
+    ) {
+        let ends: Vec<Level> = match steps {
+            [] => vec![Level::FULL],
+            _ => steps.iter().map(Level::end_of).collect(),
+        };
+        for contact in contacts {
+            let boundary = &contact.boundary;
+            let last = boundary.nodes.len() - 1;
+            // a contact that ends on the axis is told of with its line of symmetry
+            if [0, last].iter().any(|&i| axis.holds(boundary.positions[i])) {
+                continue;
+            }
+            let radial = |level: &Level| {
+                let pushed = level.indentation * contact.indentation;
+                let along = level.tangential_displacement * contact.tangential_displacement;
+                // a ring that is pressed onto a cylinder along the axis is only thicker than the gap
+                let of_drag = |i: usize| along * boundary.tangent(i)[0];
+                let of_all = |i: usize| {
+                    let (n, t, [a, b]) =
+                        (boundary.normals[i], boundary.tangent(i), contact.push[i]);
+                    of_drag(i) - pushed * (a * n[0] - b * t[0])
+                };
+                let most = |of_node: &dyn Fn(usize) -> f64| {
+                    (0..=last).map(|i| of_node(i).abs()).fold(0.0, f64::max)
+                };
+                let least = RADIAL * along.abs();
+                most(&of_drag) > least && most(&of_all) > least
+            };
+            if !ends.iter().any(radial) {
+                continue;
+            }
+            let d = contact.tangential_displacement;
+            self.warn(
+                WarningCode::RadialDrag,
+                &format!("{}/tangential_displacement", contact.pointer),
+                format!("The obstacle is displaced along the contact by {d}, and with it away from the axis or towards it: a rigid body of revolution cannot widen or shrink, and only moves along its axis. Leave it out, or where only a sector slides, model it in plane strain."),
             );
         }
     }

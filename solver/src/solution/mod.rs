@@ -44,6 +44,18 @@ pub struct Solution {
 }
 
 impl Solution {
+    /// Whether another solution was found, with other forces, at the end of any step.
+    pub fn has_second(&self) -> bool {
+        let ends = self.steps.iter().map(|step| &step.summary);
+        let mut all = ends.chain([&self.summary]);
+        all.any(|summary| {
+            summary
+                .warnings
+                .iter()
+                .any(|w| w.code == WarningCode::NotUnique)
+        })
+    }
+
     /// Whether every number is finite, also those that are not part of the document.
     pub fn is_finite(&self) -> bool {
         // all of them by name, here and below, so that a new one is not forgotten
@@ -312,6 +324,10 @@ pub enum WarningCode {
     ContactTurns,
     /// An obstacle that is dragged along a contact with a line of symmetry at its end.
     SymmetricDrag,
+    /// A rigid obstacle of revolution that is dragged away from the axis or towards it.
+    RadialDrag,
+    /// Materials that meet on the surface in contact, where the pressure has no limit.
+    MaterialJunction,
     /// Edges longer than the nonlocal radius.
     MeshTooCoarseForRadius,
     /// Few elements in the contact.

@@ -3,12 +3,15 @@
 
 mod between;
 mod extents;
+mod junction;
 mod quantities;
 mod resolution;
 mod warnings;
 
 pub use between::Missed;
 pub use quantities::{Estimable, Quantity};
+
+use std::cell::OnceCell;
 
 use super::system::{Patch, System, shape_without_oblique};
 use crate::algorithm::finished::Finished;
@@ -35,6 +38,8 @@ pub(super) struct PatchView<'a> {
     pressed: Option<[f64; 2]>,
     /// g at start, end and midside of every edge; 0 in the total law.
     anchors: Vec<[f64; 3]>,
+    /// Where materials meet in the contact, once that is known.
+    worst_junction: OnceCell<Option<junction::Junction>>,
     /// σ_t likewise, if it does not follow from the law: in the thesis's own iteration and in bonded contacts.
     tractions: Option<Vec<[f64; 3]>>,
 }
@@ -84,6 +89,7 @@ impl<'a> PatchView<'a> {
             largest: largest_pressure(&forces.pressures[system.range(patch)]),
             pressed: None,
             anchors: Vec::new(),
+            worst_junction: OnceCell::new(),
             tractions: None,
         };
         view.pressed = view.pressed();

@@ -5,6 +5,7 @@ use crate::algorithm::adjoint::Gradient;
 use crate::algorithm::system::Point;
 use crate::contact::edge_nodes;
 use crate::element::edge3;
+use crate::friction::BoundLaw;
 use crate::solution::{Outcome, QuantityName};
 
 /// A quantity of a contact.
@@ -37,6 +38,8 @@ pub struct Quantity {
     pub between_at: Vec<(usize, f64)>,
     /// The edges between whose nodes the obstacle has a shape of its own, likewise.
     pub unseen_at: Vec<(usize, f64)>,
+    /// Parts of the contact like the one that is modelled: two where it goes on beyond a line of symmetry.
+    pub images: f64,
     /// Whether an error can be stated.
     pub estimable: Estimable,
 }
@@ -111,17 +114,20 @@ impl PatchView<'_> {
     fn add_cuts(&self, quantities: &mut [Quantity]) {
         let ends = self.ends_of_contact();
         let cut: f64 = ends.iter().map(|end| end.cut).sum();
-        let (Some(first), Some(last)) = (ends.first(), ends.last()) else {
-            return;
-        };
         // a contact of one node is not resolved at all
-        let part = (cut / (last.s - first.s)).min(1.0);
+        let part = match (ends.first(), ends.last()) {
+            (Some(first), Some(last)) if cut > 0.0 => (cut / (last.s - first.s)).min(1.0),
+            _ => 0.0,
+        };
+        let rubbed = self.system.circumference * self.prescribed_friction_left_out();
         let friction = self.summary().friction_force;
-        for quantity in quantities.iter_mut().filter(|_| cut > 0.0) {
+        for quantity in quantities {
             quantity.cut = match quantity.name {
                 QuantityName::ContactStart | QuantityName::ContactEnd => continue,
                 QuantityName::StickEnd => cut,
-                QuantityName::TangentialForce => part * friction,
+                QuantityName::TangentialForce | QuantityName::FrictionForce => {
+                    rubbed.max(part * friction)
+                }
                 _ => part * quantity.value.abs(),
             };
         }
@@ -142,6 +148,25 @@ impl PatchView<'_> {
             };
             quantity.unseen_at.clone_from(&by_edge);
         }
+    }
+
+    /// The friction that a prescribed bound, which acts whether or not the body touches, has on what is left out (force,
+    /// without 2π).
+    fn prescribed_friction_left_out(&self) -> f64 {
+        let Some(law) = self.patch.law.as_ref() else {
+            return 0.0;
+        };
+        let BoundLaw::Prescribed(_) = law.bound else {
+            return 0.0;
+        };
+        let boundary = &self.patch.contact.boundary;
+        let last = self.count() - 1;
+        let at_end = |(node, edge): (usize, usize)| {
+            let [start, end, _] = boundary.edge_arc(edge);
+            let depth = self.weight(edge) / (end - start);
+            self.averaged_and_bound(boundary.s[node]).1 * depth * self.left_out(node)
+        };
+        [(0, 0), (last, last / 2 - 1)].into_iter().map(at_end).sum()
     }
 
     /// The length that the obstacle covers beyond the first or the last node.
@@ -169,8 +194,15 @@ impl PatchView<'_> {
             spacing_at: Vec::new(),
             between_at: Vec::new(),
             unseen_at: Vec::new(),
+            images: 1.0 + self.mirrored_ends() as f64,
             estimable: Estimable::Yes,
         }
+    }
+
+    /// Ends of the boundary on lines of symmetry, beyond which the contact goes on.
+    pub(super) fn mirrored_ends(&self) -> usize {
+        let goes_on = |i: &usize| self.engaged(*i) && self.symmetric(*i);
+        [0, self.count() - 1].iter().filter(|i| goes_on(i)).count()
     }
 
     fn forces(&self) -> Vec<Quantity> {
@@ -278,14 +310,14 @@ impl PatchView<'_> {
         found
     }
 
-    /// The pressure grows without limit at a sharp end of the obstacle and, slowly, at a kink.
+    /// The pressure grows without limit at a sharp end of the obstacle, where materials meet and, slowly, at a kink.
     fn pressure_without_limit(&self) -> bool {
         let sharp = |i: usize| self.active(i) && self.may_be_sharp(i);
-        sharp(0) || sharp(self.count() - 1) || !self.kinks().is_empty()
+        sharp(0) || sharp(self.count() - 1) || !self.kinks().is_empty() || self.junction().is_some()
     }
 
     /// The bound follows the pressure itself, and not its average.
-    fn averages_nothing(&self) -> bool {
+    pub(super) fn averages_nothing(&self) -> bool {
         let friction = self.patch.contact.friction.as_ref();
         friction.is_some_and(|law| law.bound.radius() == Some(0.0))
     }
@@ -312,8 +344,10 @@ impl PatchView<'_> {
             .as_ref()
             .map_or(0.0, |law| STEADY * law.elastic_slip);
         turns.retain(|(edge, _, slope)| touches(*edge) && slope.abs() > steady);
-        let few = turns.len() <= MOST_STICK_ENDS;
-        turns.truncate(MOST_STICK_ENDS);
+        // as many as of the whole, of which this may be a half
+        let most = MOST_STICK_ENDS / (1 + self.mirrored_ends());
+        let few = turns.len() <= most;
+        turns.truncate(most);
         for (edge, xi, slope) in turns {
             let point = self.point(edge, xi);
             let arc = self.patch.contact.boundary.edge_arc(edge);

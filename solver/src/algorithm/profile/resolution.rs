@@ -1,6 +1,8 @@
 //! What the distances between nodes, and between the points where friction acts, leave open in the quantities of a
 //! contact: parts of the errors that are stated, beside those by recovery.
 
+use std::collections::BTreeSet;
+
 use super::PatchView;
 use crate::contact::edge_nodes;
 use crate::element::edge3;
@@ -44,7 +46,7 @@ impl PatchView<'_> {
     }
 
     /// The length of an edge times its depth: ∫ ds.
-    fn weight(&self, edge: usize) -> f64 {
+    pub(super) fn weight(&self, edge: usize) -> f64 {
         let places = &self.patch.contact.boundary.friction_points[3 * edge..3 * edge + 3];
         places.iter().map(|place| place.weight).sum()
     }
@@ -104,13 +106,22 @@ impl PatchView<'_> {
                 found.push((end.edge, cohesion * weight));
             }
         }
-        for kink in self.kinks() {
-            for edge in self.neighbours(kink.edge) {
-                found.push((edge, AT_KINKS * self.friction_on(edge)));
-            }
-        }
+        found.extend(self.open_at_kinks());
         found.extend(self.unseen_stick());
         found
+    }
+
+    /// What kinks leave open, by the edges beside them (force, without 2π). How a kink lies between the nodes makes friction
+    /// too large or too small: what several edges with kinks leave open adds up like the parts of a random sum.
+    fn open_at_kinks(&self) -> Vec<(usize, f64)> {
+        let with_kinks: BTreeSet<usize> = self.kinks().iter().map(|kink| kink.edge).collect();
+        let beside: BTreeSet<usize> = with_kinks
+            .iter()
+            .flat_map(|e| self.neighbours(*e))
+            .collect();
+        let part = AT_KINKS / (with_kinks.len().max(1) as f64).sqrt();
+        let open = |edge: usize| (edge, part * self.friction_on(edge));
+        beside.into_iter().map(open).collect()
     }
 
     /// Where the motion turns, a part of the contact sticks. If all of it lies between two points where friction acts, or

@@ -33,6 +33,7 @@ impl PatchView<'_> {
         self.warn_of_oscillation(warnings);
         self.warn_of_missed(warnings);
         self.warn_of_kinks(warnings);
+        self.warn_of_junction(warnings);
         self.warn_of_contact(warnings);
     }
 
@@ -112,7 +113,7 @@ impl PatchView<'_> {
         let edges = (0..contact.boundary.edge_count())
             .filter(|k| edge_nodes(*k).iter().all(|&i| self.active(i)))
             .count();
-        if edges < FEWEST_EDGES {
+        if edges * (1 + self.mirrored_ends()) < FEWEST_EDGES {
             warn(
                 WarningCode::MeshTooCoarseForContact,
                 format!(
@@ -297,10 +298,16 @@ impl PatchView<'_> {
         node.on_axis || node.symmetric()
     }
 
-    /// A node at which the obstacle may end: neither on a line of symmetry nor in a corner, where another contact begins.
+    /// A node at which the obstacle may end: neither on a line of symmetry nor in a corner, where another obstacle touches too.
     pub(super) fn may_be_sharp(&self, i: usize) -> bool {
-        let node = &self.system.nodes[self.patch.first + i];
-        !self.symmetric(i) && node.oblique.is_none_or(|oblique| !oblique.shared)
+        let (system, node) = (self.system, self.patch.contact.boundary.nodes[i]);
+        let others = (0..system.patches.len()).filter(|p| *p != self.p);
+        let mut there = others.flat_map(|p| {
+            let patch = &system.patches[p];
+            patch.contact.boundary.nodes.iter().zip(system.range(patch))
+        });
+        let touched = there.any(|(other, k)| *other == node && self.finished.state.active[k]);
+        !self.symmetric(i) && !touched
     }
 
     /// The largest |σ_t| that a prescribed bound exerts on edges of which no node touches.

@@ -1,0 +1,59 @@
+//! What a solution says of the common ends of contacts: which of them each node is of.
+
+use std::collections::BTreeSet;
+
+use crate::algorithm::system::{State, System};
+use crate::model::Alone;
+
+/// An obstacle reaches into a body if it does so by more than this part of its contact's length.
+const ROUNDING: f64 = 1e-10;
+
+/// Common nodes that are taken to be of one contact alone, though the obstacle of the other one reaches into the body there.
+pub fn touched_by_both(system: &System<'_>, state: &State) -> Vec<u32> {
+    let mut found = Vec::new();
+    for patch in &system.patches {
+        let boundary = &patch.contact.boundary;
+        let least = ROUNDING * boundary.length();
+        for (i, node) in system.range(patch).enumerate() {
+            let follows = system.nodes[node].follows.is_some();
+            if follows && system.opening(&state.v, node) < -least {
+                found.push(boundary.nodes[i]);
+            }
+        }
+    }
+    found
+}
+
+/// Which contact each common node is better taken to be of alone, after this solution; those in `both` have been
+/// found to be of both. None if that is as it was. Without a state there is no solution.
+pub fn better(system: &System<'_>, state: Option<&State>, both: &BTreeSet<u32>) -> Option<Alone> {
+    let model = system.model;
+    let mut alone = model.alone.clone();
+    alone.retain(|node, _| !both.contains(node));
+    let Some(state) = state else {
+        return (alone != model.alone).then_some(alone);
+    };
+    let touches = |c: usize| {
+        let mut nodes = system.range(&system.patches[c]);
+        nodes.any(|node| state.active[node])
+    };
+    let touches_at = |c: usize, node: u32| {
+        let patch = &system.patches[c];
+        let mut places = patch.contact.boundary.nodes.iter().zip(system.range(patch));
+        places.any(|(n, i)| *n == node && state.active[i])
+    };
+    for (node, contacts) in model.common_nodes() {
+        if both.contains(&node) {
+            continue;
+        }
+        let at = contacts.map(|c| touches_at(c, node));
+        let anywhere = contacts.map(touches);
+        let only = match (at, anywhere) {
+            ([true, false], _) | ([false, false], [true, false]) => contacts[0],
+            ([false, true], _) | ([false, false], [false, true]) => contacts[1],
+            _ => continue,
+        };
+        alone.insert(node, only);
+    }
+    (alone != model.alone).then_some(alone)
+}

@@ -1,0 +1,79 @@
+//! Common ends of two contacts. Where both touch, the node's displacement is measured along both normals, and no friction
+//! acts on it (formulation 3.3). Where only one touches, the other changes nothing: the node is that one's alone, with its
+//! normal and tangent, and what the other contact has there follows.
+
+use std::collections::BTreeMap;
+
+use super::contact_model::ContactModel;
+use super::level::Level;
+use super::supports::Held;
+use super::{Model, contacts};
+use crate::problem::Step;
+
+/// By common node: the contact, by its place in the model, that the node is taken to be of alone.
+pub type Alone = BTreeMap<u32, usize>;
+
+impl Model {
+    /// Nodes of two contacts, with both by their places in the model; none of supported nodes, where both are needed.
+    pub fn common_nodes(&self) -> BTreeMap<u32, [usize; 2]> {
+        common(&self.contacts, &self.fixed)
+    }
+
+    /// The same problem with other common nodes of one contact alone.
+    pub fn with_alone(&self, alone: Alone) -> Model {
+        Model {
+            oblique: contacts::oblique(&self.contacts, &self.fixed, &alone),
+            alone,
+            ..self.clone()
+        }
+    }
+}
+
+/// A first guess: the contact whose obstacle overlaps the body at the common node; if neither does, that which is nearer.
+/// Both if both do. A friction bound that is given acts wherever the body is.
+pub(super) fn guess(
+    contacts: &[ContactModel],
+    fixed: &BTreeMap<u32, Held>,
+    steps: &[Step],
+) -> Alone {
+    let ends: Vec<Level> = match steps {
+        [] => vec![Level::FULL],
+        _ => steps.iter().map(Level::end_of).collect(),
+    };
+    let nearest = |c: usize, node: u32| {
+        let contact = &contacts[c];
+        let place = contact.boundary.nodes.iter().position(|n| *n == node);
+        let law = contact.friction.as_ref();
+        match place {
+            Some(i) if law.is_none_or(|law| law.bound.radius().is_some()) => {
+                let gaps = ends.iter().map(|level| contact.gap(i, level.indentation));
+                gaps.fold(f64::INFINITY, f64::min)
+            }
+            _ => f64::NEG_INFINITY,
+        }
+    };
+    let mut alone = Alone::new();
+    for (node, [a, b]) in common(contacts, fixed) {
+        let gaps = [nearest(a, node), nearest(b, node)];
+        if gaps.iter().any(|gap| *gap > 0.0) {
+            alone.insert(node, if gaps[0] <= gaps[1] { a } else { b });
+        }
+    }
+    alone
+}
+
+fn common(contacts: &[ContactModel], fixed: &BTreeMap<u32, Held>) -> BTreeMap<u32, [usize; 2]> {
+    let mut first: BTreeMap<u32, usize> = BTreeMap::new();
+    let mut common = BTreeMap::new();
+    for (c, contact) in contacts.iter().enumerate() {
+        let nodes = &contact.boundary.nodes;
+        for node in [nodes[0], nodes[nodes.len() - 1]] {
+            if let Some(other) = first.insert(node, c)
+                && !fixed.contains_key(&node)
+            {
+                common.insert(node, [other, c]);
+            }
+        }
+    }
+    common
+}
