@@ -416,7 +416,6 @@ fn half_and_whole_state_the_same_errors() {
                 for name in [
                     QuantityName::NormalForce,
                     QuantityName::FrictionForce,
-                    QuantityName::PeakNormalStress,
                     QuantityName::ContactEnd,
                 ] {
                     let of = |all: &[EstimatedQuantity]| {
