@@ -17,6 +17,14 @@ pub(crate) fn section(records: &Path) -> String {
             "Poisson's ratio 0.4999",
         ),
         (
+            "calibration_varied",
+            "Other meshes (without a structure, of Gmsh's, half as fine) and orthotropic materials",
+        ),
+        (
+            "calibration_unseen",
+            "Problems that no factor was fitted to (`tests/verification/unseen.rs`: tapered, leaning, round and stepped bodies, uneven grids, orthotropic and layered materials, steps in few increments, the true errors by 24 times as many)",
+        ),
+        (
             "calibration_verified",
             "With `\"accuracy\": \"verify\"` (Poisson's ratio from 0 to 0.45; true errors from three more refinements)",
         ),

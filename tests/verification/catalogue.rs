@@ -3,7 +3,7 @@
 
 use fastrand::Rng;
 use serde_json::{Value, json};
-use solver::problem::{Grid, Problem};
+use solver::problem::{Analysis, Elasticity, Grid, Problem};
 
 use crate::support::{Lattice, problem, union};
 
@@ -354,6 +354,42 @@ pub(crate) fn gmsh(number: u64) -> Problem {
     let path = format!("{folder}/block-{part}-{family}.msh");
     let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
     problem.mesh = serde_json::from_value(json!({"gmsh": text})).unwrap();
+    problem
+}
+
+/// The problem of this number with a body of an orthotropic material; one of revolution stays as it is.
+pub(crate) fn orthotropic(number: u64) -> Problem {
+    let mut problem = case(number).problem;
+    let dice = &mut Rng::with_seed(number);
+    let Elasticity::Isotropic { youngs_modulus, .. } = problem.materials[0].elasticity else {
+        return problem;
+    };
+    if !matches!(problem.analysis, Analysis::Axisymmetric {}) {
+        let mut part = |low: f64, high: f64| youngs_modulus * between(dice, low, high);
+        let material = json!({"orthotropic": {
+            "e1": youngs_modulus, "e2": part(0.2, 1.5), "e3": part(0.2, 1.5), "g12": part(0.07, 0.6),
+            "nu12": part(0.0, 0.25) / youngs_modulus, "nu13": part(0.0, 0.15) / youngs_modulus,
+            "nu23": part(0.0, 0.15) / youngs_modulus, "angle": part(-90.0, 90.0) / youngs_modulus,
+        }});
+        problem.materials = vec![serde_json::from_value(material).unwrap()];
+    }
+    problem
+}
+
+/// The problem of this number on every second line of its grid; the outermost lines and that of an edge stay. Other meshes
+/// stay.
+pub(crate) fn coarse(number: u64) -> Problem {
+    let mut problem = case(number).problem;
+    let edges = problem.contacts[0].obstacle.span();
+    if let Some(grid) = problem.mesh.grid_mut() {
+        for lines in [&mut grid.x, &mut grid.y] {
+            let last = lines.len() - 1;
+            let kept = lines.iter().enumerate().filter(|(i, line)| {
+                i % 2 == 0 || *i == last || edges.0 == Some(**line) || edges.1 == Some(**line)
+            });
+            *lines = kept.map(|(_, line)| *line).collect();
+        }
+    }
     problem
 }
 
