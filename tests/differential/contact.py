@@ -11,7 +11,7 @@ import scipy.sparse.linalg
 
 import friction
 import obstacles
-from elastic import GAUSS, Body, arc_lengths, curve_error, edge_shape, edge_way
+from elastic import GAUSS, Body, arc_lengths, curve_error, edge_shape, edge_way, node_normals
 from meshes import ROUNDING, normals
 
 
@@ -48,11 +48,8 @@ class Contact:
 
     @staticmethod
     def mean_normals(mesh, edges):
-        sums = np.zeros((2 * len(edges) + 1, 2))
-        for k, edge in enumerate(edges):
-            for place, n in zip((2 * k, 2 * k + 2, 2 * k + 1), normals(mesh, edge)):
-                sums[place] += n
-        return sums / np.hypot(*sums.T)[:, None]
+        found = node_normals(mesh, edges)
+        return np.array([found[n] for n in [edges[0][0]] + [n for _, end, mid in edges for n in (mid, end)]])
 
     def coordinate(self, position, s):
         return s if self.obstacle.get("along") == "arc_length" else position[0]
@@ -76,13 +73,14 @@ class Contact:
         return [edges[k] for k in found], found[0]
 
     def snap(self, held):
-        """An end on a line of symmetry has its normal along that line, but for the error of the curve's parabola."""
+        """An end that a support holds along its normal or tangent, within the errors of both, has exactly that direction."""
         for end, edge in ((0, self.edges[0]), (len(self.nodes) - 1, self.edges[-1])):
             error = curve_error(self.body.mesh.nodes[list(edge)])
-            for way, value in held.get(self.nodes[end], []):
-                along = np.array([-way[1], way[0]]) * np.sign(way[0] * self.normals[end][1] - way[1] * self.normals[end][0])
-                if value == 0 and self.normals[end] @ along > np.cos(error):
-                    self.normals[end] = along
+            for way, _ in held.get(self.nodes[end], []):
+                across = np.array([-way[1], way[0]])
+                for exact in (way, -way, across, -across):
+                    if self.normals[end] @ exact > np.cos(error):
+                        self.normals[end] = exact
 
     def see(self):
         """Distance of the obstacle and the parts of a push along normal and tangent."""
@@ -537,9 +535,15 @@ class Reference:
                     shear -= force
             own = {"normal_force": ring * reactions.sum(), "tangential_force": ring * shear, "friction_force": 0.0}
             n, t = (np.einsum("ia,ia->i", found["u"][contact.nodes], way) for way in (contact.normals, contact.tangents))
+            shown = pressures[number].copy()
+            if self.body.axisymmetric:
+                for end, beside in ((0, 1), (len(contact.nodes) - 1, len(contact.nodes) - 2)):
+                    if contact.positions[end][0] == 0 and shown[beside]:
+                        # what the node on the axis carries, which has no area, is shown beside it
+                        shown[beside] = (reactions[end] + reactions[beside]) / contact.areas[beside]
             profile = {
                 "s": contact.s, "gap": contact.gap(level), "normal_displacement": n, "tangential_displacement": t,
-                "normal_stress": -pressures[number], "areas": ring * contact.areas,
+                "normal_stress": -shown, "areas": ring * contact.areas,
             }  # fmt: skip
             for patch in self.patches:
                 if patch["number"] == number:

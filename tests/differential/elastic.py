@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sparse
 import skfem
 
-from meshes import normals
+from meshes import normals, surface
 
 GAUSS = np.polynomial.legendre.leggauss(3)
 # above this ratio of κ to the shear stiffness elements get a pressure of their own
@@ -20,15 +20,45 @@ def edge_shape(xi):
     return np.array([xi * (xi - 1) / 2, xi * (xi + 1) / 2, 1 - xi * xi])
 
 
-def curve_error(points):
-    """How far the normal at an end of a side is from that of the circle through its nodes (radians), and rounding: between
-    two such sides a smooth curve turns by what both are off.
+def side_error(points):
+    """How far the direction of a side at its ends is from the curve that it stands for (radians), 3.12 of formulation.md."""
+    start, end, mid = points
+    chord, bow = end - start, mid - (start + end) / 2
+    along, across = abs(chord @ bow) / (chord @ chord), (chord[0] * bow[1] - chord[1] * bow[0]) / (chord @ chord)
+    half = np.arctan(4 * across)
+    return abs(half) ** 3 / 4 + 4 * along * abs(half), 2 * half / np.hypot(*chord), np.hypot(*chord)
 
-    A parabola over an arc of the angle θ has the slope 2 tan(θ/4) at its ends, the circle tan(θ/2): θ³/32 apart.
-    """
-    (a, b), (c, d) = edge_way(points, -1.0), edge_way(points, 1.0)
-    turn = abs(np.arctan2(a * d - b * c, a * c + b * d))
-    return turn**3 / 30 + 1e-7
+
+def curve_error(points):
+    """The error of a normal at a side's end (radians)."""
+    return min(4 * side_error(points)[0] + 5e-4, 0.26)
+
+
+def smooth(before, after):
+    """Whether the surface goes on smoothly from one side to the next."""
+    (ax, ay), (bx, by) = edge_way(before, 1.0), edge_way(after, -1.0)
+    turn = abs(np.arctan2(ay * bx - ax * by, ax * bx + ay * by))
+    (e1, k1, h1), (e2, k2, h2) = side_error(before), side_error(after)
+    return turn <= min(4 * (e1 + e2) + 2 * abs(h1 - h2) * abs(k1 - k2) / 6 + 1e-3, 0.26)
+
+
+def node_normals(mesh, edges):
+    """At every node of a boundary the mean normal of its sides, and of the side beyond an end where the surface goes on
+    smoothly."""
+    sums, own = {}, set(edges)
+    after, before = {e[0]: e for e in surface(mesh)}, {e[1]: e for e in surface(mesh)}
+    points = lambda edge: mesh.nodes[list(edge)]
+    for edge in edges:
+        start, end, mid = normals(mesh, edge)
+        for node, n in zip(edge, (start, end, mid)):
+            sums[node] = sums.get(node, 0) + n
+        beyond = before.get(edge[0])
+        if beyond not in own and beyond and smooth(points(beyond), points(edge)):
+            sums[edge[0]] = sums[edge[0]] + normals(mesh, beyond)[1]
+        beyond = after.get(edge[1])
+        if beyond not in own and beyond and smooth(points(edge), points(beyond)):
+            sums[edge[1]] = sums[edge[1]] + normals(mesh, beyond)[0]
+    return {node: n / np.hypot(*n) for node, n in sums.items()}
 
 
 def edge_way(points, xi):
@@ -376,23 +406,10 @@ class Body:
         return held
 
     def support_normals(self):
-        """Of the supports along normal or tangent, one normal a node: of all sides that meet there smoothly."""
-        at, everywhere = {}, {}
-        for number, support in enumerate(self.problem.get("supports", [])):
-            if support.get("un") is None and support.get("ut") is None:
-                continue
-            own = at[number] = {}
-            for edge in self.mesh.boundaries[support["boundary"]]:
-                error = curve_error(self.mesh.nodes[list(edge)])
-                for node, n in zip(edge, normals(self.mesh, edge)):
-                    own.setdefault(node, []).append(n)
-                    everywhere.setdefault(node, {})[edge] = (n, error)
-        found = {}
-        for number, own in at.items():
-            found[number] = {}
-            for node, list_ in own.items():
-                sides = list(everywhere[node].values())
-                smooth = len(sides) == 2 and sides[0][0] @ sides[1][0] > np.cos(sides[0][1] + sides[1][1])
-                mean = np.sum([n for n, _ in sides] if smooth else list_, axis=0)
-                found[number][node] = mean / np.hypot(*mean)
-        return found
+        """The normals of the supports along normal or tangent, by the support's number and the node."""
+        along = lambda support: support.get("un") is not None or support.get("ut") is not None
+        return {
+            number: node_normals(self.mesh, self.mesh.boundaries[support["boundary"]])
+            for number, support in enumerate(self.problem.get("supports", []))
+            if along(support)
+        }

@@ -9,7 +9,7 @@ import random
 import numpy as np
 
 import obstacles
-from elastic import arc_lengths, curve_error
+from elastic import arc_lengths, curve_error, smooth
 from files import abaqus_text, gmsh_text
 from meshes import Mesh, chains, from_grid, from_inline, name_parts, normals, quad_shape, triangle_shape
 
@@ -366,10 +366,7 @@ class Generator:
     def smooth(self, side):
         """Without corners of its own."""
         edges = self.mesh.boundaries[side]
-        error = lambda edge: curve_error(self.mesh.nodes[list(edge)])
-        return all(
-            normals(self.mesh, a)[1] @ normals(self.mesh, b)[0] > np.cos(error(a) + error(b)) for a, b in zip(edges, edges[1:])
-        )
+        return all(smooth(self.mesh.nodes[list(a)], self.mesh.nodes[list(b)]) for a, b in zip(edges, edges[1:]))
 
     def roles(self, contacts):
         draw = self.draw
