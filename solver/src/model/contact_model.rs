@@ -29,9 +29,11 @@ pub struct ContactModel {
     pub cut: Vec<(Edge, f64)>,
     /// How far the obstacle is pushed against the body (length).
     pub indentation: f64,
-    /// The parts of that push along the contact's normal and along its t, at each node: 1 and 0 with
-    /// the body's normal; with the obstacle's the cosine and minus the sine of the slope.
+    /// The parts of that push against the contact's normal and along its t, at each node: without a direction of its own 1
+    /// and 0 with the body's normal, and with the obstacle's the cosine and minus the sine of the slope.
     pub push: Vec<[f64; 2]>,
+    /// The body's own normal at each node.
+    pub outward: Vec<[f64; 2]>,
     /// The obstacle's own displacement along the contact's t (length).
     pub tangential_displacement: f64,
     /// Sliding changes neither gap nor place: a straight obstacle without ends along a whole straight side of the body.
@@ -59,14 +61,20 @@ impl ContactModel {
 
     /// Whether the second of the oblique axes of a node lies along the surface of the body.
     pub fn held_along_surface(&self, node: usize, [_, held]: &[[f64; 2]; 2]) -> bool {
-        // the body's own normal: the push is against it
-        let ([a, b], n, t) = (
+        let [x, y] = self.outward[node];
+        (held[0] * x + held[1] * y).abs() <= ALIGNED
+    }
+
+    /// How far the indentation moves the obstacle along the surface of the body at a node (length); 0 without a direction
+    /// of its own.
+    pub(super) fn pushed_along_body(&self, node: usize) -> f64 {
+        let ([a, b], m, t) = (
             self.push[node],
             self.boundary.normals[node],
             self.boundary.tangent(node),
         );
-        let across = (0..2).map(|i| held[i] * (a * n[i] - b * t[i])).sum::<f64>();
-        across.abs() <= ALIGNED
+        let [x, y] = self.outward[node];
+        self.indentation * (y * (b * t[0] - a * m[0]) - x * (b * t[1] - a * m[1]))
     }
 
     /// d: the obstacle's displacement along the contact's t at a node (length).

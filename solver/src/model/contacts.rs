@@ -97,10 +97,15 @@ impl Checks {
             ContactBoundary::new(mesh, &run.chain, run.start, held, |x| section.depth(x));
         let radius = friction.as_ref().and_then(|law| law.bound.radius());
         self.sound(&boundary, axis, contact, radius, &run, &pointer)?;
-        let push = turn_normals(&mut boundary, &run, contact.normal, held);
+        let outward = boundary.normals.clone();
+        let turned = turn_normals(&mut boundary, &run, contact.normal, held);
         let end_slopes = [0, run.profile.len() - 1].map(|i| run.profile[i].slope);
-        let along = |(profile, push): (&Profile, &[f64; 2])| profile.distance * push[0];
-        let profile: Vec<f64> = run.profile.iter().zip(&push).map(along).collect();
+        let along = |(profile, turned): (&Profile, &[f64; 2])| profile.distance * turned[0];
+        let profile: Vec<f64> = run.profile.iter().zip(&turned).map(along).collect();
+        let push = match contact.direction {
+            Some(direction) => push_along(direction, &boundary),
+            None => turned,
+        };
         Ok(ContactModel {
             name: contact.boundary.clone(),
             pointer,
@@ -116,6 +121,7 @@ impl Checks {
             end_slopes,
             indentation: contact.indentation,
             push,
+            outward,
             tangential_displacement: contact.tangential_displacement,
             normal: contact.normal,
             condition: contact.condition,
@@ -583,6 +589,20 @@ fn turn_normals(
         *push = [cosine, -cosine * slope + 0.0];
     }
     push
+}
+
+/// The parts of a unit push along one direction, against the contact's normal m and along its t, at each node.
+fn push_along([x, y]: [f64; 2], boundary: &ContactBoundary) -> Vec<[f64; 2]> {
+    let length = x.hypot(y);
+    let parts = |i: usize| {
+        let (m, t) = (boundary.normals[i], boundary.tangent(i));
+        // + 0.0 turns −0 into 0
+        [
+            -(x * m[0] + y * m[1]) / length + 0.0,
+            (x * t[0] + y * t[1]) / length + 0.0,
+        ]
+    };
+    (0..boundary.nodes.len()).map(parts).collect()
 }
 
 /// The power of a profile.

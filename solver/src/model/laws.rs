@@ -23,6 +23,33 @@ const FEWEST_SMOOTHED: usize = 4;
 const LARGE_DEVIATION: f64 = 0.1;
 
 impl Checks {
+    /// The direction of a push, which has a length; a body of revolution is pushed along its axis.
+    pub(super) fn push_direction(
+        &mut self,
+        analysis: &Analysis,
+        direction: Option<[f64; 2]>,
+        pointer: &str,
+    ) -> Checked {
+        let Some([x, y]) = direction else {
+            return Ok(());
+        };
+        let radial = matches!(analysis, Analysis::Axisymmetric {}) && x != 0.0;
+        match x.hypot(y) {
+            length if length > 0.0 && length.is_finite() && !radial => Ok(()),
+            _ => Err(self.report(
+                pointer,
+                Reason::OutOfRange,
+                format!("[{x}, {y}]"),
+                if radial {
+                    "a direction along the axis: [0, 1] or [0, −1]"
+                } else {
+                    "a direction, such as [0, −1]"
+                },
+                "A rigid body moves in one direction; a rigid ring can move along the axis only.",
+            )),
+        }
+    }
+
     /// The numbers of an obstacle.
     pub(super) fn obstacle(&mut self, obstacle: &Obstacle, pointer: &str) -> Checked {
         let mut all = AllChecks::default();

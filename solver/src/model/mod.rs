@@ -143,6 +143,7 @@ impl Checks {
             let obstacle = self.obstacle(&contact.obstacle, &at("obstacle"));
             let (friction, sound) = self.friction(&analysis, contact, &at("friction"));
             all.check(sound);
+            all.check(self.push_direction(&analysis, contact.direction, &at("direction")));
             numbers.push((obstacle, friction));
         }
         let mesh = match source {

@@ -244,6 +244,15 @@ impl Checks {
                     "The thesis uses the body's normal only; choose another algorithm.",
                 ));
             }
+            if contact.direction.is_some() {
+                all.fail(self.report(
+                    format!("/contacts/{i}/direction"),
+                    Reason::NotUsed,
+                    "a direction",
+                    "none: against the body's normal",
+                    "The thesis's obstacles move so; choose another algorithm.",
+                ));
+            }
             if contact.friction.as_ref().is_some_and(|f| f.bound.is_some()) {
                 all.fail(self.report(
                     format!("/contacts/{i}/friction/bound"),

@@ -29,10 +29,8 @@ impl Checks {
         steps: &[Step],
     ) {
         let drags = |step: &Step| step.tangential_displacement != 0.0;
-        if !steps.is_empty() && !steps.iter().any(drags) {
-            return;
-        }
-        for contact in contacts.iter().filter(|c| c.tangential_displacement != 0.0) {
+        let dragged = steps.is_empty() || steps.iter().any(drags);
+        for contact in contacts {
             let boundary = &contact.boundary;
             let on_axis = |i: usize| axis.holds(boundary.positions[i]);
             let held = |i: usize| match fixed.get(&boundary.nodes[i]) {
@@ -43,7 +41,20 @@ impl Checks {
             let Some(end) = ends.find(|&i| on_axis(i) || held(i)) else {
                 continue;
             };
-            let ([x, y], d) = (boundary.positions[end], contact.tangential_displacement);
+            let own = if dragged {
+                contact.tangential_displacement
+            } else {
+                0.0
+            };
+            let pushed = contact.pushed_along_body(end);
+            let (field, d) = match own != 0.0 {
+                true => ("tangential_displacement", own),
+                false if pushed.abs() > ALIGNED * contact.indentation.abs() => {
+                    ("direction", pushed)
+                }
+                false => continue,
+            };
+            let [x, y] = boundary.positions[end];
             let (what, instead) = match on_axis(end) {
                 true => (
                     "the axis",
@@ -56,7 +67,7 @@ impl Checks {
             };
             self.warn(
                 WarningCode::SymmetricDrag,
-                &format!("{}/tangential_displacement", contact.pointer),
+                &format!("{}/{field}", contact.pointer),
                 format!("The contact ends on {what}, at ({x}, {y}), and its obstacle is displaced along it by {d}: beyond that end it would be dragged the opposite way. {instead}"),
             );
         }

@@ -113,6 +113,7 @@ fn same_boundary((a, b): (&Contact, &Contact)) -> bool {
     a.boundary == b.boundary
         && a.obstacle == b.obstacle
         && a.normal == b.normal
+        && a.direction == b.direction
         && a.condition == b.condition
 }
 

@@ -16,6 +16,10 @@ pub struct Contact {
     /// gap = profile − indentation.
     #[serde(default)]
     pub indentation: f64,
+    /// The direction `[x, y]` that the indentation moves the obstacle along, as a rigid body; its length does not
+    /// matter. Absent: against the body's normal at each node, which on a curved boundary is no motion of a rigid body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub direction: Option<[f64; 2]>,
     /// Displacement of the obstacle along t, the outward normal turned clockwise (length). The contact stays on the
     /// material that faced the obstacle before: keep the slip below the contact's length.
     #[serde(default)]

@@ -312,6 +312,10 @@ pub enum WarningCode {
     ElementsReversed,
     /// Elements without midside nodes, which were given some.
     RaisedToSecondOrder,
+    /// Elements of a rigid body of a deck.
+    RigidElementsLeftOut,
+    /// A part of a deck that is solved differently here.
+    DeckDiffers,
     /// Nodes at the same place that are not connected: a crack.
     CoincidentNodes,
     /// A strip that leaves its polyline between two grid lines.

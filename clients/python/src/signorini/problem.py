@@ -710,6 +710,9 @@ class Contact(Part):
     boundary: Name of the boundary.
     obstacle: The obstacle that faces it.
     condition: The contact condition.
+    direction: The direction `[x, y]` that the indentation moves the obstacle along, as a rigid body; its length
+        does not matter. Absent: against the body's normal at each node, which on a curved boundary is no motion of
+        a rigid body.
     friction: Absent: frictionless.
     indentation: How far the obstacle is pushed against the body (length, either sign): gap = profile − indentation.
     normal: The direction that gap and normal displacement are measured along.
@@ -720,6 +723,7 @@ class Contact(Part):
     boundary: str
     obstacle: Obstacle
     condition: Condition = "unilateral"
+    direction: Pair | None = None
     friction: Friction | None = None
     indentation: float = 0.0
     normal: NormalOf = "body"

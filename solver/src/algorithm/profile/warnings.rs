@@ -82,7 +82,10 @@ impl PatchView<'_> {
                     .normal_displacement(self.v, self.patch.first + i);
                 (contact.profile[i] - moved) / contact.push[i][0]
             };
-            let needed = (0..self.count()).map(engages).fold(f64::INFINITY, f64::min);
+            // a push in a direction of its own may lead away from some nodes
+            let nearer = |i: &usize| contact.push[*i][0] > 0.0;
+            let nodes = (0..self.count()).filter(nearer);
+            let needed = nodes.map(engages).fold(f64::INFINITY, f64::min);
             let message = match self.missed().is_empty() {
                 true => format!(
                     "The body never touches the obstacle: the smallest gap is {smallest:.6e}. There is contact if the indentation is above {needed:.6e}."
