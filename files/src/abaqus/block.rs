@@ -1,5 +1,6 @@
 //! Blocks of data lines: what each line adds to the deck.
 
+use super::contact_parts::ContactBlock;
 use super::deck::Deck;
 use super::element::Shape;
 use super::part::Numbered;
@@ -50,6 +51,7 @@ pub(super) enum Block {
     Amplitude(Name),
     Thickness,
     Period,
+    Contact(ContactBlock),
     /// Rows of `*BOUNDARY`, and the name of their amplitude.
     Boundary(Option<Name>),
     Load(Rows, Option<Name>),
@@ -177,9 +179,15 @@ impl Deck {
                 let words = fields(text);
                 let period = words.get(1).and_then(|word| number(word));
                 self.period = period.filter(|period| *period > 0.0);
+                let initial = words.first().and_then(|word| number(word));
+                self.contact.note_increments(initial, self.period);
                 *block = Block::Skip;
             }
-            Block::Boundary(amplitude) => self.boundary(amplitude, line, text),
+            Block::Contact(block) => self.contact_data(block, line, text),
+            Block::Boundary(amplitude) => {
+                self.note_row(amplitude, line, text);
+                self.boundary(amplitude, line, text);
+            }
             Block::Load(rows, amplitude) => self.load(*rows, amplitude, line, text),
             Block::Instance(lines) => {
                 let values = self.numbers(line, text);
@@ -503,8 +511,11 @@ impl Deck {
             None => Some(Sides::Outer),
             // edges of shells are the sides of their plane
             Some(word) => match &word.to_uppercase()[..] {
-                "SPOS" | "SNEG" | "END1" | "END2" | "CIRCUMFERENTIAL" | "S5" | "S6" | "SP"
-                | "SN" => Some(Sides::None),
+                "SPOS" => Some(Sides::OfLine { left: true }),
+                "SNEG" => Some(Sides::OfLine { left: false }),
+                "END1" | "END2" | "CIRCUMFERENTIAL" | "S5" | "S6" | "SP" | "SN" => {
+                    Some(Sides::None)
+                }
                 _ => side_number(word, &['S', 'E']).map(Sides::Number),
             },
         };
@@ -642,7 +653,7 @@ impl Deck {
 }
 
 /// Components by name: those of the plane that it holds, or some that a plane body holds by itself.
-fn named_components(name: &str) -> Option<(u64, u64)> {
+pub(super) fn named_components(name: &str) -> Option<(u64, u64)> {
     match name {
         "PINNED" | "ENCASTRE" | "ZASYMM" => Some((1, 2)),
         "XSYMM" | "YASYMM" => Some((1, 1)),

@@ -2,10 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::contact_parts::{Analytical, Held, RigidBody};
 use super::deck::Deck;
 use super::element::Mechanics;
 use super::names::{Key, Meant, Names, Room, unknown};
 use super::part::{Numbered, Part};
+use super::rigid::{Search, Tools};
 use super::scope::{Kind, Scope};
 use super::written::{
     Force, Incomplete, Name, Prescribed, Pressure, Section, Sides, Target, on_line,
@@ -41,6 +43,9 @@ pub(super) struct Built {
     pub(super) forces: Vec<Row<Force>>,
     /// Which nodes belong to plane elements.
     pub(super) used: Vec<bool>,
+    pub(super) tools: Tools,
+    /// For each contact pair the names of its surfaces in the mesh.
+    pub(super) pairs: Vec<[String; 2]>,
 }
 
 impl Deck {
@@ -54,6 +59,8 @@ impl Deck {
             scopes: &scopes,
         };
         let mut sets = merged.sets(&names);
+        let tools = merged.take_tools(&names, &sets);
+        let pairs = merged.named_pairs(&names);
         let used = merged.used();
         merged.check_plane(&used);
         let sections = merged.named_sections(&names);
@@ -90,6 +97,8 @@ impl Deck {
             pressures,
             forces,
             used,
+            tools,
+            pairs,
         }
     }
 }
@@ -101,6 +110,9 @@ struct Rows {
     prescribed: Vec<(usize, Prescribed)>,
     pressures: Vec<(usize, Pressure)>,
     forces: Vec<(usize, Force)>,
+    held: Vec<(usize, Held)>,
+    rigid_bodies: Vec<(usize, RigidBody)>,
+    analytical: Vec<(usize, Name, Analytical)>,
 }
 
 /// All parts in one.
@@ -223,6 +235,13 @@ impl Merged {
             .extend(part.pressures.into_iter().map(|row| (place, row)));
         rows.forces
             .extend(part.forces.into_iter().map(|row| (place, row)));
+        rows.held
+            .extend(part.held.into_iter().map(|row| (place, row)));
+        rows.rigid_bodies
+            .extend(part.rigid_bodies.into_iter().map(|body| (place, body)));
+        let analytical = part.analytical.into_iter();
+        rows.analytical
+            .extend(analytical.map(|(name, surface)| (place, name, surface)));
         self.incomplete.add(part.incomplete);
         part.faults.add_to(&mut self.faults);
         part.doubts.add_to(&mut self.doubts);
@@ -238,6 +257,61 @@ impl Merged {
             node_surfaces: part.node_surfaces,
             surfaces: part.surfaces,
         }
+    }
+
+    /// The rigid bodies; their elements are taken out of the mesh.
+    fn take_tools(&mut self, names: &Names<'_>, sets: &Sets) -> Tools {
+        let search = Search {
+            names,
+            raw: &self.raw,
+            lines: &self.lines,
+            numbered: &self.numbered,
+            elements: &sets.elements,
+        };
+        let held = std::mem::take(&mut self.rows.held);
+        let tools = search.tools(&self.rows.rigid_bodies, &self.rows.analytical, held);
+        if tools.elements.is_empty() {
+            return tools;
+        }
+        let kept = |place: &u32| !tools.elements.contains(place);
+        let kept: Vec<u32> = (0..self.raw.elements.len() as u32).filter(kept).collect();
+        let mut number = vec![NO_NODE; self.raw.elements.len()];
+        for (new, old) in kept.iter().enumerate() {
+            number[*old as usize] = new as u32;
+        }
+        for element in &mut self.numbered {
+            if let Numbered::Plane(place) = *element {
+                *element = match number[place as usize] {
+                    NO_NODE => Numbered::Other,
+                    new => Numbered::Plane(new),
+                };
+            }
+        }
+        let raw = &mut self.raw;
+        raw.elements = kept.iter().map(|&k| raw.elements[k as usize]).collect();
+        raw.element_labels = kept
+            .iter()
+            .map(|&k| raw.element_labels[k as usize])
+            .collect();
+        tools
+    }
+
+    /// The names in the mesh of the surfaces of contact pairs; one that is not known is as it is written.
+    fn named_pairs(&self, names: &Names<'_>) -> Vec<[String; 2]> {
+        let has = |scope: usize, name: &Name| {
+            let rigid = |(s, n, _): &(usize, Name, Analytical)| *s == scope && n == name;
+            names.scopes[scope].surfaces.contains_key(name)
+                || names.scopes[scope].node_surfaces.contains_key(name)
+                || self.rows.analytical.iter().any(rigid)
+        };
+        let full = |word: &Name| match names.named(0, word, has) {
+            Some((scope, name)) => names.full(scope, &name),
+            None => word.to_string(),
+        };
+        let pairs = names.deck.contact.pairs.iter();
+        pairs
+            .map(|pair| [full(&pair.surfaces[0]), full(&pair.surfaces[1])])
+            .collect()
     }
 
     /// Which nodes belong to plane elements.
@@ -590,7 +664,7 @@ impl Building<'_> {
                 let corners = element.family().corners();
                 let between = |side: usize| [element[side], element[(side + 1) % corners]];
                 match *side {
-                    Sides::None => return None,
+                    Sides::None | Sides::OfLine { .. } => return None,
                     Sides::Number(side) if side > corners => {
                         let label = merged.raw.element_labels[place as usize];
                         merged.faults.add(Violation::new(

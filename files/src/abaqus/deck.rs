@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use super::contact_parts::DeckContact;
 use super::part::Part;
 use super::written::{
     Amplitude, LONGEST_NAME, MOST_NAMES, MaterialDefinition, Name, Orientation, Set, Sides,
@@ -52,6 +53,7 @@ pub(super) struct Deck {
     /// The step has had a `*BOUNDARY`.
     pub(super) supported_in_step: bool,
     pub(super) title: Option<String>,
+    pub(super) contact: DeckContact,
 }
 
 impl Deck {

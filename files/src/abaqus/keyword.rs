@@ -101,8 +101,29 @@ const NOT_ELASTIC: &[&str] = &[
 
 /// A keyword line in parts.
 pub(super) struct Keyword {
-    name: String,
-    parameters: Vec<(String, Option<String>)>,
+    pub(super) name: String,
+    pub(super) parameters: Vec<(String, Option<String>)>,
+}
+
+/// CalculiX reads keywords without their blanks, too.
+fn spaced(name: String) -> String {
+    const OF_WORDS: [&str; 6] = [
+        "SOLID SECTION",
+        "RIGID BODY",
+        "CONTACT PAIR",
+        "SURFACE INTERACTION",
+        "SURFACE BEHAVIOR",
+        "INITIAL CONDITIONS",
+    ];
+    let mut known = OF_WORDS.iter().chain(IDLE);
+    let known = known.find(|known| known.replace(' ', "") == name);
+    known.map_or(name, |known| (*known).to_owned())
+}
+
+/// Whether a parameter has a name, with or without blanks.
+fn same(parameter: &str, name: &str) -> bool {
+    let letters = |text: &str| text.chars().filter(|c| *c != ' ').collect::<String>();
+    parameter == name || letters(parameter) == letters(name)
 }
 
 impl Keyword {
@@ -124,7 +145,7 @@ impl Keyword {
             (name.to_uppercase(), value)
         };
         Keyword {
-            name: words.join(" ").to_uppercase(),
+            name: spaced(words.join(" ").to_uppercase()),
             parameters: parts
                 .filter(|part| !part.is_empty())
                 .map(parameter)
@@ -132,19 +153,24 @@ impl Keyword {
         }
     }
 
-    fn has(&self, name: &str) -> bool {
-        self.parameters.iter().any(|p| p.0 == name)
+    pub(super) fn has(&self, name: &str) -> bool {
+        self.parameters.iter().any(|p| same(&p.0, name))
     }
 
-    fn get(&self, name: &str) -> Option<&str> {
-        let found = self.parameters.iter().find(|p| p.0 == name)?;
+    pub(super) fn get(&self, name: &str) -> Option<&str> {
+        let found = self.parameters.iter().find(|p| same(&p.0, name))?;
         found.1.as_deref().filter(|value| !value.is_empty())
     }
 
-    fn is(&self, name: &str, value: &str) -> bool {
+    pub(super) fn is(&self, name: &str, value: &str) -> bool {
         self.get(name)
             .is_some_and(|given| given.eq_ignore_ascii_case(value))
     }
+}
+
+/// Rigid lines in the plane, and of a body of revolution: without stiffness of their own.
+fn is_rigid_line(kind: &str) -> bool {
+    kind == "R2D2" || kind == "RAX2"
 }
 
 impl Deck {
@@ -165,6 +191,9 @@ impl Deck {
                 );
             }
             return Block::Skip;
+        }
+        if let Some(block) = self.begin_contact(keyword, line) {
+            return block;
         }
         match &keyword.name[..] {
             "HEADING" => Block::Title,
@@ -330,7 +359,7 @@ impl Deck {
         }
     }
 
-    fn named(&mut self, keyword: &Keyword, parameter: &str) -> Option<Name> {
+    pub(super) fn named(&mut self, keyword: &Keyword, parameter: &str) -> Option<Name> {
         keyword.get(parameter).map(|name| self.spelled(name))
     }
 
@@ -339,7 +368,7 @@ impl Deck {
         Block::Skip
     }
 
-    fn nameless(&mut self, line: u64, keyword: &str, parameter: &str) -> Block {
+    pub(super) fn nameless(&mut self, line: u64, keyword: &str, parameter: &str) -> Block {
         self.here.incomplete.names = true;
         self.fault(
             line,
@@ -474,7 +503,7 @@ impl Deck {
                     self.here.types.push(mechanics);
                 }
             }
-            None if kind.idle => {}
+            None if kind.idle || is_rigid_line(&name) => {}
             None => self.doubt(
                 line,
                 got.clone(),

@@ -10,18 +10,24 @@
 
 mod block;
 mod build;
+mod contact;
+mod contact_parts;
 mod deck;
 mod element;
+mod interaction;
 mod keyword;
 mod names;
 mod part;
 mod problem;
 mod read;
+mod rigid;
 mod scope;
+mod steps;
 mod supports;
+mod tool;
 mod written;
 
-pub use problem::problem;
+pub use problem::{has_step, problem, problem_with_warnings};
 
 use std::io::BufRead;
 
@@ -43,6 +49,7 @@ pub(crate) fn read_for(
     holds: impl Fn(&str) -> bool,
 ) -> Result<(Mesh, Vec<Warning>), ReadError> {
     let mut built = read::read(reader)?.build();
+    let left_out = built.tools.warning();
     let supports = supports::supports(&built);
     built.raw.node_sets.extend(supports.sets);
     let raw = built.faults.into_result(built.raw);
@@ -54,6 +61,7 @@ pub(crate) fn read_for(
         message,
     });
     read.map(|(mesh, mut warnings)| {
+        warnings.extend(left_out);
         warnings.extend(overlaps);
         (mesh, warnings)
     })

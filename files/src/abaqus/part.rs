@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::contact_parts::{Analytical, Held, RigidBody};
 use super::element::Mechanics;
 use super::written::{Force, Incomplete, Name, Prescribed, Pressure, Section, Set, Surface};
 use crate::source::Labels;
@@ -48,6 +49,10 @@ pub(super) struct Part {
     pub(super) prescribed: Vec<Prescribed>,
     pub(super) pressures: Vec<Pressure>,
     pub(super) forces: Vec<Force>,
+    pub(super) rigid_bodies: Vec<RigidBody>,
+    pub(super) analytical: BTreeMap<Name, Analytical>,
+    /// Every row of `*BOUNDARY`, with all its components.
+    pub(super) held: Vec<Held>,
     /// What of it is not all known, since a line could not be read.
     pub(super) incomplete: Incomplete,
     /// Violations of its mesh.
@@ -98,11 +103,20 @@ impl Part {
         for height in &mut self.heights {
             *height += moved[2];
         }
+        for surface in self.analytical.values_mut() {
+            surface.place(|[x, y]| [x + moved[0], y + moved[1]]);
+        }
         if let Some(([a, b], angle)) = turned {
             let (sin, cos) = exact(angle);
             for node in &mut self.nodes {
                 let [x, y] = [node[0] - a, node[1] - b];
                 *node = [a + cos * x - sin * y, b + sin * x + cos * y];
+            }
+            for surface in self.analytical.values_mut() {
+                surface.place(|[x, y]| {
+                    let [x, y] = [x - a, y - b];
+                    [a + cos * x - sin * y, b + sin * x + cos * y]
+                });
             }
         }
     }

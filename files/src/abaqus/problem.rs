@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::build::{Built, Row, key, sides_of_two};
+use super::contact;
 use super::element::{Mechanics, Theory};
 use super::read::read;
 use super::supports::supports;
@@ -15,14 +16,38 @@ use solver::problem::{
     Analysis, BoundaryValue, Elasticity, Load, Material, MeshInput, MeshSource, Orthotropic,
     Problem, SolverControls,
 };
+use solver::solution::Warning;
 
-/// The problem that a deck states: one linear static step, without contact. The text itself becomes
-/// the problem's mesh.
+/// Whether a deck has a step: one without is a mesh only.
+pub fn has_step(text: &str) -> bool {
+    let keyword = |line: &str| {
+        let name = line.trim_start().split(',').next().unwrap_or_default();
+        name.trim_end().eq_ignore_ascii_case("*STEP")
+    };
+    text.split(['\n', '\r']).any(keyword)
+}
+
+/// The problem that a deck states: one linear static step; or several, which move rigid bodies against it. The text
+/// itself becomes the problem's mesh.
 pub fn problem(text: &str) -> Result<Problem, Vec<Violation>> {
+    problem_with_warnings(text).map(|(problem, _)| problem)
+}
+
+/// The same, with what is done differently here than the deck says.
+pub fn problem_with_warnings(text: &str) -> Result<(Problem, Vec<Warning>), Vec<Violation>> {
     let deck = read(text.as_bytes()).map_err(ReadError::into_violations)?;
     let mut built = deck.build();
     let analysis = analysis(&mut built);
+    let axisymmetric = matches!(analysis, Analysis::Axisymmetric {});
     let quadrature = quadrature(&mut built);
+    let motions = built.take_motions(axisymmetric);
+    let factors = built.factors();
+    built.keep_last_loads();
+    let thickness = match analysis {
+        Analysis::PlaneStrain {} => built.sections.first().and_then(|s| s.row.thickness),
+        _ => None,
+    };
+    let thickness = thickness.unwrap_or(1.0);
     let materials = materials(&mut built);
     built.check_steps();
     let supports = supports(&built);
@@ -30,35 +55,66 @@ pub fn problem(text: &str) -> Result<Problem, Vec<Violation>> {
         built.doubt(
             line,
             format!("a displacement of `{name:.60}`"),
-            "nodes of plane elements",
-            "Move a rigid tool by the `indentation` and `drag` of a contact, in a problem of Signorini.",
+            "nodes of plane elements, or the reference node of a *RIGID BODY",
+            "Move a rigid tool by its reference node, or by the `indentation` of a contact in a problem of Signorini.",
         );
     }
-    let loads = loads(&mut built, &analysis);
+    let loads = loads(&mut built, thickness);
     let Built {
         mut deck,
-        mut faults,
+        raw,
+        faults,
         doubts,
+        tools,
+        pairs,
         ..
     } = built;
-    faults.extend(doubts.into_violations());
-    faults.into_result(Problem {
+    let mut violations = faults.into_violations();
+    let sound = violations.is_empty();
+    violations.extend(doubts.into_violations());
+    let (mut contacts, mut steps, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
+    if !pairs.is_empty() && sound {
+        let (mesh, _) = solver::mesh::build(raw)?;
+        let source = contact::Source {
+            said: &deck.contact,
+            pairs: &pairs,
+            tools: &tools,
+            mesh: &mesh,
+            materials: &materials,
+            axisymmetric,
+            motions: &motions,
+        };
+        let mut refused = contact::Refused::default();
+        let found = source.contacts(&mut refused, &factors);
+        (contacts, steps, warnings) = (found.contacts, found.steps, found.warnings);
+        violations.extend(refused.violations);
+    }
+    if thickness != 1.0 {
+        warnings.push(contact::differs(format!(
+            "In plane strain forces are per unit of thickness here: those of the deck, {thickness} thick, are {thickness} times as large."
+        )));
+    }
+    if !violations.is_empty() {
+        return Err(violations);
+    }
+    let problem = Problem {
         title: deck.title.take(),
         analysis,
         mesh: MeshInput::new(MeshSource::Abaqus(text.to_owned())),
         materials,
         supports: supports.list,
         loads,
-        contacts: Vec::new(),
-        steps: Vec::new(),
+        contacts,
+        steps,
         quadrature,
         units: Default::default(),
         solver: SolverControls::default(),
-    })
+    };
+    Ok((problem, warnings))
 }
 
 impl Built {
-    fn doubt(&mut self, line: u64, got: impl Into<String>, expected: &str, hint: &str) {
+    pub(super) fn doubt(&mut self, line: u64, got: impl Into<String>, expected: &str, hint: &str) {
         let reason = Reason::NotUnderstood;
         self.doubts.add(match line {
             0 => Violation::new("", reason, got.into(), expected, hint),
@@ -67,13 +123,16 @@ impl Built {
     }
 
     fn check_steps(&mut self) {
-        if self.deck.steps != 1 {
-            let got = format!("{} steps", self.deck.steps);
+        let steps = self.deck.steps;
+        if steps == 0 || steps != 1 && self.pairs.is_empty() {
             self.doubt(
                 0,
-                got,
+                format!("{steps} steps"),
                 "one *STEP",
-                "Give the load steps in a problem of Signorini.",
+                match steps {
+                    0 => "A deck without a step is a mesh: upload it, or quote it in a problem as JSON, \"mesh\": {\"abaqus\": \"…\"}.",
+                    _ => "Several steps are read where they move a rigid body (*CONTACT PAIR). Give others in a problem as JSON, with this deck as its mesh.",
+                },
             );
         }
         // without one of the two there are no thermal strains
@@ -112,16 +171,13 @@ fn analysis(built: &mut Built) -> Analysis {
         .collect();
     let first = thicknesses.first().and_then(|(_, thickness)| *thickness);
     for (line, thickness) in thicknesses {
-        let wanted = match theory {
-            Theory::PlaneStress => first.unwrap_or(1.0),
-            _ => 1.0,
-        };
+        let wanted = first.unwrap_or(1.0);
         if theory != Theory::Axisymmetric && thickness.unwrap_or(1.0) != wanted {
             built.doubt(
                 line,
                 format!("a thickness of {}", thickness.unwrap_or(1.0)),
                 &format!("{wanted}"),
-                "Plane strain is per unit of thickness, and a sheet has one thickness.",
+                "A plane body has one thickness.",
             );
         }
     }
@@ -307,7 +363,9 @@ fn constants(elastic: &Elastic) -> (String, &'static str) {
     )
 }
 
-fn loads(built: &mut Built, analysis: &Analysis) -> Vec<Load> {
+/// `thickness`: of a body in plane strain, whose forces are per unit of thickness here. On a body of revolution a force
+/// acts on the whole ring, in Abaqus and CalculiX as here.
+fn loads(built: &mut Built, thickness: f64) -> Vec<Load> {
     let mut loads = Vec::new();
     let pressures = std::mem::take(&mut built.pressures);
     let inner = match pressures.is_empty() {
@@ -356,18 +414,11 @@ fn loads(built: &mut Built, analysis: &Analysis) -> Vec<Load> {
             );
             continue;
         }
-        if matches!(analysis, Analysis::Axisymmetric {}) {
-            built.doubt(
-                row.line,
-                "*CLOAD on a body of revolution",
-                "a pressure",
-                "Programs differ in the part of the ring that the force acts on.",
-            );
-        }
+        let value = row.value / thickness;
         let force = if row.component == 1 {
-            [row.value, 0.0]
+            [value, 0.0]
         } else {
-            [0.0, row.value]
+            [0.0, value]
         };
         loads.push(Load::Force(name, force));
     }

@@ -135,6 +135,8 @@ pub(super) enum Sides {
     Outer,
     /// Faces that plane elements do not have, or their own plane.
     None,
+    /// The left of lines from their first node to their second, SPOS, or the right of them, SNEG.
+    OfLine { left: bool },
 }
 
 /// A surface as it is written: sides by element or set and number.

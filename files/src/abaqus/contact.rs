@@ -1,0 +1,758 @@
+//! Contact between a surface of the body and a rigid surface of a refused, as contacts with obstacles.
+
+use super::contact_parts::{Adjust, Behavior, DeckContact, DeckFriction, Pair, WRITTEN_INSTEAD};
+use super::rigid::{MOST_POINTS, Tools};
+use super::steps::{Motion, common_factors};
+use super::tool::{Joined, Outline, Point, chain, cross, dot, length, met, minus, outline};
+use super::written::on_line;
+use solver::error::{Reason, Violation};
+use solver::mesh::{Edge, Mesh, runs};
+use solver::problem::{
+    Along, Contact, Friction, FrictionPoints, History, Interpolation, Kernel, Material, Measure,
+    NormalOf, Normalization, Obstacle, Step, Transition,
+};
+use solver::solution::{Warning, WarningCode};
+
+/// Elastic slip, in lengths of a side: Abaqus's own default.
+const SLIP_TOLERANCE: f64 = 0.005;
+
+/// Sine of the angles that count as none: what the digits of a file leave.
+const STRAIGHT: f64 = 1e-6;
+
+/// Of the body's size: gaps that the digits of a file leave.
+const CLOSED: f64 = 1e-6;
+
+/// Nodes of a boundary that are looked at.
+const MOST_LOOKS: usize = 1000;
+
+/// The contacts of a refused, its steps, and what is done differently here.
+pub(super) struct Translated {
+    pub(super) contacts: Vec<Contact>,
+    pub(super) steps: Vec<Step>,
+    pub(super) warnings: Vec<Warning>,
+}
+
+/// What contacts are made from.
+pub(super) struct Source<'a> {
+    pub(super) said: &'a DeckContact,
+    /// For each contact pair the names of its surfaces in the mesh.
+    pub(super) pairs: &'a [[String; 2]],
+    pub(super) tools: &'a Tools,
+    pub(super) mesh: &'a Mesh,
+    pub(super) materials: &'a [Material],
+    pub(super) axisymmetric: bool,
+    /// Motion of each rigid body, `None` if it is not known.
+    pub(super) motions: &'a [Option<Motion>],
+}
+
+/// What cannot be a contact here.
+#[derive(Default)]
+pub(super) struct Refused {
+    pub(super) violations: Vec<Violation>,
+}
+
+impl Refused {
+    fn doubt(&mut self, line: u64, got: impl Into<String>, expected: &str, hint: &str) {
+        let violation = on_line(line, Reason::NotUnderstood, got.into(), expected, hint);
+        self.violations.push(violation);
+    }
+}
+
+/// One contact, and its motion at the end of each step.
+struct Made {
+    contact: Contact,
+    /// Indentation and tangential displacement at the end of each step.
+    moved: Vec<[f64; 2]>,
+}
+
+impl Source<'_> {
+    /// All contacts; `steps`: the factors of loads and supports at the end of each, `increments` as `*STATIC` begins.
+    pub(super) fn contacts(&self, refused: &mut Refused, others: &[[f64; 2]]) -> Translated {
+        let mut found = Translated {
+            contacts: Vec::new(),
+            steps: Vec::new(),
+            warnings: Vec::new(),
+        };
+        let mut all = Vec::new();
+        for (pair, surfaces) in self.said.pairs.iter().zip(self.pairs) {
+            all.extend(self.contact((pair, surfaces), others, refused, &mut found.warnings));
+        }
+        if all.len() < self.said.pairs.len() {
+            return found; // with violations
+        }
+        let moved: Vec<&[[f64; 2]]> = all.iter().map(|made| &made.moved[..]).collect();
+        let Some(factors) = common_factors(&moved) else {
+            let line = self.said.pairs.last().map_or(0, |pair| pair.line);
+            refused.doubt(
+                line,
+                "rigid bodies that several steps move in different proportions",
+                "one factor for all in each step",
+                WRITTEN_INSTEAD,
+            );
+            return found;
+        };
+        let friction = all.iter().any(|made| made.contact.friction.is_some());
+        let loaded = [0, 1].map(|kind| others.iter().any(|other| other[kind] != 0.0));
+        for made in all {
+            let [indentation, tangential] = largest(&made.moved);
+            found.contacts.push(Contact {
+                indentation,
+                tangential_displacement: tangential,
+                ..made.contact
+            });
+        }
+        if friction || others.len() > 1 {
+            for (k, (factor, other)) in factors.iter().zip(others).enumerate() {
+                let written = self.said.steps.get(k).and_then(|step| step.1);
+                found.steps.push(Step {
+                    name: Some(format!("Step-{}", k + 1)),
+                    indentation: factor[0],
+                    tangential_displacement: factor[1],
+                    loads: if loaded[0] { other[0] } else { 1.0 },
+                    supports: if loaded[1] { other[1] } else { 1.0 },
+                    increments: if friction { increments(written) } else { 1 },
+                    ..Step::default()
+                });
+            }
+        }
+        found
+    }
+
+    fn contact(
+        &self,
+        (pair, [first, second]): (&Pair, &[String; 2]),
+        others: &[[f64; 2]],
+        refused: &mut Refused,
+        warnings: &mut Vec<Warning>,
+    ) -> Option<Made> {
+        let line = pair.line;
+        let rigid = [first, second].map(|name| self.tools.by_surface.get(name));
+        let (name, tool, (number, pieces)) = match rigid {
+            [None, Some(tool)] => (first, second, tool),
+            [Some(tool), None] => (second, first, tool),
+            [None, None] => {
+                let got =
+                    format!("a contact of two deformable bodies, `{first:.60}` and `{second:.60}`");
+                refused.doubt(line, got, "one surface of the elastic body, and one of a *RIGID BODY", "Both bodies cannot be elastic here. If one is much stiffer, make it rigid: *RIGID BODY, ELSET=…, REF NODE=….");
+                return None;
+            }
+            [Some(_), Some(_)] => {
+                refused.doubt(
+                    line,
+                    format!("a contact of two rigid surfaces, `{first:.60}` and `{second:.60}`"),
+                    "a surface of the elastic body",
+                    "Name a surface of deformable elements.",
+                );
+                return None;
+            }
+        };
+        let body = &self.tools.bodies[*number];
+        if body.attached {
+            refused.doubt(
+                body.line,
+                "a rigid body that shares nodes with the elastic body",
+                "a rigid body by itself",
+                "Support those nodes by *BOUNDARY instead.",
+            );
+            return None;
+        }
+        let Some(edges) = self
+            .mesh
+            .boundaries
+            .get(name)
+            .filter(|edges| !edges.is_empty())
+        else {
+            refused.doubt(
+                line,
+                format!("`{name:.60}` in a contact pair"),
+                "a surface with sides of the elastic body's surface",
+                "Name it by *SURFACE, TYPE=ELEMENT.",
+            );
+            return None;
+        };
+        let Some(pieces) = chain(pieces) else {
+            refused.doubt(
+                line,
+                format!("the rigid surface `{tool:.60}`, which is no single line"),
+                "lines that follow one another, all with the body on the same side",
+                WRITTEN_INSTEAD,
+            );
+            return None;
+        };
+        let motion = self.motions.get(*number)?.as_ref()?;
+        let outline = outline(&pieces);
+        if outline.points.len() > MOST_POINTS {
+            let got = format!(
+                "{} points of the rigid surface `{tool:.60}`",
+                outline.points.len()
+            );
+            refused.doubt(
+                line,
+                got,
+                &format!("at most {MOST_POINTS}"),
+                "Leave out what the body cannot touch.",
+            );
+            return None;
+        }
+        let placed = Placed {
+            mesh: self.mesh,
+            edges,
+            outline,
+            size: self.size(),
+        };
+        if !placed.faces() {
+            refused.doubt(line, format!("the rigid surface `{tool:.60}`, whose outer side does not face `{name:.60}`"), "a rigid surface with the body on its left: the normal is its direction turned counter-clockwise (SPOS of a rigid line, too)", "Write its segments in the opposite order, or name the other side.");
+            return None;
+        }
+        if let Some(adjust) = pair.adjust
+            && placed.is_moved_by(adjust)
+        {
+            refused.doubt(
+                line,
+                "*CONTACT PAIR with ADJUST, which moves nodes here",
+                "nodes that lie on the rigid surface already, or beyond the distance",
+                "Mesh the body so that it touches, and remove ADJUST.",
+            );
+        }
+        let interaction = pair.interaction.as_ref();
+        let unknown = interaction.filter(|name| !self.said.interactions.contains_key(*name));
+        if let Some(unknown) = unknown {
+            refused.doubt(
+                line,
+                format!("the interaction `{unknown:.60}`"),
+                "a *SURFACE INTERACTION of that name",
+                "Define it.",
+            );
+        }
+        let interaction = interaction.and_then(|name| self.said.interactions.get(name));
+        let friction = interaction.and_then(|i| i.friction.as_ref());
+        let friction =
+            friction.and_then(|friction| self.friction(friction, edges, refused, warnings));
+        let shape = placed.shape(motion, friction.is_some(), others, self.axisymmetric);
+        let shape = match shape {
+            Ok(shape) => shape,
+            Err((got, expected)) => {
+                refused.doubt(
+                    line,
+                    format!("{got} (the rigid surface `{tool:.60}`)"),
+                    expected,
+                    WRITTEN_INSTEAD,
+                );
+                return None;
+            }
+        };
+        if let Some(message) = shape.message {
+            warnings.push(differs(format!("*CONTACT PAIR on line {line}: {message}")));
+        }
+        if let Some(interaction) = interaction {
+            self.behavior(
+                &interaction.behavior,
+                edges,
+                &shape.moved,
+                refused,
+                warnings,
+            );
+        }
+        Some(Made {
+            contact: Contact {
+                boundary: name.clone(),
+                obstacle: shape.obstacle,
+                indentation: 0.0,
+                direction: shape.direction,
+                tangential_displacement: 0.0,
+                normal: NormalOf::Obstacle,
+                condition: Default::default(),
+                friction,
+            },
+            moved: shape.moved,
+        })
+    }
+
+    /// Coulomb's law, which depends on the path; `None`: without friction.
+    fn friction(
+        &self,
+        said: &DeckFriction,
+        edges: &[Edge],
+        refused: &mut Refused,
+        warnings: &mut Vec<Warning>,
+    ) -> Option<Friction> {
+        let line = said.line;
+        let Some(coefficient) = said.coefficient else {
+            refused.doubt(
+                line,
+                "*FRICTION without a coefficient",
+                "a friction coefficient ≥ 0",
+                "Give it on the line after *FRICTION.",
+            );
+            return None;
+        };
+        if coefficient == 0.0 {
+            return None;
+        }
+        let side = self.mean_side(edges);
+        let tolerance = said.slip_tolerance.unwrap_or(SLIP_TOLERANCE);
+        let elastic_slip = said.elastic_slip.unwrap_or(tolerance * side);
+        if said.elastic_slip.is_none() && said.slip_tolerance.is_none() {
+            let ours = format!(
+                "the elastic slip is {elastic_slip:.4e} here, {SLIP_TOLERANCE} of the mean side of the contact"
+            );
+            warnings.push(differs(match (said.stick_slope, said.lagrange) {
+                (Some(slope), _) => format!("*FRICTION on line {line}: the stick slope of {slope:e} makes the slip at which friction is reached proportional to the pressure; {ours}. SLIP TOLERANCE or ELASTIC SLIP sets it."),
+                (None, true) => format!("*FRICTION on line {line}: LAGRANGE sticks without slip; {ours}."),
+                (None, false) => format!("*FRICTION on line {line} gives no elastic slip: {ours}. SLIP TOLERANCE or ELASTIC SLIP sets it."),
+            }));
+        }
+        Some(Friction {
+            coefficient: Some(coefficient),
+            nonlocal_radius: Some(0.0),
+            elastic_slip,
+            kernel: Kernel::default(),
+            normalization: Normalization::default(),
+            transition: Transition::default(),
+            history: History::Incremental,
+            points: FrictionPoints::Nodal,
+            measure: Measure::default(),
+            cohesion: 0.0,
+            shear_cap: said.most_stress,
+            bound: None,
+        })
+    }
+
+    /// Contact is hard here: says how far a softer one is from that, or refuses it.
+    fn behavior(
+        &self,
+        behavior: &Behavior,
+        edges: &[Edge],
+        moved: &[[f64; 2]],
+        refused: &mut Refused,
+        warnings: &mut Vec<Warning>,
+    ) {
+        match *behavior {
+            Behavior::Hard => {}
+            Behavior::Linear { line, slope } => {
+                let stiffness = |material: &Material| match &material.elasticity {
+                    solver::problem::Elasticity::Isotropic { youngs_modulus, .. } => {
+                        *youngs_modulus
+                    }
+                    solver::problem::Elasticity::Orthotropic(o) => o.e1.max(o.e2),
+                };
+                let modulus = self.materials.iter().map(stiffness).fold(0.0, f64::max);
+                let least = modulus / self.mean_side(edges);
+                match slope {
+                    Some(slope) if slope >= least => warnings.push(differs(format!(
+                        "*SURFACE BEHAVIOR on line {line}: contact is hard here; the deck's lets the surfaces overlap by p/{slope:e} at a pressure p, {:.1e} for a thousandth of Young's modulus.",
+                        1e-3 * modulus / slope
+                    ))),
+                    _ => refused.doubt(
+                        line,
+                        format!("a pressure of {} per length of overclosure", slope.unwrap_or(0.0)),
+                        &format!("hard contact, or a slope of at least {least:e} (Young's modulus per side of an element), which is nearly hard"),
+                        "A layer as soft as that is no contact with a rigid obstacle: mesh it.",
+                    ),
+                }
+            }
+            Behavior::Exponential { line, clearance } => {
+                let most = moved.iter().map(|m| m[0].abs()).fold(0.0, f64::max);
+                match clearance {
+                    Some(clearance) if clearance > 0.0 && clearance <= 0.01 * most => warnings.push(differs(format!(
+                        "*SURFACE BEHAVIOR on line {line}: contact is hard here; the deck's begins at a clearance of {clearance:e}."
+                    ))),
+                    _ => refused.doubt(
+                        line,
+                        format!("a pressure that begins at a clearance of {}", clearance.unwrap_or(0.0)),
+                        "hard contact, or a clearance of at most a hundredth of the indentation",
+                        "Use PRESSURE-OVERCLOSURE=HARD.",
+                    ),
+                }
+            }
+        }
+    }
+
+    /// Mean length of the sides of a contact.
+    fn mean_side(&self, edges: &[Edge]) -> f64 {
+        let side = |edge: &Edge| {
+            let [a, b, _] = self.mesh.edge_nodes(edge);
+            length(minus(b, a))
+        };
+        edges.iter().map(side).sum::<f64>() / edges.len() as f64
+    }
+
+    fn size(&self) -> f64 {
+        self.mesh.extent(0).max(self.mesh.extent(1))
+    }
+}
+
+/// The increments of a step with friction, which depends on the path: as many as the deck begins with.
+fn increments(written: Option<f64>) -> u32 {
+    const FEWEST: f64 = 10.0;
+    const MOST: f64 = 100.0;
+    written.unwrap_or(FEWEST).ceil().clamp(FEWEST, MOST) as u32
+}
+
+/// The largest motion of each kind, with its sign; the last of equal ones.
+fn largest(moved: &[[f64; 2]]) -> [f64; 2] {
+    [0, 1].map(|kind| {
+        let all = moved.iter().map(|m| m[kind]);
+        all.fold(
+            0.0,
+            |most: f64, m| if m.abs() >= most.abs() { m } else { most },
+        )
+    })
+}
+
+pub(super) fn differs(message: String) -> Warning {
+    Warning {
+        code: WarningCode::DeckDiffers,
+        pointer: "/mesh/abaqus".to_owned(),
+        message,
+    }
+}
+
+/// A rigid surface before a boundary of the body.
+struct Placed<'a> {
+    mesh: &'a Mesh,
+    edges: &'a [Edge],
+    outline: Outline,
+    /// Of the body (length).
+    size: f64,
+}
+
+/// A rigid surface and its motion, as an obstacle.
+struct Shape {
+    obstacle: Obstacle,
+    direction: Option<Point>,
+    /// Indentation and tangential displacement at the end of each step.
+    moved: Vec<[f64; 2]>,
+    message: Option<String>,
+}
+
+/// Why a rigid surface cannot be an obstacle: what was found, and what is expected.
+type Unlike = (String, &'static str);
+
+impl Placed<'_> {
+    /// Corner nodes of the boundary with the normal of a side at each, not too many.
+    fn looks(&self) -> impl Iterator<Item = (Point, Point)> + '_ {
+        let stride = self.edges.len().div_ceil(MOST_LOOKS).max(1);
+        self.edges.iter().step_by(stride).flat_map(|edge| {
+            let nodes = self.mesh.edge_nodes(edge);
+            let normals = solver::contact::edge_normals(&nodes);
+            [0, 2, 1].map(|k| (nodes[k], normals[k]))
+        })
+    }
+
+    fn met(&self, (place, n): (Point, Point)) -> Option<(f64, Point)> {
+        met(&self.outline.points, place, n, 0.1 * self.size)
+    }
+
+    /// Whether the outer side of the rigid surface faces the body where it is nearest. One that faces no node is left to
+    /// the checks of the obstacle.
+    fn faces(&self) -> bool {
+        let hits = self.looks().filter_map(|look| {
+            let (distance, m) = self.met(look)?;
+            Some((distance.abs(), dot(m, look.1)))
+        });
+        let nearest = hits.min_by(|a, b| a.0.total_cmp(&b.0));
+        nearest.is_none_or(|(_, along)| along < 0.0)
+    }
+
+    /// Whether `ADJUST` would move nodes of the body.
+    fn is_moved_by(&self, adjust: Adjust) -> bool {
+        let closed = CLOSED * self.size;
+        self.looks().any(|look| {
+            let distance = self.met(look).map(|(distance, _)| distance);
+            distance.is_some_and(|distance| match adjust {
+                Adjust::Within(within) => {
+                    distance < -closed || distance > closed && distance <= within
+                }
+                Adjust::Set => distance.abs() > closed,
+            })
+        })
+    }
+
+    /// The normal of a straight boundary.
+    fn straight(&self) -> Option<Point> {
+        let mut normals = self
+            .edges
+            .iter()
+            .flat_map(|edge| solver::contact::edge_normals(&self.mesh.edge_nodes(edge)));
+        let n = normals.next()?;
+        let same = normals.all(|m| cross(n, m).abs() <= STRAIGHT && dot(n, m) > 0.0);
+        same.then_some(n)
+    }
+
+    /// The normal of a straight rigid surface, towards the body.
+    fn flat(&self) -> Option<Point> {
+        if self.outline.joined != Joined::Lines {
+            return None;
+        }
+        let points = &self.outline.points;
+        let whole = minus(points[points.len() - 1], points[0]);
+        let size = length(whole);
+        let along = whole.map(|x| x / size);
+        let same = |pair: &[Point]| {
+            let step = minus(pair[1], pair[0]);
+            cross(along, step).abs() <= STRAIGHT * length(step) && dot(along, step) > 0.0
+        };
+        points.windows(2).all(same).then_some([-along[1], along[0]])
+    }
+
+    /// The obstacle, and how it moves.
+    fn shape(
+        &self,
+        motion: &Motion,
+        friction: bool,
+        others: &[[f64; 2]],
+        axisymmetric: bool,
+    ) -> Result<Shape, Unlike> {
+        let ends = &motion.ends;
+        if axisymmetric && ends.iter().any(|u| u[0] != 0.0) {
+            return Err((
+                "a rigid body of revolution that moves radially".into(),
+                "one that moves along the axis",
+            ));
+        }
+        match (self.straight(), self.flat()) {
+            (Some(n), _) => Ok(self.before_a_straight_side(n, ends, others)),
+            (None, Some(q)) => Ok(self.straight_before_a_curve(q, ends)),
+            (None, None) => self.curve_before_a_curve(ends, friction),
+        }
+    }
+
+    /// A straight boundary: what the rigid surface moves along n is its indentation, and what it moves along t is its
+    /// tangential displacement, by which it is placed as well.
+    fn before_a_straight_side(&self, n: Point, ends: &[Point], others: &[[f64; 2]]) -> Shape {
+        let t = [n[1], -n[0]];
+        let mut moved: Vec<[f64; 2]> = ends.iter().map(|u| [-dot(*u, n), dot(*u, t)]).collect();
+        let last = moved.last().map_or(0.0, |m| m[1]);
+        let parallel = self.flat().is_some_and(|q| cross(q, n).abs() <= STRAIGHT);
+        let shift = if parallel {
+            [0.0; 2]
+        } else {
+            t.map(|x| last * x)
+        };
+        let points: Vec<Point> = self
+            .outline
+            .points
+            .iter()
+            .map(|p| [p[0] + shift[0], p[1] + shift[1]])
+            .collect();
+        let mut message = (shift != [0.0; 2] && others.len() > 1).then(|| {
+            format!("the rigid surface is placed where the last step leaves it along the body, {last:e} from where it was; earlier steps have it there as well.")
+        });
+        let foot = self.mesh.nodes[self.edges[0][0] as usize];
+        // profiles begin at zero distance: the rest is part of the indentation, if nothing else moves meanwhile
+        let alone = moved.iter().all(|m| m[1] == 0.0)
+            && others
+                .iter()
+                .all(|[loads, supports]| *loads == 0.0 && *supports == 0.0);
+        let obstacle = match self.outline.joined {
+            Joined::Circle {
+                center,
+                radius,
+                convex: true,
+            } => {
+                let center = [center[0] + shift[0], center[1] + shift[1]];
+                let clearance = dot(minus(center, foot), n) - radius;
+                if alone || clearance.abs() <= 1e-9 * radius {
+                    moved.iter_mut().for_each(|m| m[0] -= clearance);
+                    Some(self.circle(center, radius, t, &points))
+                } else {
+                    None
+                }
+            }
+            _ => None,
+        };
+        let obstacle = obstacle.unwrap_or_else(|| {
+            let reach = |p: &[Point]| span(p.iter().map(|p| dot(*p, t)));
+            let [low, high] = reach(&points);
+            let [from, to] = reach(&self.nodes());
+            match self.flat() {
+                Some(_) if low <= from && high >= to => line(&points),
+                _ => {
+                    let (obstacle, off) = polyline(points, self.outline.joined);
+                    message = message.take().or(off);
+                    obstacle
+                }
+            }
+        });
+        Shape {
+            obstacle,
+            direction: None,
+            moved,
+            message,
+        }
+    }
+
+    /// A circle by its profile along the boundary; it ends where its arc ends.
+    fn circle(&self, center: Point, radius: f64, t: Point, points: &[Point]) -> Obstacle {
+        let run = runs(self.edges);
+        let start = run
+            .first()
+            .map_or([0.0; 2], |run| self.mesh.nodes[run[0][0] as usize]);
+        let horizontal = t[1].abs() <= STRAIGHT;
+        let coordinate = |p: Point| match horizontal {
+            true => p[0],
+            false => dot(minus(p, start), t),
+        };
+        let [low, high] = span(points.iter().map(|p| coordinate(*p)));
+        let middle = coordinate(center);
+        let whole = 1e-6 * radius;
+        Obstacle::Circle {
+            radius,
+            center: middle,
+            from: (low > middle - radius + whole).then_some(low),
+            to: (high < middle + radius - whole).then_some(high),
+            along: if horizontal {
+                Along::X
+            } else {
+                Along::ArcLength
+            },
+        }
+    }
+
+    /// A straight rigid surface before a curved boundary, by the rigid surface's own normal, which is the same
+    /// everywhere: `q`, towards the body.
+    fn straight_before_a_curve(&self, q: Point, ends: &[Point]) -> Shape {
+        // of the contact: n = −q
+        let t = [-q[1], q[0]];
+        let moved = ends.iter().map(|u| [dot(*u, q), dot(*u, t)]).collect();
+        let reach = |p: &[Point]| span(p.iter().map(|p| dot(*p, t)));
+        let ([low, high], [from, to]) = (reach(&self.outline.points), reach(&self.nodes()));
+        let obstacle = match low <= from && high >= to {
+            true => line(&self.outline.points),
+            false => polyline(self.outline.points.clone(), self.outline.joined).0,
+        };
+        Shape {
+            obstacle,
+            direction: Some(q),
+            moved,
+            message: None,
+        }
+    }
+
+    /// A curved rigid surface before a curved boundary, which moves in one direction.
+    fn curve_before_a_curve(&self, ends: &[Point], friction: bool) -> Result<Shape, Unlike> {
+        let most =
+            ends.iter().copied().fold(
+                [0.0; 2],
+                |most, u| if length(u) > length(most) { u } else { most },
+            );
+        let size = length(most);
+        let (obstacle, message) = polyline(self.outline.points.clone(), self.outline.joined);
+        if size == 0.0 {
+            let moved = vec![[0.0; 2]; ends.len()];
+            return Ok(Shape {
+                obstacle,
+                direction: None,
+                moved,
+                message,
+            });
+        }
+        let direction = most.map(|x| x / size);
+        if ends
+            .iter()
+            .any(|u| cross(direction, *u).abs() > STRAIGHT * size)
+        {
+            return Err((
+                "several steps that move a curved rigid surface in different directions along a curved boundary".into(),
+                "one direction",
+            ));
+        }
+        self.is_linear(most, friction)?;
+        let moved = ends.iter().map(|u| [dot(*u, direction), 0.0]).collect();
+        Ok(Shape {
+            obstacle,
+            direction: Some(direction),
+            moved,
+            message,
+        })
+    }
+
+    /// Whether the gaps of the moved surface are those that follow from its normals before, where it comes near.
+    fn is_linear(&self, u: Point, friction: bool) -> Result<(), Unlike> {
+        /// Of the largest overlap.
+        const ALLOWED: f64 = 0.02;
+        let moved: Vec<Point> = self
+            .outline
+            .points
+            .iter()
+            .map(|p| [p[0] + u[0], p[1] + u[1]])
+            .collect();
+        let gaps: Vec<[f64; 2]> = self
+            .looks()
+            .filter_map(|look| {
+                let (distance, m) = self.met(look)?;
+                let (after, of) = met(&moved, look.0, look.1, 0.1 * self.size)?;
+                let along = -dot(m, look.1);
+                Some([distance * along - dot(u, m), after * -dot(of, look.1)])
+            })
+            .collect();
+        let deepest = gaps.iter().map(|g| -g[1]).fold(0.0, f64::max);
+        let off = gaps
+            .iter()
+            .filter(|g| g[0].min(g[1]) < 0.0)
+            .map(|g| (g[0] - g[1]).abs())
+            .fold(0.0, f64::max);
+        match off <= ALLOWED * deepest {
+            true => Ok(()),
+            false => Err((
+                format!(
+                    "a motion so large that the gaps of the curved surface change by {off:.2e} more than its normals before it say, with an overlap of {deepest:.2e}{}",
+                    if friction { " and with friction" } else { "" }
+                ),
+                "a motion that is small beside the radii of both surfaces",
+            )),
+        }
+    }
+
+    fn nodes(&self) -> Vec<Point> {
+        self.edges
+            .iter()
+            .flatten()
+            .map(|n| self.mesh.nodes[*n as usize])
+            .collect()
+    }
+}
+
+fn span(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
+        [low.min(x), high.max(x)]
+    })
+}
+
+/// A straight line without ends, through the first and the last of points.
+fn line(points: &[Point]) -> Obstacle {
+    let step = minus(points[points.len() - 1], points[0]);
+    Obstacle::Line {
+        point: points[0],
+        angle: step[1].atan2(step[0]).to_degrees(),
+        from: None,
+        to: None,
+        along: Along::X,
+    }
+}
+
+/// Points as an obstacle, and how far it is from the curves that they were taken from.
+fn polyline(points: Vec<Point>, joined: Joined) -> (Obstacle, Option<String>) {
+    let (interpolation, off) = match joined {
+        Joined::Lines => (Interpolation::Linear, 0.0),
+        Joined::Polygon(off) => (Interpolation::Linear, off),
+        Joined::Spline(off) => (Interpolation::Cubic, off),
+        Joined::Circle { radius, .. } => (Interpolation::Cubic, radius * 2e-6),
+    };
+    let how = match interpolation {
+        Interpolation::Linear => "straight lines",
+        Interpolation::Cubic => "a spline",
+    };
+    let message = (off > 0.0).then(|| {
+        format!("the curves of the rigid surface are {how} through {} points of them, within {off:.1e}.", points.len())
+    });
+    let obstacle = Obstacle::Polyline {
+        points,
+        interpolation,
+        from: None,
+        to: None,
+        along: Along::X,
+    };
+    (obstacle, message)
+}

@@ -1,0 +1,225 @@
+//! How the steps of a deck move its rigid bodies, and scale everything else.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::build::{Built, Row};
+use super::contact_parts::WRITTEN_INSTEAD;
+use super::rigid::{Body, Moving};
+use super::tool::Point;
+use super::written::{Force, Pressure};
+
+/// How a reference node moves.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Motion {
+    /// Its displacement at the end of each step.
+    pub(super) ends: Vec<Point>,
+}
+
+/// Values that are equal up to the digits of a file.
+const SAME: f64 = 1e-9;
+
+impl Built {
+    /// Takes the rows of reference nodes out of the prescribed displacements: how each rigid body moves, `None` if that
+    /// is refused.
+    pub(super) fn take_motions(&mut self, axisymmetric: bool) -> Vec<Option<Motion>> {
+        let count = self.deck.contact.steps.len().max(1);
+        let bodies = std::mem::take(&mut self.tools.bodies);
+        // displacements x, y, and the rotation, at the end of each step
+        let mut held = vec![vec![[None::<f64>; 3]; count]; bodies.len()];
+        let rows = std::mem::take(&mut self.tools.rows);
+        for Moving { row, on, .. } in &rows {
+            // what is wrong with an amplitude is told of the prescribed displacement
+            let factor = row.amplitude.as_ref().map(|name| self.deck.factor(name));
+            let value = row.value * factor.and_then(Result::ok).unwrap_or(1.0);
+            let step = self.deck.contact.step_of(row.line);
+            for (number, rotates) in on {
+                for &component in &row.components {
+                    let kind = match (component, rotates) {
+                        (1 | 2, false) => component as usize - 1,
+                        (6, false) | (3, true) => 2,
+                        _ => continue,
+                    };
+                    let later = held[*number][step..].iter_mut();
+                    later.for_each(|values| values[kind] = Some(value));
+                }
+            }
+        }
+        let alone: BTreeSet<u64> = rows
+            .iter()
+            .filter(|row| row.alone)
+            .map(|row| row.row.line)
+            .collect();
+        self.prescribed.retain(|row| !alone.contains(&row.row.line));
+        let motions = bodies.iter().zip(&held);
+        let motions = motions
+            .map(|(body, held)| self.motion(body, held, axisymmetric))
+            .collect();
+        self.tools.bodies = bodies;
+        motions
+    }
+
+    fn motion(
+        &mut self,
+        body: &Body,
+        held: &[[Option<f64>; 3]],
+        axisymmetric: bool,
+    ) -> Option<Motion> {
+        let last = held[held.len() - 1];
+        if body.reference.is_none() {
+            self.doubt(
+                body.line,
+                "*RIGID BODY",
+                "REF NODE with one node",
+                "Name one node, or a set of one.",
+            );
+            return None;
+        }
+        let turned = |values: &[Option<f64>; 3]| values[2].is_some_and(|angle| angle != 0.0);
+        if held.iter().any(turned) {
+            self.doubt(
+                body.line,
+                "a rigid body that rotates",
+                "rotation 6 held at 0",
+                "Rigid bodies are only displaced here.",
+            );
+            return None;
+        }
+        let components = ["1", "2", "6"].into_iter().zip(last);
+        let free =
+            components.filter(|(name, value)| value.is_none() && !(axisymmetric && *name != "2"));
+        let free: Vec<&str> = free.map(|(name, _)| name).collect();
+        if !free.is_empty() {
+            let got = format!(
+                "a rigid body whose reference node is free in {}",
+                free.join(", ")
+            );
+            self.doubt(body.line, got, "displacements 1 and 2 and rotation 6 of its reference node prescribed by *BOUNDARY", WRITTEN_INSTEAD);
+            return None;
+        }
+        let end = |values: &[Option<f64>; 3]| [0, 1].map(|k| values[k].unwrap_or(0.0));
+        Some(Motion {
+            ends: held.iter().map(end).collect(),
+        })
+    }
+
+    /// The factors of loads and of prescribed displacements at the end of each step: those of the last are 1. What is
+    /// prescribed at the end replaces what was prescribed before, and must be in proportion to it.
+    pub(super) fn factors(&mut self) -> Vec<[f64; 2]> {
+        let steps = &self.deck.contact;
+        let count = steps.steps.len().max(1);
+        let mut loads: BTreeMap<String, Vec<(usize, f64)>> = BTreeMap::new();
+        for Row { row, name } in &self.pressures {
+            let rows = loads.entry(format!("p {name}")).or_default();
+            rows.push((steps.step_of(row.line), row.value));
+        }
+        for Row { row, name } in &self.forces {
+            let rows = loads
+                .entry(format!("f{} {name}", row.component))
+                .or_default();
+            rows.push((steps.step_of(row.line), row.value));
+        }
+        let mut supports: BTreeMap<String, Vec<(usize, f64)>> = BTreeMap::new();
+        for Row { row, name } in &self.prescribed {
+            for component in row.components.0..=row.components.1 {
+                let rows = supports.entry(format!("{component} {name}")).or_default();
+                rows.push((steps.step_of(row.line), row.value));
+            }
+        }
+        // a support that a later step adds would hold the body from the beginning
+        let late = supports
+            .values()
+            .any(|rows| rows.iter().all(|(step, _)| *step > 0));
+        let found = [proportion(&loads, count), proportion(&supports, count)];
+        match (found, late) {
+            ([Some(loads), Some(supports)], false) => loads
+                .into_iter()
+                .zip(supports)
+                .map(|(l, s)| [l, s])
+                .collect(),
+            _ => {
+                self.doubt(0, "steps that change loads or supports in different proportions, or add supports", "supports of the first step, and one factor on all loads and one on all prescribed displacements in each step", WRITTEN_INSTEAD);
+                vec![[1.0; 2]; count]
+            }
+        }
+    }
+
+    /// Leaves of each load only its row of the last step that has one.
+    pub(super) fn keep_last_loads(&mut self) {
+        let steps = &self.deck.contact;
+        let mut last: BTreeMap<String, usize> = BTreeMap::new();
+        let pressure = |row: &Row<Pressure>| format!("p {}", row.name);
+        let force = |row: &Row<Force>| format!("f{} {}", row.row.component, row.name);
+        for row in &self.pressures {
+            last.insert(pressure(row), steps.step_of(row.row.line));
+        }
+        for row in &self.forces {
+            last.insert(force(row), steps.step_of(row.row.line));
+        }
+        let is_last = |key: String, line: u64| last.get(&key) == Some(&steps.step_of(line));
+        self.pressures
+            .retain(|row| is_last(pressure(row), row.row.line));
+        self.forces.retain(|row| is_last(force(row), row.row.line));
+    }
+}
+
+/// The factor of all values at the end of each step; 0 where there are none. `None`: they are not in proportion.
+fn proportion(rows: &BTreeMap<String, Vec<(usize, f64)>>, count: usize) -> Option<Vec<f64>> {
+    let at = |rows: &[(usize, f64)], step: usize| {
+        let before = rows.iter().filter(|(s, _)| *s <= step);
+        before.last().map_or(0.0, |(_, value)| *value)
+    };
+    let ends: Vec<f64> = rows.values().map(|rows| at(rows, count - 1)).collect();
+    let size = ends.iter().fold(0.0f64, |most, end| most.max(end.abs()));
+    let factor = |step: usize| {
+        let now: Vec<f64> = rows.values().map(|rows| at(rows, step)).collect();
+        let most = now
+            .iter()
+            .zip(&ends)
+            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+        let factor = most
+            .filter(|_| size > 0.0)
+            .map_or(0.0, |(now, end)| now / end);
+        let fits = now
+            .iter()
+            .zip(&ends)
+            .all(|(now, end)| (now - factor * end).abs() <= SAME * size.max(now.abs()));
+        fits.then_some(factor)
+    };
+    (0..count).map(factor).collect()
+}
+
+/// The factors of indentations and of tangential displacements that all contacts have in common at the end of each step.
+pub(super) fn common_factors(moved: &[&[[f64; 2]]]) -> Option<Vec<[f64; 2]>> {
+    let count = moved.first()?.len();
+    let mut found = vec![[0.0; 2]; count];
+    for kind in [0, 1] {
+        let mut common: Option<Vec<f64>> = None;
+        for contact in moved {
+            let most = contact.iter().map(|m| m[kind]).fold(0.0, |most: f64, m| {
+                if m.abs() >= most.abs() { m } else { most }
+            });
+            if most == 0.0 {
+                continue;
+            }
+            let factors: Vec<f64> = contact.iter().map(|m| m[kind] / most).collect();
+            match &common {
+                Some(known)
+                    if known
+                        .iter()
+                        .zip(&factors)
+                        .any(|(a, b)| (a - b).abs() > SAME) =>
+                {
+                    return None;
+                }
+                Some(_) => {}
+                None => common = Some(factors),
+            }
+        }
+        let common = common.unwrap_or_else(|| vec![f64::from(u8::from(kind == 0)); count]);
+        found
+            .iter_mut()
+            .zip(common)
+            .for_each(|(found, factor)| found[kind] = factor);
+    }
+    Some(found)
+}

@@ -1,0 +1,517 @@
+//! Rigid rollers, punches and plates of decks: contact pairs with analytical surfaces, rigid lines and rigid elements
+//! become contacts with obstacles. Held to problems written by hand, to rigid motions that change nothing, and to
+//! CalculiX (the same in `tests/calculix.py`).
+
+use files::abaqus;
+use serde_json::json;
+use solver::problem::{Contact, History, Problem, Step};
+use solver::solution::{Solution, WarningCode};
+
+use crate::support::solve;
+
+/// Nodes and elements (CPE8) of a patch that is a grid in two parameters u, v of 0 … 1.
+fn patch(
+    name: &str,
+    base: usize,
+    [nu, nv]: [usize; 2],
+    at: impl Fn(f64, f64) -> [f64; 2],
+) -> String {
+    let (mut nodes, mut elements) = (
+        format!("*NODE, NSET=N{name}\n"),
+        format!("*ELEMENT, TYPE=CPE8, ELSET={name}\n"),
+    );
+    let label = |i: usize, j: usize| base + i + (2 * nu + 1) * j;
+    for j in 0..=2 * nv {
+        for i in 0..=2 * nu {
+            if i % 2 == 0 || j % 2 == 0 {
+                let [x, y] = at(i as f64 / (2 * nu) as f64, j as f64 / (2 * nv) as f64);
+                nodes += &format!("{}, {x:.15e}, {y:.15e}\n", label(i, j));
+            }
+        }
+    }
+    for j in 0..nv {
+        for i in 0..nu {
+            let (a, b) = (2 * i, 2 * j);
+            let around = [
+                [0, 0],
+                [2, 0],
+                [2, 2],
+                [0, 2],
+                [1, 0],
+                [2, 1],
+                [1, 2],
+                [0, 1],
+            ];
+            let numbers = around
+                .map(|[p, q]| label(a + p, b + q).to_string())
+                .join(", ");
+            elements += &format!("{}, {numbers}\n", base + i + nu * j);
+        }
+    }
+    // the sides v = 0 and v = 1
+    nodes += &format!(
+        "*NSET, NSET={name}LOW, GENERATE\n{base}, {}, 1\n",
+        base + 2 * nu
+    );
+    let (first, last) = (base, base + nu * (nv - 1));
+    elements += &format!(
+        "*ELSET, ELSET={name}FIRST, GENERATE\n{first}, {}, 1\n",
+        first + nu - 1
+    );
+    elements += &format!(
+        "*ELSET, ELSET={name}LAST, GENERATE\n{last}, {}, 1\n",
+        last + nu - 1
+    );
+    nodes + &elements
+}
+
+/// Of the side v = 1 of BODY.
+const MATERIAL: &str = "*MATERIAL, NAME=M\n*ELASTIC\n1000., 0.3\n*SOLID SECTION, ELSET=BODY, MATERIAL=M\n\
+    *SURFACE, NAME=FACE\nBODYLAST, S3\n*BOUNDARY\nBODYLOW, 1, 2\n";
+
+/// A block 6 wide and 3 high with its face at y = 0, turned by an angle (degrees) about the origin.
+fn block(angle: f64) -> String {
+    let (sine, cosine) = f64::to_radians(angle).sin_cos();
+    // nodes come closer to the middle
+    let part = |u: f64| {
+        let w = 2.0 * u - 1.0;
+        3.0 * w * (0.2 + 0.8 * w.abs())
+    };
+    let place = move |u: f64, v: f64| {
+        let (i, x) = (u * 24.0, |k: f64| part(k / 24.0));
+        // midsides in the middle
+        let x = if i.rem_euclid(2.0) > 0.5 {
+            0.5 * (x(i - 1.0) + x(i + 1.0))
+        } else {
+            x(i)
+        };
+        let y = -3.0 * (1.0 - v);
+        [cosine * x - sine * y, sine * x + cosine * y]
+    };
+    patch("BODY", 1, [12, 5], place) + MATERIAL
+}
+
+/// A ring sector about the origin between two radii, clamped at v = 0, from one angle to another (degrees).
+fn sector([inner, outer]: [f64; 2], [from, to]: [f64; 2]) -> String {
+    let place = move |u: f64, v: f64| {
+        let (r, angle) = (
+            inner + v * (outer - inner),
+            f64::to_radians(from + u * (to - from)),
+        );
+        [r * angle.cos(), r * angle.sin()]
+    };
+    patch("BODY", 1, [16, 3], place) + MATERIAL
+}
+
+const ROLLER: &str = "*SURFACE, TYPE=SEGMENTS, NAME=TOOL\nSTART, 4., 4.\nCIRCL, 0., 0., 0., 4.\nCIRCL, -4., 4., 0., 4.\n";
+
+/// A rigid surface with its reference node, and the pair with FACE.
+fn touching(tool: &str, interaction: &str) -> String {
+    format!(
+        "*NODE\n9000, 0., 0.\n{tool}*RIGID BODY, ANALYTICAL SURFACE=TOOL, REF NODE=9000\n{}",
+        pair(interaction)
+    )
+}
+
+fn pair(interaction: &str) -> String {
+    format!(
+        "*SURFACE INTERACTION, NAME=I\n1.,\n{interaction}*CONTACT PAIR, INTERACTION=I\nFACE, TOOL\n*BOUNDARY\n9000, 6, 6\n"
+    )
+}
+
+fn step(rows: &str) -> String {
+    format!("*STEP\n*STATIC\n*BOUNDARY\n{rows}*END STEP\n")
+}
+
+fn pressed(u: [f64; 2]) -> String {
+    step(&format!("9000, 1, 1, {}\n9000, 2, 2, {}\n", u[0], u[1]))
+}
+
+fn read(deck: &str) -> Problem {
+    abaqus::problem(deck).unwrap_or_else(|list| panic!("{list:#?}"))
+}
+
+fn contact(value: serde_json::Value) -> Contact {
+    serde_json::from_value(value).unwrap()
+}
+
+fn doubts(deck: &str) -> Vec<String> {
+    let list = abaqus::problem(deck).expect_err("a deck that cannot be solved was taken");
+    list.into_iter().map(|v| v.to_string()).collect()
+}
+
+fn numbers(solution: &Solution) -> [f64; 3] {
+    let s = &solution.summary;
+    assert!(s.converged);
+    [s.normal_force, s.tangential_force, s.friction_force]
+}
+
+fn close(a: [f64; 3], b: [f64; 3], within: f64) {
+    let size = a[0].abs();
+    assert!(
+        size > 0.0 && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= within * size),
+        "{a:?} {b:?}"
+    );
+}
+
+/// The whole contact, as it is written by hand.
+#[test]
+fn a_roller_is_a_circle_that_is_pushed() {
+    let problem = read(&(block(0.0) + &touching(ROLLER, "") + &pressed([0.0, -0.05])));
+    assert_eq!(
+        problem.contacts,
+        [contact(
+            json!({"boundary": "FACE", "normal": "obstacle", "indentation": 0.05,
+            "obstacle": {"kind": "circle", "radius": 4.0}})
+        )]
+    );
+    assert!(problem.steps.is_empty());
+    // one that comes from farther away
+    let away = "*SURFACE, TYPE=SEGMENTS, NAME=TOOL\nSTART, 4., 4.5\nCIRCL, 0., 0.5, 0., 4.5\nCIRCL, -4., 4.5, 0., 4.5\n";
+    let problem = read(&(block(0.0) + &touching(away, "") + &pressed([0.0, -0.55])));
+    assert!((problem.contacts[0].indentation - 0.05).abs() < 1e-12);
+}
+
+/// A quarter of the circle faces what its arc faces.
+#[test]
+fn an_arc_ends_where_it_ends() {
+    let half = "*SURFACE, TYPE=SEGMENTS, NAME=TOOL\nSTART, 4., 4.\nCIRCL, 0., 0., 0., 4.\n";
+    let problem = read(&(block(0.0) + &touching(half, "") + &pressed([0.0, -0.05])));
+    let (from, to, _) = problem.contacts[0].obstacle.span();
+    assert_eq!((from, to), (Some(0.0), None));
+}
+
+/// The same roller on a face that is turned, where positions count along the face: to rounding.
+#[test]
+fn a_turned_deck_gives_the_same_forces() {
+    let friction = "*FRICTION, ELASTIC SLIP=1e-4\n0.3,\n";
+    let solved = |angle: f64| {
+        let (s, c) = f64::to_radians(angle).sin_cos();
+        let turn = |[x, y]: [f64; 2]| [c * x - s * y, s * x + c * y];
+        let point = |p: [f64; 2]| {
+            let [x, y] = turn(p);
+            format!("{x:.15e}, {y:.15e}")
+        };
+        let tool = format!(
+            "*SURFACE, TYPE=SEGMENTS, NAME=TOOL\nSTART, {}\nCIRCL, {}, {}\nCIRCL, {}, {}\n",
+            point([4.0, 4.0]),
+            point([0.0, 0.0]),
+            point([0.0, 4.0]),
+            point([-4.0, 4.0]),
+            point([0.0, 4.0])
+        );
+        let motion = pressed(turn([0.002, -0.02]));
+        numbers(&solve(&read(
+            &(block(angle) + &touching(&tool, friction) + &motion),
+        )))
+    };
+    let straight = solved(0.0);
+    assert!(
+        straight[1] > 0.05 * straight[0],
+        "it is dragged to the right: {straight:?}"
+    );
+    for angle in [90.0, 180.0, -37.0] {
+        close(straight, solved(angle), 1e-8);
+    }
+}
+
+/// Friction depends on the path, so that increments and steps are those of the deck.
+#[test]
+fn steps_press_and_drag() {
+    let friction = "*FRICTION, SLIP TOLERANCE=0.01, TAUMAX=20.\n0.25\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=HARD\n";
+    let deck = block(0.0)
+        + &touching(ROLLER, friction)
+        + &pressed([0.0, -0.05])
+        + &step("9000, 1, 1, 0.01\n").replace("*STATIC\n", "*STATIC\n0.05, 1.\n");
+    let problem = read(&deck);
+    let found = &problem.contacts[0];
+    let law = found.friction.as_ref().unwrap();
+    assert_eq!(
+        (law.coefficient, law.nonlocal_radius, law.shear_cap),
+        (Some(0.25), Some(0.0), Some(20.0))
+    );
+    assert_eq!(law.history, History::Incremental);
+    assert!(
+        (law.elastic_slip - 0.01 * 0.5).abs() < 1e-15,
+        "of the mean side: {}",
+        law.elastic_slip
+    );
+    assert_eq!(
+        (found.indentation, found.tangential_displacement),
+        (0.05, 0.01)
+    );
+    let factors = |s: &Step| {
+        (
+            s.indentation,
+            s.tangential_displacement,
+            s.loads,
+            s.supports,
+            s.increments,
+        )
+    };
+    let steps: Vec<_> = problem.steps.iter().map(factors).collect();
+    assert_eq!(steps, [(1.0, 0.0, 1.0, 1.0, 10), (1.0, 1.0, 1.0, 1.0, 20)]);
+    // the roller stands where the last step leaves it, and the deck's user is told
+    let (_, warnings) = abaqus::problem_with_warnings(&deck).unwrap();
+    assert!(
+        warnings
+            .iter()
+            .any(|w| w.code == WarningCode::DeckDiffers && w.message.contains("placed where"))
+    );
+    assert_eq!(
+        serde_json::to_value(&found.obstacle).unwrap()["center"],
+        0.01
+    );
+}
+
+/// A rigid plate under a disc: that the plate moves up or the disc down is the same, with friction too. Along a curved
+/// boundary only a motion in one direction is one of a rigid body.
+#[test]
+fn a_plate_that_moves_is_a_body_that_moves() {
+    let plate = "*SURFACE, TYPE=SEGMENTS, NAME=TOOL\nSTART, -9., -1.\nLINE, 9., -1.\n";
+    let friction = "*FRICTION, ELASTIC SLIP=1e-4\n0.3,\n";
+    let disc = sector([0.4, 1.0], [-30.0, -150.0]) + &touching(plate, friction);
+    let plate_moves = read(&(disc.clone() + &pressed([0.01, 0.02])));
+    let disc_moves =
+        read(&(disc + &step("9000, 1, 2\nBODYLOW, 1, 1, -0.01\nBODYLOW, 2, 2, -0.02\n")));
+    assert_eq!(plate_moves.contacts[0].direction, Some([0.0, 1.0]));
+    let (a, b) = (numbers(&solve(&plate_moves)), numbers(&solve(&disc_moves)));
+    assert!(a[1].abs() > 0.05 * a[0] && a[2] > a[1].abs(), "{a:?}");
+    close(a, b, 1e-9);
+    // pushed against the body's own normals it would not be a plate
+    let mut by_normals = plate_moves;
+    by_normals.contacts[0].direction = None;
+    let c = numbers(&solve(&by_normals));
+    assert!((c[2] - a[2]).abs() > 0.02 * a[2], "{c:?} {a:?}");
+}
+
+/// A pin in a hole: both are curved.
+#[test]
+fn a_pin_in_a_hole_is_a_spline_that_moves() {
+    // the hole of radius 1, seen from inside the body: from its right to its left below the centre
+    let hole = sector([2.0, 1.0], [-20.0, -160.0]);
+    let pin = "*SURFACE, TYPE=SEGMENTS, NAME=TOOL\nSTART, 0.98, -0.02\nCIRCL, 0., -1., 0., -0.02\nCIRCL, -0.98, -0.02, 0., -0.02\n";
+    let friction = "*FRICTION, ELASTIC SLIP=1e-4\n0.2,\n";
+    let deck = hole + &touching(pin, friction);
+    let pin_moves = read(&(deck.clone() + &pressed([0.001, -0.004])));
+    let hole_moves =
+        read(&(deck + &step("9000, 1, 2\nBODYLOW, 1, 1, -0.001\nBODYLOW, 2, 2, 0.004\n")));
+    let (a, b) = (numbers(&solve(&pin_moves)), numbers(&solve(&hole_moves)));
+    close(a, b, 1e-9);
+}
+
+/// Rigid lines of Abaqus, and elements of CalculiX that a rigid body holds: the same tool three times.
+#[test]
+fn rigid_lines_and_rigid_elements_are_the_analytical_surface() {
+    let motion = "*STEP\n*STATIC\n*BOUNDARY\n9000, 1, 1, 0.\n9000, 2, 2, -0.03\n*END STEP\n";
+    let analytical = "*SURFACE, TYPE=SEGMENTS, NAME=TOOL\nSTART, 2., 1.\nLINE, 1., 0.\nLINE, -1., 0.\nLINE, -2., 1.\n";
+    let first = read(&(block(0.0) + &touching(analytical, "") + motion));
+    let places = "*NODE\n9000, 0., 5.\n9001, 2., 1.\n9002, 1., 0.\n9003, -1., 0.\n9004, -2., 1.\n";
+    let lines = format!(
+        "{places}*ELEMENT, TYPE=R2D2, ELSET=RIGID\n8001, 9001, 9002\n8003, 9003, 9004\n8002, 9002, 9003\n\
+        *SURFACE, NAME=TOOL\nRIGID, SPOS\n*RIGID BODY, ELSET=RIGID, REF NODE=9000\n{}",
+        pair("")
+    );
+    let second = read(&(block(0.0) + &lines + motion));
+    assert_eq!(first.contacts, second.contacts);
+    let elements = format!(
+        "{places}9005, 2., 2.\n9006, 1., 2.\n9007, -1., 2.\n9008, -2., 2.\n*NODE\n9010, 0., 5.\n\
+        *ELEMENT, TYPE=CPE4, ELSET=RIGID\n8001, 9002, 9001, 9005, 9006\n8002, 9003, 9002, 9006, 9007\n8003, 9004, 9003, 9007, 9008\n\
+        *SOLID SECTION, ELSET=RIGID, MATERIAL=M\n*NSET, NSET=ALLRIGID, GENERATE\n9001, 9008, 1\n\
+        *SURFACE, NAME=TOOL\nRIGID, S1\n*RIGID BODY, NSET=ALLRIGID, REF NODE=9000, ROT NODE=9010\n{}*BOUNDARY\n9010, 3, 3\n",
+        pair("")
+    );
+    let deck = block(0.0) + &elements.replace("9000, 6, 6\n", "9000, 1, 1\n") + motion;
+    let third = read(&deck);
+    assert_eq!(first.contacts, third.contacts);
+    assert_eq!(third.materials.len(), 1, "the rigid elements need none");
+    let (mesh, warnings) = abaqus::read(deck.as_bytes()).unwrap();
+    assert_eq!(mesh.elements.len(), 60);
+    assert!(
+        warnings
+            .iter()
+            .any(|w| w.code == WarningCode::RigidElementsLeftOut)
+    );
+    close(numbers(&solve(&first)), numbers(&solve(&third)), 1e-12);
+}
+
+/// A circle of sides of second order is nearly one of arcs.
+#[test]
+fn a_meshed_roller_is_nearly_the_round_one() {
+    let place = |u: f64, v: f64| {
+        let (r, angle) = (4.0 - 0.5 * v, 0.4 * (1.0 - 2.0 * u));
+        [-r * angle.sin(), 4.0 - r * angle.cos()]
+    };
+    let tool = patch("RIGID", 20_001, [24, 1], place)
+        + "*NODE\n9000, 0., 4.\n*SURFACE, NAME=TOOL\nRIGID, S1\n\
+        *RIGID BODY, ELSET=RIGID, REF NODE=9000\n"
+        + &pair("");
+    let meshed = numbers(&solve(&read(
+        &(block(0.0) + &tool + &pressed([0.0, -0.05])),
+    )));
+    let round = numbers(&solve(&read(
+        &(block(0.0) + &touching(ROLLER, "") + &pressed([0.0, -0.05])),
+    )));
+    close(meshed, round, 1e-6);
+}
+
+/// A fillet between straight sides is a spline through points of them; its force is that of the exact shape.
+#[test]
+fn fillets_are_a_spline() {
+    let punch = "*SURFACE, TYPE=SEGMENTS, NAME=TOOL\nSTART, 1.5, 3.\nLINE, 1.5, 0.5\nCIRCL, 1., 0., 1., 0.5\nLINE, -1., 0.\n\
+        CIRCL, -1.5, 0.5, -1., 0.5\nLINE, -1.5, 3.\n";
+    let deck = block(0.0) + &touching(punch, "") + &pressed([0.0, -0.05]);
+    let (problem, warnings) = abaqus::problem_with_warnings(&deck).unwrap();
+    assert!(
+        warnings.iter().any(|w| w.message.contains("spline")),
+        "{warnings:?}"
+    );
+    let mut exact = problem.clone();
+    exact.contacts = vec![contact(
+        json!({"boundary": "FACE", "normal": "obstacle", "indentation": 0.05,
+        "obstacle": {"kind": "rounded_flat", "half_width": 1.0, "radius": 0.5}}),
+    )];
+    close(numbers(&solve(&exact)), numbers(&solve(&problem)), 1e-5);
+}
+
+/// What cannot be translated is refused in words, with what is written instead.
+#[test]
+fn what_is_no_contact_with_a_rigid_obstacle_is_refused() {
+    let good = block(0.0)
+        + &touching(ROLLER, "*FRICTION, ELASTIC SLIP=1e-4\n0.3,\n")
+        + &pressed([0.0, -0.05]);
+    assert!(abaqus::problem(&good).is_ok());
+    for (from, to, told) in [
+        (
+            "*RIGID BODY, ANALYTICAL SURFACE=TOOL, REF NODE=9000\n",
+            "",
+            "a contact of two deformable bodies",
+        ),
+        ("FACE, TOOL", "TOOL, TOOL", "two rigid surfaces"),
+        ("FACE, TOOL", "FAC, TOOL", "`FAC` in a contact pair"),
+        (
+            "START, 4., 4.\nCIRCL, 0., 0., 0., 4.\nCIRCL, -4.",
+            "START, -4., 4.\nCIRCL, 0., 0., 0., 4.\nCIRCL, 4.",
+            "whose outer side does not face",
+        ),
+        (
+            "CIRCL, 0., 0., 0., 4.",
+            "CIRCL, 0., 0., 0., 3.",
+            "`CIRCL, 0., 0., 0., 3.`",
+        ),
+        ("START, 4., 4.\n", "", "`CIRCL"),
+        (
+            "TYPE=SEGMENTS, NAME=TOOL",
+            "TYPE=SEGMENTS, NAME=TOOL, FILLET RADIUS=0.1",
+            "FILLET RADIUS",
+        ),
+        ("9000, 6, 6\n", "", "free in 6"),
+        ("9000, 1, 1, 0\n", "", "free in 1"),
+        ("9000, 6, 6\n", "9000, 6, 6, 0.1\n", "that rotates"),
+        (
+            "*END STEP",
+            "*CLOAD\n9000, 2, -5.\n*END STEP",
+            "which has no node of an element",
+        ),
+        ("*FRICTION, ELASTIC SLIP=1e-4", "*FRICTION, ROUGH", "ROUGH"),
+        (
+            "*FRICTION, ELASTIC SLIP=1e-4",
+            "*FRICTION, EXPONENTIAL DECAY",
+            "EXPONENTIAL DECAY",
+        ),
+        (
+            "0.3,\n",
+            "0.3, 0., 10.\n0.2, 0., 20.\n",
+            "one friction coefficient",
+        ),
+        (
+            "0.3,\n",
+            "0.3,\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR\n0., 0.\n1., 1.\n",
+            "TABULAR",
+        ),
+        (
+            "0.3,\n",
+            "0.3,\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n50.\n",
+            "a pressure of 50 per length",
+        ),
+        (
+            "0.3,\n",
+            "0.3,\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL\n0.01, 5.\n",
+            "a clearance of 0.01",
+        ),
+        (
+            "0.3,\n",
+            "0.3,\n*SURFACE BEHAVIOR, NO SEPARATION\n",
+            "NO SEPARATION",
+        ),
+        (
+            "*CONTACT PAIR, INTERACTION=I",
+            "*CONTACT PAIR, INTERACTION=I, TIED",
+            "TIED",
+        ),
+        (
+            "*CONTACT PAIR, INTERACTION=I",
+            "*CONTACT PAIR, INTERACTION=J",
+            "the interaction `J`",
+        ),
+        (
+            "*CONTACT PAIR, INTERACTION=I",
+            "*CONTACT PAIR, INTERACTION=I, ADJUST=0.1",
+            "ADJUST",
+        ),
+        (
+            "*CONTACT PAIR, INTERACTION=I\n",
+            "*CLEARANCE, VALUE=0.1\n*CONTACT PAIR, INTERACTION=I\n",
+            "*CLEARANCE",
+        ),
+        (
+            "*CONTACT PAIR, INTERACTION=I\nFACE, TOOL\n",
+            "*CONTACT\n*CONTACT INCLUSIONS, ALL EXTERIOR\n",
+            "`contacts`",
+        ),
+    ] {
+        assert!(good.contains(from), "{from}");
+        let found = doubts(&good.replacen(from, to, 1));
+        assert!(
+            found.iter().any(|text| text.contains(told)),
+            "{to}: {found:#?}"
+        );
+    }
+    let json = doubts(&good.replace("FACE, TOOL", "FACE, TOOL, X"));
+    assert!(json[0].contains("\"mesh\": {\"abaqus\""), "{json:?}");
+    // a stiff layer is nearly hard, and its difference is told
+    let stiff = good.replacen(
+        "0.3,\n",
+        "0.3,\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n1e7\n",
+        1,
+    );
+    let (_, warnings) = abaqus::problem_with_warnings(&stiff).unwrap();
+    assert!(
+        warnings.iter().any(|w| w.message.contains("p/1e7")),
+        "{warnings:?}"
+    );
+    // without an elastic slip of its own it is Abaqus's default, and told
+    let (_, warnings) =
+        abaqus::problem_with_warnings(&good.replace(", ELASTIC SLIP=1e-4", "")).unwrap();
+    assert!(
+        warnings
+            .iter()
+            .any(|w| w.message.contains("gives no elastic slip")),
+        "{warnings:?}"
+    );
+    let curved = sector([2.0, 1.0], [-20.0, -160.0])
+        + &touching(
+            "*SURFACE, TYPE=SEGMENTS, NAME=TOOL\nSTART, 0.98, -0.02\nCIRCL, 0., -1., 0., -0.02\nCIRCL, -0.98, -0.02, 0., -0.02\n",
+            "",
+        )
+        + &pressed([0.0, -0.004]);
+    assert!(abaqus::problem(&curved).is_ok());
+    let turned = curved.clone() + &step("9000, 1, 1, 0.002\n");
+    assert!(doubts(&turned)[0].contains("different directions"));
+    let far = curved.replace("-0.004", "-0.3");
+    assert!(
+        doubts(&far)[0].contains("a motion so large"),
+        "{:?}",
+        doubts(&far)
+    );
+}
