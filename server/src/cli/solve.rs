@@ -16,7 +16,7 @@ use solver::{
     error::{Reason, SolveError, Violation},
     mesh::Mesh,
     problem::Problem,
-    solution::Observer,
+    solution::{Observer, Warning},
 };
 
 use super::{
@@ -44,7 +44,8 @@ pub(super) struct Arguments {
     #[arg(short, long, value_name = "OUT", help = output::help())]
     output: Vec<PathBuf>,
 
-    /// The file of the mesh that the problem names by its hash (mesh.stored), as it was uploaded
+    /// The file of the mesh that the problem names by its hash (mesh.stored), as it was uploaded. `solve` of the mesh
+    /// itself prints that hash
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
 
@@ -88,8 +89,9 @@ pub(super) fn run(
     }: &Arguments,
 ) -> anyhow::Result<Exit> {
     let start = Instant::now();
-    let problem = match read(file) {
-        Ok(problem) => problem,
+    let (problem, told) = match read(file) {
+        Ok(Given::Problem(problem, warnings)) => (*problem, warnings),
+        Ok(Given::Mesh) => return only_a_mesh(file),
         Err(ReadError::Invalid(violations)) => {
             let exit = invalid(file, &violations);
             let of_sweep = |violation: &Violation| {
@@ -145,7 +147,10 @@ pub(super) fn run(
         return Ok(Exit::Invalid);
     }
     let solve = |observe: &mut Observer<'_>| {
-        let external = files::external_mesh(&problem, stored.clone());
+        let mut external = files::external_mesh(&problem, stored.clone());
+        if let Some(Ok(external)) = &mut external {
+            external.warnings.extend(told.iter().cloned());
+        }
         solver::solve_on(&problem, external, observe)
     };
     let mut view = View::new(To::Error);
@@ -233,19 +238,8 @@ fn stored_mesh(
             ));
         }
     };
-    let mut hash = Sha256::new();
     let mut opened = File::open(file)?;
-    let (mut piece, mut bytes) = (vec![0; 1 << 16], 0);
-    loop {
-        match opened.read(&mut piece)? {
-            0 => break,
-            read => {
-                hash.update(&piece[..read]);
-                bytes += read as u64;
-            }
-        }
-    }
-    let found = digest::sha256_text(hash);
+    let (found, bytes) = hashed(&mut opened)?;
     if found != named {
         return Err(Unusable::Reason(format!(
             "--mesh {}: it has the hash {found}, and the problem names {named}",
@@ -260,19 +254,99 @@ fn stored_mesh(
     Ok(Some((info, mesh)))
 }
 
+/// The hash of what is left of a file, and how many bytes that is.
+fn hashed(opened: &mut File) -> std::io::Result<(String, u64)> {
+    let mut hash = Sha256::new();
+    let (mut piece, mut bytes) = (vec![0; 1 << 16], 0);
+    loop {
+        match opened.read(&mut piece)? {
+            0 => return Ok((digest::sha256_text(hash), bytes)),
+            read => {
+                hash.update(&piece[..read]);
+                bytes += read as u64;
+            }
+        }
+    }
+}
+
+/// What a file is.
+enum Given {
+    /// A problem, and what is done differently here than its deck says.
+    Problem(Box<Problem>, Vec<Warning>),
+    /// A mesh of Gmsh, or a deck without a step.
+    Mesh,
+}
+
+/// Says what a mesh is, and how a problem refers to it.
+fn only_a_mesh(file: &Path) -> anyhow::Result<Exit> {
+    let cannot = || format!("cannot read {}", file.display());
+    let mut opened = File::open(file).with_context(cannot)?;
+    let (hash, _) = hashed(&mut opened).with_context(cannot)?;
+    opened.rewind().with_context(cannot)?;
+    let mesh = match files::read_mesh(BufReader::new(opened)) {
+        Ok((_, mesh, _)) => mesh,
+        Err(ReadError::Invalid(violations)) => return Ok(invalid(file, &violations)),
+        Err(ReadError::Io(error)) => return Err(error).with_context(cannot),
+    };
+    let names = |what: &str, names: Vec<&String>| match names.len() {
+        0 => format!("no {what}"),
+        count => {
+            let first: Vec<String> = names
+                .iter()
+                .take(20)
+                .map(|name| format!("`{name:.60}`"))
+                .collect();
+            let more = if count > 20 { ", …" } else { "" };
+            format!("{what} {}{more}", first.join(", "))
+        }
+    };
+    let name = file.display();
+    eprintln!(
+        "{name}: a mesh and no problem: {} nodes, {} elements, {}, {}, {}.",
+        mesh.nodes.len(),
+        mesh.elements.len(),
+        names("boundaries", mesh.boundaries.keys().collect()),
+        names("groups", mesh.groups.keys().collect()),
+        names("node sets", mesh.node_sets.keys().collect()),
+    );
+    eprintln!(
+        "  Write a problem as JSON with \"mesh\": {{\"stored\": \"{hash}\"}}, materials, supports and contacts, and solve it by \
+         `signorini solve problem.json --mesh {name}`."
+    );
+    Ok(Exit::Invalid)
+}
+
 /// Reads a problem by the ending of its file: of a JSON file with a mesh only the mesh is held, not its text.
-fn read(file: &Path) -> Result<Problem, ReadError> {
+fn read(file: &Path) -> Result<Given, ReadError> {
     let mut opened = File::open(file).map_err(ReadError::Io)?;
-    let deck = file
-        .extension()
-        .is_some_and(|ending| ending.eq_ignore_ascii_case("inp"));
-    if !deck {
-        return files::read(opened);
+    let is = |wanted: &str| {
+        let ending = file.extension();
+        ending.is_some_and(|ending| ending.eq_ignore_ascii_case(wanted))
+    };
+    if is("msh") {
+        return Ok(Given::Mesh);
+    }
+    let problem = |problem, warnings| Given::Problem(Box::new(problem), warnings);
+    if !is("inp") {
+        return files::read(opened).map(|read| problem(read, Vec::new()));
     }
     let mut bytes = Vec::new();
     let read = opened.read_to_end(&mut bytes);
     read.map_err(ReadError::Io)?;
-    files::abaqus::problem(&files::text(bytes)).map_err(ReadError::Invalid)
+    let text = files::text(bytes);
+    if !files::abaqus::has_step(&text) {
+        return Ok(Given::Mesh);
+    }
+    let (read, warnings) =
+        files::abaqus::problem_with_warnings(&text).map_err(ReadError::Invalid)?;
+    if read.contacts.is_empty() {
+        eprintln!(
+            "{}: a deck without contact, solved as an elastic problem. Contact with a rigid surface is a *CONTACT PAIR, or `contacts` \
+             in a problem as JSON with this deck as its mesh.",
+            file.display()
+        );
+    }
+    Ok(problem(read, warnings))
 }
 
 /// `signorini schema`.

@@ -98,9 +98,10 @@ fn gravity(code: WarningCode) -> u8 {
         | MeshTooCoarseForContact
         | MeshTooCoarseForRadius => 1,
         LinesInside | SupportsOverlap | CentreNodesDropped | ElementsReversed
-        | RaisedToSecondOrder | StripCutsPolyline | ObstacleCutsEdge | SmoothingFlattens
-        | ContactTurns | KinkInContact | MaterialJunction | RadiusExceedsContact
-        | CohesionJumps | OscillatingStick | SlowContraction => 2,
+        | RaisedToSecondOrder | RigidElementsLeftOut | DeckDiffers | StripCutsPolyline
+        | ObstacleCutsEdge | SmoothingFlattens | ContactTurns | KinkInContact
+        | MaterialJunction | RadiusExceedsContact | CohesionJumps | OscillatingStick
+        | SlowContraction => 2,
     }
 }
 

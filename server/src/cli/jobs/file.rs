@@ -63,7 +63,11 @@ impl Submitted {
         if deck {
             let text = files::text(bytes);
             let path = path.to_path_buf();
-            let problem = files::abaqus::problem(&text).map_err(ApiError::InvalidProblem)?;
+            let (problem, warnings) =
+                files::abaqus::problem_with_warnings(&text).map_err(ApiError::InvalidProblem)?;
+            for warning in warnings {
+                eprintln!("{}: {}", path.display(), warning.message);
+            }
             let fields = [("problem".to_owned(), to_raw_value(&problem)?)].into();
             return Ok(Submitted {
                 path,
