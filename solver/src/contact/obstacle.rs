@@ -616,7 +616,7 @@ mod tests {
             top: None,
             bottom: None,
         });
-        facing(&mesh, &mesh.boundaries["top"], &BTreeMap::new(), obstacle)
+        facing(&mesh, &mesh.boundaries["top"], &HeldDirections::new(), obstacle)
     }
 
     #[test]
