@@ -317,17 +317,31 @@ class Reference:
         found = [np.zeros(len(contact.nodes)) for contact in self.contacts]
         for force, (number, i, _) in zip(forces, self.unilateral):
             found[number][i] = force / self.area(self.contacts[number], i)
+        for number, contact in enumerate(self.contacts):
+            for beside, end in self.beside_axis(contact, forces):
+                found[number][beside] = (7 / 8 * forces[contact.index[beside]] + forces[contact.index[end]]) / contact.areas[beside]
         for force, (number, i, which) in zip(ties, self.bonds):
             if which == 0:
                 found[number][i] = force / self.contacts[number].areas[i]
         return found
 
-    def pressure_rows(self, patch):
+    def beside_axis(self, contact, forces):
+        """The midside node beside one on the axis, where it is in contact: it carries what that node has, R₀ + R₁ (3.5)."""
+        last = len(contact.nodes) - 1
+        for end, beside in ((0, 1), (last, last - 1)):
+            on_axis = self.body.axisymmetric and contact.positions[end][0] == 0
+            if on_axis and end in contact.index and beside in contact.index and forces[contact.index[beside]] > 0:
+                yield beside, end
+
+    def pressure_rows(self, patch, forces):
         """dp/d(forces of the constraints) of a patch's contact."""
         contact = patch["contact"]
         rows = np.zeros((len(contact.nodes), len(self.unilateral)))
         for i, k in contact.index.items():
             rows[i, k] = 1 / self.area(contact, i)
+        for beside, end in self.beside_axis(contact, forces):
+            rows[beside, contact.index[beside]] *= 7 / 8
+            rows[beside, contact.index[end]] = 1 / contact.areas[beside]
         return rows
 
     def right_side(self, level):
@@ -390,7 +404,7 @@ class Reference:
             residual[:n] = self.stiffness @ v - right + self.rows.T @ forces + self.bond_rows.T @ ties
             for patch in self.patches:
                 law = dict(patch["law"], elastic_slip=patch["law"]["elastic_slip"] * widen)
-                to_pressure = self.pressure_rows(patch)
+                to_pressure = self.pressure_rows(patch, forces)
                 tau, slope = friction.bound(law, patch["average"], to_pressure @ forces, patch["s"])
                 e = self.slip(patch, v, level)
                 phi, stiffness, _ = friction.transition(law, e)
@@ -492,7 +506,7 @@ class Reference:
     def anchor(self, level, v, forces, ties):
         taus = []
         for patch in self.patches:
-            tau, _ = friction.bound(patch["law"], patch["average"], self.pressure_rows(patch) @ forces, patch["s"])
+            tau, _ = friction.bound(patch["law"], patch["average"], self.pressure_rows(patch, forces) @ forces, patch["s"])
             taus.append(tau)
         largest = max((tau.max(initial=0.0) for tau in taus), default=0.0)
         for patch, tau in zip(self.patches, taus):
@@ -535,15 +549,9 @@ class Reference:
                     shear -= force
             own = {"normal_force": ring * reactions.sum(), "tangential_force": ring * shear, "friction_force": 0.0}
             n, t = (np.einsum("ia,ia->i", found["u"][contact.nodes], way) for way in (contact.normals, contact.tangents))
-            shown = pressures[number].copy()
-            if self.body.axisymmetric:
-                for end, beside in ((0, 1), (len(contact.nodes) - 1, len(contact.nodes) - 2)):
-                    if contact.positions[end][0] == 0 and shown[beside]:
-                        # what the node on the axis carries, which has no area, is shown beside it
-                        shown[beside] = (reactions[end] + reactions[beside]) / contact.areas[beside]
             profile = {
                 "s": contact.s, "gap": contact.gap(level), "normal_displacement": n, "tangential_displacement": t,
-                "normal_stress": -shown, "areas": ring * contact.areas,
+                "normal_stress": -pressures[number], "areas": ring * contact.areas,
             }  # fmt: skip
             for patch in self.patches:
                 if patch["number"] == number:
