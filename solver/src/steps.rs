@@ -57,16 +57,20 @@ pub fn run(
     Ok(solved)
 }
 
+/// Solves all steps on one body; the history is given back.
+type SolveOn<'s, T> = dyn for<'a> FnMut(
+        LoadHistory<'a>,
+        &ElasticBody,
+        &mut Observer<'_>,
+    ) -> Result<(T, LoadHistory<'a>), SolveError>
+    + 's;
+
 /// Solves with the common ends of contacts as the model has them, and again while the solution shows that they are of other
 /// contacts: each is tried as one contact's or the other's, and in the end as that of both.
 fn with_corners<T>(
     (model, body): (&Model, &ElasticBody),
     observe: &mut Observer<'_>,
-    solve: &mut dyn for<'a> FnMut(
-        LoadHistory<'a>,
-        &ElasticBody,
-        &mut Observer<'_>,
-    ) -> Result<(T, LoadHistory<'a>), SolveError>,
+    solve: &mut SolveOn<'_, T>,
 ) -> Result<T, SolveError> {
     let mut tried = vec![model.alone.clone()];
     let mut both: BTreeSet<u32> = BTreeSet::new();

@@ -54,7 +54,8 @@ fn holds(few: &Summary, many: &Summary, what: &str) {
 #[test]
 fn errors_of_too_few_increments_are_stated() {
     let wedge = json!({"kind": "wedge", "angle": 5});
-    let paths: [(&str, Value, &dyn Fn(u32, &str) -> Value); 4] = [
+    type Path<'a> = (&'a str, Value, &'a dyn Fn(u32, &str) -> Value);
+    let paths: [Path<'_>; 4] = [
         (
             "a cylinder",
             parabola(),

@@ -23,6 +23,9 @@ const NUMBERS: std::ops::Range<u64> = 0..2200;
 /// Largest difference of two descriptions of the same gaps: rounding, and for smooth polylines the spline through 240 points
 /// of a circle of radius R, off by 2·10⁻⁸ R at gaps from 10⁻⁴ R on.
 const SAME: f64 = 1e-8;
+/// The end of a polyline is where an edge is divided; moved along a curved side it faces another place of it.
+const BY_ITS_END: f64 = 1e-4;
+
 const BY_SPLINE: f64 = 1e-3;
 
 /// A body with the boundaries `face` and `back`, the latter moved.
@@ -430,8 +433,11 @@ fn an_overlap_is_the_same_problem_as_one_that_is_pushed_or_moved() {
         let Some((words, body, pair)) = pair(number) else {
             continue;
         };
-        let exact = words.contains("moved") || words.contains("corners");
-        let allowed = if exact { SAME } else { BY_SPLINE };
+        let allowed = match () {
+            () if words.contains("polyline") => BY_ITS_END,
+            () if words.contains("moved") || words.contains("corners") => SAME,
+            () => BY_SPLINE,
+        };
         let row = rows.entry(words.clone()).or_default();
         let fault = row.add(pair.each_ref().map(forces), allowed);
         wrong.extend(fault.map(|fault| format!("{number}: {words}; {body}: {fault}")));
@@ -526,7 +532,9 @@ fn a_tilted_floor_behind_the_end_of_a_disc_is_no_overlap() {
         }
         println!("{angle}: {forces:?}");
         close(forces[0], 44.9, 1e-2);
-        (1..3).for_each(|k| close(forces[k], forces[0], 1e-9));
+        close(forces[1], forces[0], 1e-9);
+        // an edge is divided where the polyline ends
+        close(forces[2], forces[0], 1e-6);
     }
 }
 

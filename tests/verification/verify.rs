@@ -210,7 +210,7 @@ fn a_flat_punch_keeps_a_peak_without_a_limit() {
 /// Without a coarser mesh there is no order, and the reasons name the finer mesh.
 #[test]
 fn a_coarse_mesh_is_told_what_the_finer_one_says() {
-    let solution = solve(&cylinder(0.6, 0));
+    let solution = solve(&cylinder(1.2, 0));
     let verified = accuracy(&solution);
     assert!(
         verified

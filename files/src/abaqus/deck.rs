@@ -20,6 +20,9 @@ pub(super) enum Inside {
     Instance(Name),
 }
 
+/// How far an instance is moved, and then turned: about which point, by which angle (radians).
+pub(super) type Placement = ([f64; 3], Option<([f64; 2], f64)>);
+
 /// The supported parts of a deck, and the violations.
 #[derive(Default)]
 pub(super) struct Deck {
@@ -46,8 +49,8 @@ pub(super) struct Deck {
     /// The first line that gives temperatures.
     pub(super) temperatures: Option<u64>,
     pub(super) steps: usize,
-    /// How far the instance that lines belong to is moved, and then turned: about which point, by which angle (radians).
-    pub(super) placement: Option<([f64; 3], Option<([f64; 2], f64)>)>,
+    /// Where the instance that lines belong to is.
+    pub(super) placement: Option<Placement>,
     /// The length of the step's time.
     pub(super) period: Option<f64>,
     /// The step has had a `*BOUNDARY`.

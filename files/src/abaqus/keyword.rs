@@ -503,7 +503,11 @@ impl Deck {
                     self.here.types.push(mechanics);
                 }
             }
-            None if kind.idle || is_rigid_line(&name) => {}
+            None if kind.idle => {}
+            // whether a rigid body has them is known at the end
+            None if is_rigid_line(&name) => {
+                self.contact.rigid_lines.get_or_insert((line, got.clone()));
+            }
             None => self.doubt(
                 line,
                 got.clone(),

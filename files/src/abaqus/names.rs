@@ -304,16 +304,14 @@ impl<'a> Members<'a> {
                     }
                 }
                 (_, None) if told => {}
-                (Target::Set(other), None) => {
-                    if !(place.incomplete.names || names.scopes[0].incomplete.names) {
-                        unknown(
-                            faults,
-                            &format!("`{other:.60}` in the set `{:.60}`", self.name),
-                            &format!("a {what} or a set (*{})", kind.keyword()),
-                            || names.all_sets(kind),
-                        );
-                    }
-                }
+                (Target::Set(_), None)
+                    if place.incomplete.names || names.scopes[0].incomplete.names => {}
+                (Target::Set(other), None) => unknown(
+                    faults,
+                    &format!("`{other:.60}` in the set `{:.60}`", self.name),
+                    &format!("a {what} or a set (*{})", kind.keyword()),
+                    || names.all_sets(kind),
+                ),
                 (Target::Label(label), None) if !numbers => {
                     let got = format!("{what} {label} in the set `{:.60}`", self.name);
                     unknown(

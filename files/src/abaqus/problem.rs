@@ -11,7 +11,7 @@ use super::written::{
     Elastic, MOST_CONSTANTS, MaterialDefinition, Name, Orientation, Section, on_line,
 };
 use crate::source::ReadError;
-use solver::error::{Reason, Violation};
+use solver::error::{Findings, Reason, Violation};
 use solver::problem::{
     Analysis, BoundaryValue, Elasticity, Load, Material, MeshInput, MeshSource, Orthotropic,
     Problem, SolverControls,
@@ -50,6 +50,7 @@ pub fn problem_with_warnings(text: &str) -> Result<(Problem, Vec<Warning>), Vec<
     let thickness = thickness.unwrap_or(1.0);
     let materials = materials(&mut built);
     built.check_steps();
+    built.check_rigid_lines();
     let supports = supports(&built);
     for (line, name) in supports.of_no_element {
         built.doubt(
@@ -95,7 +96,12 @@ pub fn problem_with_warnings(text: &str) -> Result<(Problem, Vec<Warning>), Vec<
         )));
     }
     if !violations.is_empty() {
-        return Err(violations);
+        // those of the lines, of the analysis and of contacts, each as many as a list may have
+        let mut all = Findings::default();
+        violations
+            .into_iter()
+            .for_each(|violation| all.add(violation));
+        return Err(all.into_violations());
     }
     let problem = Problem {
         title: deck.title.take(),
@@ -120,6 +126,19 @@ impl Built {
             0 => Violation::new("", reason, got.into(), expected, hint),
             _ => on_line(line, reason, got.into(), expected, hint),
         });
+    }
+
+    /// Rigid lines that are of no rigid body would join nodes of the elastic one.
+    fn check_rigid_lines(&mut self) {
+        let lines = self.deck.contact.rigid_lines.clone();
+        if let Some((line, got)) = lines.filter(|_| self.tools.bodies.is_empty()) {
+            self.doubt(
+                line,
+                got,
+                "a *RIGID BODY that they are of",
+                "Remove them, or name their set by *RIGID BODY, ELSET=…, REF NODE=….",
+            );
+        }
     }
 
     fn check_steps(&mut self) {

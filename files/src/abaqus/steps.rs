@@ -165,8 +165,10 @@ impl Built {
 /// The factor of all values at the end of each step; 0 where there are none. `None`: they are not in proportion.
 fn proportion(rows: &BTreeMap<String, Vec<(usize, f64)>>, count: usize) -> Option<Vec<f64>> {
     let at = |rows: &[(usize, f64)], step: usize| {
-        let before = rows.iter().filter(|(s, _)| *s <= step);
-        before.last().map_or(0.0, |(_, value)| *value)
+        let mut latest = rows.iter().rev();
+        latest
+            .find(|(s, _)| *s <= step)
+            .map_or(0.0, |(_, value)| *value)
     };
     let ends: Vec<f64> = rows.values().map(|rows| at(rows, count - 1)).collect();
     let size = ends.iter().fold(0.0f64, |most, end| most.max(end.abs()));

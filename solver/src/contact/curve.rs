@@ -79,6 +79,16 @@ impl<'a> Curve<'a> {
         Curve::Line(point, [point[0] + cosine, point[1] + sine])
     }
 
+    /// Its two ends; none of a straight line, and of a curve that is closed.
+    pub(super) fn ends(&self) -> Option<[[f64; 2]; 2]> {
+        let [first, last] = match self {
+            Curve::Segments(points, _) => [*points.first()?, *points.last()?],
+            Curve::Smooth(cubics, _) => [cubics.first()?[0], cubics.last()?[3]],
+            Curve::Line(..) => return None,
+        };
+        (first != last).then_some([first, last])
+    }
+
     /// Where the straight line through a normal of the body crosses the curve.
     pub(super) fn crossings(&self, ray: &Ray, rounding: f64) -> Vec<Crossing> {
         let mut found: Vec<Crossing> = Vec::new();

@@ -6,6 +6,8 @@ pub mod obstacle;
 mod shape;
 pub mod smooth;
 
+pub use smooth::edge_normals;
+
 use std::collections::BTreeMap;
 
 use crate::element::edge3;
@@ -175,15 +177,6 @@ fn aligned(normal: [f64; 2], direction: [f64; 2], error: f64) -> [f64; 2] {
 /// Chain nodes (start, end, midside) of an edge.
 pub fn edge_nodes(edge: usize) -> [usize; 3] {
     [2 * edge, 2 * edge + 2, 2 * edge + 1]
-}
-
-/// Unit outward normals of an edge at its start, end and midside.
-pub fn edge_normals(positions: &[[f64; 2]; 3]) -> [[f64; 2]; 3] {
-    [-1.0, 1.0, 0.0].map(|xi| {
-        let [dx, dy] = edge3::map(positions, xi).1;
-        let length = dx.hypot(dy);
-        [-dy / length, dx / length]
-    })
 }
 
 /// Arc length at the nodes of a chain of edges, from its first node.

@@ -113,7 +113,7 @@ pub fn ends_inside_edges(mesh: &Mesh, boundary: &[Edge], obstacle: &Obstacle) ->
         for end in limits.into_iter().filter(|end| end.is_finite()) {
             found.extend(view.place_of(k, end).map(|xi| (*edge, xi)));
         }
-        found.extend(view.ends_of_sight(k, edge).map(|xi| (*edge, xi)));
+        found.extend(view.ends_faced(k, edge).into_iter().map(|xi| (*edge, xi)));
     }
     found
 }
@@ -273,29 +273,47 @@ impl<'a> View<'a> {
         bisected(|xi| length(xi) < c, -1.0, 1.0)
     }
 
-    /// Where on an edge a curve in space comes into sight or is lost along the edge's own normals, between nodes that see it and
-    /// nodes that do not. A straight line has no end: the body turns away from it.
-    fn ends_of_sight(&self, k: usize, edge: &Edge) -> impl Iterator<Item = f64> {
-        let normals = self.own_normals(edge);
-        let sees = |xi: f64| {
-            let (place, n, c) = self.place_between(k, xi, &normals);
-            self.seen_from_place(place, n, c).is_some()
+    /// Where an edge faces an end of a curve in space along the edge's own normals. A curve that is lost from sight before its end
+    /// has none there: the body turns away from it, or another part of it comes before. Round a corner of the body it is not faced
+    /// either, though it overlaps the body there.
+    fn ends_faced(&self, k: usize, edge: &Edge) -> Vec<f64> {
+        let Some(ends) = self.shape.in_space().and_then(Curve::ends) else {
+            return Vec::new();
         };
-        let halves = match self.shape.in_space() {
-            Some(Curve::Segments(..) | Curve::Smooth(..)) => vec![[-1.0, 0.0], [0.0, 1.0]],
-            Some(Curve::Line(..)) | None => Vec::new(),
+        let normals = self.own_normals(edge);
+        let faced = |xi: f64| {
+            let (place, n, c) = self.place_between(k, xi, &normals);
+            let distance = self.seen_from_place(place, n, c)?.profile.distance;
+            Some((distance, [0, 1].map(|a| place[a] + distance * n[a])))
+        };
+        let [start, end, _] = edge_nodes(k);
+        let round_corner = |xi: f64| {
+            let corner = match xi {
+                -1.0 => self.whole.corner(start),
+                1.0 => self.whole.corner(end),
+                _ => 0.0,
+            };
+            corner != 0.0 && faced(xi).is_some_and(|(distance, _)| distance < 0.0)
         };
         let end_in = |[first, last]: [f64; 2]| {
-            let [from, to] = match [sees(first), sees(last)] {
+            let [from, to] = match [faced(first).is_some(), faced(last).is_some()] {
                 [true, false] => [first, last],
                 [false, true] => [last, first],
                 _ => return None,
             };
+            if round_corner(from) {
+                return None;
+            }
             // the last place from which it is seen
-            bisected(sees, from, to)
+            let xi = bisected(|xi| faced(xi).is_some(), from, to)?;
+            let (_, [x, y]) = faced(xi)?;
+            let near = |[a, b]: [f64; 2]| (x - a).hypot(y - b) <= 1e3 * self.rounding;
+            ends.into_iter().any(near).then_some(xi)
         };
-        let ends: Vec<f64> = halves.into_iter().filter_map(end_in).collect();
-        ends.into_iter()
+        [[-1.0, 0.0], [0.0, 1.0]]
+            .into_iter()
+            .filter_map(end_in)
+            .collect()
     }
 
     /// The coordinate c of a node.
@@ -616,7 +634,12 @@ mod tests {
             top: None,
             bottom: None,
         });
-        facing(&mesh, &mesh.boundaries["top"], &HeldDirections::new(), obstacle)
+        facing(
+            &mesh,
+            &mesh.boundaries["top"],
+            &HeldDirections::new(),
+            obstacle,
+        )
     }
 
     #[test]

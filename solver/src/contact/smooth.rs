@@ -8,6 +8,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::element::edge3;
 use crate::mesh::{Edge, Mesh};
 
 /// Directions differ by no more than this many errors of the sides where a curve is smooth (ellipses, waves and cubics
@@ -25,6 +26,15 @@ const CORNER: f64 = 0.26;
 
 /// Positions of a side's start, end and midside.
 pub type Side = [[f64; 2]; 3];
+
+/// Unit outward normals of an edge at its start, end and midside.
+pub fn edge_normals(positions: &[[f64; 2]; 3]) -> [[f64; 2]; 3] {
+    [-1.0, 1.0, 0.0].map(|xi| {
+        let [dx, dy] = edge3::map(positions, xi).1;
+        let length = dx.hypot(dy);
+        [-dy / length, dx / length]
+    })
+}
 
 /// How far the direction of a side at its ends may be off that of the surface (angle).
 pub fn direction_error(side: &Side) -> f64 {
@@ -74,7 +84,7 @@ pub fn normals_beyond(mesh: &Mesh, boundary: &[Edge]) -> BTreeMap<u32, [f64; 2]>
                 false => (&beyond, &own),
             };
             if corner(before, after) == 0.0 {
-                let [start, end, _] = super::edge_normals(&beyond);
+                let [start, end, _] = edge_normals(&beyond);
                 found.insert(node, if starts { start } else { end });
             }
         }

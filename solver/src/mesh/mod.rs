@@ -4,6 +4,8 @@ mod build;
 mod coincident;
 mod curved;
 mod divide;
+mod edge;
+mod first;
 mod graded;
 mod grid;
 mod halving;
@@ -15,11 +17,13 @@ mod refine;
 pub use build::{NO_NODE, RawMesh, build};
 pub use coincident::coincident_nodes;
 pub use curved::OffCurve;
+pub use edge::Edge;
+pub use first::FirstSide;
 pub use graded::GradedMesh;
 pub use grid::{check_grid, grid_mesh, largest_cut};
 pub use inline::inline_mesh;
 pub use inverted::check_inverted;
-pub use lineage::{FirstSide, Lineage, Part};
+pub use lineage::{Lineage, Part};
 pub use refine::refine;
 
 use std::collections::{BTreeMap, HashMap};
@@ -29,11 +33,6 @@ use serde::{Deserialize, Serialize};
 use crate::element::Element;
 use crate::error::Violation;
 use crate::solution::Warning;
-
-/// A side of an element on the surface of the body: start, end, midside node, so directed that the
-/// body lies on the right (a top edge runs along +x). The outward normal is the direction turned
-/// counter-clockwise; in other words t, the normal turned clockwise, is the direction.
-pub type Edge = [u32; 3];
 
 /// Nodes, elements and named boundaries, independent of their use.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -59,7 +59,7 @@ impl Finer {
             nodes: mesh.nodes.clone(),
             halves: vec![None; mesh.nodes.len()],
             sets: Sets::new(mesh),
-            lineage: Lineage::of_finer(mesh),
+            lineage: mesh.lineage.of_finer(mesh.nodes.len()),
         }
     }
 

@@ -7,27 +7,10 @@ use std::collections::BTreeMap;
 use super::contact_model::ContactModel;
 use super::level::Level;
 use super::supports::Held;
-use super::{Model, contacts};
 use crate::problem::Step;
 
 /// By common node: the contact, by its place in the model, that the node is taken to be of alone.
 pub type Alone = BTreeMap<u32, usize>;
-
-impl Model {
-    /// Nodes of two contacts, with both by their places in the model; none of supported nodes, where both are needed.
-    pub fn common_nodes(&self) -> BTreeMap<u32, [usize; 2]> {
-        common(&self.contacts, &self.fixed)
-    }
-
-    /// The same problem with other common nodes of one contact alone.
-    pub fn with_alone(&self, alone: Alone) -> Model {
-        Model {
-            oblique: contacts::oblique(&self.contacts, &self.fixed, &alone),
-            alone,
-            ..self.clone()
-        }
-    }
-}
 
 /// A first guess: the contact whose obstacle overlaps the body at the common node; if neither does, that which is nearer.
 /// Both if both do. A friction bound that is given acts wherever the body is.
@@ -62,7 +45,11 @@ pub(super) fn guess(
     alone
 }
 
-fn common(contacts: &[ContactModel], fixed: &BTreeMap<u32, Held>) -> BTreeMap<u32, [usize; 2]> {
+/// Nodes of two contacts, with both by their places in `contacts`; none of supported nodes, where both are needed.
+pub(super) fn common(
+    contacts: &[ContactModel],
+    fixed: &BTreeMap<u32, Held>,
+) -> BTreeMap<u32, [usize; 2]> {
     let mut first: BTreeMap<u32, usize> = BTreeMap::new();
     let mut common = BTreeMap::new();
     for (c, contact) in contacts.iter().enumerate() {

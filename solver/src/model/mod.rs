@@ -98,6 +98,20 @@ impl Model {
         self.loads.body_force.map(|f| level.loads * f)
     }
 
+    /// Nodes of two contacts, with both by their places in the model; none of supported nodes, where both are needed.
+    pub fn common_nodes(&self) -> BTreeMap<u32, [usize; 2]> {
+        corners::common(&self.contacts, &self.fixed)
+    }
+
+    /// The same problem with other common nodes of one contact alone.
+    pub fn with_alone(&self, alone: Alone) -> Model {
+        Model {
+            oblique: contacts::oblique(&self.contacts, &self.fixed, &alone),
+            alone,
+            ..self.clone()
+        }
+    }
+
     /// Whether the end depends on the increments that lead to it: some friction is incremental.
     pub fn depends_on_path(&self) -> bool {
         let laws = self.contacts.iter().filter_map(|c| c.friction.as_ref());

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{LN_2, TAU};
 
-use super::PatchView;
+use super::{Junction, PatchView};
 use crate::contact::edge_nodes;
 use crate::elasticity::{Side, Wedge, growth};
 use crate::element::edge3;
@@ -14,16 +14,6 @@ const SHAPING: f64 = 0.01;
 
 /// Angles that differ by less are one: of sides of elements that meet in a node.
 const SAME_ANGLE: f64 = 1e-6;
-
-/// A point of the contact at which materials meet.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Junction {
-    s: f64,
-    /// λ, if the pressure grows like a power of the distance, r^(λ−1); else like its logarithm.
-    exponent: Option<f64>,
-    /// What each halving of the mesh adds to the pressure there (stress).
-    growth: f64,
-}
 
 impl PatchView<'_> {
     /// The junction at which the pressure grows most, if it shapes the pressure.

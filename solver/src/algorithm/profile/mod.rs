@@ -39,9 +39,19 @@ pub(super) struct PatchView<'a> {
     /// g at start, end and midside of every edge; 0 in the total law.
     anchors: Vec<[f64; 3]>,
     /// Where materials meet in the contact, once that is known.
-    worst_junction: OnceCell<Option<junction::Junction>>,
+    worst_junction: OnceCell<Option<Junction>>,
     /// σ_t likewise, if it does not follow from the law: in the thesis's own iteration and in bonded contacts.
     tractions: Option<Vec<[f64; 3]>>,
+}
+
+/// A point of the contact at which materials meet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Junction {
+    s: f64,
+    /// λ, if the pressure grows like a power of the distance, r^(λ−1); else like its logarithm.
+    exponent: Option<f64>,
+    /// What each halving of the mesh adds to the pressure there (stress).
+    growth: f64,
 }
 
 /// Nodal forces of a state, all contacts in a row.

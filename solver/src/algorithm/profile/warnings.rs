@@ -116,7 +116,7 @@ impl PatchView<'_> {
         let edges = (0..contact.boundary.edge_count())
             .filter(|k| edge_nodes(*k).iter().all(|&i| self.active(i)))
             .count();
-        if edges * (1 + self.mirrored_ends()) < FEWEST_EDGES {
+        if edges < FEWEST_EDGES {
             warn(
                 WarningCode::MeshTooCoarseForContact,
                 format!(
