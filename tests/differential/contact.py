@@ -284,9 +284,9 @@ class Reference:
                 patch["average"] = patch["operator"](patch["s"])
             self.patches.append(patch)
 
-    def mirrored(self, contact, i, law):
+    def mirrored(self, contact, i):
         if self.body.axisymmetric and contact.positions[i][0] == 0:
-            return law.get("measure") != "surface"
+            return True
         node = contact.nodes[i]
         ways = self.held.get(node, [])
         u = self.prescribed[[2 * node, 2 * node + 1]]
@@ -302,9 +302,9 @@ class Reference:
         return normals(self.mesh, edge)[0 if i == 0 else 1]
 
     def average(self, contact, law, at):
-        ends = [self.mirrored(contact, i, law) for i in (0, len(contact.nodes) - 1)]
-        radii = contact.positions[:, 0] if law.get("measure") == "surface" and self.body.axisymmetric else None
-        return friction.average(law, contact.s, at, ends, radii)
+        ends = [self.mirrored(contact, i) for i in (0, len(contact.nodes) - 1)]
+        rings = law.get("measure") == "surface" and self.body.axisymmetric
+        return friction.average(law, contact.s, at, ends, contact.positions if rings else None)
 
     def area(self, contact, i):
         """∫h of a contact node, from the force of its constraint to a pressure; at the axis 3.5 has it."""

@@ -25,11 +25,11 @@ def kernel(law, surface=False):
     return lambda x: np.where(np.abs(x) < radius, constant * bell(np.clip(x / radius, -1, 1)), 0.0)
 
 
-def average(law, s, at, mirrored, radii=None):
+def average(law, s, at, mirrored, positions=None):
     """The rows of W: S at the arc lengths `at` from nodal pressures at s (start, midside, end, midside …).
 
-    `mirrored`: whether the pressure continues as an even function beyond the start and the end. `radii`: of the nodes, where
-    the average is over rings of the contact surface.
+    `mirrored`: whether the pressure continues as an even function beyond the start and the end. `positions`: (r, z) of the nodes,
+    where the average is over rings of the contact surface: beyond a mirror they are mirrored too.
     """
     radius = law["nonlocal_radius"]
     rows = np.zeros((len(at), len(s)))
@@ -39,22 +39,20 @@ def average(law, s, at, mirrored, radii=None):
             edge, xi = locate(s, edges, place)
             row[edge] = edge_shape(xi)
         return rows
-    omega, copies = kernel(law, radii is not None), images(s, radius, mirrored)
+    omega, copies = kernel(law, positions is not None), images(s, radius, mirrored)
     conserving = law.get("normalization") == "conserving"
     for row, place in zip(rows, at):
-        own_radius = None if radii is None else radius_at(s, edges, radii, place)
+        own_radius = None if positions is None else radius_at(s, edges, positions[:, 0], place)
         for edge in edges:
             for sign, shift in copies:
+                radii = None if positions is None else moved(positions, s, sign, shift)
                 ends = sorted(sign * s[edge[k]] + shift for k in (0, 1))
                 for y, weight in pieces(*ends, place, radius, 8 if radii is not None else 1):
                     shape = np.array([edge_shape(xi) for xi in position(s, edge, sign * (y - shift))])
                     if radii is None:
                         weight = weight * omega(place - y)
                     else:
-                        # beyond an end the rings are those of the place that the pressure is continued to
-                        r = shape @ radii[edge]
-                        r = r if sign > 0 else 2 * radii[0 if y.mean() < s[0] else -1] - r
-                        weight = weight * ring(omega, radius, own_radius, r)
+                        weight = weight * ring(omega, radius, own_radius, shape @ radii[edge])
                     if conserving:
                         weight = weight / on_boundary(omega, s, radius, copies, sign * (y - shift))
                     row[edge] += shape.T @ weight
@@ -68,6 +66,24 @@ def images(s, radius, mirrored):
         most = int(radius / (end - start)) + 2
         return [c for k in range(-most, most + 1) for c in ((1, 2 * k * (end - start)), (-1, 2 * start + 2 * k * (end - start)))]
     return [(1, 0.0)] + [(-1, 2 * x) for x, is_mirror in zip((start, end), mirrored) if is_mirror]
+
+
+def moved(positions, s, sign, shift):
+    """Distances from the axis of the nodes of an image of the chain, which is reflected at one end after the other."""
+
+    def reflected(x, end, middle, other):
+        if positions[end][0] == 0:
+            return x * [-1, 1]
+        along = 4 * positions[middle] - 3 * positions[end] - positions[other]
+        along /= np.linalg.norm(along)
+        return x - 2 * np.outer((x - positions[end]) @ along, along)
+
+    at_start, at_end = (lambda x: reflected(x, 0, 1, 2)), (lambda x: reflected(x, -1, -2, -3))
+    x = positions if sign > 0 else at_start(positions)
+    periods = round((shift - (2 * s[0] if sign < 0 else 0)) / (2 * (s[-1] - s[0])))
+    for _ in range(abs(periods)):
+        x = at_end(at_start(x)) if periods > 0 else at_start(at_end(x))
+    return x[:, 0]
 
 
 def pieces(start, end, centre, radius, parts=1):
@@ -90,7 +106,7 @@ def ring(omega, radius, at, r):
     found = np.zeros_like(r)
     for k, own in enumerate(r):
         near = abs(own - at)
-        if near >= radius:
+        if near >= radius or own <= 0:
             continue
         if own + at <= radius:
             reach = np.pi

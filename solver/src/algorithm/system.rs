@@ -4,10 +4,10 @@
 use crate::body::{AXIS_SHARE, ElasticBody};
 use crate::elasticity::Dof;
 use crate::error::SolveError;
-use crate::friction::{Average, Averaging, BoundLaw, Chain, FrictionLaw, Source, largest_pressure};
+use crate::friction::{Average, Averaging, Chain, FrictionLaw, Source, largest_pressure};
 use crate::linear::Dense;
 use crate::model::{ContactModel, Level, Model};
-use crate::problem::{Condition, FrictionPoints, Measure};
+use crate::problem::{Condition, FrictionPoints};
 use crate::solution::{Observer, Progress};
 
 /// A friction point whose bound is below this part of the largest is open: its anchor follows it.
@@ -301,22 +301,10 @@ impl<'a> System<'a> {
             let free = [end, beside].map(|i| matches!(self.nodes[i].normal, Dof::Free(_)));
             self.nodes[beside].beside_axis = (free == [true; 2]).then_some(end);
         }
-        let surface = |law: &FrictionLaw<Average>| match &law.bound {
-            BoundLaw::Pressure { average, .. } => average.measure == Measure::Surface,
-            BoundLaw::Prescribed(_) => false,
-        };
-        // over a surface the rings already include the other side of the axis
-        let round = contact.friction.as_ref().is_some_and(surface);
-        let symmetric = |i: usize| {
-            if on_axis(i) {
-                !round
-            } else {
-                self.nodes[first + i].symmetric()
-            }
-        };
+        let symmetric = |i: usize| on_axis(i) || self.nodes[first + i].symmetric();
         let chain = Chain {
             s: boundary.s.clone(),
-            radius: boundary.positions.iter().map(|x| x[0]).collect(),
+            positions: boundary.positions.clone(),
             mirror_start: symmetric(0),
             mirror_end: symmetric(count - 1),
         };

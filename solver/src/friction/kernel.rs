@@ -43,8 +43,8 @@ const LOCAL: f64 = 1e-9;
 pub struct Chain {
     /// Arc length at the nodes (corner, midside, corner, …).
     pub s: Vec<f64>,
-    /// Distance of the nodes from the axis, for `Measure::Surface`; not used otherwise.
-    pub radius: Vec<f64>,
+    /// The nodes (r, z), for `Measure::Surface`; not used otherwise.
+    pub positions: Vec<[f64; 2]>,
     /// The pressure continues as an even function beyond the first node: a line of symmetry.
     pub mirror_start: bool,
     /// Likewise beyond the last node.
@@ -56,7 +56,7 @@ impl Chain {
     pub fn plain(s: Vec<f64>) -> Self {
         Chain {
             s,
-            radius: Vec::new(),
+            positions: Vec::new(),
             mirror_start: false,
             mirror_end: false,
         }
@@ -89,6 +89,20 @@ pub struct Averaging {
     scale: f64,
     /// [`Normalization::Conserving`].
     conserving: bool,
+}
+
+/// A distance from the axis as a function of a place, a r + b z + c.
+type Distance = [f64; 3];
+
+/// That of the place itself.
+const OWN: Distance = [1.0, 0.0, 0.0];
+
+/// A copy of the chain that continues it evenly beyond its mirrors.
+struct Image {
+    /// Centre of the kernel before all was moved onto the chain itself.
+    centre: f64,
+    /// Distance of the copy from the axis, of places of the chain.
+    distance: Distance,
 }
 
 /// One row of W: weights of the nodes from `first` on.
@@ -212,8 +226,8 @@ impl Averaging {
                 Measure::Line => None,
                 Measure::Surface => Some(self.distance_from_axis(s)),
             };
-            for centre in self.images(s) {
-                self.integrate(centre, ring, &mut add);
+            for image in self.images(s) {
+                self.integrate(&image, ring, &mut add);
             }
         }
         let edges = parts.iter().map(|(edge, _)| *edge);
@@ -239,9 +253,16 @@ impl Averaging {
     /// Distance from the axis at arc length s.
     fn distance_from_axis(&self, s: f64) -> f64 {
         let edge = self.edge_at(s);
-        let r = |i: usize| self.chain.radius[i];
         let h = edge3::shape(edge3::invert(&self.arc(edge), s));
-        edge3::interpolate(&h, &[r(2 * edge), r(2 * edge + 2), r(2 * edge + 1)]).max(0.0)
+        edge3::interpolate(&h, &self.distances(edge, OWN)).max(0.0)
+    }
+
+    /// A distance from the axis at the nodes of an edge.
+    fn distances(&self, edge: usize, [a, b, c]: Distance) -> [f64; 3] {
+        [2 * edge, 2 * edge + 2, 2 * edge + 1].map(|i| {
+            let [r, z] = self.chain.positions[i];
+            a * r + b * z + c
+        })
     }
 
     /// The kernel around a place at distance r from the axis, integrated over a ring of radius
@@ -272,10 +293,12 @@ impl Averaging {
         around * most * ring
     }
 
-    /// Integrates the kernel centred at `centre` (also outside the chain) edge by edge; over rings
-    /// where the centre's distance from the axis is given.
-    fn integrate(&self, centre: f64, ring: Option<f64>, add: &mut impl FnMut(usize, [f64; 3])) {
+    /// Integrates the kernel at an image's centre (also outside the chain) edge by edge; over rings, those of the image,
+    /// where the kernel's own distance from the axis is given.
+    fn integrate(&self, image: &Image, ring: Option<f64>, add: &mut impl FnMut(usize, [f64; 3])) {
+        let centre = image.centre;
         let (low, high) = (centre - self.radius, centre + self.radius);
+        let cubed = ring.is_some() && self.kernel == Kernel::Parabola;
         let few = ring.is_some_and(|r| r > 2.0 * self.radius) && !self.conserving;
         for edge in self.edge_at(low)..self.chain.s.len() / 2 {
             let arc = self.arc(edge);
@@ -286,6 +309,10 @@ impl Averaging {
             if ring.is_none() && self.by_moments(&arc) && a < b {
                 add(edge, self.weights_by_moments(&arc, centre, [a, b]));
                 continue;
+            }
+            let radii = ring.map_or([0.0; 3], |_| self.distances(edge, image.distance));
+            if ring.is_some() && radii.iter().all(|r| *r <= 0.0) {
+                continue; // across the axis: these are rings of the chain itself
             }
             let middle = centre.clamp(a, b.max(a));
             let mut weights = [0.0; 3];
@@ -307,17 +334,29 @@ impl Averaging {
                     }
                 };
                 for (xi, w) in rule.iter() {
-                    let y = a + 0.5 * length * (1.0 + xi);
+                    let part = 0.5 * (1.0 + xi);
+                    // over rings the parabola ends as a power 3/2 of the distance, which a square makes a cube
+                    let (y, w) = match () {
+                        () if !cubed => (a + length * part, *w),
+                        () if b == high => {
+                            let rest = 1.0 - part;
+                            (b - length * rest * rest, 2.0 * w * rest)
+                        }
+                        () if a == low => (a + length * part * part, 2.0 * w * part),
+                        () => (a + length * part, *w),
+                    };
+                    let shape = edge3::shape(edge3::invert(&arc, y));
                     let omega = match ring {
                         None => self.omega(y - centre),
-                        Some(r) => self.ring_omega(y - centre, r, self.distance_from_axis(y)),
+                        Some(r) => {
+                            self.ring_omega(y - centre, r, edge3::interpolate(&shape, &radii))
+                        }
                     };
                     let inside = match self.conserving {
                         true => self.part_inside(y),
                         false => 1.0,
                     };
                     let factor = 0.5 * length * w * omega / inside;
-                    let shape = edge3::shape(edge3::invert(&arc, y));
                     (0..3).for_each(|i| weights[i] += factor * shape[i]);
                 }
             }
@@ -360,27 +399,65 @@ impl Averaging {
         ]
     }
 
-    /// Kernel centres that stand for s on the chain continued evenly at its mirrors: a kernel over
-    /// the mirrored pressure equals the mirrored kernel over the pressure.
-    fn images(&self, s: f64) -> Vec<f64> {
+    /// The chain continued evenly at its mirrors, for a kernel at s: a kernel over the mirrored pressure equals the mirrored
+    /// kernel over the pressure. Rings are mirrored in space.
+    fn images(&self, s: f64) -> Vec<Image> {
         let (start, end) = (self.chain.s[0], self.chain.s[self.chain.s.len() - 1]);
-        let reaches = |c: &f64| *c > start - self.radius && *c < end + self.radius;
+        let reaches = |i: &Image| i.centre > start - self.radius && i.centre < end + self.radius;
+        let image = |centre: f64, distance: Distance| Image { centre, distance };
+        let at_start = |distance: Distance| self.reflected(distance, false);
+        let at_end = |distance: Distance| self.reflected(distance, true);
         let mirrored = match (self.chain.mirror_start, self.chain.mirror_end) {
             (false, false) => vec![],
-            (true, false) => vec![2.0 * start - s],
-            (false, true) => vec![2.0 * end - s],
+            (true, false) => vec![image(2.0 * start - s, at_start(OWN))],
+            (false, true) => vec![image(2.0 * end - s, at_end(OWN))],
             (true, true) => {
                 let period = 2.0 * (end - start);
                 let most = (self.radius / period).ceil() as i64 + 1;
+                // two reflections move the chain by a period, forwards or backwards
+                let moved = |k: i64| {
+                    (0..k.abs()).fold(OWN, |distance, _| match k > 0 {
+                        true => at_start(at_end(distance)),
+                        false => at_end(at_start(distance)),
+                    })
+                };
                 let shifted = (-most..=most)
                     .filter(|k| *k != 0)
-                    .map(|k| s + k as f64 * period);
-                shifted
-                    .chain((-most..=most).map(|k| 2.0 * start - s + k as f64 * period))
-                    .collect()
+                    .map(|k| image(s + k as f64 * period, moved(-k)));
+                let turned = (-most..=most)
+                    .map(|k| image(2.0 * start - s + k as f64 * period, at_start(moved(k))));
+                shifted.chain(turned).collect()
             }
         };
-        std::iter::once(s).chain(mirrored).filter(reaches).collect()
+        std::iter::once(image(s, OWN))
+            .chain(mirrored)
+            .filter(reaches)
+            .collect()
+    }
+
+    /// A distance from the axis, of places that are first reflected in the line across the chain's start or end:
+    /// x → x − 2 t (x − e)·t with the tangent t at the end e. At the axis the line is the axis.
+    fn reflected(&self, distance: Distance, at_end: bool) -> Distance {
+        let x = &self.chain.positions;
+        let n = x.len();
+        if n == 0 {
+            return distance;
+        }
+        let [e, middle, other] = match at_end {
+            true => [n - 1, n - 2, n - 3],
+            false => [0, 1, 2],
+        }
+        .map(|i| x[i]);
+        let along: [f64; 2] = std::array::from_fn(|i| 4.0 * middle[i] - 3.0 * e[i] - other[i]);
+        let length = along[0].hypot(along[1]);
+        let t = match e[0] <= LOCAL * length {
+            true => [1.0, 0.0],
+            false => along.map(|c| c / length),
+        };
+        let [a, b, c] = distance;
+        let part = 2.0 * (a * t[0] + b * t[1]);
+        let offset = e[0] * t[0] + e[1] * t[1];
+        [a - part * t[0], b - part * t[1], c + part * offset]
     }
 
     fn arc(&self, edge: usize) -> [f64; 3] {
@@ -415,7 +492,7 @@ mod tests {
             &average,
             Chain {
                 s,
-                radius: Vec::new(),
+                positions: Vec::new(),
                 mirror_start,
                 mirror_end,
             },
@@ -542,7 +619,7 @@ mod tests {
             ..average(rho)
         };
         let chain = Chain {
-            radius: s.clone(),
+            positions: flat(&s),
             ..Chain::plain(s.clone())
         };
         let averaging = Averaging::new(&surface, chain);
@@ -581,7 +658,7 @@ mod tests {
                     ..average(rho)
                 };
                 let chain = Chain {
-                    radius: s.clone(),
+                    positions: flat(&s),
                     ..Chain::plain(s.clone())
                 };
                 let averaging = Averaging::new(&average, chain);
@@ -608,8 +685,8 @@ mod tests {
                     for edge in 0..corners.len() - 1 {
                         let arc = [s[2 * edge], s[2 * edge + 2], s[2 * edge + 1]];
                         let (from, to) = (arc[0].max(at - rho), arc[1].min(at + rho));
-                        for piece in 0..8 {
-                            let length = (to - from) / 8.0;
+                        for piece in 0..32 {
+                            let length = (to - from) / 32.0;
                             for (xi, w) in rule.iter().filter(|_| length > 0.0) {
                                 let y = from + length * (f64::from(piece) + 0.5 + 0.5 * xi);
                                 let h = edge3::shape(edge3::invert(&arc, y));
@@ -639,6 +716,63 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    /// Rings of a plane.
+    fn flat(s: &[f64]) -> Vec<[f64; 2]> {
+        s.iter().map(|r| [*r, 0.0]).collect()
+    }
+
+    fn over_rings(rho: f64, s: &[f64], positions: Vec<[f64; 2]>, mirrors: [bool; 2]) -> Averaging {
+        let average = Average {
+            measure: Measure::Surface,
+            ..average(rho)
+        };
+        let chain = Chain {
+            s: s.to_vec(),
+            positions,
+            mirror_start: mirrors[0],
+            mirror_end: mirrors[1],
+        };
+        Averaging::new(&average, chain)
+    }
+
+    #[test]
+    fn an_even_pressure_over_rings_stays_beside_mirrors() {
+        let ring = with_midsides(&[3.0, 3.1, 3.25, 3.6, 4.0]);
+        let disc = with_midsides(&[0.0, 0.1, 0.4, 1.0]);
+        // ρ beyond the contact too; up to the first or last mirror that is missing
+        for (s, mirrors, rho, places) in [
+            (&ring, [true, false], 0.4, [3.0, 3.02, 3.5]),
+            (&ring, [false, true], 0.4, [3.5, 3.9, 4.0]),
+            (&ring, [true, true], 0.7, [3.0, 3.3, 4.0]),
+            (&ring, [true, true], 2.5, [3.0, 3.3, 4.0]),
+            (&disc, [true, false], 0.4, [0.0, 0.1, 0.6]),
+            (&disc, [true, true], 0.4, [0.0, 0.7, 1.0]),
+            (&disc, [true, true], 3.3, [0.0, 0.7, 1.0]),
+        ] {
+            let averaging = over_rings(rho, s, flat(s), mirrors);
+            for at in places {
+                let one = averaging.row(at).apply(&vec![1.0; s.len()]);
+                assert!((one - 1.0).abs() < 1e-8, "{mirrors:?} {rho} {at}: {one}");
+            }
+        }
+    }
+
+    /// The outside of a barrel r = 3 − z²/4, whole and cut where it is widest.
+    #[test]
+    fn rings_beyond_a_mirror_are_those_of_the_whole() {
+        let [half, whole] = [0.0, -1.0].map(|low| {
+            let edges = (8.0 * (1.0 - low)) as usize;
+            let s: Vec<f64> = (0..=2 * edges).map(|k| low + k as f64 / 16.0).collect();
+            let positions = s.iter().map(|z| [3.0 - 0.25 * z * z, *z]).collect();
+            let averaging = over_rings(0.3, &s, positions, [low == 0.0, false]);
+            let p: Vec<f64> = s.iter().map(|z| 1.0 + z * z).collect();
+            [0.0, 0.1, 0.2].map(|at| averaging.row(at).apply(&p))
+        });
+        for (half, whole) in half.iter().zip(whole) {
+            assert!((half - whole).abs() < 1e-10, "{half} {whole}");
         }
     }
 
