@@ -122,6 +122,8 @@ class Reference:
         self.supports()
         self.condense()
         self.constraints()
+        self.both = set()
+        self.alone = self.nearest()
         self.friction_points()
 
     def supports(self):
@@ -231,11 +233,51 @@ class Reference:
             bonded[k] = (gaps, drags)[which][number][i] - moved(number, i, way)
         return right, bonded
 
+    def common(self):
+        """Ends of two contacts that no support holds, with both."""
+        found = {}
+        for contact in self.contacts:
+            for i in (0, len(contact.nodes) - 1):
+                if contact.nodes[i] not in self.held:
+                    found.setdefault(contact.nodes[i], []).append((contact, i))
+        return {node: ends for node, ends in found.items() if len(ends) == 2}
+
+    def nearest(self):
+        """Of which contact a common end is first taken to be: that whose obstacle overlaps the body there or is nearer (3.11)."""
+        levels = [dict(WHOLE, **step) for step in self.problem.get("steps") or [{}]]
+
+        def gap(contact, i):
+            given = contact.law is not None and contact.law.get("bound") is not None
+            return -np.inf if given else min(contact.gap(level)[i] for level in levels)
+
+        gaps = {node: [gap(*end) for end in ends] for node, ends in self.common().items()}
+        return {
+            node: self.common()[node][0 if own[0] <= own[1] else 1][0] for node, own in gaps.items() if max(own) > 0
+        }  # fmt: skip
+
+    def touching(self, states):
+        """Of which contact each common end is, from the forces of all steps; where both touch, of both."""
+        alone = dict(self.alone)
+        for node, ends in self.common().items():
+            force = [[f[c.index[i]] if i in c.index else 0.0 for c, i in ends] for f in states]
+            if any(min(of) > 0 for of in force):
+                self.both.add(node)
+            if node in self.both:
+                alone.pop(node, None)
+                continue
+            at = [of > 0 for of in force[-1]]
+            anywhere = [any(states[-1][k] > 0 for k in c.index.values()) for c, _ in ends]
+            for own in (at, anywhere if not any(at) else at):
+                if sum(own) == 1:
+                    alone[node] = ends[own.index(True)][0]
+                    break
+        return alone
+
     def oblique(self, contact, i):
         """Whether two directions that are not perpendicular belong to a contact node."""
         node = contact.nodes[i]
         if any(other is not contact and node in other.nodes for other in self.contacts):
-            return True
+            return self.alone.get(node) is not contact
         ways = self.held.get(node, [])
         if not ways or np.linalg.matrix_rank(self.row(node, [1, 0]) ** 2 + self.row(node, [0, 1]) ** 2) == 0:
             return False
@@ -324,6 +366,10 @@ class Reference:
             if which == 0:
                 found[number][i] = force / self.contacts[number].areas[i]
         return found
+
+    def on_axis(self, contact):
+        """Which nodes are on the axis: on a curved side their own shape function has some area, which nothing belongs to (3.5)."""
+        return self.body.axisymmetric * (contact.positions[:, 0] == 0)
 
     def beside_axis(self, contact, forces):
         """The midside node beside one on the axis, where it is in contact: it carries what that node has, R₀ + R₁ (3.5)."""
@@ -478,12 +524,26 @@ class Reference:
         raise last
 
     def solve(self, known=None):
-        """The result of every load step; `known`: profiles at the end of each, near which a solution is sought."""
+        """The result of every load step; `known`: profiles at the end of each, near which a solution is sought.
+
+        Again where an end of two contacts was taken to be of the wrong one.
+        """
+        for _ in range(6):
+            results, states = self.follow(known)
+            alone = self.touching(states)
+            if alone == self.alone:
+                return results
+            self.alone = alone
+            self.friction_points()
+        raise Unsolved("a common end of two contacts changes between them")
+
+    def follow(self, known):
+        """The results of all steps, and the forces of the constraints at the end of each."""
         steps = self.problem.get("steps") or [None]
         for patch in self.patches:
             patch["anchor"] = np.zeros(len(patch["s"]))
         before = dict.fromkeys(WHOLE, 0.0)
-        results = []
+        results, states = [], []
         for number, step in enumerate(steps):
             end = dict(WHOLE)
             increments = 1
@@ -501,7 +561,8 @@ class Reference:
                 self.anchor(level, *state)
             before = end
             results.append(result)
-        return results
+            states.append(state[1])
+        return results, states
 
     def anchor(self, level, v, forces, ties):
         taus = []
@@ -551,7 +612,7 @@ class Reference:
             n, t = (np.einsum("ia,ia->i", found["u"][contact.nodes], way) for way in (contact.normals, contact.tangents))
             profile = {
                 "s": contact.s, "gap": contact.gap(level), "normal_displacement": n, "tangential_displacement": t,
-                "normal_stress": -pressures[number], "areas": ring * contact.areas,
+                "normal_stress": -pressures[number], "areas": ring * contact.areas * (1 - self.on_axis(contact)),
             }  # fmt: skip
             for patch in self.patches:
                 if patch["number"] == number:

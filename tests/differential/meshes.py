@@ -283,7 +283,9 @@ def descendant(first, nodes, elements):
     for name, edges in first.boundaries.items():
         own = {frozenset(e[:2]) for e in edges}
         mesh.boundaries[name] = in_order([fine for fine, edge in parent.items() if frozenset(edge[:2]) in own])
-    centres = [mesh.nodes[list(e[: len(e) // 2])].mean(axis=0) for e in mesh.elements]
+    # of a curved element, the middle of its corners may lie outside
+    middle = lambda e: quad_shape(0, 0) if len(e) == 8 else triangle_shape(1 / 3, 1 / 3)
+    centres = [middle(e) @ mesh.nodes[list(e)] for e in mesh.elements]
     for name, group in first.groups.items():
         points = [first.nodes[list(first.elements[e])] for e in group]
         mesh.groups[name] = [i for i, c in enumerate(centres) if any(holds(p, c) for p in points)]

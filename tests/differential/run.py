@@ -118,11 +118,12 @@ def integral(found, theirs, own, summary, size):
     """The pressure between the nodes, quadratic on each edge, adds up to the normal force."""
     s, pressures = np.array(theirs["s"]), -np.array(theirs["normal_stress"])
     at = [int(np.argmin(np.abs(s - x))) for x in own["s"]]
-    alone = pressures[at][own["areas"] < 1e-12 * own["areas"].max()].max(initial=0.0) > 0 and np.sum(pressures[at] > 0) == 1
-    if alone:
-        return  # the node on the axis has no area: there the profile shows its pressure alone
+    pressures, areas = pressures[at], own["areas"]
+    for end, beside in ((0, 1), (-1, -2)):
+        if areas[end] == 0 and pressures[end] > 0 and pressures[beside] <= 0:
+            return  # the node on the axis has no area: without the one beside it the profile shows its pressure alone
     found["integral of a profile"] = max(
-        found.get("integral of a profile", 0), off(own["areas"] @ pressures[at], summary["normal_force"], size)
+        found.get("integral of a profile", 0), off(areas @ pressures, summary["normal_force"], size)
     )
 
 
