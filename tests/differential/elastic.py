@@ -299,30 +299,38 @@ class Body:
         return x if self.axisymmetric else self.thickness
 
     def loads(self, loads):
-        force = np.zeros(self.size)
+        force, left = np.zeros(self.size), {}
+
+        def at_nodes(given, sides=None):
+            for node, f in self.at_nodes(force, given, sides).items():
+                left[node] = left.get(node, 0.0) + f
+
         for load in loads:
             if "body_force" in load:
                 for part in self.parts:
                     np.add.at(force, part.dofs, part.body_force(load["body_force"]))
             elif "force" in load:
-                self.at_nodes(force, dict.fromkeys(self.mesh.node_sets[load["nodes"]], load["force"]))
+                at_nodes(dict.fromkeys(self.mesh.node_sets[load["nodes"]], load["force"]))
             elif "nodal" in load:
                 edges = self.mesh.first_boundaries[load["boundary"]]
                 nodes = [edges[0][0]] + [n for _, end, mid in edges for n in (mid, end)]
-                self.at_nodes(force, dict(zip(nodes, load["nodal"], strict=True)), edges)
+                at_nodes(dict(zip(nodes, load["nodal"], strict=True)), edges)
             else:
                 self.traction(force, load)
+        # a side's forces may come from several sets: its corners and its midsides
+        for node, f in self.at_nodes(force, left).items():
+            force[2 * node : 2 * node + 2] += f / self.ring
         return force
 
     def at_nodes(self, force, given, sides=None):
         """Forces on nodes of the first mesh. Those on all nodes of a side of the surface are the traction on it that does
-        their work on all displacements it has there: on finer meshes they act between the nodes too."""
+        their work on all displacements it has there: on finer meshes they act between the nodes too. Returns those that remain at their nodes."""
         mesh, parts = self.mesh, {}
         for fine, (side, low, high) in mesh.parts.items():
             parts.setdefault(side, []).append((fine, low, high))
-        finer = lambda side: len(parts[side]) > 1 or (mesh.raised and side[2] not in given)
         named = lambda side: side[0] in given and side[1] in given and (side[2] in given or mesh.raised)
-        whole = [side for side in (sides or parts) if named(side) and finer(side)]
+        # of a side that is not divided its forces are these; it has its share of those on its corners
+        whole = [side for side in (sides or parts) if named(side)]
         lengths = {side: arc_lengths(mesh.nodes, [side])[-1] for side in whole}
         around = {}
         for side in whole:
@@ -343,9 +351,7 @@ class Body:
                     for node, h in zip(fine, edge_shape(x)):
                         force[2 * node : 2 * node + 2] += w * (high - low) / 2 * h * (shape(xi) @ stress) / self.ring
         spent = {n for side in whole for n in side}
-        for node, f in given.items():
-            if node not in spent:
-                force[2 * node : 2 * node + 2] += np.array(f) / self.ring
+        return {node: np.array(f) for node, f in given.items() if node not in spent}
 
     def traction(self, force, load):
         edges = self.mesh.boundaries[load["boundary"]]
