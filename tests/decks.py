@@ -39,7 +39,7 @@ def allowed(kind):
     sector of two degrees differs by, with the same decks by up to 15 times what it is with full integration."""
     if kind in ("CAX8R", "CAX6"):
         return 3e-3
-    return ALLOWED["cax"] if kind == "CAX8" else ALLOWED["cpe"]
+    return ALLOWED["ring-cax"] if kind == "CAX8" else ALLOWED["ring-cpe"]
 
 
 class Deck:

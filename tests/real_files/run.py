@@ -28,7 +28,8 @@ DEBIAN = "calculix-ccx-test"
 
 # plane files that are refused for what is wrong with them
 BROKEN = {
-    "axrad2.inp": "its plane elements lie in two planes (z = 0 and z = −0.05)",
+    "beamfsh1.inp": "its first line is `>**`, which is neither a comment nor a keyword",
+    "scheibe.inp": "a set names node 29, which does not exist; CalculiX warns, and leaves it out",
 }
 
 # those of Gmsh's tutorials that are plane, and small
@@ -106,15 +107,24 @@ def tutorials(folder, into):
     return made
 
 
-class Content:
-    """What a file holds, by a reader that is not ours: plane elements, by their nodes."""
+# elements of three dimensions, which Gmsh writes instead of their surface; in a deck they stand beside the plane ones
+SOLID = re.compile(r"tetra|hexahedron|wedge|pyramid")
 
-    def __init__(self, elements, points, others):
+# plane elements of decks with their number of nodes: solids, and what has a plane shape and another stiffness
+PLANE = re.compile(r"(CPE|CPS|CAX|STRI|M3D|SFM3D|DC2D|DCAX|DS|S)(\d)")
+
+
+class Content:
+    """What a file holds, by a reader that is not ours: plane elements, by their nodes; `foreign`: the types of those that are
+    geometry here, but have another stiffness (shells, membranes)."""
+
+    def __init__(self, elements, points, others, foreign=()):
         self.others = sorted(others)
+        self.foreign = sorted(foreign)
         self.elements = elements
         used = {node for element in elements for node in element}
         z = {points[node][2] for node in used if node in points}
-        self.plane = bool(elements) and not any(is_solid(name) for name in others) and len(z) == 1
+        self.plane = bool(elements) and not any(SOLID.match(name) for name in others) and len(z) == 1
         self.missing = any(node not in points for node in used)
         # elements of first order get midsides, which neighbours share
         second = {edge(e, k) for e in elements if len(e) in (6, 8, 9) for k in range(corners(e))}
@@ -129,11 +139,6 @@ def corners(element):
 
 def edge(element, k):
     return frozenset((element[k], element[(k + 1) % corners(element)]))
-
-
-def is_solid(name):
-    """Elements that no plane body has."""
-    return bool(re.match(r"(C3D|DC3D|F3D|S\d|DS\d|M3D|SC|U1|US|tetra|hexahedron|wedge|pyramid|STRI|ACIN|R3D|B3[12]|D$|DCOUP)", name))
 
 
 def content(path):
@@ -154,7 +159,7 @@ def gmsh_content(path):
 
 def deck_content(path):
     """meshio reads few decks of CalculiX: nodes and elements, by the format's own rules."""
-    points, elements, others, pending, mode = {}, [], set(), [], None
+    points, elements, others, foreign, pending, mode = {}, [], set(), set(), [], None
     for line in path.read_text(encoding="latin-1").splitlines():
         line = line.strip()
         if not line or line.startswith("**"):
@@ -168,9 +173,10 @@ def deck_content(path):
                 mode = "node"
             elif name == "*ELEMENT":
                 kind = next((word.split("=")[1].strip() for word in words if word.replace(" ", "").startswith("TYPE=")), "")
-                plane = re.match(r"(CPE|CPS|CAX)(\d)", kind)
+                plane = PLANE.match(kind)
                 mode = int(plane[2]) if plane else None
                 others |= set() if plane else {kind}
+                foreign |= {kind} if plane and not plane[1].startswith("C") else set()
         elif mode == "node":
             words = [word.strip() for word in line.split(",")]
             values = [float(word.upper().replace("D", "E")) if word else 0.0 for word in words[1:4]]
@@ -180,7 +186,7 @@ def deck_content(path):
             while len(pending) > mode:
                 elements.append(tuple(pending[1 : mode + 1]))
                 pending = pending[mode + 1 :]
-    return Content(elements, points, others)
+    return Content(elements, points, others, foreign)
 
 
 def run(program, path):
@@ -271,7 +277,7 @@ def look(program, path):
         fault = is_read and not isinstance(expected, str) and path.name not in BROKEN
         return [what + (f" ({others})" if others else ""), "read" if is_read else f"refused: {mesh}", "", fault]
     right = (expected.nodes, len(expected.elements))
-    what = f"plane, {right[1]} elements"
+    what = f"plane, {right[1]} elements" + (f" ({', '.join(expected.foreign)})" if expected.foreign else "")
     if mesh != right:
         fault = path.name not in BROKEN
         return [what, f"refused: {mesh}" if isinstance(mesh, str) else f"{mesh} for {right}", BROKEN.get(path.name, ""), fault]
@@ -281,7 +287,7 @@ def look(program, path):
         if code == 0:
             off = against_calculix(path, displacements(program, path))
             row[2] = "solved" if off is None else f"solved; from CalculiX {off[0]:.0e}"
-            row[3] = off is not None and off[0] > off[1]
+            row[3] = bool(expected.foreign) or (off is not None and off[0] > off[1])
         else:
             row[2] = f"refused: {words(lines)}"
     return row
