@@ -178,7 +178,11 @@ fn faults_of_a_mesh_are_reported_with_their_line() {
             "      3,          2.0,          0.0, 5",
             "z = 0 at node 1 and 5 at node 3",
         ),
-        ("both, S3", "booth, S3", "`booth` in the surface `Upper`"),
+        (
+            "both, S3",
+            "booth, S3",
+            "line 24: `booth` in the surface `Upper`",
+        ),
         (
             "*Instance, name=Part-1-1, part=Part-1",
             "*Instance, name=Part-1-1, part=Part-2",

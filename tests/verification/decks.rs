@@ -435,6 +435,14 @@ fn a_set_of_nodes_may_be_that_of_elements() {
         list[0].got.contains("`E3` in the set `Q`") && list[0].hint.contains("E2"),
         "{list:#?}"
     );
+    // a number that no node has is found by its line
+    let deck = block("*NSET, NSET=N1\n4, 999, 10\n", "");
+    let Err(ReadError::Invalid(list)) = abaqus::read(deck.as_bytes()) else {
+        panic!("a node that is missing");
+    };
+    let line = deck.lines().position(|text| text.contains("N1")).unwrap() + 1;
+    let got = [line, line + 1].map(|line| format!("line {line}: node 999 in the set `N1`"));
+    assert!(got.contains(&list[0].got), "{list:#?}");
 }
 
 #[test]
@@ -524,6 +532,19 @@ fn other_elements_are_left_out_of_a_mesh_and_refused_in_a_problem() {
             "{found:?}"
         );
     }
+    // rigid lines of a rigid body are its surface; those beside them would hold the nodes of the body together
+    let rigid = "*NODE\n51, 0, 3\n52, 2, 3\n53, 1, 3\n*ELEMENT, TYPE=R2D2, ELSET=TOOL\n71, 51, 52\n\
+        *RIGID BODY, ELSET=TOOL, REF NODE=53\n*BOUNDARY\n53, 1, 2\n53, 6\n";
+    let beside = "*ELEMENT, TYPE=R2D2, ELSET=BAR\n72, 6, 9\n";
+    problem(&block(&format!("{rigid}{HELD}"), "*CLOAD\nR, 1, 2.\n"));
+    let found = refused(&block(
+        &format!("{rigid}{beside}{HELD}"),
+        "*CLOAD\nR, 1, 2.\n",
+    ));
+    assert!(
+        found.len() == 1 && found[0].contains("`R2D2` that no *RIGID BODY has"),
+        "{found:?}"
+    );
     let mass = format!("*ELEMENT, TYPE=MASS, ELSET=Point\n7, 5\n*MASS, ELSET=Point\n3.\n{HELD}");
     near(
         corner(&block(&mass, "*CLOAD\nR, 1, 2.\n")),

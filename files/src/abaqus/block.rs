@@ -29,6 +29,8 @@ pub(super) enum Block {
     Nodes(Option<Name>),
     Elements {
         shape: Shape,
+        /// Lines of a rigid surface.
+        is_rigid: bool,
         set: Option<Name>,
         pending: Vec<u64>,
         /// The last line of an element of unknown size ended in a comma.
@@ -97,14 +99,22 @@ impl Deck {
             } => self.plane_elements((*family, *nodes), set, pending, line, text),
             Block::Elements {
                 shape: Shape::Line(nodes),
+                is_rigid,
                 set,
                 ..
-            } => self.line_element(*nodes, set, line, text),
+            } => {
+                self.line_element(*nodes, set, line, text);
+                let next = self.here.numbered.len() as u32;
+                if let (true, Some(lines)) = (*is_rigid, self.here.rigid_lines.last_mut()) {
+                    lines.places.end = next;
+                }
+            }
             Block::Elements {
                 shape: Shape::Other(nodes),
                 set,
                 pending,
                 continued,
+                ..
             } => self.other_element(*nodes, set, (pending, continued), text),
             Block::NodeSet { name, of, generate } => {
                 if let Some(found) = self.members(*generate, line, text) {

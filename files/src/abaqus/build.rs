@@ -5,8 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::contact_parts::{Analytical, Held, RigidBody};
 use super::deck::Deck;
 use super::element::Mechanics;
+use super::keyword::REMOVE_ELEMENTS;
 use super::names::{Key, Meant, Names, Room, unknown};
-use super::part::{Numbered, Part};
+use super::part::{Numbered, Part, RigidLines};
 use super::rigid::{Search, Tools};
 use super::scope::{Kind, Scope};
 use super::written::{
@@ -124,6 +125,7 @@ struct Merged {
     numbered: Vec<Numbered>,
     types: Vec<Mechanics>,
     unused_type: Option<(u64, String)>,
+    rigid_lines: Vec<RigidLines>,
     rows: Rows,
     incomplete: Incomplete,
     /// Members of sets and surfaces, as they are written.
@@ -226,6 +228,11 @@ impl Merged {
             }
         }
         self.unused_type = self.unused_type.take().or(part.unused_type);
+        self.rigid_lines
+            .extend(part.rigid_lines.into_iter().map(|lines| RigidLines {
+                places: lines.places.start + numbered..lines.places.end + numbered,
+                ..lines
+            }));
         let rows = &mut self.rows;
         rows.sections
             .extend(part.sections.into_iter().map(|row| (place, row)));
@@ -270,6 +277,18 @@ impl Merged {
         };
         let held = std::mem::take(&mut self.rows.held);
         let tools = search.tools(&self.rows.rigid_bodies, &self.rows.analytical, held);
+        for lines in &self.rigid_lines {
+            let known = |place: u32| tools.members.contains(&place);
+            if !(lines.places.clone().all(known) || self.incomplete.names) {
+                self.doubts.add(on_line(
+                    lines.line,
+                    Reason::Unsupported,
+                    format!("{} that no *RIGID BODY has", lines.what),
+                    "rigid lines as the surface of a *RIGID BODY, ELSET=…, REF NODE=…",
+                    REMOVE_ELEMENTS,
+                ));
+            }
+        }
         if tools.elements.is_empty() {
             return tools;
         }
@@ -506,8 +525,13 @@ impl Merged {
         expected: &str,
         known: impl FnOnce() -> Vec<String>,
     ) {
-        let got = format!("line {line}: `{got:.60}`");
-        unknown(&mut self.doubts, &got, expected, known);
+        unknown(
+            &mut self.doubts,
+            line,
+            &format!("`{got:.60}`"),
+            expected,
+            known,
+        );
     }
 
     /// The surfaces of the deck, and the sides that it loads; returns the rows of loads.
@@ -641,6 +665,7 @@ impl Building<'_> {
                         let got = format!("`{:.60}` in the surface `{name:.60}`", word(target));
                         unknown(
                             &mut merged.faults,
+                            line,
                             &got,
                             "an element or a set of elements",
                             || self.names.all_sets(Kind::Elements),

@@ -17,8 +17,6 @@ pub(super) struct DeckContact {
     pub(super) current: Option<Name>,
     /// The lines of `*STEP`, and the increments that `*STATIC` begins with.
     pub(super) steps: Vec<(u64, Option<f64>)>,
-    /// The first block of rigid lines: its line, and what it is.
-    pub(super) rigid_lines: Option<(u64, String)>,
 }
 
 impl DeckContact {

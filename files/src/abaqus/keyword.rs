@@ -3,7 +3,7 @@
 use super::block::{Block, Rows};
 use super::deck::{Deck, Inside};
 use super::element::{ElementType, Shape};
-use super::part::Part;
+use super::part::{Part, RigidLines};
 use super::written::{
     Amplitude, Elastic, Incomplete, MOST_NAMES, Name, Orientation, Section, fields,
 };
@@ -167,6 +167,10 @@ impl Keyword {
             .is_some_and(|given| given.eq_ignore_ascii_case(value))
     }
 }
+
+/// What a problem can have of elements, and what to do about others.
+const SOLIDS: &str = "CPE, CPS or CAX with 3, 4, 6 or 8 nodes (and R, I, H, M or T)";
+pub(super) const REMOVE_ELEMENTS: &str = "Remove them from the problem, or use the deck as a mesh: there they are left out or name boundaries.";
 
 /// Rigid lines in the plane, and of a body of revolution: without stiffness of their own.
 fn is_rigid_line(kind: &str) -> bool {
@@ -496,6 +500,7 @@ impl Deck {
             );
         }
         let kind = ElementType::new(&name);
+        let is_rigid = is_rigid_line(&name);
         let got = format!("elements of type `{name:.20}`");
         match kind.mechanics {
             Some(mechanics) => {
@@ -504,22 +509,22 @@ impl Deck {
                 }
             }
             None if kind.idle => {}
-            // whether a rigid body has them is known at the end
-            None if is_rigid_line(&name) => {
-                self.contact.rigid_lines.get_or_insert((line, got.clone()));
+            None if is_rigid => {
+                let next = self.here.numbered.len() as u32;
+                self.here.rigid_lines.push(RigidLines {
+                    line,
+                    what: got.clone(),
+                    places: next..next,
+                });
             }
-            None => self.doubt(
-                line,
-                got.clone(),
-                "CPE, CPS or CAX with 3, 4, 6 or 8 nodes (and R, I, H, M or T)",
-                "Remove them from the problem, or use the deck as a mesh: there they are left out or name boundaries.",
-            ),
+            None => self.doubt(line, got.clone(), SOLIDS, REMOVE_ELEMENTS),
         }
         if matches!(kind.shape, Shape::Other(_)) {
             self.here.unused_type.get_or_insert((line, got));
         }
         Block::Elements {
             shape: kind.shape,
+            is_rigid,
             set,
             pending: Vec::new(),
             continued: false,

@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::deck::Deck;
 use super::scope::{Kind, Scope};
 use super::written::{Name, Set, Target, on_line};
-use solver::error::{Findings, Reason, Violation};
+use solver::error::{Findings, Reason};
 
 /// A set by the place of its scope and its name.
 pub(super) type Key = (usize, Name);
@@ -236,9 +236,13 @@ impl<'a> Members<'a> {
             };
             if !known && depth == 0 && !self.names.scopes[0].incomplete.names {
                 let got = format!("`{elements:.60}` in the set `{:.60}`", self.name);
-                unknown(faults, &got, "a set of elements (*ELSET)", || {
-                    self.names.all_sets(Kind::Elements)
-                });
+                unknown(
+                    faults,
+                    self.line,
+                    &got,
+                    "a set of elements (*ELSET)",
+                    || self.names.all_sets(Kind::Elements),
+                );
             }
         }
         for (instance, members) in &set.of_instances {
@@ -250,7 +254,13 @@ impl<'a> Members<'a> {
                         "the instance `{instance:.60}` of the set `{:.60}`",
                         self.name
                     );
-                    unknown(faults, &got, "the name of an *INSTANCE", Vec::new);
+                    unknown(
+                        faults,
+                        self.line,
+                        &got,
+                        "the name of an *INSTANCE",
+                        Vec::new,
+                    );
                 }
             }
         }
@@ -284,6 +294,7 @@ impl<'a> Members<'a> {
                     let got = format!("{what}s {first} to {last} in the set `{:.60}`", self.name);
                     unknown(
                         faults,
+                        self.line,
                         &got,
                         &format!("numbers that {what}s have"),
                         Vec::new,
@@ -308,6 +319,7 @@ impl<'a> Members<'a> {
                     if place.incomplete.names || names.scopes[0].incomplete.names => {}
                 (Target::Set(other), None) => unknown(
                     faults,
+                    self.line,
                     &format!("`{other:.60}` in the set `{:.60}`", self.name),
                     &format!("a {what} or a set (*{})", kind.keyword()),
                     || names.all_sets(kind),
@@ -316,6 +328,7 @@ impl<'a> Members<'a> {
                     let got = format!("{what} {label} in the set `{:.60}`", self.name);
                     unknown(
                         faults,
+                        self.line,
                         &got,
                         &format!("a number that a {what} has"),
                         Vec::new,
@@ -377,6 +390,7 @@ const MOST_LISTED: usize = 20;
 /// Reports a name or number that nothing has; `known`: the names that there are.
 pub(super) fn unknown(
     faults: &mut Findings,
+    line: u64,
     got: &str,
     expected: &str,
     known: impl FnOnce() -> Vec<String>,
@@ -393,7 +407,13 @@ pub(super) fn unknown(
         true => "Correct the number.".to_owned(),
         false => format!("Known names: {}.", names.join(", ")),
     };
-    faults.add(Violation::new("", Reason::UnknownName, got, expected, hint));
+    faults.add(on_line(
+        line,
+        Reason::UnknownName,
+        got.to_owned(),
+        expected,
+        &hint,
+    ));
 }
 #[cfg(test)]
 mod tests {

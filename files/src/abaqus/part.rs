@@ -1,6 +1,7 @@
 //! A part of a deck, with numbers and names of its own, and where an instance of it is.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use super::contact_parts::{Analytical, Held, RigidBody};
 use super::element::Mechanics;
@@ -18,6 +19,16 @@ pub(super) enum Numbered {
     Line(u32),
     /// Of no use to a plane mesh.
     Other,
+}
+
+/// A block of rigid lines: a problem has them as the surface of a rigid body only.
+#[derive(Clone)]
+pub(super) struct RigidLines {
+    /// The line of its keyword, and what it is.
+    pub(super) line: u64,
+    pub(super) what: String,
+    /// The places of its elements among all of its part.
+    pub(super) places: Range<u32>,
 }
 
 /// What a part defines, or an instance of it, or the assembly: in a deck without parts all of it.
@@ -39,6 +50,8 @@ pub(super) struct Part {
     pub(super) with_centre: usize,
     /// The first type of element that is of no use to a plane mesh, and its line.
     pub(super) unused_type: Option<(u64, String)>,
+    /// Rigid lines, block by block.
+    pub(super) rigid_lines: Vec<RigidLines>,
     pub(super) types: Vec<Mechanics>,
     pub(super) node_sets: BTreeMap<Name, Set>,
     pub(super) element_sets: BTreeMap<Name, Set>,

@@ -50,7 +50,6 @@ pub fn problem_with_warnings(text: &str) -> Result<(Problem, Vec<Warning>), Vec<
     let thickness = thickness.unwrap_or(1.0);
     let materials = materials(&mut built);
     built.check_steps();
-    built.check_rigid_lines();
     let supports = supports(&built);
     for (line, name) in supports.of_no_element {
         built.doubt(
@@ -126,19 +125,6 @@ impl Built {
             0 => Violation::new("", reason, got.into(), expected, hint),
             _ => on_line(line, reason, got.into(), expected, hint),
         });
-    }
-
-    /// Rigid lines that are of no rigid body would join nodes of the elastic one.
-    fn check_rigid_lines(&mut self) {
-        let lines = self.deck.contact.rigid_lines.clone();
-        if let Some((line, got)) = lines.filter(|_| self.tools.bodies.is_empty()) {
-            self.doubt(
-                line,
-                got,
-                "a *RIGID BODY that they are of",
-                "Remove them, or name their set by *RIGID BODY, ELSET=…, REF NODE=….",
-            );
-        }
     }
 
     fn check_steps(&mut self) {

@@ -20,6 +20,8 @@ pub(super) struct Tools {
     pub(super) by_surface: BTreeMap<String, (usize, Vec<Piece>)>,
     /// Places of plane elements of rigid bodies: they are no part of the elastic body.
     pub(super) elements: BTreeSet<u32>,
+    /// Places of all elements of rigid bodies among all elements.
+    pub(super) members: BTreeSet<u32>,
     /// Rows of `*BOUNDARY` for reference nodes, in the order of the deck.
     pub(super) rows: Vec<Moving>,
 }
@@ -143,6 +145,7 @@ impl Search<'_> {
                 tools.elements.insert(place);
             }
         }
+        tools.members = owner.into_keys().collect();
         tools
     }
 
