@@ -538,6 +538,34 @@ fn a_tilted_floor_behind_the_end_of_a_disc_is_no_overlap() {
     }
 }
 
+/// A floor that ends where a curved side still looks at it has one node there for each of its ends, however long it is: the
+/// side is divided where its own normal passes the end. Divided again beside that, it was made of needles, and the solution
+/// did not converge.
+#[test]
+fn a_curved_side_is_divided_once_at_each_end_of_a_floor() {
+    for (angle, normal) in [(0.0, "obstacle"), (0.5, "body"), (-3.0, "body")] {
+        let mut text = half_disc(angle, "line");
+        text["contacts"][0]["normal"] = json!(normal);
+        let endless = solve(&problem(&text.to_string()));
+        let (sine, cosine) = f64::to_radians(angle).sin_cos();
+        let at = |part: f64| [4.0 * sine + part * cosine, -4.0 * cosine + part * sine];
+        for half in [3.1, 4.4, 5.7, 7.3, 9.0, 14.0] {
+            text["contacts"][0]["obstacle"] =
+                json!({"kind": "polyline", "points": [at(-half), at(half)]});
+            let problem = problem(&text.to_string());
+            let solution = solve(&problem);
+            // a quadrilateral becomes three triangles, with four nodes more
+            let more = Model::new(&problem, None).unwrap().mesh.nodes.len() - 797;
+            assert_eq!(more, 8, "{half} at {angle}");
+            let cut = |w: &Warning| w.code == WarningCode::ObstacleCutsEdge;
+            assert!(!solution.summary.warnings.iter().any(cut));
+            // of the ends, far from the contact, only the triangles are felt
+            let forces = [&solution, &endless].map(|s| s.summary.normal_force);
+            close(forces[0], forces[1], 1e-5);
+        }
+    }
+}
+
 /// A box round the body: what lies behind a side is for another side, also where that overlaps it, and whichever way round
 /// the box is drawn.
 #[test]

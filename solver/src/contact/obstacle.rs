@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::curve::{Curve, Hit, Ray, Side};
 use super::shape::{Corner, Shape};
+use super::smooth::edge_normal;
 use super::{ContactBoundary, HeldDirections, Profile, ROUNDING, edge_nodes, length_through};
 use crate::element::edge3;
 use crate::mesh::{Edge, Mesh};
@@ -281,9 +282,16 @@ impl<'a> View<'a> {
             return Vec::new();
         };
         let normals = self.own_normals(edge);
+        let positions = edge_nodes(k).map(|node| self.whole.positions[node]);
         let faced = |xi: f64| {
-            let (place, n, c) = self.place_between(k, xi, &normals);
-            let distance = self.seen_from_place(place, n, c)?.profile.distance;
+            let (mut place, mut n, c) = self.place_between(k, xi, &normals);
+            let mut rounding = self.rounding;
+            if ![-1.0, 0.0, 1.0].contains(&xi) {
+                // the normal that a node has if it is put there, and half the tolerance that it then has: it sees the curve
+                (place, n) = (edge3::map(&positions, xi).0, edge_normal(&positions, xi));
+                rounding *= 0.5;
+            }
+            let distance = self.seen_within(rounding, place, n, c)?.profile.distance;
             Some((distance, [0, 1].map(|a| place[a] + distance * n[a])))
         };
         let [start, end, _] = edge_nodes(k);
@@ -330,13 +338,17 @@ impl<'a> View<'a> {
     }
 
     fn seen_from_place(&self, place: [f64; 2], n: [f64; 2], c: f64) -> Option<Seen> {
+        self.seen_within(self.rounding, place, n, c)
+    }
+
+    fn seen_within(&self, rounding: f64, place: [f64; 2], n: [f64; 2], c: f64) -> Option<Seen> {
         let t = tangent(n);
         if let Some(curve) = self.shape.in_space() {
             let ray = Ray { place, n, t };
-            let Hit { profile, pieces } = curve.faced_by(&ray, self.rigid, self.rounding)?;
+            let Hit { profile, pieces } = curve.faced_by(&ray, self.rigid, rounding)?;
             return Some(Seen { profile, pieces });
         }
-        let (distance, slope) = self.shape.at(c, self.rounding)?;
+        let (distance, slope) = self.shape.at(c, rounding)?;
         let profile = Profile {
             distance,
             slope: slope * self.per_length(t),

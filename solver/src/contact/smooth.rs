@@ -28,12 +28,15 @@ const CORNER: f64 = 0.26;
 pub type Side = [[f64; 2]; 3];
 
 /// Unit outward normals of an edge at its start, end and midside.
-pub fn edge_normals(positions: &[[f64; 2]; 3]) -> [[f64; 2]; 3] {
-    [-1.0, 1.0, 0.0].map(|xi| {
-        let [dx, dy] = edge3::map(positions, xi).1;
-        let length = dx.hypot(dy);
-        [-dy / length, dx / length]
-    })
+pub fn edge_normals(positions: &Side) -> [[f64; 2]; 3] {
+    [-1.0, 1.0, 0.0].map(|xi| edge_normal(positions, xi))
+}
+
+/// Unit outward normal of an edge at a place of it, −1 … 1.
+pub fn edge_normal(positions: &Side, xi: f64) -> [f64; 2] {
+    let [dx, dy] = edge3::map(positions, xi).1;
+    let length = dx.hypot(dy);
+    [-dy / length, dx / length]
 }
 
 /// How far the direction of a side at its ends may be off that of the surface (angle).
