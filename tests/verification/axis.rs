@@ -128,6 +128,25 @@ fn the_axis_stays_closed_under_a_flat_punch_and_open_under_a_hollow_one() {
     assert_eq!(hollow.node_profiles["top"].state[0], NodeState::Open);
 }
 
+/// A hollow that ends within the first element, however shallow, pushes the node beside the axis by an eighth of its depth too
+/// far: told on a mesh with many elements in the contact, and not where the mesh resolves it, or nothing is hollow.
+#[test]
+fn a_hollow_within_the_first_element_is_told() {
+    let told = |x: f64, depth: f64| {
+        let obstacle =
+            json!({"kind": "table", "x": [0, x, 2], "gap": [depth, 0, 0], "from": 0, "to": 0.8});
+        let solution = pressed(obstacle, 0.02, false, None);
+        let warnings = &solution.summary.warnings;
+        warnings
+            .iter()
+            .any(|w| w.message.contains("The node on the axis is open"))
+    };
+    assert!(told(0.04, 0.04));
+    assert!(told(0.04, 1.0));
+    assert!(!told(0.3, 0.05));
+    assert!(!told(0.04, 0.0));
+}
+
 /// 2π ∫ p r dr by the parabolas through the nodes, on straight edges of one height; exact by Simpson's rule.
 fn integral(solution: &Solution, boundary: &str) -> f64 {
     let profile = &solution.node_profiles[boundary];

@@ -25,6 +25,9 @@ const TURN: f64 = 0.02;
 /// More than this part of the friction must not be lost at the ends without a word.
 const MOST_LOST: f64 = 0.05;
 
+/// A node may press so far from the obstacle, as a part of the largest displacement along the normal.
+const MOST_EARLY: f64 = 0.01;
+
 /// With fewer edges than this across a contact, its pressure is not reliable.
 const FEWEST_EDGES: usize = 6;
 
@@ -122,6 +125,14 @@ impl PatchView<'_> {
                 format!(
                     "Only {edges} whole element(s) lie in the contact; at least {FEWEST_EDGES} are needed for a pressure to rely on. {} Refine the mesh there.",
                     self.peak_uncertainty(edges)
+                ),
+            );
+        }
+        if let Some(opening) = self.pressed_beside_open_axis() {
+            warn(
+                WarningCode::MeshTooCoarseForContact,
+                format!(
+                    "The node on the axis is open, and the midside node beside it presses while it is still {opening:.3e} from the obstacle: what the obstacle leaves free at the axis lies within the first element, where the pressure and the displacements are wrong. Refine the mesh there, or end the obstacle's profile where it begins."
                 ),
             );
         }
@@ -293,6 +304,23 @@ impl PatchView<'_> {
             true => own.chunks(3).map(cancels).collect(),
             false => Vec::new(),
         }
+    }
+
+    /// How far from the obstacle a midside node presses beside an open node on the axis, by u₁ − u₀/8 ≤ s₁ − s₀/8 (formulation
+    /// 3.5); none where that is little beside the displacements.
+    fn pressed_beside_open_axis(&self) -> Option<f64> {
+        let first = self.patch.first;
+        let moved = |i: usize| self.system.normal_displacement(self.v, first + i).abs();
+        let largest = (0..self.count()).map(moved).fold(0.0, f64::max);
+        let opening = |i: usize| {
+            let end = self.system.nodes[first + i].beside_axis?;
+            let pressed = self.active(i) && !self.finished.state.active[end];
+            pressed.then(|| self.system.opening(self.v, first + i))
+        };
+        let openings = (0..self.count()).filter_map(opening);
+        openings
+            .reduce(f64::max)
+            .filter(|opening| *opening > MOST_EARLY * largest)
     }
 
     /// A node on a line of symmetry: on the axis, or held along the tangent.
