@@ -4,7 +4,7 @@ Usage: run.py SIGNORINI [--write]
 
 The files are fetched by pip and apt-get into target/real_files and are not part of the repository. A registry that cannot
 be reached ends the run with exit code 1 and its name: nothing is skipped silently. Without --write the page is compared.
-Needs the packages of requirements.txt (meshio counts, gmsh meshes its own tutorials) and CalculiX (ccx).
+Needs the packages of requirements.txt beside it (meshio counts, gmsh meshes its own tutorials) and CalculiX (ccx).
 """
 
 import collections
