@@ -258,6 +258,7 @@ class Reference:
     def touching(self, states):
         """Of which contact each common end is, from the forces of all steps; where both touch, of both."""
         alone = dict(self.alone)
+        states = [np.where(f > 1e-9 * np.abs(f).max(initial=0.0), f, 0.0) for f in states]  # without rounding
         for node, ends in self.common().items():
             force = [[f[c.index[i]] if i in c.index else 0.0 for c, i in ends] for f in states]
             if any(min(of) > 0 for of in force):
