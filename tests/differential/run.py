@@ -76,8 +76,9 @@ def compare(problem, document, reference, results):
     if len(fields["x"]) != len(mesh.nodes) or distance.max() > 1e-9 * mesh.size or len(set(at)) != len(at):
         return {"nodes": np.inf}
     ours = np.column_stack([fields["ux"], fields["uy"]])[at]
-    largest = np.abs(last["u"]).max()
-    found["displacements"] = off(ours, last["u"])
+    # a step that takes all loads away leaves rounding of the displacements before it
+    largest = max(np.abs(result["u"]).max() for result in results)
+    found["displacements"] = off(ours, last["u"], 1e-3 * largest)
     gauss = fields["gauss"]
     points = cKDTree(np.column_stack([gauss["x"], gauss["y"]]))
     stresses = np.column_stack([gauss[f"stress_{c}"] for c in ("xx", "yy", "zz", "xy")])

@@ -404,7 +404,7 @@ async fn a_watch_and_a_wait_go_on_when_the_service_comes_back() {
     let mut server = Server::start(SIGNORINI, &["--workers", "1"]).await;
     let folder = tempfile::tempdir().unwrap();
     let port = server.url.rsplit(':').next().unwrap().to_owned();
-    let file = write(folder.path(), "large.json", &block(120, 110).to_string());
+    let file = write(folder.path(), "large.json", &block(240, 200).to_string());
     let submit = ["submit", &file, "-q", "--cache", "off"];
     let id = ends(&server.url, &submit, 0).await.0.trim().to_owned();
     server.until_running(&id).await;

@@ -372,8 +372,7 @@ fn fillets_are_a_spline() {
         json!({"boundary": "FACE", "normal": "obstacle", "indentation": 0.05,
         "obstacle": {"kind": "rounded_flat", "half_width": 1.0, "radius": 0.5}}),
     )];
-    // edges are divided where the exact shape ends; the spline goes on upwards
-    close(numbers(&solve(&exact)), numbers(&solve(&problem)), 3e-4);
+    close(numbers(&solve(&exact)), numbers(&solve(&problem)), 1e-5);
 }
 
 /// What cannot be translated is refused in words, with what is written instead.

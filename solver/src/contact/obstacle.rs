@@ -103,18 +103,31 @@ fn along(mesh: &Mesh, chain: &[Edge], held: &HeldDirections) -> ContactBoundary 
 }
 
 /// Where an obstacle ends inside edges of `boundary` (edges that follow one another): those edges, with the place of the
-/// end on each, −1 … 1.
-pub fn ends_inside_edges(mesh: &Mesh, boundary: &[Edge], obstacle: &Obstacle) -> Vec<(Edge, f64)> {
+/// end on each, −1 … 1. `deepest`: the largest indentation; of a curve in space that an edge then does not reach, no end matters.
+pub fn ends_inside_edges(
+    mesh: &Mesh,
+    boundary: &[Edge],
+    obstacle: &Obstacle,
+    deepest: f64,
+) -> Vec<(Edge, f64)> {
     // supports turn a normal by rounding only
     let free = HeldDirections::new();
     let view = View::new(mesh, boundary, &free, obstacle);
-    let limits = view.limits(obstacle);
+    // a rounded flat ends in two flanks: a node there would face along the body what is beside it
+    let limits = match obstacle {
+        Obstacle::RoundedFlat { from, to, .. } => [
+            from.unwrap_or(f64::NEG_INFINITY),
+            to.unwrap_or(f64::INFINITY),
+        ],
+        _ => view.limits(obstacle),
+    };
     let mut found = Vec::new();
     for (k, edge) in boundary.iter().enumerate() {
         for end in limits.into_iter().filter(|end| end.is_finite()) {
             found.extend(view.place_of(k, end).map(|xi| (*edge, xi)));
         }
-        found.extend(view.ends_faced(k, edge).into_iter().map(|xi| (*edge, xi)));
+        let ends = view.ends_of_sight(k, edge, deepest);
+        found.extend(ends.into_iter().map(|xi| (*edge, xi)));
     }
     found
 }
@@ -275,10 +288,10 @@ impl<'a> View<'a> {
     }
 
     /// Where an edge faces an end of a curve in space along the edge's own normals. A curve that is lost from sight before its end
-    /// has none there: the body turns away from it, or another part of it comes before. Round a corner of the body it is not faced
-    /// either, though it overlaps the body there.
-    fn ends_faced(&self, k: usize, edge: &Edge) -> Vec<f64> {
-        let Some(ends) = self.shape.in_space().and_then(Curve::ends) else {
+    /// has none there: it turns away, and its flank, steeper than 45°, is no place for a node. Round a corner of the body nothing
+    /// ends: what overlaps the body there is faced by the other side.
+    fn ends_of_sight(&self, k: usize, edge: &Edge, deepest: f64) -> Vec<f64> {
+        let Some(curve_ends) = self.shape.in_space().and_then(Curve::ends) else {
             return Vec::new();
         };
         let normals = self.own_normals(edge);
@@ -291,9 +304,14 @@ impl<'a> View<'a> {
                 (place, n) = (edge3::map(&positions, xi).0, edge_normal(&positions, xi));
                 rounding *= 0.5;
             }
-            let distance = self.seen_within(rounding, place, n, c)?.profile.distance;
-            Some((distance, [0, 1].map(|a| place[a] + distance * n[a])))
+            let profile = self.seen_within(rounding, place, n, c)?.profile;
+            Some((profile, [0, 1].map(|a| place[a] + profile.distance * n[a])))
         };
+        let distance = |xi: f64| faced(xi).map(|(profile, _)| profile.distance);
+        let touches = |xi: f64| distance(xi).is_some_and(|distance| distance <= deepest);
+        if ![-1.0, 0.0, 1.0].into_iter().chain(BETWEEN).any(touches) {
+            return Vec::new();
+        }
         let [start, end, _] = edge_nodes(k);
         let round_corner = |xi: f64| {
             let corner = match xi {
@@ -301,10 +319,10 @@ impl<'a> View<'a> {
                 1.0 => self.whole.corner(end),
                 _ => 0.0,
             };
-            corner != 0.0 && faced(xi).is_some_and(|(distance, _)| distance < 0.0)
+            corner != 0.0 && distance(xi).is_some_and(|distance| distance < 0.0)
         };
         let end_in = |[first, last]: [f64; 2]| {
-            let [from, to] = match [faced(first).is_some(), faced(last).is_some()] {
+            let [from, to] = match [first, last].map(|xi| distance(xi).is_some()) {
                 [true, false] => [first, last],
                 [false, true] => [last, first],
                 _ => return None,
@@ -313,10 +331,10 @@ impl<'a> View<'a> {
                 return None;
             }
             // the last place from which it is seen
-            let xi = bisected(|xi| faced(xi).is_some(), from, to)?;
-            let (_, [x, y]) = faced(xi)?;
+            let xi = bisected(|xi| distance(xi).is_some(), from, to)?;
+            let (profile, [x, y]) = faced(xi)?;
             let near = |[a, b]: [f64; 2]| (x - a).hypot(y - b) <= 1e3 * self.rounding;
-            ends.into_iter().any(near).then_some(xi)
+            (profile.slope.abs() <= 1.0 && curve_ends.into_iter().any(near)).then_some(xi)
         };
         [[-1.0, 0.0], [0.0, 1.0]]
             .into_iter()

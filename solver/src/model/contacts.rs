@@ -507,9 +507,14 @@ fn along_one_direction(fixed: &BTreeMap<u32, Held>) -> HeldDirections {
 pub(super) fn put_nodes_at_ends<'a>(
     mesh: &mut Mesh,
     contacts: impl Iterator<Item = (&'a Contact, bool)>,
+    steps: &[Step],
 ) {
     /// Ends inside edges: two of an obstacle, and where a curve in space is hidden.
     const MOST_ENDS: usize = 16;
+    let factors = steps
+        .iter()
+        .map(|step| Level::end_of(step).indentation.abs());
+    let most = factors.fold(1.0, f64::max);
     for (contact, _) in contacts.filter(|(_, sound)| *sound) {
         for _ in 0..MOST_ENDS {
             let Some(edges) = mesh.boundaries.get(&contact.boundary) else {
@@ -518,7 +523,16 @@ pub(super) fn put_nodes_at_ends<'a>(
             let runs = mesh::runs(edges);
             let [run] = &runs[..] else { break };
             // one at a time: an edge may have two, and of a divided edge the places are new
-            let ends = obstacle::ends_inside_edges(mesh, run, &contact.obstacle);
+            // a friction bound that is given acts whether or not the body touches
+            let everywhere = contact
+                .friction
+                .as_ref()
+                .is_some_and(|law| law.bound.is_some());
+            let deepest = match everywhere {
+                true => f64::INFINITY,
+                false => most * contact.indentation.abs(),
+            };
+            let ends = obstacle::ends_inside_edges(mesh, run, &contact.obstacle, deepest);
             let mut ends = ends.into_iter();
             if !ends.any(|(edge, xi)| mesh.divide_side(edge, xi)) {
                 break;

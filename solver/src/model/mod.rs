@@ -168,7 +168,7 @@ impl Checks {
                 if problem.solver.algorithm != Algorithm::Thesis {
                     let sound = numbers.iter().map(|(obstacle, _)| obstacle.is_ok());
                     let contacts = problem.contacts.iter().zip(sound);
-                    contacts::put_nodes_at_ends(&mut mesh, contacts);
+                    contacts::put_nodes_at_ends(&mut mesh, contacts, &problem.steps);
                 }
                 mesh
             }
