@@ -481,8 +481,8 @@ fn a_curve_in_space_is_seen_between_nodes() {
     }
 }
 
-/// The side from 0.4 to 0.5 is divided where a table, a polyline or a rounded face ends, and the contact ends there; next to a
-/// node it is not, and the contact ends at 0.4, which is told.
+/// The side from 0.4 to 0.5 is divided where a table or a polyline ends, and the contact ends there; next to a node it is not,
+/// and the contact ends at 0.4, which is told. So it is where a rounded face ends in its flank.
 #[test]
 fn an_obstacle_that_ends_inside_an_edge_has_a_node_there_whatever_its_kind() {
     let x: Vec<f64> = (-10..=10).map(|i| f64::from(i) / 10.0).collect();
@@ -523,10 +523,11 @@ fn an_obstacle_that_ends_inside_an_edge_has_a_node_there_whatever_its_kind() {
             };
             assert_eq!(ends(end, obstacle.clone()), told, "{obstacle}");
         }
-        // both ends
-        let rounded = json!({"kind": "rounded_flat", "half_width": 0.2, "radius": end - 0.2});
-        assert_eq!(ends(end, rounded), 2 * cut, "{end}");
     }
+    let rounded = json!({"kind": "rounded_flat", "half_width": 0.2, "radius": 0.29});
+    let checked = solver::check(&block(&x, rounded, 0.01), None).unwrap();
+    let cut = |w: &&Warning| w.code == WarningCode::ObstacleCutsEdge;
+    assert_eq!(checked.warnings.iter().filter(cut).count(), 2);
 }
 
 /// A flat punch from −3 to an end between lines 1 apart is known within its errors, against one on a grid with a line on that
