@@ -13,7 +13,7 @@ use solver::error::Reason;
 const MOST_PARTS: usize = 1 << 8;
 
 /// How often instances may repeat what the parts contain.
-const MOST_TIMES: u64 = 16;
+const MOST_TIMES: u64 = 8;
 
 /// Keywords without effect on a linear static step: requests for output, options of its solution, and what only other
 /// kinds of steps use.
