@@ -630,7 +630,7 @@ impl Deck {
             return Part::default();
         };
         self.instantiated += part.size();
-        let most = (1 << 16) + MOST_TIMES * self.written;
+        let most = (1 << 14) + MOST_TIMES * self.written;
         if self.instances.len() < MOST_PARTS && self.instantiated <= most {
             return part.clone();
         }
