@@ -69,8 +69,9 @@ pub struct FrictionPoint {
 }
 
 impl ContactBoundary {
-    /// From edges that follow one another, the first node at arc length `start`; `depth` as in `elasticity::Section`. `held`:
-    /// where the direction along which supports hold a node is normal or tangent but for such errors, as on a line of symmetry, it exactly is.
+    /// From edges that follow one another, the first node at arc length `start`; `depth` as in `elasticity::Section`. A normal
+    /// that a direction of `held` is parallel or perpendicular to, up to the errors of both, is made exactly so: on a line of
+    /// symmetry it lies in that line.
     pub fn new(
         mesh: &Mesh,
         chain: &[Edge],
