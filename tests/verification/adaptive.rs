@@ -187,7 +187,7 @@ fn every_mesh_is_named_while_it_is_solved() {
 /// On whichever mesh it is told to stop, it does so.
 #[test]
 fn adaptive_refinement_stops_at_any_question() {
-    let problem = to(0.05, example("cylinder"));
+    let problem = to(0.03, example("cylinder"));
     let mut questions = 0;
     let whole = solver::solve(&problem, &mut |_| {
         questions += 1;

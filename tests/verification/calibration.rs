@@ -138,7 +138,7 @@ fn stated_errors_hold_on_other_meshes_and_materials_too() {
     });
 }
 
-/// Problems that no factor was fitted to: other bodies, meshes, materials and supports. With SIGNORINI_UNSEEN=1000..1450, for
+/// Problems that no factor was fitted to: other bodies, meshes, materials and supports. With SIGNORINI_UNSEEN=2000..2450, for
 /// half an hour, the table is published.
 #[test]
 fn stated_errors_hold_for_problems_that_they_were_not_fitted_to() {

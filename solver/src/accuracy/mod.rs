@@ -77,7 +77,7 @@ impl Parts {
             between,
             value,
         ] = factors(name);
-        signed * self.signed.abs()
+        let sum = signed * self.signed.abs()
             + absolute * self.absolute
             + away * self.away
             + STANDING_OUT * self.standing_out
@@ -87,8 +87,9 @@ impl Parts {
             + spacing * self.spacing
             + between * self.between
             + of_cut(name) * self.cut
-            + self.unseen
-            + value * self.value
+            + value * self.value;
+        // what the obstacle does between the nodes is in the other parts as far as the nodes see it
+        sum.max(self.unseen)
     }
 }
 
@@ -101,13 +102,13 @@ fn factors(name: QuantityName) -> [f64; 9] {
     use QuantityName::*;
     #[rustfmt::skip] // a table
     let factors = match name {
-        NormalForce              => [0.5,  2.3,  0.0, 0.0,  0.3,  0.0,  0.0,   0.0,   1e-4],
-        TangentialForce          => [2.2,  1.0,  0.0, 0.25, 0.0,  0.4,  0.45,  0.1,   1e-4],
-        FrictionForce            => [0.6,  2.0,  0.0, 0.0,  0.0,  0.5,  0.68,  0.11,  1e-4],
-        PeakNormalStress         => [0.8,  0.0,  1.5, 1.4,  0.0,  0.0,  0.75,  0.068, 1e-4],
-        PeakTangentialStress     => [2.2,  1.15, 0.0, 2.2,  0.0,  0.0,  0.21,  0.012, 1e-4],
+        NormalForce              => [0.95, 2.1,  0.0, 0.0,  0.45, 0.0,  0.0,   0.0,   1e-4],
+        TangentialForce          => [3.7,  0.95, 0.0, 0.55, 0.0,  0.1,  0.53,  0.07,  1e-4],
+        FrictionForce            => [1.85, 2.1,  0.0, 0.17, 0.2,  0.14, 0.68,  0.21,  1e-4],
+        PeakNormalStress         => [1.6,  0.0,  0.5, 0.0,  0.0,  0.0,  1.9,   0.02,  1e-4],
+        PeakTangentialStress     => [0.0,  1.65, 0.0, 1.1,  0.0,  0.0,  0.76,  0.185, 1e-4],
         ContactStart | ContactEnd => [0.0, 0.0,  0.0, 0.0,  0.0,  0.0,  0.75,  0.0,   0.0],
-        StickEnd                 => [0.0,  1.5,  0.0, 0.0,  2.5,  0.0,  0.4,   0.0,   0.0],
+        StickEnd                 => [0.0,  2.05, 0.0, 0.0,  0.0,  0.0,  0.42,  0.0,   0.0],
     };
     factors
 }

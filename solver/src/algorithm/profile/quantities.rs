@@ -21,8 +21,9 @@ pub struct Quantity {
     /// Its error per change of what `gradient` is of; 1 but for the end of stick, which moves with the slip there.
     pub factor: f64,
     /// What the place of nodes alone leaves open, in the unit of the value: the distance to the next node at an end of
-    /// contact, the drop beside a peak, in friction forces what cancels within edges, what is beside singularities, and stick
-    /// between points.
+    /// contact or of stick; at a peak of the pressure how far a smooth curve through the nodes around it is off; at a peak of
+    /// σ_t what friction turns around it; in friction forces what cancels within edges, what is beside singularities,
+    /// and stick between points.
     pub spacing: f64,
     /// What the law has between the points where friction acts, likewise: in friction forces; beside a peak of the pressure
     /// a jump of σ_t; at a peak of σ_t the change of its bound.
@@ -77,9 +78,6 @@ const MOST_STICK_ENDS: usize = 8;
 /// A slip that changes by less than this part of ε along an edge is ε on all of it, to rounding, and stick does not end
 /// there: the incremental law leaves it so where the load rests.
 const STEADY: f64 = 1e-6;
-
-/// How far from a peak of σ_t its neighbourhood is looked at, in half edges.
-const NEAR: f64 = 0.25;
 
 fn limited(has_limit: bool) -> Estimable {
     match has_limit {
@@ -274,13 +272,12 @@ impl PatchView<'_> {
             for (i, shape) in edge_nodes(edge).into_iter().zip(edge3::shape(xi)) {
                 gradient.add_pressure(system, self.patch.first + i, -shape);
             }
-            let beside = [xi - NEAR, xi + NEAR].map(|xi| self.along(edge, xi, Self::pressure_at));
             let jumps: Vec<(usize, f64)> = self
                 .neighbours(edge)
                 .map(|edge| (edge, self.jump_within(edge)))
                 .collect();
             found.push(Quantity {
-                spacing: pressure - beside[0].min(beside[1]),
+                spacing: self.off_smooth_pressure(pressure, edge, xi),
                 spacing_at: vec![(edge, 1.0)],
                 between: jumps.iter().fold(0.0, |most, (_, jump)| most.max(*jump)),
                 between_at: jumps,
@@ -296,10 +293,8 @@ impl PatchView<'_> {
                 let pressures = &self.forces.pressures;
                 gradient.add_traction(system, state, pressures, bound, &point, 1.0);
             }
-            let size = |xi: f64| self.along(edge, xi, Self::tangential_stress_at).abs();
-            let beside = [xi - NEAR, xi + NEAR].map(size);
             found.push(Quantity {
-                spacing: stress.abs() - beside[0].min(beside[1]),
+                spacing: stress.abs() * self.turn_around(edge, xi),
                 spacing_at: vec![(edge, 1.0)],
                 between: self.change_of_bound(edge, xi),
                 between_at: vec![(edge, 1.0)],

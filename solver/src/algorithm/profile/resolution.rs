@@ -4,13 +4,25 @@
 use std::collections::BTreeSet;
 
 use super::PatchView;
-use crate::contact::edge_nodes;
 use crate::element::edge3;
 use crate::element::gauss::GAUSS_3;
 use crate::friction::BoundLaw;
 
 /// Halvings of an edge in the search for a jump: to 1/256 of a quarter of it.
 const HALVINGS: u32 = 8;
+
+/// Nodes that a smooth curve through the pressure around its peak is laid through: with five it follows their zigzag, and
+/// with nine no longer the pressure.
+const AROUND: usize = 7;
+
+/// Coefficients of a cubic.
+const CUBIC: usize = 4;
+
+/// How far around a peak of σ_t friction may turn, in half edges: calibrated.
+const AROUND_TURN: f64 = 0.75;
+
+/// Part of the change of friction from one full slip to the other that the points there follow: calibrated.
+const FOLLOWED: f64 = 0.3;
 
 /// What a kink leaves open in the friction force, as a part of that on the edges beside it: calibrated.
 const AT_KINKS: f64 = 0.2;
@@ -31,12 +43,64 @@ impl PatchView<'_> {
         }
     }
 
-    /// p at a place.
-    pub(super) fn pressure_at(&self, edge: usize, xi: f64) -> f64 {
-        edge3::interpolate(
-            &edge3::shape(xi),
-            &edge_nodes(edge).map(|i| self.pressure(i)),
-        )
+    /// How far the largest pressure is off that of a smooth curve beside it: a cubic through the [`AROUND`] nearest nodes in
+    /// contact, mirror images included, by least squares (stress). All of it where there are too few nodes for a cubic.
+    pub(super) fn off_smooth_pressure(&self, largest: f64, edge: usize, xi: f64) -> f64 {
+        let arc = self.patch.contact.boundary.edge_arc(edge);
+        let peak = edge3::interpolate(&edge3::shape(xi), &arc);
+        let mut nodes = self.pressed_nodes_near(edge);
+        let distance = |node: &[f64; 3]| (node[0] - peak).abs();
+        nodes.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        nodes.truncate(AROUND);
+        let reach = nodes.last().map_or(0.0, distance);
+        if nodes.len() < CUBIC || reach == 0.0 {
+            return largest.abs();
+        }
+        let within: Vec<[f64; 3]> = nodes
+            .iter()
+            .map(|[s, pressure, weight]| [(s - peak) / reach, *pressure, *weight])
+            .collect();
+        (highest_of_cubic(&within) - largest).abs()
+    }
+
+    /// Arc length, pressure and length of the nodes in contact on the edges near one, with those beyond a line of symmetry.
+    fn pressed_nodes_near(&self, edge: usize) -> Vec<[f64; 3]> {
+        let s = &self.patch.contact.boundary.s;
+        let last = self.count() - 1;
+        let nodes = 2 * edge.saturating_sub(AROUND / 2)..=(2 * (edge + 1 + AROUND / 2)).min(last);
+        let mirrors = [0, last].map(|end| (end, self.symmetric(end)));
+        let mut found = Vec::new();
+        for i in nodes.filter(|i| self.active(*i)) {
+            // ∫ h_i
+            let weight = match i % 2 {
+                1 => 4.0 * (s[i + 1] - s[i - 1]),
+                _ => s[(i + 2).min(last)] - s[i.saturating_sub(2)],
+            };
+            let mut weight = weight / 6.0;
+            for (end, _) in mirrors.iter().filter(|(_, symmetric)| *symmetric) {
+                match i == *end {
+                    true => weight *= 2.0,
+                    false => found.push([2.0 * s[*end] - s[i], self.pressure(i), weight]),
+                }
+            }
+            found.push([s[i], self.pressure(i), weight]);
+        }
+        found
+    }
+
+    /// What part of friction's change from one full slip to the other happens around a place, beyond what the points there
+    /// follow: between them u_t is a parabola, and a peak of σ_t may be that parabola's.
+    pub(super) fn turn_around(&self, edge: usize, xi: f64) -> f64 {
+        const STEPS: i32 = 6;
+        let Some(law) = &self.patch.law else {
+            return 0.0;
+        };
+        let at = |k: i32| xi + AROUND_TURN * f64::from(k) / f64::from(STEPS);
+        let ratios = (-STEPS..=STEPS).map(|k| law.phi(self.along(edge, at(k), Self::slip_at)));
+        let (low, high) = ratios.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), phi| {
+            (low.min(phi), high.max(phi))
+        });
+        (0.5 * (high - low) - FOLLOWED).max(0.0)
     }
 
     /// An edge and those beside it.
@@ -194,9 +258,64 @@ impl PatchView<'_> {
     }
 }
 
+/// The largest value, within half of the reach of its points, of the cubic through points (place, value, weight), places
+/// between −1 and 1, by least squares.
+fn highest_of_cubic(points: &[[f64; 3]]) -> f64 {
+    const SAMPLES: usize = 41;
+    let sample = |k: usize| -0.5 + k as f64 / (SAMPLES - 1) as f64;
+    let places: Vec<f64> = points
+        .iter()
+        .map(|point| point[0])
+        .chain((0..SAMPLES).map(sample))
+        .collect();
+    // Gram and Schmidt: polynomials orthogonal on the points, evaluated at the samples too
+    let product = |a: &[f64], b: &[f64]| -> f64 {
+        let terms = points.iter().zip(a).zip(b);
+        terms.map(|((point, a), b)| point[2] * a * b).sum()
+    };
+    let mut rest: Vec<f64> = points.iter().map(|point| point[1]).collect();
+    let mut curve = vec![0.0; SAMPLES];
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    for degree in 0..CUBIC {
+        let mut next: Vec<f64> = places.iter().map(|x| x.powi(degree as i32)).collect();
+        for other in &basis {
+            let part = product(&next, other) / product(other, other);
+            next.iter_mut().zip(other).for_each(|(a, b)| *a -= part * b);
+        }
+        let part = product(&rest, &next) / product(&next, &next);
+        rest.iter_mut().zip(&next).for_each(|(a, b)| *a -= part * b);
+        let at_samples = curve.iter_mut().zip(&next[points.len()..]);
+        at_samples.for_each(|(a, b)| *a += part * b);
+        basis.push(next);
+    }
+    curve.into_iter().fold(f64::NEG_INFINITY, f64::max)
+}
+
 /// The mean of a value over an edge, by many places.
 fn mean(value: impl Fn(f64) -> f64) -> f64 {
     const SAMPLES: usize = 16;
     let sample = |k: usize| value(-1.0 + (2 * k + 1) as f64 / SAMPLES as f64);
     (0..SAMPLES).map(sample).sum::<f64>() / SAMPLES as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cubic_is_found_again_and_a_zigzag_is_smoothed() {
+        let points = |value: &dyn Fn(f64, usize) -> f64| -> Vec<[f64; 3]> {
+            let place = |k: usize| (k as f64 - 3.0) / 3.0;
+            let point = |k: usize| [place(k), value(place(k), k), [1.0, 4.0][k % 2]];
+            (0..7).map(point).collect()
+        };
+        // largest at x = ⅓, which lies between two of the samples
+        let cubic = |x: f64, _: usize| 2.0 + x - x.powi(2) - x.powi(3);
+        let highest = highest_of_cubic(&points(&cubic));
+        let exact = cubic(1.0 / 3.0, 0);
+        assert!(highest <= exact && highest > exact - 1e-4, "{highest}");
+        let zigzag = |_: f64, k: usize| 1.0 + [0.1, -0.1][k % 2];
+        let highest = highest_of_cubic(&points(&zigzag));
+        assert!((0.9..1.05).contains(&highest), "{highest}");
+    }
 }
