@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 use crate::solution::{Accuracy, ErrorMethod, EstimatedQuantity, Outcome, QuantityName, Verdict};
 
 /// Relative errors up to which a verdict is `good`, and `fair`: of forces, and of peaks and extents. `good` promises 1 %
-/// and 5 %: since one stated error in twenty is too small, it takes three quarters of that
-/// (`tests/verification/calibration.rs`).
+/// and 5 %: since one stated error in twenty is too small, it takes three quarters of that for forces and three fifths for the
+/// others, of which some are too small by more (`tests/verification/calibration.rs`).
 const FORCES: [f64; 2] = [0.0075, 0.05];
-const OTHERS: [f64; 2] = [0.0375, 0.2];
+const OTHERS: [f64; 2] = [0.03, 0.2];
 
 /// Why a quantity has no error.
 #[derive(Clone, Copy, Debug, PartialEq)]
