@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import io
 import pathlib
 import pickle
 import sys
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 
 import signorini as sg
-from signorini._data import Fields, Number, Profile, Summary, Warning, known
+from signorini._data import Fields, Number, Profile, Summary, Warning, arrays, known
 from signorini._extras import load
 
 
@@ -202,3 +203,21 @@ def test_columns_that_this_client_does_not_know_are_left_out(punch: sg.Result) -
     columns = punch.profile().columns()
     assert "new" not in known(Profile, {**columns, "new": columns["s"]})
     assert str(Warning("code", "in words")) == "code: in words"
+
+
+def test_arrays_are_read_in_many_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    content = io.BytesIO()
+    np.savez(content, a=np.arange(3))
+    load_once = np.load
+    failures = [SystemError("AST constructor recursion depth mismatch")] * 3
+
+    def fails_at_first(*given: Any, **named: Any) -> Any:
+        if failures:
+            raise failures.pop()
+        return load_once(*given, **named)
+
+    monkeypatch.setattr("numpy.load", fails_at_first)
+    assert arrays(content.getvalue())["a"].tolist() == [0, 1, 2]
+    failures = [SystemError("for good")] * 1000
+    with pytest.raises(SystemError):
+        arrays(content.getvalue())

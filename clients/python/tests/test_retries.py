@@ -11,7 +11,8 @@ import httpx
 import pytest
 
 import signorini as sg
-from signorini import _calls as calls
+from signorini._answer import raise_error
+from signorini._pool import AsyncPool, Pool
 from signorini._progress import Waiting
 from signorini._retry import Attempts
 
@@ -39,9 +40,7 @@ class Service:
 
 def client_of(service: Service, monkeypatch: pytest.MonkeyPatch, retry_for: float = 60) -> sg.Client:
     client = sg.Client("http://service.test", token="secret", retry_for=retry_for)
-    client._http = httpx.Client(
-        base_url=client.url, headers=client._http.headers, transport=httpx.MockTransport(service)
-    )
+    client._http = Pool({**client._connection.settings(), "transport": httpx.MockTransport(service)})
     monkeypatch.setattr("time.sleep", service.pauses.append)
     return client
 
@@ -181,11 +180,11 @@ def test_addresses_and_tokens_that_cannot_be() -> None:
     with pytest.raises(ValueError, match="the file of a certificate authority, '/no/such.pem', cannot be used"):
         sg.Client("https://lab", ca="/no/such.pem")
     # as it is read from a file
-    assert sg.Client(token="secret\n")._http.headers["Authorization"] == "Bearer secret"
+    assert sg.Client(token="secret\n")._connection.token == "secret"
 
 
 def test_every_code_of_the_service_has_its_class(client: sg.Client) -> None:
-    paths = client._http.get("/openapi.json").json()["paths"].values()
+    paths = httpx.get(client.url + "/openapi.json").json()["paths"].values()
     answers = [answer for path in paths for verb in path.values() for answer in verb["responses"].values()]
     refusals = [answer["content"].get("application/problem+json") for answer in answers if "content" in answer]
     codes = {code for refusal in refusals if refusal for code in refusal["schema"]["properties"]["code"]["enum"]}
@@ -193,9 +192,9 @@ def test_every_code_of_the_service_has_its_class(client: sg.Client) -> None:
     assert codes | {"method-not-allowed"} == set(sg.errors.CLASSES)
     for code, kind in sg.errors.CLASSES.items():
         with pytest.raises(kind):
-            calls.raise_error(problem(400, code))
+            raise_error(problem(400, code))
     with pytest.raises(sg.ApiError) as caught:
-        calls.raise_error(httpx.Response(418, json=["tea"]))
+        raise_error(httpx.Response(418, json=["tea"]))
     assert type(caught.value) is sg.ApiError
 
 
@@ -219,7 +218,7 @@ def test_events_go_on_where_they_broke_off(monkeypatch: pytest.MonkeyPatch) -> N
             def __aiter__(self) -> Any:
                 return pieces()
 
-        return httpx.Response(200, stream=Both())
+        return httpx.Response(200, headers={"Content-Type": "text/event-stream"}, stream=Both())
 
     def answers() -> list[Answer]:
         return [
@@ -236,7 +235,7 @@ def test_events_go_on_where_they_broke_off(monkeypatch: pytest.MonkeyPatch) -> N
     client = client_of(service, monkeypatch)
     assert [event.seq for event in sg.Job(client, JOB).events()] == [1, 2, 3, 4, 5]
     assert [request.headers["Last-Event-ID"] for request in service.requests] == asked
-    service.answers = [httpx.Response(204)]
+    service.answers = [httpx.Response(204, headers={"X-Request-Id": "1"})]
     assert list(sg.Job(client, JOB).events(after_seq=5)) == []
     service.answers = [problem(410, "deleted")]
     with pytest.raises(sg.Deleted):
@@ -246,7 +245,7 @@ def test_events_go_on_where_they_broke_off(monkeypatch: pytest.MonkeyPatch) -> N
         twin = sg.AsyncClient("http://service.test")
         other = Service(*answers())
         transport = httpx.MockTransport(other)
-        twin._http = httpx.AsyncClient(base_url=twin.url, transport=transport)
+        twin._http = AsyncPool({"base_url": twin.url, "transport": transport})
 
         async def pause(seconds: float) -> None:
             other.pauses.append(seconds)
@@ -254,13 +253,17 @@ def test_events_go_on_where_they_broke_off(monkeypatch: pytest.MonkeyPatch) -> N
         monkeypatch.setattr("asyncio.sleep", pause)
         found = [event.seq async for event in sg.AsyncJob(twin, JOB).events()]
         assert [request.headers["Last-Event-ID"] for request in other.requests] == asked
-        other.answers = [httpx.Response(204)]
+        other.answers = [httpx.Response(204, headers={"X-Request-Id": "1"})]
         assert [event async for event in sg.AsyncJob(twin, JOB).events(5)] == []
         other.answers = [problem(410, "deleted")]
         with pytest.raises(sg.Deleted):
             [event async for event in sg.AsyncJob(twin, JOB).events()]
-        other.answers = [httpx.ReadError("reset"), problem(503, "draining", True), httpx.Response(200, json={"a": 1})]
-        assert await twin.info() == {"a": 1}
+        other.answers = [
+            httpx.ReadError("reset"),
+            problem(503, "draining", True),
+            httpx.Response(200, json={"name": "x"}),
+        ]
+        assert await twin.info() == {"name": "x"}
         return found
 
     assert asyncio.run(the_same_with_asyncio()) == [1, 2, 3, 4, 5]
@@ -269,11 +272,12 @@ def test_events_go_on_where_they_broke_off(monkeypatch: pytest.MonkeyPatch) -> N
 def test_something_else_at_the_address(monkeypatch: pytest.MonkeyPatch) -> None:
     service = Service(httpx.Response(200, text="<html>Sign in", headers={"Content-Type": "text/html"}))
     with pytest.raises(
-        sg.SignoriniError, match="http://service.test/v1/info is not answered as by the service: <html>"
+        sg.UnexpectedAnswer,
+        match="http://service.test/v1/info is not answered as by the service: got status 200, text/html, '<html>Sign",
     ):
         client_of(service, monkeypatch).info()
     service = Service(httpx.Response(200, json={}))
-    with pytest.raises(sg.SignoriniError, match="is not answered as by the service: KeyError"):
+    with pytest.raises(sg.UnexpectedAnswer, match="it lacks something: KeyError"):
         client_of(service, monkeypatch).submit_many([sg.examples.sheet()])
     # a proxy's own answer, without the service's words
     service = Service(httpx.Response(503, text="busy"), httpx.Response(200, json={"name": "x"}))

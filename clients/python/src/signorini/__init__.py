@@ -62,6 +62,7 @@ from .errors import (
     TooLarge,
     Unauthenticated,
     Unavailable,
+    UnexpectedAnswer,
     Violation,
     WaitTimeout,
 )
@@ -117,6 +118,7 @@ __all__ = [
     "TooLarge",
     "Unauthenticated",
     "Unavailable",
+    "UnexpectedAnswer",
     "Validation",
     "Violation",
     "WaitTimeout",

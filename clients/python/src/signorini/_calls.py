@@ -6,23 +6,25 @@ differ, and a request is written once.
 
 from __future__ import annotations
 
+import dataclasses
 import datetime
 import json
 import math
 import os
 import pathlib
+import re
 import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Generic, NoReturn, TypeVar
+from typing import Any, Generic, TypeVar
 from urllib.parse import quote
 
 import httpx
 
 from . import errors
-from ._data import Array, StoredMesh, Validation, arrays
-from ._parts import plain
-from ._retry import retry_after_s
+from ._answer import FILES, JSON, NOTHING, NPZ, Kind, read, unexpected
+from ._data import Array, StoredMesh, Validation
+from ._parts import plain, takes_integers
 from .errors import Violation
 from .pointer import escape, to_pointer
 from .problem import MeshInput, Problem
@@ -30,6 +32,10 @@ from .problem import MeshInput, Problem
 T = TypeVar("T", covariant=True)
 Document = dict[str, Any]
 Params = tuple[tuple[str, str], ...]
+
+JOB = ("id", "status", "result_available")
+"""What the service says of every job."""
+ENDED = ("succeeded", "failed", "canceled")
 
 LONGEST_WAIT_S = 20.0
 """How long the service is asked to hold back an answer: less than proxies usually allow."""
@@ -39,31 +45,40 @@ LONGEST_WAIT_S = 20.0
 class Call(Generic[T]):
     """A request, and how its answer is read.
 
+    decode: what is made of what the answer says
     repeatable: sending it twice does no more than sending it once
-    wait_s: the service may take so many seconds longer than usual to answer
+    wait_s: the service may hold its answer back for so many seconds
+    kind: what the body of the answer is
+    about: id of the job or sweep that it is about, and so must be the answer
+    gone: codes of errors that mean success once an earlier attempt may have done what was asked
+    repeated: what is made of the answer then, where it differs
     """
 
     method: str
     path: str
-    decode: Callable[[httpx.Response], T]
+    decode: Callable[[Any], T]
     params: Params = ()
     headers: Mapping[str, str] = field(default_factory=dict)
     content: bytes | None = None
     repeatable: bool = True
     wait_s: float = 0.0
+    kind: Kind = JSON
+    about: str = ""
+    gone: tuple[str, ...] = ()
+    repeated: Callable[[Any], T] | None = None
 
     def read(self, response: httpx.Response, attempt: int) -> T:
-        """What the answer says. Raises an `ApiError` if it is an error."""
-        if attempt > 1 and self.method == "DELETE" and response.status_code == 410:
-            # an earlier attempt has deleted it, and its answer was lost
-            return self.decode(httpx.Response(204, request=response.request))
-        if response.is_error:
-            raise_error(response)
+        """What the answer says. Raises an `ApiError` if it is an error, and what `_answer.read` raises."""
         try:
-            return self.decode(response)
-        except (ValueError, KeyError, TypeError) as error:  # the page of a proxy, or of something else at this address
-            begin = response.text[:100] if "text" in response.headers.get("Content-Type", "") else repr(error)
-            raise errors.SignoriniError(f"{response.url} is not answered as by the service: {begin}") from error
+            found = read(response, self.kind, self.about)
+        except errors.ApiError as error:
+            if attempt > 1 and error.code in self.gone:
+                return self.decode(None)
+            raise
+        try:
+            return (self.repeated if attempt > 1 and self.repeated else self.decode)(found)
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise unexpected(response, f"it lacks something: {error!r}") from error
 
 
 @dataclass
@@ -79,7 +94,7 @@ class Submission:
 
     problem: Problem | Mapping[str, Any]
     name: str | None = None
-    labels: Mapping[str, str] = field(default_factory=dict)
+    labels: Mapping[str, object] = field(default_factory=dict)
     priority: int | None = None
     timeout_s: float | None = None
     queue_ttl_s: float | None = None
@@ -95,7 +110,7 @@ class Submission:
 
 def _envelope(
     name: str | None,
-    labels: Mapping[str, str] | None,
+    labels: Mapping[str, object] | None,
     priority: int | None,
     timeout_s: float | None,
     queue_ttl_s: float | None,
@@ -103,11 +118,11 @@ def _envelope(
     limits = {"timeout_s": timeout_s, "queue_ttl_s": queue_ttl_s}
     body = {
         "name": name,
-        "labels": {key: str(value) for key, value in labels.items()} if labels else None,
+        "labels": {str(key): str(value) for key, value in labels.items()} if labels else None,
         "priority": priority,
         "limits": {key: value for key, value in limits.items() if value is not None} or None,
     }
-    return {key: value for key, value in body.items() if value is not None}
+    return {key: plain(value) for key, value in body.items() if value is not None}
 
 
 def problem_document(problem: Problem | Mapping[str, Any], defaults: bool = False) -> Document:
@@ -141,47 +156,47 @@ def _find_non_json(value: Any, pointer: str, found: list[Violation]) -> None:
         found.append(Violation(pointer, "wrong_type", type(value).__name__, "a value of JSON"))
 
 
-def raise_error(response: httpx.Response) -> NoReturn:
-    """Raises the error that an answer is."""
-    try:
-        document = response.json()
-    except ValueError:
-        document = None
-    if not isinstance(document, dict):  # from a proxy, or from something that is not the service
-        document = {"detail": response.text[:300]}
-    raise errors.of_answer(
-        response.status_code,
-        document,
-        retry_after_s=retry_after_s(response),
-        request_id=response.headers.get("X-Request-Id", ""),
-    )
+def _having(*names: str) -> Callable[[Document], Document]:
+    """Reads a document that has these names, as what the service says of a thing always has."""
+
+    def decode(document: Document) -> Document:
+        for name in names:
+            document[name]
+        return document
+
+    return decode
 
 
-def _json(response: httpx.Response) -> Document:
-    document: Document = response.json()
-    return document
-
-
-def _nothing(response: httpx.Response) -> None:
+def _nothing(document: None) -> None:
     return None
 
 
-def _get(path: str, params: Params = ()) -> Call[Document]:
-    return Call("GET", path, _json, params)
+def _of(id: str, *path: str) -> Callable[[Document], Document]:
+    """Reads a document that has, at a place in it, the id that was asked for."""
+
+    def decode(document: Document) -> Document:
+        named: Any = document
+        for name in path or ("id",):
+            named = named[name]
+        if named != id:
+            raise ValueError(f"it is about {named}, not {id}")
+        return document
+
+    return decode
 
 
-def _post(path: str, body: Any = None, *, key: str | None = None, params: Params = ()) -> Call[Document]:
+def _get(path: str, *names: str, params: Params = ()) -> Call[Document]:
+    return Call("GET", path, _having(*names), params)
+
+
+def _post(path: str, *names: str, body: Any = None, key: Any = None, params: Params = ()) -> Call[Document]:
     """A request that changes something. With a key it can be repeated: the service does it once."""
     headers = {"Content-Type": "application/json"} if body is not None else {}
-    if key:
-        headers["Idempotency-Key"] = key
+    if key is not None:
+        # letters that no header can have are written as in an address
+        headers["Idempotency-Key"] = re.sub(r"[^ -~]+", lambda found: quote(found[0]), str(key))
     content = None if body is None else json.dumps(body, allow_nan=False, ensure_ascii=False).encode()
-    return Call("POST", path, _json, params, headers, content, repeatable=bool(key))
-
-
-def _safely(call: Call[Document]) -> Call[Document]:
-    """The same call, which does no harm when it is repeated."""
-    return Call(call.method, call.path, call.decode, call.params, call.headers, call.content, True, call.wait_s)
+    return Call("POST", path, _having(*names), params, headers, content, repeatable=key is not None)
 
 
 def new_key() -> str:
@@ -192,62 +207,82 @@ def new_key() -> str:
 
 
 def submit(submission: Submission) -> Call[Document]:
-    return _post("/v1/jobs", submission.to_dict(), key=submission.key or new_key())
+    return _post("/v1/jobs", *JOB, body=submission.to_dict(), key=submission.key or new_key())
 
 
 def submit_many(submissions: Sequence[Submission], key: str | None) -> Call[list[Document]]:
     if any(submission.key for submission in submissions):
         raise ValueError("jobs that are submitted together have one key: submit_many(…, key=…)")
-    call = _post("/v1/jobs/batch", {"jobs": [s.to_dict() for s in submissions]}, key=key or new_key())
-    return Call(call.method, call.path, lambda r: list(r.json()["jobs"]), (), call.headers, call.content, True)
+    call = _post("/v1/jobs/batch", body={"jobs": [s.to_dict() for s in submissions]}, key=key or new_key())
+
+    def decode(document: Document) -> list[Document]:
+        if len(document["jobs"]) != len(submissions):
+            raise ValueError(f"{len(document['jobs'])} jobs, not {len(submissions)}")
+        return list(document["jobs"])
+
+    return Call(call.method, call.path, decode, (), call.headers, call.content, True)
 
 
 def job(id: str, wait_s: float | None = None) -> Call[Document]:
     """The job now or, with `wait_s`, when it has ended, at the latest after so many seconds."""
     params: Params = () if wait_s is None else (("wait", f"{wait_s:.3f}"), ("until", "terminal"))
-    return Call("GET", _job(id), _json, params, wait_s=wait_s or 0.0)
+    return Call("GET", _job(id), _of(id), params, wait_s=wait_s or 0.0)
 
 
 def jobs(params: Params, page_token: str) -> Call[Document]:
-    return _get("/v1/jobs", params + ((("page_token", page_token),) if page_token else ()))
+    return _get("/v1/jobs", "jobs", params=params + _page(page_token))
 
 
 def count(params: Params) -> Call[Document]:
-    return _get("/v1/jobs/count", params)
+    return _get("/v1/jobs/count", "total", params=params)
 
 
 def cancel(id: str) -> Call[Document]:
-    return _safely(_post(_job(id) + "/cancel"))
+    return Call("POST", _job(id) + "/cancel", _of(id, "job", "id"))
 
 
 def cancel_jobs(params: Params) -> Call[Document]:
-    return _post("/v1/jobs/cancel", params=params)
+    return _post("/v1/jobs/cancel", "matched", "changed", params=params)
 
 
-def delete_jobs(params: Params) -> Call[Document]:
-    return Call("DELETE", "/v1/jobs", _json, params)
+def delete_jobs(params: Params, before: Mapping[str, Any]) -> Call[Document]:
+    """before: how many jobs there were, by their status: an attempt whose answer is lost leaves none to count"""
+    ended = sum(before["groups"].get(status, 0) for status in ENDED)
+
+    def repeated(document: Document) -> Document:
+        return {
+            **document,
+            "matched": max(document["matched"], before["total"]),
+            "changed": max(document["changed"], ended),
+        }
+
+    return Call("DELETE", "/v1/jobs", _having("matched", "changed"), params, repeated=repeated)
 
 
 def retry(id: str, timeout_s: float | None, queue_ttl_s: float | None, priority: int | None) -> Call[Document]:
-    return _post(_job(id) + "/retry", _envelope(None, None, priority, timeout_s, queue_ttl_s) or None, key=new_key())
+    limits = _envelope(None, None, priority, timeout_s, queue_ttl_s)
+    call = _post(_job(id) + "/retry", body=limits or None, key=new_key())
+    return dataclasses.replace(call, decode=_of(id, "parent"))
 
 
 def edit(id: str, changes: Mapping[str, Any]) -> Call[Document]:
     headers = {"Content-Type": "application/merge-patch+json"}
-    return Call("PATCH", _job(id), _json, headers=headers, content=json.dumps(changes).encode())
+    return Call("PATCH", _job(id), _of(id), headers=headers, content=json.dumps(plain(changes)).encode())
 
 
 def delete(id: str) -> Call[None]:
-    return Call("DELETE", _job(id), _nothing)
+    return Call("DELETE", _job(id), _nothing, kind=NOTHING, gone=("deleted",))
 
 
 def problem(id: str) -> Call[Document]:
-    return _get(_job(id) + "/problem")
+    return _get(_job(id) + "/problem", "mesh", "materials")
 
 
-def result(id: str, partial: bool) -> Call[Document]:
-    def decode(response: httpx.Response) -> Document:
-        document = _json(response)
+def result(id: str, partial: bool, input_hash: str) -> Call[Document]:
+    def decode(document: Document) -> Document:
+        found = document["summary"].get("input_hash") or input_hash
+        if found != input_hash:
+            raise ValueError(f"it is of the problem {found}, not {input_hash}")
         # while a job runs, the service has the last of its load steps that has ended
         if document["result_available"] == "partial" and not partial:
             detail = "what it has so far is partial: result(partial=True) returns that"
@@ -264,29 +299,35 @@ def profile(id: str, boundary: str, step: int | str | None, points: int | str | 
     if points is not None:
         params.append(("points", str(points)))
     path = f"{_job(id)}/profiles/{quote(boundary, safe='')}"
-    return Call("GET", path, lambda r: arrays(r.content), tuple(params))
+    return _file(id, path, NPZ, tuple(params))
 
 
 def history(id: str, max_points: int | None) -> Call[dict[str, Array]]:
     params: Params = (("format", "npz"),)
     if max_points is not None:
         params += (("max_points", str(max_points)),)
-    return Call("GET", _job(id) + "/history", lambda r: arrays(r.content), params)
+    return _file(id, _job(id) + "/history", NPZ, params)
 
 
 def fields(id: str) -> Call[dict[str, Array]]:
-    return Call("GET", _job(id) + "/fields", lambda r: arrays(r.content), (("format", "npz"),))
+    return _file(id, _job(id) + "/fields", NPZ, (("format", "npz"),))
 
 
 def vtu(id: str) -> Call[bytes]:
-    return Call("GET", _job(id) + "/fields", lambda r: r.content, (("format", "vtu"),))
+    return _file(id, _job(id) + "/fields", FILES["vtu"], (("format", "vtu"),))
 
 
 def plot(id: str, name: str, ending: str, theme: str, size: str, step: int | str | None) -> Call[bytes]:
     params: Params = (("theme", theme), ("size", size))
     if step is not None:
         params += (("step", str(step)),)
-    return Call("GET", f"{_job(id)}/plots/{quote(name, safe='')}.{ending}", lambda r: r.content, params)
+    return _file(id, f"{_job(id)}/plots/{quote(name, safe='')}.{ending}", FILES[ending], params)
+
+
+def _file(id: str, path: str, kind: Kind, params: Params) -> Call[Any]:
+    # compressed, it has no length by which to tell that it is whole
+    headers = {"Accept": kind.media, "Accept-Encoding": "identity"}
+    return Call("GET", path, lambda content: content, params, headers, kind=kind, about=id)
 
 
 FIGURES = ("svg", "png", "pdf")
@@ -306,17 +347,19 @@ def _job(id: str) -> str:
 
 def filters(
     status: str | Sequence[str] | None = None,
-    labels: Mapping[str, str] | None = None,
-    **others: str | datetime.datetime | int | None,
+    labels: Mapping[str, object] | None = None,
+    **others: str | datetime.date | int | None,
 ) -> Params:
     """The parameters of `GET /v1/jobs`."""
     found = [("status", s) for s in ([status] if isinstance(status, str) else status or [])]
     found += [(f"label.{key}", str(value)) for key, value in (labels or {}).items()]
     for name, value in others.items():
+        if isinstance(value, datetime.date) and not isinstance(value, datetime.datetime):
+            value = datetime.datetime.combine(value, datetime.time())
         if isinstance(value, datetime.datetime):
             value = value.astimezone(datetime.timezone.utc).isoformat().replace("+00:00", "Z")
         if value is not None:
-            found.append((name, str(value)))
+            found.append((name, str(value).lower() if isinstance(value, bool) else str(value)))
     return tuple(found)
 
 
@@ -366,46 +409,49 @@ def submit_sweep(
     else:
         body["points"] = [{to_pointer(path): plain(v) for path, v in point.items()} for point in axes]
         body["mode"] = "list"
-    return _post("/v1/sweeps", body, key=key or new_key())
+    return _post("/v1/sweeps", "id", "paths", "members", body=body, key=key or new_key())
 
 
 def _axis(path: str, values: Any) -> Document:
     axis: Document = {"path": to_pointer(path)}
-    if isinstance(values, Spaced):
+    if isinstance(values, Spaced) and not (takes_integers(Problem, path) and all(v == int(v) for v in values)):
         axis[values.kind] = {"start": values.start, "stop": values.stop, "count": values.count}
     else:
-        axis["values"] = plain(values if isinstance(values, Sequence) else list(values))
+        axis["values"] = plain([int(v) for v in values] if isinstance(values, Spaced) else values)
     return axis
 
 
 def sweep(id: str, wait_s: float | None = None) -> Call[Document]:
     params: Params = () if wait_s is None else (("wait", f"{wait_s:.3f}"),)
-    return Call("GET", _sweep(id), _json, params, wait_s=wait_s or 0.0)
+    return Call("GET", _sweep(id), _of(id), params, wait_s=wait_s or 0.0)
 
 
 def sweeps(page_token: str) -> Call[Document]:
-    return _get("/v1/sweeps", (("page_token", page_token),) if page_token else ())
+    return _get("/v1/sweeps", "sweeps", params=_page(page_token))
 
 
 def sweep_table(id: str) -> Call[dict[str, Array]]:
-    return Call("GET", _sweep(id) + "/results", lambda r: arrays(r.content), (("format", "npz"),))
+    return _file(id, _sweep(id) + "/results", NPZ, (("format", "npz"),))
 
 
 def sweep_members(id: str, page_token: str) -> Call[Document]:
-    params: Params = (("page_size", "1000"),)
-    return _get(_sweep(id) + "/results", params + ((("page_token", page_token),) if page_token else ()))
+    return _get(_sweep(id) + "/results", "members", params=(("page_size", "1000"), *_page(page_token)))
+
+
+def _page(token: str) -> Params:
+    return (("page_token", token),) if token else ()
 
 
 def cancel_sweep(id: str) -> Call[Document]:
-    return _safely(_post(_sweep(id) + "/cancel"))
+    return Call("POST", _sweep(id) + "/cancel", _of(id))
 
 
 def delete_sweep(id: str) -> Call[None]:
-    return Call("DELETE", _sweep(id), _nothing)
+    return Call("DELETE", _sweep(id), _nothing, kind=NOTHING, gone=("deleted",))
 
 
 def member_job(id: str, number: int) -> Call[Document]:
-    return _post(f"{_sweep(id)}/members/{number}/job", key=new_key())
+    return _post(f"{_sweep(id)}/members/{number}/job", *JOB, key=new_key())
 
 
 def _sweep(id: str) -> str:
@@ -422,7 +468,7 @@ def upload_mesh(source: MeshSource) -> Call[StoredMesh]:
     """A mesh is stored by the hash of its content, so that sending it twice does no more than once."""
     content = mesh_bytes(source)
     headers = {"Content-Type": "application/octet-stream"}
-    return Call("POST", "/v1/meshes", lambda r: StoredMesh.from_json(r.json()), headers=headers, content=content)
+    return Call("POST", "/v1/meshes", StoredMesh.from_json, headers=headers, content=content)
 
 
 def mesh_bytes(source: MeshSource) -> bytes:
@@ -442,15 +488,19 @@ def mesh_bytes(source: MeshSource) -> bytes:
 
 
 def mesh(hash: str) -> Call[StoredMesh]:
-    return Call("GET", "/v1/meshes/" + quote(hash, safe=":"), lambda r: StoredMesh.from_json(r.json()))
+    return Call("GET", _mesh(hash), lambda document: StoredMesh.from_json(_of(hash, "hash")(document)))
 
 
 def meshes(page_token: str) -> Call[Document]:
-    return _get("/v1/meshes", (("page_token", page_token),) if page_token else ())
+    return _get("/v1/meshes", "meshes", params=_page(page_token))
 
 
 def delete_mesh(hash: str) -> Call[None]:
-    return Call("DELETE", "/v1/meshes/" + quote(hash, safe=":"), _nothing)
+    return Call("DELETE", _mesh(hash), _nothing, kind=NOTHING, gone=("deleted", "not-found"))
+
+
+def _mesh(hash: str) -> str:
+    return "/v1/meshes/" + quote(hash, safe=":")
 
 
 # Service
@@ -463,33 +513,32 @@ def validate(problem: Problem | Mapping[str, Any]) -> Call[Validation]:
     _find_non_json(document, "", found)
     if found:
         raise errors.invalid(found)
-    call = _post("/v1/problems/validate", {"problem": document})
-    return Call(call.method, call.path, lambda r: Validation.from_json(r.json()), (), call.headers, call.content, True)
+    call = _post("/v1/problems/validate", body={"problem": document})
+    return Call(call.method, call.path, Validation.from_json, (), call.headers, call.content, True)
 
 
 def info() -> Call[Document]:
-    return _get("/v1/info")
+    return _get("/v1/info", "name")
 
 
 def me() -> Call[Document]:
-    return _get("/v1/me")
+    return _get("/v1/me", "owner")
 
 
 def queue() -> Call[Document]:
-    return _get("/v1/queue")
+    return _get("/v1/queue", "paused")
 
 
 def pause_queue() -> Call[Document]:
-    return _safely(_post("/v1/queue/pause"))
+    return Call("POST", "/v1/queue/pause", _having("paused"))
 
 
 def resume_queue() -> Call[Document]:
-    return _safely(_post("/v1/queue/resume"))
+    return Call("POST", "/v1/queue/resume", _having("paused"))
 
 
 def explain(kind: str, code: str) -> Call[Document]:
-    call = _get(f"/v1/{kind}/" + quote(code, safe=""))
-    return Call(call.method, call.path, _json, headers={"Accept": "application/json"})
+    return Call("GET", f"/v1/{kind}/" + quote(code, safe=""), _having("title"), headers={"Accept": "application/json"})
 
 
 def submissions(problems: Iterable[Problem | Mapping[str, Any] | Submission]) -> list[Submission]:

@@ -50,7 +50,7 @@ class Connection:
         return cls(url.rstrip("/"), token, os.fspath(ca))
 
     def settings(self) -> dict[str, Any]:
-        """Of `httpx.Client` and `httpx.AsyncClient`."""
+        """Of `httpx.Client` and `httpx.AsyncClient`; made once, since reading certificates takes its time."""
         headers = {"User-Agent": f"signorini-python/{package_version()}", "Accept": "application/json"}
         if self.token:
             headers["Authorization"] = f"Bearer {self.token}"
@@ -63,10 +63,10 @@ class Connection:
             "trust_env": not is_loopback(self.url),
         }
 
-    def _trusted(self) -> ssl.SSLContext | bool:
+    def _trusted(self) -> ssl.SSLContext:
         """Whom a service over https may have its certificate from."""
         if not self.url.startswith("https://"):
-            return True
+            return ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # of no use, and made at once
         if self.ca:
             try:
                 return ssl.create_default_context(cafile=self.ca)
@@ -81,6 +81,7 @@ class Connection:
 
 
 def request_arguments(call: Call[Any]) -> Mapping[str, Any]:
+    """Of `Pool.call` and `AsyncPool.call`."""
     return {
         "method": call.method,
         "url": call.path,

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import math
+import zipfile
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, cast
@@ -145,6 +147,9 @@ class Event:
 
     def __getitem__(self, name: str) -> Any:
         return self.data[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.data
 
 
 @dataclass(frozen=True)
@@ -337,10 +342,23 @@ class Fields:
         return figures.deformed(self, **options)
 
 
+ATTEMPTS = 20
+"""NumPy reads headers with Python's parser, which in some versions fails when several threads use it (gh-106905)."""
+
+
 def arrays(content: bytes) -> dict[str, Array]:
-    """The arrays of an `npz` file. No pickles: whatever a server sends, nothing of it is run."""
-    with np.load(io.BytesIO(content), allow_pickle=False) as file:
-        return {name: file[name] for name in file.files}
+    """The arrays of an `npz` file. No pickles: whatever a server sends, nothing of it is run. Raises ValueError or
+    EOFError if it is not whole."""
+    for left in reversed(range(ATTEMPTS)):
+        try:
+            with np.load(io.BytesIO(content), allow_pickle=False) as file:
+                return {name: file[name] for name in file.files}
+        except (zipfile.BadZipFile, zlib.error, AttributeError) as error:
+            raise ValueError(f"no npz file: {error}") from error
+        except SystemError:
+            if not left:
+                raise
+    raise AssertionError("the last attempt returns or raises")
 
 
 def known(cls: type, found: Mapping[str, Array]) -> dict[str, Any]:

@@ -9,9 +9,10 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 from ._data import Event
-from .errors import SignoriniError
+from .errors import SignoriniError, UnexpectedAnswer
 
 
 @dataclass(frozen=True)
@@ -68,12 +69,14 @@ class Parser:
 class Cursor:
     """A place in the events of a job or sweep.
 
+    id: which one; empty if it is not known
     seq: number of the last event that was seen
     done: whether the last of all events was seen
     """
 
-    def __init__(self, after_seq: int = 0) -> None:
+    def __init__(self, after_seq: int = 0, id: str = "") -> None:
         self.seq = after_seq
+        self._id = id
         self.done = False
         self._parser = Parser()
 
@@ -82,11 +85,22 @@ class Cursor:
         self._parser = Parser()
         return {"Accept": "text/event-stream", "Last-Event-ID": str(self.seq)}
 
+    def _is_asked(self, data: Any) -> bool:
+        """Whether what an event says of a job or sweep is said of the one that was asked for."""
+        named = data.get("job") or data.get("sweep")
+        found = named.get("id") if isinstance(named, dict) else named
+        return not self._id or not found or found == self._id
+
     def read(self, content: bytes) -> Iterator[Event]:
         """The events that these bytes complete, each once and in its order."""
         for message in self._parser.feed(content):
-            data = json.loads(message.data)
-            event = Event(int(data["seq"]), str(data["type"]), data)
+            try:
+                data = json.loads(message.data)
+                event = Event(int(data["seq"]), str(data["type"]), data)
+            except (ValueError, KeyError, TypeError) as error:
+                raise UnexpectedAnswer(f"this is no event of the service: {message.data[:100]!r}") from error
+            if not self._is_asked(data):
+                raise UnexpectedAnswer(f"this event is not of {self._id}: {message.data[:200]!r}")
             if event.seq <= self.seq:
                 continue
             if event.seq != self.seq + 1:

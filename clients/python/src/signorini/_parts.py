@@ -1,20 +1,23 @@
 """What the types of `problem.py` have in common: values are checked against the annotations of the fields.
 
 One function, `convert`, reads a value by the type that it should have. It takes what is convenient (plain
-dictionaries, NumPy arrays and numbers, tuples), returns what the field holds (dataclasses, lists, floats), and notes
-everything that is wrong instead of stopping at the first fault, each fault with its JSON Pointer, as the service does.
-Ranges of numbers are left to the service (`Problem.validate`), which knows them; here are names, types and shapes.
+dictionaries, arrays, ranges, numbers of NumPy and of `decimal`, paths), returns what the field holds (dataclasses,
+lists, floats), and notes everything that is wrong instead of stopping at the first fault, each fault with its JSON
+Pointer, as the service does. Ranges of numbers are left to the service (`Problem.validate`), which knows them; here are
+names, types and shapes.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import decimal
 import difflib
 import math
 import numbers
+import os
 import types
 import typing
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from typing import Any, Literal, TypeVar, Union
 
 import numpy as np
@@ -139,23 +142,35 @@ def is_default(field: dataclasses.Field[Any], value: Any) -> bool:
 
 def plain(value: Any, defaults: bool = False) -> Any:
     """Plain JSON of a value."""
+    value = simple(value)
     if isinstance(value, Part):
         return value.to_dict(defaults=defaults)
     if isinstance(value, Mapping):
         return {str(key): plain(item, defaults) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, (list, tuple)):
+    if isinstance(value, list):
         return [plain(item, defaults) for item in value]
     return value
 
 
+def simple(value: Any) -> Any:
+    """A value of NumPy, pandas or the standard library as what JSON has: numbers, texts, lists."""
+    if isinstance(value, np.generic):
+        return value.item()
+    if value is None or isinstance(value, (str, bytes, int, float, list, Mapping, Set, Part)):
+        return value
+    if isinstance(value, (numbers.Real, decimal.Decimal)):
+        number = float(value)
+        return int(number) if number.is_integer() and value == int(number) else number
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if hasattr(value, "__array__"):  # a Series of pandas, an array of another library
+        return np.asarray(value).tolist()
+    return list(value) if isinstance(value, Iterable) else value
+
+
 def convert(value: Any, hint: Any, pointer: str, found: list[Violation]) -> Any:
     """`value` as its field holds it; what is wrong is added to `found`."""
-    if isinstance(value, np.generic):
-        value = value.item()
+    value = simple(value)
     origin = typing.get_origin(hint)
     if origin is Union or isinstance(hint, types.UnionType):
         return convert_union(value, typing.get_args(hint), pointer, found)
@@ -189,9 +204,7 @@ def convert_scalar(value: Any, hint: type, pointer: str, found: list[Violation])
 
 
 def convert_list(value: Any, shape: ListOf, pointer: str, found: list[Violation]) -> Any:
-    if isinstance(value, np.ndarray):
-        value = value.tolist()
-    if not isinstance(value, Sequence) or isinstance(value, (str, bytes)):
+    if not isinstance(value, list):
         return fault(found, pointer, "wrong_type", value, described(shape))
     if len(value) < shape.least or (shape.most is not None and len(value) > shape.most):
         return fault(found, pointer, "wrong_length", f"{len(value)} items", described(shape))
@@ -262,7 +275,7 @@ def fits(value: Any, hint: Any) -> bool:
     if typing.get_origin(hint) is Union or isinstance(hint, types.UnionType):
         return any(fits(value, choice) for choice in typing.get_args(hint))
     if list_shape(hint):
-        return isinstance(value, (Sequence, np.ndarray)) and not isinstance(value, (str, bytes))
+        return isinstance(value, list)
     if typing.get_origin(hint) is dict:
         return isinstance(value, Mapping)
     if isinstance(hint, type) and issubclass(hint, Part):
@@ -270,6 +283,33 @@ def fits(value: Any, hint: Any) -> bool:
     if hint in (int, float):
         return isinstance(value, numbers.Real) and not isinstance(value, bool)
     return isinstance(value, hint)
+
+
+def within(hint: Any, name: str) -> list[Any]:
+    """The types that a value of a type may have at a name or number in it; `int` and `float` stand for themselves."""
+    if shape := list_shape(hint):
+        found = shape.item
+    elif typing.get_origin(hint) is dict:
+        found = typing.get_args(hint)[1]
+    elif isinstance(hint, type) and issubclass(hint, Part):
+        found = {json_name(field): inner for field, inner in hints(hint).items()}.get(name)
+    else:
+        return []
+    return alternatives(found)
+
+
+def takes_integers(cls: Any, path: str) -> bool:
+    """Whether there are only whole numbers at a place in a part."""
+    hints = [cls]
+    for name in pointers.names(path):
+        hints = [inner for hint in hints for inner in within(hint, name)]
+    return int in hints and float not in hints
+
+
+def alternatives(hint: Any) -> list[Any]:
+    if typing.get_origin(hint) is Union or isinstance(hint, types.UnionType):
+        return [inner for choice in typing.get_args(hint) for inner in alternatives(choice)]
+    return [hint]
 
 
 def list_shape(hint: Any) -> ListOf | None:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
 import sys
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TextIO
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, TextIO
 
 from ._calls import LONGEST_WAIT_S
+from ._retry import Late
 from .errors import WaitTimeout
 
-if TYPE_CHECKING:
-    from .local import LocalServer
-
 REFRESH_S = 0.5
+GRACE_S = 1.0
+"""Seconds after a time-out within which an answer may still arrive."""
 
 
 class Waiting:
@@ -37,23 +39,44 @@ class Waiting:
         self.what = what
         self.back = back
         self._progress = progress
-        self._out = out or sys.stderr
+        self._out: TextIO | None = out or sys.stderr  # pythonw has none
         self._card = card if in_notebook() else None
         self._shown_card: Any = None
         self._residuals: list[float] = []
-        self._in_place = self._out.isatty() or self._card is not None
+        self._in_place = self._card is not None or _is_terminal(self._out)
         self._shown = ""
         self._status = ""
-        self._end = None if timeout is None else time.monotonic() + timeout
+        self._end = None if timeout is None else time.monotonic() + float(timeout)
 
-    def seconds(self) -> float:
-        """Seconds that the service should wait for the end before it answers."""
-        longest = REFRESH_S if self._progress and self._in_place else LONGEST_WAIT_S
-        return min(longest, self.left(longest))
+    @property
+    def deadline(self) -> float | None:
+        """When an answer is no longer waited for, of `time.monotonic`: the service itself answers at the time-out."""
+        return None if self._end is None else self._end + GRACE_S
 
-    def left(self, otherwise: float) -> float:
-        """Seconds until the time-out, at most `otherwise`."""
-        return otherwise if self._end is None else max(0.0, min(otherwise, self._end - time.monotonic()))
+    def soon(self, seconds: float) -> float:
+        """The deadline of something that is less important."""
+        return min(time.monotonic() + seconds, self.deadline or math.inf)
+
+    def seconds(self, crowded: bool = False) -> float:
+        """Seconds that the service should wait for the end before it answers.
+
+        crowded: whether others wait for their turn to ask
+        """
+        longest = REFRESH_S if crowded or (self._progress and self._in_place) else LONGEST_WAIT_S
+        return longest if self._end is None else max(0.0, min(longest, self._end - time.monotonic()))
+
+    @contextlib.contextmanager
+    def in_time(self) -> Iterator[None]:
+        """Raises `WaitTimeout` if the deadline comes while the service is asked."""
+        try:
+            yield
+        except Late as error:
+            raise self._over(f"The service does not answer: {error}") from error
+
+    def _over(self, why: str = "") -> WaitTimeout:
+        return WaitTimeout(
+            "\n  ".join(filter(None, [f"{self.what} has not ended in time; it goes on.", why, self.back]))
+        )
 
     def seen(self, status: str, line: str, ended: bool, residual: float | None = None) -> None:
         """Shows the line. Raises `WaitTimeout` when the time is over."""
@@ -65,7 +88,7 @@ class Waiting:
             self._write(line, ended)
         self._status = status
         if not ended and self._end is not None and time.monotonic() >= self._end:
-            raise WaitTimeout(f"{self.what} has not ended in time; it goes on.\n  {self.back}")
+            raise self._over()
 
     def note(self, text: str) -> None:
         """Shows, on a line of its own, what happens to the connection meanwhile."""
@@ -76,19 +99,29 @@ class Waiting:
     def detached(self) -> None:
         """Tells how to come back, after Ctrl-C."""
         self.close()
-        self._out.write(f"Detached. {self.back}\n")
-        self._out.flush()
+        self._say(f"Detached. {self.back}\n")
 
     def tell(self, lines: Iterable[str]) -> None:
         """Writes lines below the last one."""
-        self._out.writelines(line + "\n" for line in lines)
-        self._out.flush()
+        self._say("".join(line + "\n" for line in lines))
 
     def close(self) -> None:
         if self._shown and self._in_place:
-            self._out.write("\n")
-            self._out.flush()
+            self._say("\n")
         self._shown = ""
+
+    def _say(self, text: str) -> None:
+        """Writes, as far as the stream can: whatever a program has in the place of standard error, waiting goes on."""
+        if self._out is None or not text:
+            return
+        try:
+            try:
+                self._out.write(text)
+            except UnicodeEncodeError as error:
+                self._out.write(text.encode(error.encoding, "backslashreplace").decode(error.encoding))
+            self._out.flush()
+        except Exception:
+            self._out = None
 
     def _show_card(self, html: str) -> None:
         from IPython.display import HTML, display
@@ -101,18 +134,20 @@ class Waiting:
     def _write(self, line: str, ended: bool) -> None:
         if self._in_place:
             # blanks over what is left of a longer line before
-            self._out.write("\r" + line + " " * max(0, len(self._shown) - len(line)))
+            self._say("\r" + line + " " * max(0, len(self._shown) - len(line)))
             self._shown = line
             if ended:
                 self.close()
         else:
-            self._out.write(line + "\n")
-        self._out.flush()
+            self._say(line + "\n")
 
 
-def goes_on(what: str, again: str, server: LocalServer | None) -> str:
-    """What becomes of a job or sweep that nobody waits for any more, and how to wait again."""
-    if server is not None and server.temporary:
+def goes_on(what: str, again: str, ends_with_program: bool) -> str:
+    """What becomes of a job or sweep that nobody waits for any more, and how to wait again.
+
+    ends_with_program: whether it is that of a service whose jobs end with it, and that with the program
+    """
+    if ends_with_program:
         return f"The {what} is lost when this program ends, and its service with it. Until then: {again}"
     return f"The {what} goes on. Come back with {again}"
 
@@ -162,6 +197,13 @@ def duration(seconds: float) -> str:
     if minutes < 60:
         return f"{minutes} min {rest} s"
     return f"{minutes // 60} h {minutes % 60} min"
+
+
+def _is_terminal(out: Any) -> bool:
+    try:
+        return bool(out.isatty())
+    except Exception:  # None, closed, or something that can only write
+        return False
 
 
 def in_notebook() -> bool:

@@ -26,10 +26,20 @@ LOG = logging.getLogger("signorini")
 """Python shows its warnings on standard error unless the program sets up logging otherwise."""
 
 
+BROKEN = (httpx.TransportError, httpx.DecodingError)
+"""What httpx raises where there is no answer, or only a part of one."""
+
+
+class Late(ConnectionLost):
+    """The deadline of a call has come."""
+
+
 class Attempts:
     """The attempts of one request.
 
     limit_s: no attempt begins later than so many seconds after the first failure
+    deadline: nor at this time of the clock; None: without
+    address: of the service
     tell: is given a sentence when attempts go on for longer than a moment, and another one when they have succeeded
     """
 
@@ -39,8 +49,12 @@ class Attempts:
         limit_s: float,
         clock: Callable[[], float] = time.monotonic,
         tell: Callable[[str], None] = LOG.warning,
+        deadline: float | None = None,
+        address: str = "this address",
     ) -> None:
         self.repeatable = repeatable
+        self.deadline = deadline
+        self.address = address
         self.limit_s = limit_s
         self.failures = 0
         self._clock = clock
@@ -56,13 +70,13 @@ class Attempts:
         self._told = False
         self._first_failure = None
 
-    def after_error(self, error: httpx.TransportError) -> float:
+    def after_error(self, error: httpx.RequestError) -> float:
         """Seconds to wait before the next attempt. Raises `ConnectionLost` if there is none."""
         reason = str(error) or type(error).__name__
         if _is_lasting(error):
-            raise ConnectionLost(f"the service at {_address(error)} cannot be called: {reason}") from error
+            raise ConnectionLost(f"the service at {self.address} cannot be called: {reason}") from error
         never_arrived = isinstance(error, (httpx.ConnectError, httpx.ConnectTimeout, httpx.PoolTimeout))
-        why = f"the service at {_address(error)} cannot be reached ({reason})"
+        why = f"the service at {self.address} cannot be reached ({reason})"
         pause = self._pause(None, why) if self.repeatable or never_arrived else None
         if pause is None:
             after = f", also after {self.failures} attempts" if self.failures > 1 else ""
@@ -70,9 +84,7 @@ class Attempts:
                 "Is it running (`signorini serve`)? SIGNORINI_URL names another; Client.local() starts one. "
                 "Jobs that it has go on, or begin again with it"
             )
-            raise ConnectionLost(
-                f"the service at {_address(error)} cannot be reached{after}: {reason}. {hint}"
-            ) from error
+            raise ConnectionLost(f"the service at {self.address} cannot be reached{after}: {reason}. {hint}") from error
         return pause
 
     def after_answer(self, response: httpx.Response) -> float | None:
@@ -100,6 +112,10 @@ class Attempts:
         if wanted is not None:
             pause = max(pause, wanted)
         last = self._first_failure + self.limit_s
+        if self.deadline is not None and self.deadline <= last:
+            last = self.deadline
+            if now + pause > last:
+                raise Late(f"{why}, also after {self.failures} attempts")
         if now + pause > last:
             return None
         if not self._told and now + pause > self._first_failure + QUIET_S:
@@ -108,7 +124,7 @@ class Attempts:
         return pause
 
 
-def _is_lasting(error: httpx.TransportError) -> bool:
+def _is_lasting(error: httpx.RequestError) -> bool:
     """Whether the request would end the same way at any time: a certificate that is not trusted, no such protocol."""
     if isinstance(error, (httpx.UnsupportedProtocol, httpx.LocalProtocolError)):
         return True
@@ -139,11 +155,3 @@ def _reason(response: httpx.Response) -> str:
         return str(response.json()["code"])
     except (ValueError, KeyError, TypeError):  # not the service's own answer, but a proxy's
         return f"HTTP status {response.status_code}"
-
-
-def _address(error: httpx.TransportError) -> str:
-    try:
-        url = error.request.url
-        return f"{url.scheme}://{url.netloc.decode()}"
-    except RuntimeError:  # the error came without its request
-        return "this address"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import collections
 import difflib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +12,9 @@ import numpy as np
 from . import pointer as pointers
 from ._data import Array
 from ._extras import load
+from ._parts import takes_integers
 from ._progress import sweep_line
+from .problem import Problem
 
 if TYPE_CHECKING:
     import pandas
@@ -97,15 +99,17 @@ class SweepTable:
     that failed to converge (column `status`) are those of its last state.
 
     columns: arrays by name. A parameter is named by the last part of its pointer, `nonlocal_radius`, or by all of it
-        where several end alike.
+        where several end alike, or like the name of a result.
     parameters: the names of these columns
     title: the name of the sweep, which a figure has as its title
     """
 
     def __init__(self, found: Mapping[str, Array], title: str = "") -> None:
         pointed = [name for name in found if name.startswith("/")]
-        short = short_names(pointed)
-        self.columns: dict[str, Array] = {short.get(name, name): column for name, column in found.items()}
+        short = short_names(pointed, [name for name in found if name not in pointed])
+        self.columns: dict[str, Array] = {
+            short.get(name, name): _whole(name, column) if name in short else column for name, column in found.items()
+        }
         self.parameters = [short[name] for name in pointed]
         self.title = title
 
@@ -116,6 +120,13 @@ class SweepTable:
             guess = f"did you mean {close[0]!r}? " if close else ""
             raise KeyError(f"there is no column {name!r}; {guess}there are {', '.join(self.columns)}")
         return self.columns[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.columns
+
+    def __iter__(self) -> Iterator[str]:
+        """The names of the columns."""
+        return iter(self.columns)
 
     def __len__(self) -> int:
         return len(self.columns["number"])
@@ -176,13 +187,29 @@ def _cell(value: Any) -> str:
     return f"{value:.5g}" if isinstance(value, float) else str(value)
 
 
-def short_names(found: list[str]) -> dict[str, str]:
-    """The last part of each pointer, or all of it where that is not enough."""
-    last = {pointer: pointers.names(pointer)[-1] for pointer in found}
-    return {
-        pointer: name if list(last.values()).count(name) == 1 and not name.isdigit() else pointer[1:].replace("/", ".")
-        for pointer, name in last.items()
-    }
+def short_names(found: Sequence[str], taken: Iterable[str] = ()) -> dict[str, str]:
+    """For each pointer a name that no other has, and none of those that are taken: the last part of it, or all of it
+    with dots or, where even that is not enough, as it is."""
+    names: dict[str, str] = {}
+    for name in (_last, _dotted, str):
+        rest = {pointer: name(pointer) for pointer in found if pointer not in names}
+        used = collections.Counter([*rest.values(), *names.values(), *taken])
+        names.update({pointer: name for pointer, name in rest.items() if used[name] == 1 and not name.isdigit()})
+    return {pointer: names.get(pointer, pointer) for pointer in found}
+
+
+def _last(pointer: str) -> str:
+    return pointers.names(pointer)[-1]
+
+
+def _dotted(pointer: str) -> str:
+    return pointer[1:].replace("/", ".")
+
+
+def _whole(pointer: str, column: Array) -> Array:
+    """The values of a parameter: whole numbers where the problem has these, since a table has numbers of one kind."""
+    is_whole = column.dtype.kind == "f" and bool(np.all(column == np.round(column)))
+    return column.astype(np.int64) if is_whole and takes_integers(Problem, pointer) else column
 
 
 class Member:
@@ -215,6 +242,9 @@ class Member:
 
     def __getitem__(self, name: str) -> Any:
         return self.row[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.row
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.number} {self.status} {dict(self.parameters)}>"

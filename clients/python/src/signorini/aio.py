@@ -18,13 +18,15 @@ import httpx
 
 from . import _calls as calls
 from ._about import about, obstacles
+from ._answer import check_events
 from ._calls import Call, MeshSource, Submission
 from ._connection import Connection, request_arguments, stream_arguments
 from ._data import Event, Fields, History, Profile, StoredMesh, Summary, Validation, known
 from ._events import Cursor
 from ._job import JobView, changes
+from ._pool import AsyncPool
 from ._progress import Waiting, goes_on
-from ._retry import LOG, Attempts
+from ._retry import BROKEN, LOG, Attempts
 from ._sweep import TABLE_S, Member, SweepTable, SweepView
 from .errors import NotFound, SignoriniError
 from .local import LocalServer
@@ -39,7 +41,10 @@ T = TypeVar("T")
 
 
 class AsyncClient:
-    """A connection to a service, for asyncio; see `Client`. It is closed by `aclose()` or `async with`."""
+    """A connection to a service, for asyncio; see `Client`. It is closed by `aclose()` or `async with`.
+
+    It may be used in one event loop after the other, and in several threads, each with a loop of its own.
+    """
 
     def __init__(
         self,
@@ -49,11 +54,21 @@ class AsyncClient:
         ca: str | os.PathLike[str] | None = None,
         retry_for: float = 60.0,
     ) -> None:
-        connection = Connection.of(url, token, ca)
-        self.url = connection.url
+        self._connection = Connection.of(url, token, ca)
         self.retry_for = retry_for
         self._server: LocalServer | None = None
-        self._http = httpx.AsyncClient(**connection.settings())
+        self._ends_with_program = False
+        self._http = AsyncPool(self._connection.settings())
+
+    @property
+    def url(self) -> str:
+        return self._connection.url
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name not in ("_http", "_server")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, _http=AsyncPool(state["_connection"].settings()), _server=None)
 
     @classmethod
     def local(
@@ -67,7 +82,7 @@ class AsyncClient:
         """A service of one's own; see `Client.local`."""
         server = LocalServer(data, binary=binary, workers=workers, options=options)
         client = cls(server.start(), token="", ca="")
-        client._server = server
+        client._server, client._ends_with_program = server, server.temporary
         return client
 
     async def aclose(self) -> None:
@@ -93,7 +108,7 @@ class AsyncClient:
         problem: Problem | Mapping[str, Any],
         *,
         name: str | None = None,
-        labels: Mapping[str, str] | None = None,
+        labels: Mapping[str, object] | None = None,
         priority: int | None = None,
         timeout_s: float | None = None,
         queue_ttl_s: float | None = None,
@@ -129,7 +144,8 @@ class AsyncClient:
         return await self._send(calls.cancel_jobs(calls.filters(**filters)))
 
     async def delete_jobs(self, **filters: Any) -> Mapping[str, int]:
-        return await self._send(calls.delete_jobs(calls.filters(**filters)))
+        before = await self._send(calls.count(calls.filters(**filters, group_by="status")))
+        return await self._send(calls.delete_jobs(calls.filters(**filters), before))
 
     async def validate(self, problem: Problem | Mapping[str, Any]) -> Validation:
         return await self._send(calls.validate(problem))
@@ -143,7 +159,7 @@ class AsyncClient:
         *,
         mode: str = "grid",
         name: str | None = None,
-        labels: Mapping[str, str] | None = None,
+        labels: Mapping[str, object] | None = None,
         priority: int | None = None,
         timeout_s: float | None = None,
         queue_ttl_s: float | None = None,
@@ -209,41 +225,38 @@ class AsyncClient:
 
     # Sending
 
-    async def _send(self, call: Call[T], limit_s: float | None = None, tell: Callable[[str], None] = LOG.warning) -> T:
-        attempts = Attempts(call.repeatable, self.retry_for if limit_s is None else limit_s, tell=tell)
+    async def _send(self, call: Call[T], deadline: float | None = None, tell: Callable[[str], None] = LOG.warning) -> T:
+        attempts = Attempts(call.repeatable, self.retry_for, tell=tell, deadline=deadline, address=self.url)
         while True:
             try:
-                response = await self._http.request(**request_arguments(call))
-            except httpx.TransportError as error:
-                pause: float | None = attempts.after_error(error)
-            else:
+                response = await self._http.call(request_arguments(call), deadline, call.wait_s > 0)
                 pause = attempts.after_answer(response)
                 if pause is None:
                     return call.read(response, attempts.failures + 1)
-            await asyncio.sleep(pause or 0.0)
+            except BROKEN as error:
+                pause = attempts.after_error(error)
+            await asyncio.sleep(pause)
 
-    async def _events(self, path: str, after_seq: int) -> AsyncIterator[Event]:
-        cursor = Cursor(after_seq)
-        attempts = Attempts(True, self.retry_for)
+    async def _events(self, path: str, id: str, after_seq: int) -> AsyncIterator[Event]:
+        cursor = Cursor(after_seq, id)
+        attempts = Attempts(True, self.retry_for, address=self.url)
         while not cursor.done:
             try:
-                async with self._http.stream(**stream_arguments(path, cursor.headers())) as response:
-                    if response.status_code != 200:
-                        await response.aread()
-                    pause = attempts.after_answer(response)
+                async with self._http.stream(stream_arguments(path, cursor.headers())) as stream:
+                    if stream.response.status_code != 200:
+                        await stream.read()
+                    pause = attempts.after_answer(stream.response)
                     if pause is None:
-                        if response.is_error:
-                            calls.raise_error(response)
-                        if response.status_code == 204:
+                        if not check_events(stream.response, cursor.seq):
                             return
-                        async for content in response.aiter_raw():
+                        async for content in stream.pieces():
                             attempts.succeeded()
                             for event in cursor.read(content):
                                 yield event
                             if cursor.done:
                                 return
-                        pause = attempts.after_error(httpx.ReadError("the stream ended", request=response.request))
-            except httpx.TransportError as error:
+                        raise httpx.ReadError("the stream ended", request=stream.response.request)
+            except BROKEN as error:
                 pause = attempts.after_error(error)
             await asyncio.sleep(pause)
 
@@ -262,12 +275,13 @@ class AsyncJob(JobView):
     async def wait(self, timeout: float | None = None, progress: bool = True) -> AsyncResult:
         """Waits until the job has ended, and returns its result; see `Job.wait`. It can be canceled like any task,
         and the job goes on."""
-        back = goes_on("job", f"await (await client.job({self.id!r})).wait()", self._client._server)
+        back = goes_on("job", f"await (await client.job({self.id!r})).wait()", self._client._ends_with_program)
         waiting = Waiting(self.title, timeout, progress, back, self._card)
         try:
             while not self.ended:
-                call = calls.job(self.id, waiting.seconds())
-                self.document = await self._client._send(call, waiting.left(self._client.retry_for), waiting.note)
+                call = calls.job(self.id, waiting.seconds(self._client._http.crowded()))
+                with waiting.in_time():
+                    self.document = await self._client._send(call, waiting.deadline, waiting.note)
                 waiting.seen(self.status, self.line(), self.ended, self._residual())
         except asyncio.CancelledError:  # which is also what Ctrl-C becomes, and what a time-out of asyncio does
             if progress:
@@ -279,7 +293,7 @@ class AsyncJob(JobView):
 
     def events(self, after_seq: int = 0) -> AsyncIterator[Event]:
         """All events of the job, each once and in its order; see `Job.events`."""
-        return self._client._events(calls._job(self.id) + "/events", after_seq)
+        return self._client._events(calls._job(self.id) + "/events", self.id, after_seq)
 
     async def cancel(self) -> AsyncJob:
         self.document = (await self._client._send(calls.cancel(self.id)))["job"]
@@ -310,7 +324,7 @@ class AsyncJob(JobView):
             await self.refresh()
         if not partial:
             self.raise_for_status()
-        document = await self._client._send(calls.result(self.id, partial))
+        document = await self._client._send(calls.result(self.id, partial, self.input_hash))
         return AsyncResult(self._client, self, document)
 
     async def svg(self, plot: str, theme: str = "light", *, size: str = "page", step: int | str | None = None) -> str:
@@ -389,12 +403,13 @@ class AsyncSweep(SweepView):
         return self
 
     async def wait(self, timeout: float | None = None, progress: bool = True) -> AsyncSweep:
-        back = goes_on("sweep", f"await (await client.sweep({self.id!r})).wait()", self._client._server)
+        back = goes_on("sweep", f"await (await client.sweep({self.id!r})).wait()", self._client._ends_with_program)
         waiting = Waiting(self.title, timeout, progress, back, self._card)
         try:
             while not self.ended:
-                call = calls.sweep(self.id, waiting.seconds())
-                self.document = await self._client._send(call, waiting.left(self._client.retry_for), waiting.note)
+                call = calls.sweep(self.id, waiting.seconds(self._client._http.crowded()))
+                with waiting.in_time():
+                    self.document = await self._client._send(call, waiting.deadline, waiting.note)
                 waiting.seen(self.status, self.line(), self.ended)
         except asyncio.CancelledError:
             if progress:
@@ -406,14 +421,14 @@ class AsyncSweep(SweepView):
             self._told = True
             # the sweep has ended, whatever becomes of this
             with contextlib.suppress(SignoriniError):
-                waiting.tell((await self._table(waiting.left(TABLE_S))).hinted_notes())
+                waiting.tell((await self._table(waiting.soon(TABLE_S))).hinted_notes())
         return self
 
     async def table(self) -> SweepTable:
         return await self._table()
 
-    async def _table(self, retry_for: float | None = None) -> SweepTable:
-        return SweepTable(await self._client._send(calls.sweep_table(self.id), retry_for), self.title)
+    async def _table(self, deadline: float | None = None) -> SweepTable:
+        return SweepTable(await self._client._send(calls.sweep_table(self.id), deadline), self.title)
 
     async def plot(self, quantity: str, **options: Any) -> Figure:
         return (await self.table()).plot(quantity, **options)
@@ -436,7 +451,7 @@ class AsyncSweep(SweepView):
         raise IndexError(f"the sweep has members 0 to {len(self) - 1}")
 
     def events(self, after_seq: int = 0) -> AsyncIterator[Event]:
-        return self._client._events(calls._sweep(self.id) + "/events", after_seq)
+        return self._client._events(calls._sweep(self.id) + "/events", self.id, after_seq)
 
     def jobs(self) -> AsyncIterator[AsyncJob]:
         return self._client.jobs(sweep=self.id)

@@ -12,11 +12,13 @@ from typing import Any, TypeVar
 import httpx
 
 from . import _calls as calls
+from ._answer import check_events
 from ._calls import Call, MeshSource, Submission
 from ._connection import Connection, request_arguments, stream_arguments
 from ._data import Event, StoredMesh, Validation
 from ._events import Cursor
-from ._retry import LOG, Attempts
+from ._pool import Pool
+from ._retry import BROKEN, LOG, Attempts
 from .errors import NotFound
 from .job import Job
 from .local import LocalServer
@@ -36,7 +38,8 @@ class Client:
     retry_for: seconds for which a request is repeated while the service cannot be reached or is busy; only requests
         that cannot do anything twice are repeated
 
-    A client may be used by several threads at once. It is closed by `close()`, or at the end of a `with` block.
+    A client may be used by several threads at once, and in processes that are forked or are given a pickle of it, of a
+    job or of a result. It is closed by `close()`, or at the end of a `with` block.
     Every method raises an `ApiError` where the service refuses, and `ConnectionLost` where it cannot be reached.
     """
 
@@ -48,11 +51,23 @@ class Client:
         ca: str | os.PathLike[str] | None = None,
         retry_for: float = 60.0,
     ) -> None:
-        connection = Connection.of(url, token, ca)
-        self.url = connection.url
+        self._connection = Connection.of(url, token, ca)
         self.retry_for = retry_for
         self._server: LocalServer | None = None
-        self._http = httpx.Client(**connection.settings())
+        self._ends_with_program = False
+        self._http = Pool(self._connection.settings())
+
+    @property
+    def url(self) -> str:
+        return self._connection.url
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For pickles and copies, which have connections of their own, and the service of this one, if it has one, as
+        long as that runs."""
+        return {name: value for name, value in vars(self).items() if name not in ("_http", "_server")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, _http=Pool(state["_connection"].settings()), _server=None)
 
     @classmethod
     def local(
@@ -72,7 +87,7 @@ class Client:
         """
         server = LocalServer(data, binary=binary, workers=workers, options=options)
         client = cls(server.start(), token="", ca="")
-        client._server = server
+        client._server, client._ends_with_program = server, server.temporary
         return client
 
     def close(self) -> None:
@@ -99,7 +114,7 @@ class Client:
         problem: Problem | Mapping[str, Any],
         *,
         name: str | None = None,
-        labels: Mapping[str, str] | None = None,
+        labels: Mapping[str, object] | None = None,
         priority: int | None = None,
         timeout_s: float | None = None,
         queue_ttl_s: float | None = None,
@@ -129,14 +144,14 @@ class Client:
         *,
         status: str | Sequence[str] | None = None,
         name: str | None = None,
-        labels: Mapping[str, str] | None = None,
+        labels: Mapping[str, object] | None = None,
         owner: str | None = None,
         sweep: str | None = None,
         input_hash: str | None = None,
-        created_after: datetime.datetime | str | None = None,
-        created_before: datetime.datetime | str | None = None,
-        finished_after: datetime.datetime | str | None = None,
-        finished_before: datetime.datetime | str | None = None,
+        created_after: datetime.date | str | None = None,
+        created_before: datetime.date | str | None = None,
+        finished_after: datetime.date | str | None = None,
+        finished_before: datetime.date | str | None = None,
         order_by: str | None = None,
         page_size: int | None = None,
     ) -> Iterator[Job]:
@@ -171,7 +186,8 @@ class Client:
 
     def delete_jobs(self, **filters: Any) -> Mapping[str, int]:
         """Deletes all jobs that match the filters of `jobs` and have ended: `{"matched", "changed"}`."""
-        return self._send(calls.delete_jobs(calls.filters(**filters)))
+        before = self._send(calls.count(calls.filters(**filters, group_by="status")))
+        return self._send(calls.delete_jobs(calls.filters(**filters), before))
 
     def validate(self, problem: Problem | Mapping[str, Any]) -> Validation:
         """Everything that is wrong with a problem, and what solving it would cost; stores nothing."""
@@ -186,7 +202,7 @@ class Client:
         *,
         mode: str = "grid",
         name: str | None = None,
-        labels: Mapping[str, str] | None = None,
+        labels: Mapping[str, object] | None = None,
         priority: int | None = None,
         timeout_s: float | None = None,
         queue_ttl_s: float | None = None,
@@ -266,42 +282,42 @@ class Client:
 
     # Sending
 
-    def _send(self, call: Call[T], limit_s: float | None = None, tell: Callable[[str], None] = LOG.warning) -> T:
-        """Sends a request, again where that is safe, and reads the answer."""
-        attempts = Attempts(call.repeatable, self.retry_for if limit_s is None else limit_s, tell=tell)
+    def _send(self, call: Call[T], deadline: float | None = None, tell: Callable[[str], None] = LOG.warning) -> T:
+        """Sends a request, again where that is safe, and reads the answer.
+
+        deadline: of `time.monotonic`; then `Late` is raised, whatever the service or the network does
+        """
+        attempts = Attempts(call.repeatable, self.retry_for, tell=tell, deadline=deadline, address=self.url)
         while True:
             try:
-                response = self._http.request(**request_arguments(call))
-            except httpx.TransportError as error:
-                pause: float | None = attempts.after_error(error)
-            else:
+                response = self._http.call(request_arguments(call), deadline)
                 pause = attempts.after_answer(response)
                 if pause is None:
                     return call.read(response, attempts.failures + 1)
-            time.sleep(pause or 0.0)
+            except BROKEN as error:
+                pause = attempts.after_error(error)
+            time.sleep(pause)
 
-    def _events(self, path: str, after_seq: int) -> Iterator[Event]:
+    def _events(self, path: str, id: str, after_seq: int) -> Iterator[Event]:
         """The events at a path, each once, over as many connections as it takes."""
-        cursor = Cursor(after_seq)
-        attempts = Attempts(True, self.retry_for)
+        cursor = Cursor(after_seq, id)
+        attempts = Attempts(True, self.retry_for, address=self.url)
         while not cursor.done:
             try:
-                with self._http.stream(**stream_arguments(path, cursor.headers())) as response:
-                    if response.status_code != 200:
-                        response.read()
-                    pause = attempts.after_answer(response)
+                with self._http.stream(stream_arguments(path, cursor.headers())) as stream:
+                    if stream.response.status_code != 200:
+                        stream.read()
+                    pause = attempts.after_answer(stream.response)
                     if pause is None:
-                        if response.is_error:
-                            calls.raise_error(response)
-                        if response.status_code == 204:
+                        if not check_events(stream.response, cursor.seq):
                             return
-                        for content in response.iter_raw():
+                        for content in stream.pieces():
                             attempts.succeeded()
                             yield from cursor.read(content)
                             if cursor.done:
                                 return
                         # the service stopped in good order; what is missing comes from the next one
-                        pause = attempts.after_error(httpx.ReadError("the stream ended", request=response.request))
-            except httpx.TransportError as error:
+                        raise httpx.ReadError("the stream ended", request=stream.response.request)
+            except BROKEN as error:
                 pause = attempts.after_error(error)
             time.sleep(pause)

@@ -10,6 +10,7 @@ SignoriniError
 │   ├── QuotaExceeded, RateLimited
 │   └── ServiceError         ├── Unavailable, StorageFull
 ├── JobFailed                with the reason and the job ─ JobCanceled
+├── UnexpectedAnswer         something else than the service answered
 ├── WaitTimeout              also a TimeoutError; the job goes on
 └── ConnectionLost           also a ConnectionError; the job goes on
 """
@@ -187,6 +188,9 @@ class JobFailed(SignoriniError):
             text += "\n  Its last state is kept: job.result(partial=True)"
         super().__init__(text)
 
+    def __reduce__(self) -> tuple[type[JobFailed], tuple[JobView]]:
+        return type(self), (self.job,)
+
 
 class JobCanceled(JobFailed):
     """A job was canceled."""
@@ -198,6 +202,10 @@ class WaitTimeout(SignoriniError, TimeoutError):
 
 class ConnectionLost(SignoriniError, ConnectionError):
     """The service could not be reached, again and again until the limit of `Client(retry_for=…)`."""
+
+
+class UnexpectedAnswer(SignoriniError):
+    """What answered is not the service, or the answer is not one to this request: a proxy's page to log in, …"""
 
 
 CLASSES: Mapping[str, type[ApiError]] = {

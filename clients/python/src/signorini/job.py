@@ -45,7 +45,8 @@ class Job(JobView):
         try:
             while not self.ended:
                 call = calls.job(self.id, waiting.seconds())
-                self.document = self._client._send(call, waiting.left(self._client.retry_for), waiting.note)
+                with waiting.in_time():
+                    self.document = self._client._send(call, waiting.deadline, waiting.note)
                 waiting.seen(self.status, self.line(), self.ended, self._residual())
         except KeyboardInterrupt:
             waiting.detached()
@@ -56,7 +57,7 @@ class Job(JobView):
 
     def _back(self) -> str:
         again = f"client.job({self.id!r})"
-        return goes_on("job", f"{again}.wait(), or stop it with {again}.cancel()", self._client._server)
+        return goes_on("job", f"{again}.wait(), or stop it with {again}.cancel()", self._client._ends_with_program)
 
     def events(self, after_seq: int = 0) -> Iterator[Event]:
         """All events of the job, past ones first, then live ones, until it has ended.
@@ -64,7 +65,7 @@ class Job(JobView):
         Each comes once and in its order, also if the connection breaks or the service restarts. `after_seq` is the
         number of the last event that is already known.
         """
-        return self._client._events(calls._job(self.id) + "/events", after_seq)
+        return self._client._events(calls._job(self.id) + "/events", self.id, after_seq)
 
     def cancel(self) -> Job:
         """Asks the job to stop; it has ended within half a second. A job that has ended stays as it is."""
@@ -104,7 +105,7 @@ class Job(JobView):
             self.refresh()
         if not partial:
             self.raise_for_status()
-        return Result(self._client, self, self._client._send(calls.result(self.id, partial)))
+        return Result(self._client, self, self._client._send(calls.result(self.id, partial, self.input_hash)))
 
     def svg(self, plot: str, theme: str = "light", *, size: str = "page", step: int | str | None = None) -> str:
         """A figure that the service draws: `profile`, `convergence`, `deformed` or `mesh`.

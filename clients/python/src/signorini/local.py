@@ -35,6 +35,7 @@ class LocalServer:
     ) -> None:
         self.binary = find_binary(binary)
         self.temporary = data is None
+        self._starter = os.getpid()
         self.url = ""
         self._own = pathlib.Path(tempfile.mkdtemp(prefix="signorini-"))
         self.data = self._own / "data" if data is None else pathlib.Path(data)
@@ -78,7 +79,10 @@ class LocalServer:
         atexit.unregister(self.stop)
 
     def stop(self) -> None:
-        """Stops it; running jobs go on after the next start, if its folder is kept."""
+        """Stops it; running jobs go on after the next start, if its folder is kept. In a process that was forked this
+        does nothing: the service is that of its parent."""
+        if self._starter != os.getpid():
+            return
         if self._process is not None and self._process.poll() is None:
             self._process.send_signal(signal.SIGTERM)
             try:

@@ -37,12 +37,13 @@ class Sweep(SweepView):
         Arguments are those of `Job.wait`; Ctrl-C detaches. With `progress` it tells in the end how many members have no
         solution, or one with warnings.
         """
-        back = goes_on("sweep", f"client.sweep({self.id!r}).wait()", self._client._server)
+        back = goes_on("sweep", f"client.sweep({self.id!r}).wait()", self._client._ends_with_program)
         waiting = Waiting(self.title, timeout, progress, back, self._card)
         try:
             while not self.ended:
                 call = calls.sweep(self.id, waiting.seconds())
-                self.document = self._client._send(call, waiting.left(self._client.retry_for), waiting.note)
+                with waiting.in_time():
+                    self.document = self._client._send(call, waiting.deadline, waiting.note)
                 waiting.seen(self.status, self.line(), self.ended)
         except KeyboardInterrupt:
             waiting.detached()
@@ -53,15 +54,15 @@ class Sweep(SweepView):
             self._told = True
             # the sweep has ended, whatever becomes of this
             with contextlib.suppress(SignoriniError):
-                waiting.tell(self._table(waiting.left(TABLE_S)).hinted_notes())
+                waiting.tell(self._table(waiting.soon(TABLE_S)).hinted_notes())
         return self
 
     def table(self) -> SweepTable:
         """The table as it is now; it fills while the sweep runs."""
         return self._table()
 
-    def _table(self, retry_for: float | None = None) -> SweepTable:
-        return SweepTable(self._client._send(calls.sweep_table(self.id), retry_for), self.title)
+    def _table(self, deadline: float | None = None) -> SweepTable:
+        return SweepTable(self._client._send(calls.sweep_table(self.id), deadline), self.title)
 
     def plot(self, quantity: str, **options: Any) -> Figure:
         """Draws a column of the table over the parameters; see `signorini.figures.sweep`."""
@@ -88,7 +89,7 @@ class Sweep(SweepView):
 
     def events(self, after_seq: int = 0) -> Iterator[Event]:
         """The rows of members as they end, past ones first; see `Job.events`."""
-        return self._client._events(calls._sweep(self.id) + "/events", after_seq)
+        return self._client._events(calls._sweep(self.id) + "/events", self.id, after_seq)
 
     def jobs(self) -> Iterator[Job]:
         """The jobs that solve it: one for all members on the same body."""
