@@ -246,6 +246,7 @@ def storm(url: str, calls: int, seed: int) -> Storm:
         made.prepare(url)
         made.run()
         made.client.close()
+        asyncio.run(made.twin.aclose())
     return made
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import io
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -280,3 +281,96 @@ def test_cards_of_notebooks(client: sg.Client, punch: sg.Result) -> None:
     assert "normal force" in table and "±" in table and "peak σₙ" in table
     sweep = client.sweep(sg.examples.rectangular_punch(refine=0), {"contacts.0.indentation": [0.1, 0.2]})
     assert "contacts/0/indentation" in sweep.wait(60, progress=False)._repr_html_()
+
+
+def overlapping(figure: Any) -> list[tuple[str, str]]:
+    """Pairs of texts of a figure that lie on one another."""
+    from matplotlib.text import Text
+
+    figure.savefig(io.BytesIO(), format="png", dpi=figure.dpi)  # which places everything
+    boxes = []
+    for text in figure.findobj(Text):
+        lines = text.get_text().rstrip("\n")
+        # words alone: numbers of axes are there also beyond their limits
+        if re.search("[a-z]{3}", lines.replace("mathdefault", "")) and text.get_visible():
+            box = text.get_window_extent()
+            empty = (text.get_text().count("\n") - lines.count("\n")) / (text.get_text().count("\n") + 1)
+            boxes.append((lines, box.from_extents(box.x0 + 1, box.y0 + empty * box.height + 1, box.x1 - 1, box.y1 - 1)))
+    return [(a[0], b[0]) for n, a in enumerate(boxes) for b in boxes[:n] if a[1].overlaps(b[1]) and a[0] != b[0]]
+
+
+@pytest.fixture(scope="module")
+def two_contacts(client: sg.Client) -> sg.Result:
+    problem = sg.examples.rectangular_punch(refine=0)
+    friction = p.Friction(coefficient=0.25, nonlocal_radius=0.05, elastic_slip=1e-4)
+    obstacle = p.Flat(along="arc_length", from_=0.2, to=2)
+    problem.contacts.append(p.Contact(boundary="right", obstacle=obstacle, indentation=0.02, friction=friction))
+    return client.submit(problem, name="two").wait(60, progress=False)
+
+
+@pytest.mark.parametrize("size", ["column", "page", "slide"])
+def test_two_contacts_have_their_parameters_without_overlap(two_contacts: sg.Result, size: str) -> None:
+    drawn = [
+        two_contacts.plot_profile("top", size=size),
+        two_contacts.plot_profile("right", size=size),
+        two_contacts.history.plot(size=size),
+        two_contacts.fields().plot(size=size),
+        two_contacts.job.problem().plot(size=size),
+    ]
+    for figure in drawn:
+        assert not overlapping(figure)
+    for figure in drawn[2:]:
+        title = figure.axes[0].get_title(loc="left")
+        assert [line.partition(":")[0] for line in title.splitlines()] in (["top", "right"], ["right", "top"])
+
+
+def test_figures_on_axes_of_ones_own(two_contacts: sg.Result, client: sg.Client) -> None:
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(2, 4, figsize=(20, 10), layout="constrained")
+    size = plt.rcParams["font.size"]
+    history, fields = two_contacts.history, two_contacts.fields()
+    study = client.sweep(sg.examples.sheet(refine=0), {"contacts.0.friction.coefficient": [0.1, 0.2]})
+    table = study.wait(60, progress=False).table()
+    for drawn in (
+        two_contacts.plot_profile("top", ax=axes[0, 0]),
+        two_contacts.plot_profile("right", ax=axes[:, 1]),
+        history.plot(ax=axes[0, 2]),
+        fields.plot(ax=axes[1, 0], zoom=True),
+        two_contacts.job.problem().plot(ax=[axes[1, 2]]),
+        table.plot("normal_force", ax=axes[0, 3], title="a study"),
+    ):
+        assert drawn is figure
+    assert len(figure.axes) == 9, "eight, and a bar of colours"
+    assert axes[0, 0].get_ylabel() == "stress on the body" and axes[1, 1].get_ylabel().startswith("tangential stress")
+    legend = axes[0, 0].get_legend()
+    assert legend is not None and len(legend.get_texts()) == 3
+    assert "verdict: " in axes[0, 0].get_title(loc="left") and axes[0, 3].get_title(loc="left") == "a study"
+    assert not figure.get_suptitle() and figure.get_supxlabel() == "" and plt.rcParams["font.size"] == size
+    assert plt.fignum_exists(figure.number), "it is the caller's to close"
+    history.plot(ax=axes[:, 3])
+    assert not overlapping(figure)
+    with pytest.raises(ValueError, match="ax is one pair of axes or 2 of them, not 8"):
+        two_contacts.plot_profile("top", ax=axes)
+    with pytest.raises(ValueError, match="ax is one pair of axes, not 2"):
+        table.plot("normal_force", ax=axes[:, 0])
+    plt.close(figure)
+
+
+def test_a_study_over_words_and_obstacles(client: sg.Client) -> None:
+    obstacles = [p.Flat(to=0.5), p.Parabola(radius=8, to=0.5), p.Wedge(angle=3, to=0.5)]
+    axes = {"contacts.0.friction.kernel": ["bump", "parabola"], "contacts.0.obstacle": obstacles}
+    table = client.sweep(sg.examples.rectangular_punch(refine=0), axes, name="shapes").wait(60, False).table()
+    for size in ("column", "page"):
+        (drawn,) = table.plot("tangential_force", x="obstacle", size=size).axes
+        labels = [" ".join(text.get_text().split()) for text in drawn.get_xticklabels()]
+        assert labels == ["flat to 0.5", "parabola radius 8 to 0.5", "wedge angle 3 to 0.5"]
+        assert [line.get_xdata().tolist() for line in drawn.lines[:1]] == [[0, 1, 2]]  # type: ignore[union-attr]
+        other = table.plot("tangential_force", x="kernel", size=size)
+        assert [text.get_text() for text in other.axes[0].get_xticklabels()] == ["bump", "parabola"]
+        assert "obstacle = parabola radius 8 to 0.5" in words(other) and not overlapping(other)
+    # without a column of numbers the one with the most words is the axis
+    assert table.plot("tangential_force").axes[0].get_xlabel() == "obstacle"
+    whole = client.sweep(sg.examples.sheet(refine=0), {"solver.max_iterations": range(150, 153)}).wait(60, False)
+    ticks = whole.plot("normal_force").axes[0].get_xticks()
+    assert np.array_equal(ticks, np.round(ticks))

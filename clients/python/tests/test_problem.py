@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import datetime
 import json
 import os
+import pathlib
 import subprocess
 import sys
+from decimal import Decimal
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -124,7 +128,7 @@ def test_arrays_and_numbers_of_numpy_and_tuples_will_do() -> None:
     grid = p.Grid(x=np.linspace(0, 1, 3), y=(0, np.float64(1)), top=np.array([[0, 1], [1, 2]]))
     assert grid == p.Grid(x=[0, 0.5, 1], y=[0, 1], top=[[0, 1], [1, 2]])
     json.dumps(grid.to_dict())
-    assert p.Step(increments=np.int64(3)).increments == 3  # type: ignore[arg-type]
+    assert p.Step(increments=np.int64(3)).increments == 3
     assert p.Support(boundary="top", ux=np.array([0, 1])).to_dict() == {"boundary": "top", "ux": [0, 1]}
     with pytest.raises(sg.InvalidProblem, match="/x/1: got inf"):
         p.Grid(x=np.array([0, np.inf]), y=[0, 1])
@@ -142,7 +146,7 @@ def test_arrays_may_be_set_later_too() -> None:
 
 
 def test_dictionaries_will_do_wherever_a_class_is_expected() -> None:
-    contact = p.Contact(boundary="top", obstacle={"kind": "flat", "from": 0, "to": 1})  # type: ignore[arg-type]
+    contact = p.Contact(boundary="top", obstacle={"kind": "flat", "from": 0, "to": 1})
     assert contact.obstacle == p.Flat(from_=0, to=1)
     assert contact.to_dict() == {"boundary": "top", "obstacle": {"kind": "flat", "from": 0, "to": 1}}
 
@@ -196,3 +200,49 @@ def test_a_misspelt_field_is_refused_also_later() -> None:
         friction.coeficient = 0.9  # type: ignore[attr-defined]
     friction.coefficient = 0.9
     assert problem.to_dict()["contacts"][0]["friction"]["coefficient"] == 0.9
+
+
+def test_everyday_values_will_do(client: sg.Client) -> None:
+    pandas = pytest.importorskip("pandas")
+    # what a type checker is told, too: nothing here is ignored
+    contact = p.Contact(
+        boundary="top",
+        obstacle={"kind": "flat", "to": Decimal("0.5")},
+        indentation=Decimal("0.25"),
+        friction={"coefficient": np.float32(0.5), "nonlocal_radius": Fraction(1, 100), "elastic_slip": 1e-4},
+    )
+    assert contact.friction == p.Friction(coefficient=0.5, nonlocal_radius=0.01, elastic_slip=1e-4)
+    assert contact.indentation == 0.25 and contact.obstacle == p.Flat(to=0.5)
+    assert p.Step(increments=np.int64(3)) == p.Step(increments=3)
+    several: list[Any] = [range(5), pandas.Series(range(5)), (n for n in range(5)), dict.fromkeys(range(5)).keys()]
+    for lines in several:
+        assert p.Grid(x=lines, y=[0, 1]).x == [0, 1, 2, 3, 4]
+    with pytest.raises(sg.InvalidProblem, match="/x: got {0, 1}"):
+        p.Grid(x={0, 1}, y=[0, 1])  # type: ignore[arg-type]
+    with pytest.raises(sg.InvalidProblem, match="/indentation: got nan"):
+        p.Contact(boundary="top", obstacle=p.Flat(), indentation=Decimal("NaN"))
+    assert p.MeshInput(gmsh=pathlib.Path("a.msh")).gmsh == "a.msh"  # type: ignore[arg-type]
+
+    document = sg.examples.sheet(refine=0).to_dict()
+    document["title"] = pathlib.PurePosixPath("studies/größe")
+    document["solver"] = {"max_iterations": np.int32(150), "tolerance": Decimal("1e-9"), "algorithm": np.str_("auto")}
+    document["mesh"]["grid"]["x"] = pandas.Series(document["mesh"]["grid"]["x"])
+    job = client.submit(
+        document,
+        name=pathlib.PurePosixPath("größe.msh"),  # type: ignore[arg-type]
+        labels={"größe": 1, "run": np.int64(7), "path": pathlib.PurePosixPath("a/b")},
+        priority=np.int64(2),  # type: ignore[arg-type]
+        timeout_s=Decimal(60),  # type: ignore[arg-type]
+        key="größe 0.3 µ",
+    )
+    assert job.wait(60, progress=False).converged
+    assert (job.name, job.priority) == ("größe.msh", 2)
+    assert job.labels == {"größe": "1", "run": "7", "path": "a/b"}
+    same = client.submit(document, name="größe.msh", labels=job.labels, priority=2, timeout_s=60, key="größe 0.3 µ")
+    assert same.id == job.id
+    assert job.problem_document()["title"] == "studies/größe"
+    assert job.problem_document()["solver"]["max_iterations"] == 150
+    assert [found.id for found in client.jobs(labels={"größe": 1}, created_after=datetime.date(2020, 1, 1))] == [job.id]
+    assert not list(client.jobs(labels={"größe": 1}, created_before=datetime.date(2020, 1, 1)))
+    events = list(job.events())
+    assert "type" in events[0] and "nothing" not in events[0] and 0 not in events[0]

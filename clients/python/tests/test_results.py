@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 import copy
 import io
 import pathlib
 import pickle
 import sys
+import zipfile
 from typing import Any
 
 import numpy as np
@@ -221,3 +223,54 @@ def test_arrays_are_read_in_many_threads(monkeypatch: pytest.MonkeyPatch) -> Non
     failures = [SystemError("for good")] * 1000
     with pytest.raises(SystemError):
         arrays(content.getvalue())
+
+
+def test_a_result_is_saved_and_opened_without_the_service(client: sg.Client, tmp_path: pathlib.Path) -> None:
+    problem = sg.examples.rectangular_punch(refine=0)
+    problem.steps = [sg.problem.Step(name="half", indentation=0.5), sg.problem.Step(name="whole")]
+    job = client.submit(problem, name="kept", cache="off")
+    result = job.wait(60, progress=False)
+    path = result.save(tmp_path / "punch.signorini")
+    small = result.save(tmp_path / "small.signorini", fields=False)
+    assert small.stat().st_size < path.stat().st_size and len(list(tmp_path.iterdir())) == 2
+    expected = [result.profile(step=step).tangential_stress for step in (None, 0, "half", "whole")]
+    shown, history, fields = str(result), result.history, result.fields()
+    vtu = result.save_vtu(tmp_path / "a.vtu").read_bytes()
+    job.delete()
+
+    kept = sg.Result.open(path)
+    assert str(kept) == shown and kept.job.name == "kept" and kept.job.problem() == job_problem(problem)
+    for step, stress in zip((None, 0, "half", "whole"), expected, strict=True):
+        np.testing.assert_array_equal(kept.profile(step=step).tangential_stress, stress)
+    np.testing.assert_array_equal(kept.history.residual, history.residual)
+    np.testing.assert_array_equal(kept.fields().von_mises, fields.von_mises)
+    assert kept.save_vtu(tmp_path / "b.vtu").read_bytes() == vtu
+    assert kept.job.wait().normal_force == kept.normal_force and kept.job.refresh().status == "succeeded"
+    again = kept.save(tmp_path / "again.signorini")
+    assert pickle.loads(pickle.dumps(sg.Result.open(again))).normal_force == result.normal_force
+    assert repr(kept._client) == f"<Saved {path}>"
+    # what is not in it is told
+    for ask in (sg.Result.open(small).fields, lambda: kept.profile(points=7), kept.job.cancel, kept.job.delete):
+        with pytest.raises(sg.SignoriniError, match=f"does not have .*The service may: Client.*{job.id}"):
+            ask()
+    with pytest.raises(sg.SignoriniError, match="does not have the events"):
+        list(kept.job.events())
+    for wrong in (b"", b"PK", tmp_path.joinpath("a.vtu").read_bytes(), path.read_bytes()[:-100]):
+        (tmp_path / "wrong").write_bytes(wrong)
+        with pytest.raises(sg.SignoriniError, match="is not a result that was saved"):
+            sg.Result.open(tmp_path / "wrong")
+    with zipfile.ZipFile(tmp_path / "newer", "w") as file:
+        file.writestr("index.json", '{"format": "signorini result 9"}')
+    with pytest.raises(sg.SignoriniError, match="'signorini result 9', and this client reads 'signorini result 1'"):
+        sg.Result.open(tmp_path / "newer")
+
+    async def asynchronously() -> None:
+        opened = await sg.AsyncResult.open(path)
+        assert opened.normal_force == result.normal_force and len(await opened.history()) == len(history)
+        assert (await opened.save(tmp_path / "third")).read_bytes() == again.read_bytes()
+
+    asyncio.run(asynchronously())
+
+
+def job_problem(problem: sg.Problem) -> sg.Problem:
+    return sg.Problem.from_dict(problem.to_dict(defaults=True))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import signal
+from decimal import Decimal
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -181,3 +183,36 @@ def test_what_the_line_says() -> None:
         sweep_line("s", {"status": "running", "members": counts})
         == "s · running · ███████████████░░░░░ 3 of 4 · 2 failed"
     )
+
+
+def test_axes_of_everyday_values(client: sg.Client) -> None:
+    iterations = "solver.max_iterations"
+    decimals = (Decimal(n) for n in (150, 151, 152))
+    for values in (range(150, 153), np.arange(150, 153), sg.linspace(150, 152, 3), decimals):
+        table = client.sweep(BASE, {iterations: values}).wait(60, progress=False).table()
+        assert table["max_iterations"].dtype.kind == "i" and table["max_iterations"].tolist() == [150, 151, 152]
+    axes = {MU: [Decimal("0.1"), Fraction(1, 5)], "solver.check_uniqueness": [True, np.bool_(False)]}
+    sweep = client.sweep(BASE, axes, labels={"n": 1}, timeout_s=np.float64(60)).wait(60, progress=False)
+    table = sweep.table()
+    assert table["check_uniqueness"].tolist() == [True, False] * 2 and table["coefficient"].dtype == float
+    assert "coefficient" in table and "bogus" not in table and 0 not in table and list(table)[0] == "number"
+    member = sweep.member(0)
+    assert "normal_force" in member and "bogus" not in member and 0 not in member
+    listed = client.sweep(BASE, [{MU: Decimal("0.1")}, {iterations: np.int64(150)}]).wait(60, progress=False).table()
+    assert np.isnan(listed["max_iterations"][0]) and listed["max_iterations"][1] == 150
+
+
+def test_a_parameter_with_the_name_of_a_result_keeps_its_column(client: sg.Client) -> None:
+    base = BASE.with_values({"solver.algorithm": "thesis", "solver.thesis": {"relaxation": 0.9}})
+    sweep = client.sweep(base, {"/solver/thesis/friction_force": [1, 2]}).wait(60, progress=False)
+    table = sweep.table()
+    assert table.parameters == ["solver.thesis.friction_force"]
+    assert table["solver.thesis.friction_force"].tolist() == [1, 2]
+    results = [member["friction_force"] for member in sweep.members()]
+    np.testing.assert_allclose(table["friction_force"], results)
+    assert {"solver.thesis.friction_force", "friction_force"} <= set(sweep.to_pandas().columns)
+    # whatever the names: each column is there once
+    pointers = ["/a/number", "/a.b", "/c/d", "/c.d", "/e/d", "/x/status"]
+    found = {name: np.arange(2.0) for name in ["number", *pointers, "x.status", "status"]}
+    table = sg.SweepTable(found)
+    assert table.parameters == ["a.number", "a.b", "/c/d", "c.d", "e.d", "/x/status"] and len(list(table)) == 9

@@ -38,11 +38,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal, Union
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
 from numpy.typing import NDArray
 
-from ._parts import ListOf, Part
+from ._parts import JSON, ListOf, Part, Real, Whole
 from ._whole import WholeProblem
 '''
 
@@ -179,9 +179,47 @@ class Writer:
         text = textwrap.fill(" ".join(node["description"].split()), WIDTH - 4, subsequent_indent="    ")
         if meanings:
             text += "\n\n" + "\n".join(meanings) + "\n    "
-        lines = "".join(f"    {line}\n" for line in fields)
+        lines = "".join(f"    {line}\n" for line in fields) + self.accepting(order, properties, required)
         self.blocks.append(f'@dataclass(kw_only=True, repr=False)\nclass {name}({base}):\n    """{text}"""\n\n{lines}')
         self.names.append(name)
+
+    def accepting(self, order: list[str], properties: dict[str, Any], required: list[str]) -> str:
+        """What type checkers are told that a class may be made of, which is more than what its fields hold."""
+        given = []
+        for key in order:
+            node = properties[key]
+            kind = json.dumps(node["const"]) if "const" in node else self.accepted(node)
+            kind = f"Literal[{kind}]" if "const" in node else kind
+            name = self.python_name(key)
+            if key in required and "const" not in node:
+                given.append(f"{name}: {kind}")
+            else:
+                absent = " | None" if node.get("default") is None and "const" not in node else ""
+                given.append(f"{name}: {kind}{'' if kind.endswith('None') else absent} = ...")
+        lines = "".join(f"            {line},\n" for line in given)
+        head = "\n    if TYPE_CHECKING:\n\n        def __init__(\n            self,\n            *,\n"
+        return f"{head}{lines}        ) -> None: ...\n"
+
+    def accepted(self, node: dict[str, Any]) -> str:
+        if "$ref" in node:
+            name = node["$ref"].rsplit("/", 1)[1]
+            found = self.definitions[name]
+            if found.get("type") == "array":
+                return self.accepted(found)
+            choices = found.get("oneOf") or found.get("anyOf") or [found]
+            has_parts = any("properties" in choice or "properties" in self.referred(choice) for choice in choices)
+            return f"{self.type(node)} | JSON" if has_parts else self.type(node)
+        if "anyOf" in node:
+            return " | ".join(dict.fromkeys(self.accepted(choice) for choice in node["anyOf"]))
+        kinds = node["type"] if isinstance(node["type"], list) else [node["type"]]
+        if kinds[0] == "array" and self.type(node).startswith("list["):
+            return f"Sequence[{self.accepted(node['items'])}]"
+        names = {"number": "Real", "integer": "Whole"}
+        return " | ".join(names.get(kind) or self.single(node, kind) for kind in kinds)
+
+    def referred(self, node: dict[str, Any]) -> dict[str, Any]:
+        found: dict[str, Any] = self.definitions[node["$ref"].rsplit("/", 1)[1]] if "$ref" in node else {}
+        return found
 
     @staticmethod
     def python_name(key: str) -> str:

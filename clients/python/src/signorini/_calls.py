@@ -24,7 +24,7 @@ import httpx
 from . import errors
 from ._answer import FILES, JSON, NOTHING, NPZ, Kind, read, unexpected
 from ._data import Array, StoredMesh, Validation
-from ._parts import plain, takes_integers
+from ._parts import kinds_at, plain
 from .errors import Violation
 from .pointer import escape, to_pointer
 from .problem import MeshInput, Problem
@@ -79,6 +79,16 @@ class Call(Generic[T]):
             return (self.repeated if attempt > 1 and self.repeated else self.decode)(found)
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise unexpected(response, f"it lacks something: {error!r}") from error
+
+
+def unread(call: Call[Any]) -> Call[tuple[str, bytes]]:
+    """The same request, whose answer is checked but not read: its media type and content."""
+
+    def keep(content: bytes) -> tuple[str, bytes]:
+        call.decode(call.kind.read(content))
+        return call.kind.media, content
+
+    return dataclasses.replace(call, kind=Kind(call.kind.media, keep), decode=lambda found: found)
 
 
 @dataclass
@@ -414,7 +424,7 @@ def submit_sweep(
 
 def _axis(path: str, values: Any) -> Document:
     axis: Document = {"path": to_pointer(path)}
-    if isinstance(values, Spaced) and not (takes_integers(Problem, path) and all(v == int(v) for v in values)):
+    if isinstance(values, Spaced) and not (kinds_at(Problem, path) == {int} and all(v == int(v) for v in values)):
         axis[values.kind] = {"start": values.start, "stop": values.stop, "count": values.count}
     else:
         axis["values"] = plain([int(v) for v in values] if isinstance(values, Spaced) else values)

@@ -17,7 +17,7 @@ import numbers
 import os
 import types
 import typing
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal, TypeVar, Union
 
 import numpy as np
@@ -26,6 +26,11 @@ from . import pointer as pointers
 from .errors import Violation, invalid
 
 P = TypeVar("P", bound="Part")
+
+# what a class may be made of besides what its fields hold
+JSON = Mapping[str, Any]
+Real = Union[float, decimal.Decimal, "np.floating[Any]", "np.integer[Any]"]
+Whole = Union[int, "np.integer[Any]"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -156,7 +161,7 @@ def simple(value: Any) -> Any:
     """A value of NumPy, pandas or the standard library as what JSON has: numbers, texts, lists."""
     if isinstance(value, np.generic):
         return value.item()
-    if value is None or isinstance(value, (str, bytes, int, float, list, Mapping, Set, Part)):
+    if value is None or isinstance(value, (str, bytes, int, float, list, set, frozenset, Mapping, Part)):
         return value
     if isinstance(value, (numbers.Real, decimal.Decimal)):
         number = float(value)
@@ -298,12 +303,12 @@ def within(hint: Any, name: str) -> list[Any]:
     return alternatives(found)
 
 
-def takes_integers(cls: Any, path: str) -> bool:
-    """Whether there are only whole numbers at a place in a part."""
+def kinds_at(cls: Any, path: str) -> set[Any]:
+    """Which of the plain types `int`, `float`, `bool` and `str` a value at a place in a part may have."""
     hints = [cls]
     for name in pointers.names(path):
         hints = [inner for hint in hints for inner in within(hint, name)]
-    return int in hints and float not in hints
+    return {hint for hint in hints if hint in (int, float, bool, str)}
 
 
 def alternatives(hint: Any) -> list[Any]:

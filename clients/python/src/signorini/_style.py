@@ -11,6 +11,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ._extras import load
 
 SIZES = {"column": (88 / 25.4, 7.0), "page": (160 / 25.4, 9.0), "slide": (254 / 25.4, 14.0)}
@@ -84,16 +86,30 @@ SYMBOLS = {"μ": r"$\mu$", "ρ": r"$\rho$", "ε": r"$\varepsilon$"}
 
 
 @contextlib.contextmanager
-def style(size: str, theme: str) -> Iterator[tuple[Any, float, Theme]]:
-    """pyplot with our settings, the width of a figure in inches, and the theme. Raises ValueError for other names."""
+def style(size: str, theme: str, ax: Any = None) -> Iterator[tuple[Any, float, Theme]]:
+    """pyplot with our settings, the width of a figure in inches, and the theme. Raises ValueError for other names.
+
+    ax: axes of the caller, whose own settings of letters and lines then hold
+    """
     if size not in SIZES:
         raise ValueError(f"size is one of {', '.join(SIZES)}, not {size!r}")
     if theme not in THEMES:
         raise ValueError(f"theme is one of {', '.join(THEMES)}, not {theme!r}")
     pyplot = load("matplotlib.pyplot", "plot")
     width, points = SIZES[size]
+    if ax is not None:
+        yield pyplot, float(panels(ax)[0].figure.get_figwidth()), THEMES[theme]
+        return
     with pyplot.rc_context(settings(THEMES[theme], points)):
         yield pyplot, width, THEMES[theme]
+
+
+def panels(ax: Any, most: int = 2) -> list[Any]:
+    """The axes that a caller has given: one, or a list or array of them. Raises ValueError where these are too many."""
+    found = list(np.ravel(np.array(ax, dtype=object)))
+    if not 1 <= len(found) <= most:
+        raise ValueError(f"ax is one pair of axes{f' or {most} of them' if most > 1 else ''}, not {len(found)}")
+    return found
 
 
 def settings(theme: Theme, points: float) -> dict[str, Any]:
@@ -135,7 +151,7 @@ def settings(theme: Theme, points: float) -> dict[str, Any]:
 
 
 def subtitle(about: Mapping[str, Any], boundary: str | None = None) -> str:
-    """The parameters by which the figures of a study differ; of all contacts, or of one."""
+    """The parameters by which the figures of a study differ; of one contact or, on a line for each, of all of them."""
     parameters = about.get("parameters") or {}
     shown = {name: found for name, found in parameters.items() if boundary in (None, "", name)}
     parts = []
@@ -143,8 +159,8 @@ def subtitle(about: Mapping[str, Any], boundary: str | None = None) -> str:
         text = "   ".join(f"{SYMBOLS[symbol]} = {value:.4g}" for symbol, value in found.items()) or "no friction"
         parts.append(f"{name}:  {text}" if len(parameters) > 1 else text)
     if about.get("step") is not None:
-        parts.append(f"load step {about['step']}")
-    return "      ".join(parts)
+        parts[-1:] = ["      ".join([*parts[-1:], f"load step {about['step']}"])]
+    return "\n".join(parts)
 
 
 def unit(about: Mapping[str, Any], kind: str) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from . import pointer as pointers
 from ._data import Array
 from ._extras import load
-from ._parts import takes_integers
+from ._parts import kinds_at
 from ._progress import sweep_line
 from .problem import Problem
 
@@ -108,7 +108,7 @@ class SweepTable:
         pointed = [name for name in found if name.startswith("/")]
         short = short_names(pointed, [name for name in found if name not in pointed])
         self.columns: dict[str, Array] = {
-            short.get(name, name): _whole(name, column) if name in short else column for name, column in found.items()
+            short.get(name, name): _typed(name, column) if name in short else column for name, column in found.items()
         }
         self.parameters = [short[name] for name in pointed]
         self.title = title
@@ -206,10 +206,14 @@ def _dotted(pointer: str) -> str:
     return pointer[1:].replace("/", ".")
 
 
-def _whole(pointer: str, column: Array) -> Array:
-    """The values of a parameter: whole numbers where the problem has these, since a table has numbers of one kind."""
-    is_whole = column.dtype.kind == "f" and bool(np.all(column == np.round(column)))
-    return column.astype(np.int64) if is_whole and takes_integers(Problem, pointer) else column
+def _typed(pointer: str, column: Array) -> Array:
+    """The values of a parameter as the problem has them: the service's table has no whole numbers, and no booleans."""
+    kinds = kinds_at(Problem, pointer)
+    if kinds == {int} and column.dtype.kind == "f" and bool(np.all(column == np.round(column))):
+        return column.astype(np.int64)
+    if kinds == {bool} and set(column.tolist()) <= {"true", "false"}:
+        return np.asarray(column == "true")
+    return column
 
 
 class Member:

@@ -12,7 +12,7 @@ import os
 import pathlib
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import httpx
 
@@ -27,6 +27,7 @@ from ._job import JobView, changes
 from ._pool import AsyncPool
 from ._progress import Waiting, goes_on
 from ._retry import BROKEN, LOG, Attempts
+from ._saved import AsyncSaved, key, packed, requests
 from ._sweep import TABLE_S, Member, SweepTable, SweepView
 from .errors import NotFound, SignoriniError
 from .local import LocalServer
@@ -374,6 +375,22 @@ class AsyncResult(Summary):
 
     async def save_vtu(self, path: str | os.PathLike[str]) -> pathlib.Path:
         return write(path, await self._client._send(calls.vtu(self.job.id)))
+
+    async def save(self, path: str | os.PathLike[str], *, fields: bool = True) -> pathlib.Path:
+        """Writes all of it to a file; see `Result.save`."""
+        steps = [str(step["name"]) for step in self.steps]
+        wanted = requests(self.job.id, self.job.input_hash, self.summary, steps, fields)
+        return write(
+            path, packed(self.job.id, {key(call): await self._client._send(calls.unread(call)) for call in wanted})
+        )
+
+    @classmethod
+    async def open(cls, path: str | os.PathLike[str]) -> AsyncResult:
+        """A result from a file; see `Result.open`."""
+        saved = AsyncSaved(path)
+        client = cast("AsyncClient", saved)
+        job = AsyncJob(client, await saved._send(calls.job(saved.job)))
+        return cls(client, job, await saved._send(calls.result(job.id, True, job.input_hash)))
 
     async def plot_profile(
         self, boundary: str | None = None, *, step: int | str | None = None, **options: Any

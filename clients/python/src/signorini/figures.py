@@ -9,11 +9,15 @@
 All return a `matplotlib.figure.Figure`: `figure.savefig("punch.pdf")`. Each takes `size`, one of `column` (88 mm),
 `page` (default) and `slide`, and `theme`, `light` (default) or `dark`. Under the title stand the parameters μ, ρ, ε,
 beside it the verdict; below the figure the warnings.
+
+`ax` draws on axes of your own, `figure, ax = plt.subplots()`: on one, or on as many as the figure has panels. Their
+title then has the parameters and the verdict; letters and sizes are those of your figure.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import json
 import textwrap
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -22,7 +26,7 @@ import numpy as np
 
 from . import _shapes as shapes
 from ._data import Array, Fields, History, Profile
-from ._style import PARAMETERS, QUANTITIES, Theme, style, subtitle, unit
+from ._style import PARAMETERS, QUANTITIES, Theme, panels, style, subtitle, unit
 from ._sweep import SweepTable
 from .problem import Problem
 
@@ -35,16 +39,27 @@ CUT = 6.0
 """A stress is drawn up to so many times its median along the contact; a peak beyond it is cut and marked."""
 
 
-def profile(found: Profile, *, size: str = "page", theme: str = "light", title: str | None = None) -> Figure:
-    """Normal and tangential stress along a contact by arc length, with the friction bound; stick and slip shaded."""
-    with style(size, theme) as (plt, width, colours):
-        # in a narrow column the words on the axes need more height
-        height = width * (1.1 if size == "column" else 0.78)
-        figure, (upper, lower) = plt.subplots(2, 1, sharex=True, figsize=(width, height), layout="constrained")
+def profile(
+    found: Profile, *, size: str = "page", theme: str = "light", title: str | None = None, ax: Any = None
+) -> Figure:
+    """Normal and tangential stress along a contact by arc length, with the friction bound; stick and slip shaded.
+
+    ax: one for both stresses, or two
+    """
+    with style(size, theme, ax) as (plt, width, colours):
+        if ax is None:
+            # in a narrow column the words on the axes need more height
+            height = width * (1.1 if size == "column" else 0.78)
+            figure, pair = plt.subplots(2, 1, sharex=True, figsize=(width, height), layout="constrained")
+        else:
+            pair = panels(ax)
+            figure = pair[0].figure
+        upper, lower = pair[0], pair[-1]
         s = found.s
         _shade(upper, found, colours, words=True)
-        _shade(lower, found, colours, words=False)
-        upper.plot(s, found.normal_stress, color=colours.normal)
+        if lower is not upper:
+            _shade(lower, found, colours, words=False)
+        upper.plot(s, found.normal_stress, color=colours.normal, label=QUANTITIES["normal_stress"])
         bound = found.friction_bound
         signs = [sign for sign in (1, -1) if np.any(sign * found.tangential_stress > 0)] or [1]
         if np.any(bound > 0):
@@ -52,34 +67,53 @@ def profile(found: Profile, *, size: str = "page", theme: str = "light", title: 
                 label = QUANTITIES["friction_bound"] if sign == signs[0] else None
                 lower.plot(s, sign * bound, color=colours.faint, linestyle=(0, (4, 2)), label=label)
         lower.plot(s, found.tangential_stress, color=colours.tangential, label=QUANTITIES["tangential_stress"])
-        if np.any(bound > 0):
+        if lower is upper:
+            # away from the note on a peak that is cut
+            lower.legend(loc="lower left" if _is_late(s, found.normal_stress) else "lower right")
+        elif np.any(bound > 0):
             lower.legend(loc="best")
         stress = unit(found.about, "stress")
         upper.set_ylabel(QUANTITIES["normal_stress"] + stress)
-        lower.set_ylabel(QUANTITIES["tangential_stress"] + stress)
+        lower.set_ylabel(("stress on the body" if lower is upper else QUANTITIES["tangential_stress"]) + stress)
         lower.set_xlabel(f"arc length $s${unit(found.about, 'length')} along “{found.boundary}”")
-        for axes in (upper, lower):
+        for axes in pair:
             axes.axhline(0, color=colours.ink, linewidth=0.5)
             axes.margins(x=0)
-        upper.set_ylim(*_limits(s, found.normal_stress))
+        pressed = _limits(s, found.normal_stress)
         # with the bound, unless it is far from being reached
         low, high = _limits(s, found.tangential_stress, np.inf)
         reach = 1.08 * float(bound.max())
-        lower.set_ylim(min(low, max(-reach, 1.6 * low)), max(high, min(reach, 1.6 * high)))
-        _mark_cut(upper, s, found.normal_stress, colours, found.about, found.boundary)
+        rubbed = min(low, max(-reach, 1.6 * low)), max(high, min(reach, 1.6 * high))
+        if lower is upper:
+            pressed = rubbed = min(pressed[0], rubbed[0]), max(pressed[1], rubbed[1])
+        upper.set_ylim(*pressed)
+        lower.set_ylim(*rubbed)
+        _mark_cut(upper, s, found.normal_stress, colours, found.about, found.boundary, short=lower is upper)
         _position_axis(upper, found)
+        if ax is not None:
+            return _entitled(upper, found.about, found.partial, title, found.boundary)
         _head(figure, upper, found.about, colours, found.partial, title, found.boundary)
         _foot(figure, found.about, colours, width)
     return _finished(plt, figure)
 
 
-def convergence(found: History, *, size: str = "page", theme: str = "light", title: str | None = None) -> Figure:
-    """Residuals by iteration, the tolerance, and how many nodes entered and left contact."""
-    with style(size, theme) as (plt, width, colours):
-        height = width * (1.15 if size == "column" else 0.7)
-        figure, (upper, lower) = plt.subplots(
-            2, 1, sharex=True, figsize=(width, height), layout="constrained", height_ratios=[3, 1]
-        )
+def convergence(
+    found: History, *, size: str = "page", theme: str = "light", title: str | None = None, ax: Any = None
+) -> Figure:
+    """Residuals by iteration, the tolerance, and how many nodes entered and left contact.
+
+    ax: one for the residuals alone, or two
+    """
+    with style(size, theme, ax) as (plt, width, colours):
+        if ax is None:
+            height = width * (1.15 if size == "column" else 0.7)
+            figure, pair = plt.subplots(
+                2, 1, sharex=True, figsize=(width, height), layout="constrained", height_ratios=[3, 1]
+            )
+        else:
+            pair = panels(ax)
+            figure = pair[0].figure
+        upper, lower = pair[0], pair[-1]
         k = found.k
         marker = "o" if len(k) <= 60 else ""
         lines = [("residual", colours.normal, "-", "o"), ("friction_residual", colours.tangential, "--", "s")]
@@ -91,29 +125,38 @@ def convergence(found: History, *, size: str = "page", theme: str = "light", tit
         upper.semilogy(k, found.tolerance, color=colours.ink, linewidth=0.8, linestyle=":", label="tolerance")
         upper.set_ylabel("residual (dimensionless)")
         upper.grid(axis="y")
-        lower.bar(k, found.contact_entered, color=colours.stick, label="entered")
-        lower.bar(k, -found.contact_left.astype(float), color=colours.slip, hatch="///", label="left")
-        lower.axhline(0, color=colours.ink, linewidth=0.5)
-        lower.set_ylabel("nodes of\ncontact")
+        if lower is not upper:
+            lower.bar(k, found.contact_entered, color=colours.stick, label="entered")
+            lower.bar(k, -found.contact_left.astype(float), color=colours.slip, hatch="///", label="left")
+            lower.axhline(0, color=colours.ink, linewidth=0.5)
+            lower.set_ylabel("nodes of\ncontact")
         lower.set_xlabel("iteration $k$")
-        # outside, since a long history fills its panels
-        handles = [handle for axes in (upper, lower) for handle in axes.get_legend_handles_labels()[0]]
-        columns = 2 if size == "column" else 5
-        from matplotlib.transforms import offset_copy
-
-        # below the name of the axis, by the height of letters
-        below = offset_copy(lower.transAxes, figure, 0, -3.6 * plt.rcParams["font.size"], units="points")
-        lower.legend(
-            handles=handles, loc="upper left", bbox_to_anchor=(0, 0), bbox_transform=below, borderaxespad=0,
-            ncols=columns,
-        )  # fmt: skip
+        if ax is None:
+            _legend_below(plt, figure, upper, lower, columns=2 if size == "column" else 3)
+        else:
+            for axes in pair:
+                axes.legend(loc="best")
         lower.xaxis.get_major_locator().set_params(integer=True)
         for change in np.flatnonzero(np.diff(found.step.astype(int))):
-            for axes in (upper, lower):
+            for axes in pair:
                 axes.axvline((k[change] + k[change + 1]) / 2, color=colours.faint, linewidth=0.6)
+        if ax is not None:
+            return _entitled(upper, found.about, found.partial, title)
         _head(figure, upper, found.about, colours, found.partial, title)
         _foot(figure, found.about, colours, width)
     return _finished(plt, figure)
+
+
+def _legend_below(plt: Any, figure: Any, upper: Any, lower: Any, columns: int) -> None:
+    """Outside, since a long history fills its panels."""
+    from matplotlib.transforms import offset_copy
+
+    handles = [handle for axes in (upper, lower) for handle in axes.get_legend_handles_labels()[0]]
+    # below the name of the axis, by the height of letters
+    below = offset_copy(lower.transAxes, figure, 0, -3.6 * plt.rcParams["font.size"], units="points")
+    lower.legend(
+        handles=handles, loc="upper left", bbox_to_anchor=(0, 0), bbox_transform=below, borderaxespad=0, ncols=columns
+    )
 
 
 VISIBLE = 0.1
@@ -132,12 +175,14 @@ def deformed(
     size: str = "page",
     theme: str = "light",
     title: str | None = None,
+    ax: Any = None,
 ) -> Figure:
     """The deformed body, coloured by a stress, with its outline before and the obstacles as they are after.
 
     quantity: `von_mises`, `stress_xx`, `stress_yy`, `stress_zz`, `stress_xy`
     scale: factor on displacements and gaps; absent: one by which they can be seen, which the figure names
     zoom: whether only the contact and what is near it is shown; absent: a second panel shows it where it is small
+    ax: one, or two for the body and the contact
     """
     if quantity == "von_mises":
         values = found.von_mises
@@ -145,12 +190,13 @@ def deformed(
         values = found.stress[:, COMPONENTS[quantity]]
     else:
         raise ValueError(f"quantity is one of von_mises, {', '.join(COMPONENTS)}, not {quantity!r}")
-    views = _views(found, scale, zoom)
+    given = None if ax is None else panels(ax)
+    views = _views(found, scale, False if given is not None and len(given) == 1 and zoom is None else zoom)
     signed = quantity != "von_mises"
     # of the last view, which is the one at the contact
     high = _usual(found, values, views[-1])
     low = -high if signed else 0.0
-    with style(size, theme) as (plt, width, colours):
+    with style(size, theme, ax) as (plt, width, colours):
         # a long body needs the width
         below = size == "column" or views[0].height < 0.5 * views[0].width
         rows, columns = (len(views), 1) if below else (1, len(views))
@@ -158,29 +204,36 @@ def deformed(
         tall = [np.clip(0.75 * width * view.height / view.width / columns, 0.2 * width, most) for view in views]
         height = float(sum(tall) if below else max(tall)) + 0.25 * width
         ratios = {"height_ratios": tall} if below else {}
-        figure, grid = plt.subplots(
-            rows, columns, figsize=(width, height), layout="compressed", squeeze=False, **ratios
-        )
-        panels = list(grid.ravel())
-        for axes, view in zip(panels, views, strict=True):
+        if given is None:
+            figure, grid = plt.subplots(
+                rows, columns, figsize=(width, height), layout="compressed", squeeze=False, **ratios
+            )
+            drawn = list(grid.ravel())
+        else:
+            drawn = given[: len(views)]
+            figure = drawn[0].figure
+        for axes, view in zip(drawn, views, strict=True):
             image = _draw_body(
                 axes, found, view, values, colours, cmap="PuOr" if signed else "cividis", vmin=low, vmax=high
             )
             axes.set_xlabel("$x$" + unit(found.about, "length") + f"\n{view.words}")
             axes.set_ylabel("$y$" + unit(found.about, "length"))
-        handles, labels = panels[-1].get_legend_handles_labels()
+        handles, labels = drawn[-1].get_legend_handles_labels()
         if labels:
             unique = dict(zip(labels, handles, strict=True))
-            legend = panels[-1].legend(
-                unique.values(), unique.keys(), loc="upper right", markerscale=2, frameon=True, framealpha=0.85
+            place = "upper right" if len(found.profiles) < 2 else "lower left"
+            legend = drawn[-1].legend(
+                unique.values(), unique.keys(), loc=place, markerscale=2, frameon=True, framealpha=0.85
             )
             legend.get_frame().set(facecolor=colours.ground, linewidth=0)
         beyond = {(True, True): "both", (True, False): "min", (False, True): "max", (False, False): "neither"}
         extend = beyond[bool(values.min() < low), bool(values.max() > high)]
-        bar = figure.colorbar(image, ax=panels, extend=extend, shrink=0.85, pad=0.02)
+        bar = figure.colorbar(image, ax=drawn, extend=extend, shrink=0.85, pad=0.02)
         bar.set_label(QUANTITIES[quantity] + unit(found.about, "stress"))
         bar.outline.set_visible(False)
-        _head(figure, panels[0], found.about, colours, found.partial, title, right=panels[columns - 1])
+        if ax is not None:
+            return _entitled(drawn[0], found.about, found.partial, title)
+        _head(figure, drawn[0], found.about, colours, found.partial, title, right=drawn[columns - 1])
         _foot(figure, found.about, colours, width)
     return _finished(plt, figure)
 
@@ -298,16 +351,22 @@ def _draw_body(axes: Any, found: Fields, view: _View, values: Array, colours: Th
     return image
 
 
-def problem(found: Problem, *, size: str = "page", theme: str = "light", title: str | None = None) -> Figure:
+def problem(
+    found: Problem, *, size: str = "page", theme: str = "light", title: str | None = None, ax: Any = None
+) -> Figure:
     """Mesh, supports, loads and obstacles. Raises ValueError for a mesh in a file, which is not read here."""
-    with style(size, theme) as (plt, width, colours):
+    with style(size, theme, ax) as (plt, width, colours):
         from matplotlib.collections import LineCollection
 
         lines = list(shapes.mesh_lines(found.mesh))
         every = np.concatenate(lines)
         span = np.ptp(every, axis=0)
         height = float(np.clip(0.6 * width * span[1] / span[0], 0.25 * width, 1.1 * width)) + 0.2 * width
-        figure, axes = plt.subplots(figsize=(width, height), layout="compressed")
+        if ax is None:
+            figure, axes = plt.subplots(figsize=(width, height), layout="compressed")
+        else:
+            (axes,) = panels(ax, 1)
+            figure = axes.figure
         axes.add_collection(LineCollection(lines, colors=colours.faint, linewidths=0.5))
         reach = 0.03 * float(span.max())
         for support in found.supports:
@@ -341,11 +400,14 @@ def problem(found: Problem, *, size: str = "page", theme: str = "light", title: 
         axes.set_ylabel("$y$")
         handles, labels = axes.get_legend_handles_labels()
         unique = dict(zip(labels, handles, strict=True))
-        axes.legend(unique.values(), unique.keys(), loc="upper left", bbox_to_anchor=(1.0, 1.0), ncols=1)
+        outside = {} if ax is not None else {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}
+        axes.legend(unique.values(), unique.keys(), ncols=1, **outside)
         from ._about import parameters
 
         friction = {contact.boundary: parameters(contact.to_dict(defaults=True)) for contact in found.contacts}
         about = {"title": found.title or "", "parameters": friction}
+        if ax is not None:
+            return _entitled(axes, about, False, title)
         _head(figure, axes, about, colours, False, title)
     return _finished(plt, figure)
 
@@ -362,11 +424,14 @@ def sweep(
     size: str = "page",
     theme: str = "light",
     title: str | None = None,
+    ax: Any = None,
 ) -> Figure:
     """A column of a study over one parameter, with a curve for each value of the others.
 
     quantity: a column of numbers, such as `stick_width`
-    x: the parameter along the axis; absent: the one with the most values
+    x: the parameter along the axis; absent: the one with the most values. Words and obstacles stand beside each other
+        in the order of the definition.
+    ax: axes of the caller, one
 
     A member with a warning that not all of them have has a hollow marker; one without a solution interrupts its
     curve. Below is counted how many members have which warnings. Raises ValueError where more than twelve curves
@@ -379,11 +444,19 @@ def sweep(
     if x is None:
         numeric = [name for name in table.parameters if table[name].dtype.kind in "fiu"]
         x = max(numeric or table.parameters, key=lambda name: np.unique(table[name]).size)
-    along = _numbers(table, x)
+    names = _categories(table[x]) if x in table.parameters else None
+    if names is None:
+        along = _numbers(table, x)
+    else:
+        along = np.array([names.index(value) for value in table[x].tolist()], float)
     curves = _curves(table, x)
     warned = _warned(table, values)
-    with style(size, theme) as (plt, width, colours):
-        figure, axes = plt.subplots(figsize=(width, 0.7 * width), layout="constrained")
+    with style(size, theme, ax) as (plt, width, colours):
+        if ax is None:
+            figure, axes = plt.subplots(figsize=(width, 0.7 * width), layout="constrained")
+        else:
+            (axes,) = panels(ax, 1)
+            figure = axes.figure
         # along a scale of brightness, which any eye can order; neither end is lost on the ground
         scale = plt.get_cmap("cividis")(np.linspace(*((0.0, 0.85) if theme == "light" else (0.3, 1.0)), len(curves)))
         colour = [colours.normal] if len(curves) == 1 else scale
@@ -395,7 +468,12 @@ def sweep(
                 axes.plot(along[some], values[some], "o", color=colour[number], markerfacecolor=face, markersize=4)
         if np.any(warned):
             axes.plot([], [], "o", color=colours.ink, mfc=colours.ground, markersize=4, label="with warnings")
-        if len(along) and np.all(along > 0) and _is_geometric(np.unique(along)):
+        if names is not None:
+            axes.set_xticks(range(len(names)), [textwrap.fill(_short(name), 16) for name in names])
+            axes.margins(x=0.1)
+        elif table[x].dtype.kind in "iu":
+            axes.xaxis.get_major_locator().set_params(integer=True)
+        elif len(along) and np.all(along > 0) and _is_geometric(np.unique(along)):
             axes.set_xscale("log")
             # few numbers, in plain form: powers of ten would cover each other within a decade
             axes.xaxis.set_major_locator(plt.matplotlib.ticker.LogLocator(subs=(1, 2, 5)))
@@ -405,8 +483,16 @@ def sweep(
         axes.set_ylabel(QUANTITIES.get(quantity, quantity.replace("_", " ")))
         axes.grid(axis="y")
         handles, labels = axes.get_legend_handles_labels()
+        if ax is not None:
+            if labels:
+                axes.legend(loc="best")
+            axes.set_title(table.title if title is None else title, loc="left")
+            return _drawn_on(axes)
         if labels and size == "column":
-            axes.legend(handles, labels, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)
+            columns = max(1, min(3, 48 // (6 + max(map(len, labels)))))
+            # above twelve long labels there would be no room for the curves
+            figure.set_figheight(figure.get_figheight() + 0.14 * max(0, -(-len(labels) // columns) - 3))
+            axes.legend(handles, labels, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns)
         elif labels:
             # as the curves mostly are, the last on top
             axes.legend(handles[::-1], labels[::-1], loc="upper left", bbox_to_anchor=(1.0, 1.0))
@@ -443,6 +529,11 @@ def _warned(table: SweepTable, values: Array) -> Array:
     return np.asarray(there & np.array([bool(of_member - of_all) for of_member in codes], dtype=bool))
 
 
+def _categories(column: Array) -> list[Any] | None:
+    """The values of a column that has words, in the order in which they come; None for numbers."""
+    return None if column.dtype.kind in "fiu" else list(dict.fromkeys(column.tolist()))
+
+
 def _numbers(table: SweepTable, name: str) -> Array:
     column = table[name]
     if column.dtype.kind not in "fiu":
@@ -460,6 +551,10 @@ def _is_geometric(values: Array) -> bool:
 
 def _short(value: Any) -> str:
     """A value as a label has it; a member of a list that leaves it out has that of the problem itself."""
+    if isinstance(value, str) and value.startswith("{"):  # an object of the problem, such as an obstacle
+        document = json.loads(value)
+        parts = [str(document.pop("kind"))] if "kind" in document else []
+        return " ".join(parts + [f"{name} {_short(inner)}" for name, inner in document.items()])
     if value == "" or (isinstance(value, float) and np.isnan(value)):
         return "as in the problem"
     return f"{value:.6g}".replace("-", "−") if isinstance(value, float) else str(value)
@@ -531,7 +626,14 @@ def _quantile(values: Array, lengths: Array, share: float) -> float:
     return float(values[order][min(np.searchsorted(total, share * total[-1]), len(values) - 1)])
 
 
-def _mark_cut(axes: Any, s: Array, values: Array, colours: Theme, about: Mapping[str, Any], boundary: str) -> None:
+def _is_late(s: Array, values: Array) -> bool:
+    """Whether the lowest of the values is in the second half."""
+    return bool(s[int(np.argmin(values))] > (s[0] + s[-1]) / 2)
+
+
+def _mark_cut(
+    axes: Any, s: Array, values: Array, colours: Theme, about: Mapping[str, Any], boundary: str, short: bool = False
+) -> None:
     """Two small strokes wherever the curve leaves the figure, and how far it goes."""
     low, _ = axes.get_ylim()
     beyond = np.flatnonzero(values < low)
@@ -546,8 +648,10 @@ def _mark_cut(axes: Any, s: Array, values: Array, colours: Theme, about: Mapping
     at = int(np.argmin(values))
     peak = ((about.get("peaks") or {}).get(boundary) or {}).get("normal_stress")
     no_limit = peak is not None and peak.value.why == "no_limit"
-    text = f"peak {values[at]:.3g}".replace("-", "−") + (", which grows on finer meshes" if no_limit else "")
-    to_left = s[at] > (s[0] + s[-1]) / 2
+    text = f"peak {values[at]:.3g}".replace("-", "−") + (
+        ", which grows on finer meshes" if no_limit and not short else ""
+    )
+    to_left = _is_late(s, values)
     axes.annotate(
         text, (s[at], 0), xycoords=("data", "axes fraction"), xytext=(-10 if to_left else 10, 12),
         textcoords="offset points", ha="right" if to_left else "left", va="bottom", fontsize="small",
@@ -589,10 +693,27 @@ def _head(
     line.set_wrap(False)
     if mark:
         # on a line of its own where both would not fit beside each other
-        if partial or figure.get_figwidth() < 4:
-            mark += "\n"
+        lines = below.count("\n") + 1
+        if partial or figure.get_figwidth() < 4 or lines > 1:
+            mark += "\n" * lines
         weight = "bold" if partial else None
         (right or axes).set_title(mark, loc="right", fontsize="medium", color=colour, fontweight=weight)
+
+
+def _entitled(
+    axes: Any, about: Mapping[str, Any], partial: bool, title: str | None, boundary: str | None = None
+) -> Figure:
+    """Gives axes of the caller a title, and returns their figure."""
+    verdict = about.get("verdict")
+    state = "PARTIAL" if partial else f"verdict: {verdict}" if verdict else ""
+    words = "\n".join(filter(None, [about.get("title") or "", subtitle(about, boundary), state]))
+    axes.set_title(words if title is None else title, loc="left", fontsize="medium")
+    return _drawn_on(axes)
+
+
+def _drawn_on(axes: Any) -> Figure:
+    figure: Figure = axes.figure
+    return figure
 
 
 def _foot(figure: Any, about: Mapping[str, Any], colours: Theme, width: float) -> None:

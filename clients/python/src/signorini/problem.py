@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal, Union
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
 from numpy.typing import NDArray
 
-from ._parts import ListOf, Part
+from ._parts import JSON, ListOf, Part, Real, Whole
 from ._whole import WholeProblem
 
 __all__ = [
@@ -90,6 +90,14 @@ class PlaneStrain(Part):
 
     kind: Literal["plane_strain"] = "plane_strain"
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            kind: Literal["plane_strain"] = ...,
+        ) -> None: ...
+
 
 @dataclass(kw_only=True, repr=False)
 class PlaneStress(Part):
@@ -101,6 +109,15 @@ class PlaneStress(Part):
     kind: Literal["plane_stress"] = "plane_stress"
     thickness: float
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            kind: Literal["plane_stress"] = ...,
+            thickness: Real,
+        ) -> None: ...
+
 
 @dataclass(kw_only=True, repr=False)
 class Axisymmetric(Part):
@@ -108,6 +125,14 @@ class Axisymmetric(Part):
     there (u_r = 0) without a support."""
 
     kind: Literal["axisymmetric"] = "axisymmetric"
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            kind: Literal["axisymmetric"] = ...,
+        ) -> None: ...
 
 
 Analysis = Union[PlaneStrain, PlaneStress, Axisymmetric]
@@ -138,6 +163,21 @@ class Orthotropic(Part):
     nu13: float | None = None
     nu23: float | None = None
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            e1: Real,
+            e2: Real,
+            g12: Real,
+            nu12: Real,
+            angle: Real = ...,
+            e3: Real | None = ...,
+            nu13: Real | None = ...,
+            nu23: Real | None = ...,
+        ) -> None: ...
+
 
 @dataclass(kw_only=True, repr=False)
 class Material(Part):
@@ -156,6 +196,18 @@ class Material(Part):
     orthotropic: Orthotropic | None = None
     poissons_ratio: float | None = None
     youngs_modulus: float | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            group: str | None = ...,
+            name: str | None = ...,
+            orthotropic: Orthotropic | JSON | None = ...,
+            poissons_ratio: Real | None = ...,
+            youngs_modulus: Real | None = ...,
+        ) -> None: ...
 
 
 Pair = Annotated[Union[Sequence[float], NDArray[Any]], ListOf(float, 2, 2)]
@@ -185,6 +237,19 @@ class BoundaryPart(Part):
     x: Pair | None = None
     y: Pair | None = None
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            angle: Real | None = ...,
+            box: Box | None = ...,
+            normal: Pair | None = ...,
+            side: str | None = ...,
+            x: Pair | None = ...,
+            y: Pair | None = ...,
+        ) -> None: ...
+
 
 CurveKind = Literal["circle", "spline"]
 """Kinds of curves that boundaries lie on.
@@ -208,6 +273,16 @@ class Curve(Part):
     kind: CurveKind
     center: Pair | None = None
     radius: float | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            kind: CurveKind,
+            center: Pair | None = ...,
+            radius: Real | None = ...,
+        ) -> None: ...
 
 
 Numbers = Annotated[Union[Sequence[float], NDArray[Any]], ListOf(float)]
@@ -234,6 +309,17 @@ class Grid(Part):
     bottom: Pairs | None = None
     top: Pairs | None = None
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            x: Numbers,
+            y: Numbers,
+            bottom: Pairs | None = ...,
+            top: Pairs | None = ...,
+        ) -> None: ...
+
 
 @dataclass(kw_only=True, repr=False)
 class ElementRange(Part):
@@ -245,6 +331,15 @@ class ElementRange(Part):
 
     x: Pair | None = None
     y: Pair | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            x: Pair | None = ...,
+            y: Pair | None = ...,
+        ) -> None: ...
 
 
 Element = Annotated[Union[Sequence[int], NDArray[Any]], ListOf(int, 6, 8)]
@@ -284,6 +379,18 @@ class InlineMesh(Part):
     groups: dict[str, Integers] | None = None
     node_sets: dict[str, Integers] | None = None
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            elements: Elements,
+            nodes: Pairs,
+            boundaries: dict[str, Sides] = ...,
+            groups: dict[str, Integers] | None = ...,
+            node_sets: dict[str, Integers] | None = ...,
+        ) -> None: ...
+
 
 @dataclass(kw_only=True, repr=False)
 class AdaptiveRefine(Part):
@@ -295,6 +402,14 @@ class AdaptiveRefine(Part):
     """
 
     tolerance: float
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            tolerance: Real,
+        ) -> None: ...
 
 
 Refine = Union[int, AdaptiveRefine]
@@ -332,6 +447,22 @@ class MeshInput(Part):
     refine: Refine = 0
     stored: str | None = None
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            abaqus: str | None = ...,
+            boundaries: dict[str, BoundaryPart] = ...,
+            curves: dict[str, Curve] = ...,
+            gmsh: str | None = ...,
+            grid: Grid | JSON | None = ...,
+            groups: dict[str, ElementRange] = ...,
+            inline: InlineMesh | JSON | None = ...,
+            refine: Refine | JSON = ...,
+            stored: str | None = ...,
+        ) -> None: ...
+
 
 Along = Literal["x", "arc_length"]
 """The coordinate c along a contact boundary.
@@ -355,6 +486,17 @@ class Flat(Part):
     from_: float | None = None
     to: float | None = None
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            kind: Literal["flat"] = ...,
+            along: Along = ...,
+            from_: Real | None = ...,
+            to: Real | None = ...,
+        ) -> None: ...
+
 
 @dataclass(kw_only=True, repr=False)
 class Circle(Part):
@@ -373,6 +515,19 @@ class Circle(Part):
     center: float = 0.0
     from_: float | None = None
     to: float | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            kind: Literal["circle"] = ...,
+            radius: Real,
+            along: Along = ...,
+            center: Real = ...,
+            from_: Real | None = ...,
+            to: Real | None = ...,
+        ) -> None: ...
 
 
 @dataclass(kw_only=True, repr=False)
@@ -393,6 +548,19 @@ class Parabola(Part):
     from_: float | None = None
     to: float | None = None
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            kind: Literal["parabola"] = ...,
+            radius: Real,
+            along: Along = ...,
+            center: Real = ...,
+            from_: Real | None = ...,
+            to: Real | None = ...,
+        ) -> None: ...
+
 
 @dataclass(kw_only=True, repr=False)
 class Wedge(Part):
@@ -411,6 +579,19 @@ class Wedge(Part):
     center: float = 0.0
     from_: float | None = None
     to: float | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            kind: Literal["wedge"] = ...,
+            angle: Real,
+            along: Along = ...,
+            center: Real = ...,
+            from_: Real | None = ...,
+            to: Real | None = ...,
+        ) -> None: ...
 
 
 @dataclass(kw_only=True, repr=False)
@@ -431,6 +612,19 @@ class Cone(Part):
     from_: float | None = None
     to: float | None = None
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            kind: Literal["cone"] = ...,
+            angle: Real,
+            along: Along = ...,
+            center: Real = ...,
+            from_: Real | None = ...,
+            to: Real | None = ...,
+        ) -> None: ...
+
 
 @dataclass(kw_only=True, repr=False)
 class Tilted(Part):
@@ -449,6 +643,19 @@ class Tilted(Part):
     center: float = 0.0
     from_: float | None = None
     to: float | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            kind: Literal["tilted"] = ...,
+            slope: Real,
+            along: Along = ...,
+            center: Real = ...,
+            from_: Real | None = ...,
+            to: Real | None = ...,
+        ) -> None: ...
 
 
 @dataclass(kw_only=True, repr=False)
@@ -470,6 +677,20 @@ class Power(Part):
     center: float = 0.0
     from_: float | None = None
     to: float | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            kind: Literal["power"] = ...,
+            coefficient: Real,
+            exponent: Real,
+            along: Along = ...,
+            center: Real = ...,
+            from_: Real | None = ...,
+            to: Real | None = ...,
+        ) -> None: ...
 
 
 @dataclass(kw_only=True, repr=False)
@@ -493,6 +714,20 @@ class RoundedFlat(Part):
     from_: float | None = None
     to: float | None = None
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            kind: Literal["rounded_flat"] = ...,
+            half_width: Real,
+            radius: Real,
+            along: Along = ...,
+            center: Real = ...,
+            from_: Real | None = ...,
+            to: Real | None = ...,
+        ) -> None: ...
+
 
 Interpolation = Literal["linear", "cubic"]
 """What lies between the points of an obstacle.
@@ -512,6 +747,14 @@ class Smoothing(Part):
     """
 
     standard_deviation: float
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            standard_deviation: Real,
+        ) -> None: ...
 
 
 @dataclass(kw_only=True, repr=False)
@@ -537,6 +780,21 @@ class Table(Part):
     smoothing: Smoothing | None = None
     to: float | None = None
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            kind: Literal["table"] = ...,
+            gap: Numbers,
+            x: Numbers,
+            along: Along = ...,
+            from_: Real | None = ...,
+            interpolation: Interpolation | None = ...,
+            smoothing: Smoothing | JSON | None = ...,
+            to: Real | None = ...,
+        ) -> None: ...
+
 
 @dataclass(kw_only=True, repr=False)
 class Polyline(Part):
@@ -556,6 +814,19 @@ class Polyline(Part):
     interpolation: Interpolation | None = None
     to: float | None = None
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            kind: Literal["polyline"] = ...,
+            points: Pairs,
+            along: Along = ...,
+            from_: Real | None = ...,
+            interpolation: Interpolation | None = ...,
+            to: Real | None = ...,
+        ) -> None: ...
+
 
 @dataclass(kw_only=True, repr=False)
 class Line(Part):
@@ -574,6 +845,19 @@ class Line(Part):
     along: Along = "x"
     from_: float | None = None
     to: float | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            kind: Literal["line"] = ...,
+            angle: Real,
+            point: Pair,
+            along: Along = ...,
+            from_: Real | None = ...,
+            to: Real | None = ...,
+        ) -> None: ...
 
 
 Obstacle = Union[Flat, Circle, Parabola, Wedge, Cone, Tilted, Power, RoundedFlat, Table, Polyline, Line]
@@ -601,6 +885,15 @@ class BoundTable(Part):
 
     bound: Numbers
     s: Numbers
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            bound: Numbers,
+            s: Numbers,
+        ) -> None: ...
 
 
 PrescribedBound = Union[float, BoundTable]
@@ -694,6 +987,25 @@ class Friction(Part):
     shear_cap: float | None = None
     transition: Transition = "linear"
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            elastic_slip: Real,
+            bound: PrescribedBound | JSON | None = ...,
+            coefficient: Real | None = ...,
+            cohesion: Real = ...,
+            history: History = ...,
+            kernel: Kernel = ...,
+            measure: Measure = ...,
+            nonlocal_radius: Real | None = ...,
+            normalization: Normalization = ...,
+            points: FrictionPoints = ...,
+            shear_cap: Real | None = ...,
+            transition: Transition = ...,
+        ) -> None: ...
+
 
 NormalOf = Literal["body", "obstacle"]
 """The normal that a contact uses. On a sloping obstacle the two differ, and so do the forces.
@@ -728,6 +1040,21 @@ class Contact(Part):
     indentation: float = 0.0
     normal: NormalOf = "body"
     tangential_displacement: float = 0.0
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            boundary: str,
+            obstacle: Obstacle | JSON,
+            condition: Condition = ...,
+            direction: Pair | None = ...,
+            friction: Friction | JSON | None = ...,
+            indentation: Real = ...,
+            normal: NormalOf = ...,
+            tangential_displacement: Real = ...,
+        ) -> None: ...
 
 
 BoundaryValue = Union[float, Pair]
@@ -766,6 +1093,22 @@ class Load(Part):
     pressure: BoundaryValue | None = None
     tangential: BoundaryValue | None = None
     traction: Traction | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            body_force: Pair | None = ...,
+            boundary: str | None = ...,
+            force: Pair | None = ...,
+            nodal: Pairs | None = ...,
+            nodes: str | None = ...,
+            normal: BoundaryValue | None = ...,
+            pressure: BoundaryValue | None = ...,
+            tangential: BoundaryValue | None = ...,
+            traction: Traction | None = ...,
+        ) -> None: ...
 
 
 AccuracyMode = Literal["estimate", "verify"]
@@ -819,6 +1162,19 @@ class ThesisOptions(Part):
     relaxation: float = 1.0
     signed: bool = False
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            contact_guess: dict[str, Pair] | None = ...,
+            friction_force: Whole = ...,
+            local_points: Whole = ...,
+            pressure: ThesisPressure = ...,
+            relaxation: Real = ...,
+            signed: bool = ...,
+        ) -> None: ...
+
 
 @dataclass(kw_only=True, repr=False)
 class SolverControls(Part):
@@ -841,6 +1197,20 @@ class SolverControls(Part):
     max_iterations: int = 200
     thesis: ThesisOptions | None = None
     tolerance: float = 1e-10
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            accuracy: AccuracyMode | None = ...,
+            algorithm: Algorithm = ...,
+            check_increments: bool = ...,
+            check_uniqueness: bool = ...,
+            max_iterations: Whole = ...,
+            thesis: ThesisOptions | JSON | None = ...,
+            tolerance: Real = ...,
+        ) -> None: ...
 
 
 Spacing = Literal["uniform", "contact_width"]
@@ -873,6 +1243,20 @@ class Step(Part):
     supports: float = 1.0
     tangential_displacement: float = 0.0
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            increments: Whole = ...,
+            indentation: Real = ...,
+            loads: Real = ...,
+            name: str | None = ...,
+            spacing: Spacing = ...,
+            supports: Real = ...,
+            tangential_displacement: Real = ...,
+        ) -> None: ...
+
 
 @dataclass(kw_only=True, repr=False)
 class Support(Part):
@@ -894,6 +1278,19 @@ class Support(Part):
     ux: BoundaryValue | None = None
     uy: BoundaryValue | None = None
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            boundary: str | None = ...,
+            nodes: str | None = ...,
+            un: BoundaryValue | None = ...,
+            ut: BoundaryValue | None = ...,
+            ux: BoundaryValue | None = ...,
+            uy: BoundaryValue | None = ...,
+        ) -> None: ...
+
 
 @dataclass(kw_only=True, repr=False)
 class Units(Part):
@@ -908,6 +1305,16 @@ class Units(Part):
     force: str | None = None
     length: str | None = None
     stress: str | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            force: str | None = ...,
+            length: str | None = ...,
+            stress: str | None = ...,
+        ) -> None: ...
 
 
 @dataclass(kw_only=True, repr=False)
@@ -939,3 +1346,21 @@ class Problem(WholeProblem):
     supports: list[Support] = field(default_factory=list)
     title: str | None = None
     units: Units | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            analysis: Analysis | JSON,
+            materials: Sequence[Material | JSON],
+            mesh: MeshInput,
+            contacts: Sequence[Contact | JSON] = ...,
+            loads: Sequence[Load | JSON] = ...,
+            quadrature: Whole = ...,
+            solver: SolverControls | JSON = ...,
+            steps: Sequence[Step | JSON] = ...,
+            supports: Sequence[Support | JSON] = ...,
+            title: str | None = ...,
+            units: Units | JSON | None = ...,
+        ) -> None: ...

@@ -6,11 +6,12 @@ import functools
 import os
 import pathlib
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from . import _calls as calls
 from ._about import about, obstacles
 from ._data import Fields, History, Profile, Summary, known
+from ._saved import Saved, key, packed, requests
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -63,6 +64,28 @@ class Result(Summary):
     def save_vtu(self, path: str | os.PathLike[str]) -> pathlib.Path:
         """Writes the fields for ParaView, completely or not at all."""
         return write(path, self._client._send(calls.vtu(self.job.id)))
+
+    def save(self, path: str | os.PathLike[str], *, fields: bool = True) -> pathlib.Path:
+        """Writes all of it to a file, which `Result.open` reads without the service: numbers, problem, history, the
+        profiles of each contact and load step.
+
+        fields: displacements and stresses of the whole body, too
+        """
+        steps = [str(step["name"]) for step in self.steps]
+        wanted = requests(self.job.id, self.job.input_hash, self.summary, steps, fields)
+        answers = {key(call): self._client._send(calls.unread(call)) for call in wanted}
+        return write(path, packed(self.job.id, answers))
+
+    @classmethod
+    def open(cls, path: str | os.PathLike[str]) -> Result:
+        """A result from a file that `save` has written. Raises `SignoriniError` for another file, and later for what is
+        not in it."""
+        from .job import Job
+
+        saved = Saved(path)
+        client = cast("Client", saved)
+        job = Job(client, saved._send(calls.job(saved.job)))
+        return cls(client, job, saved._send(calls.result(job.id, True, job.input_hash)))
 
     def plot_profile(self, boundary: str | None = None, *, step: int | str | None = None, **options: Any) -> Figure:
         """Draws the stresses along a contact, at the end of a load step; see `signorini.figures.profile`."""
