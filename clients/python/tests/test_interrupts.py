@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import concurrent.futures
+import faulthandler
+import functools
 import gc
 import io
 import multiprocessing
@@ -33,13 +36,20 @@ def open_files() -> int:
 
 def in_process(work: Callable[..., None], *arguments: Any) -> None:
     """Does something in a process of its own: what measures coverage has a lock that a signal may leave closed."""
-    process = multiprocessing.get_context("spawn").Process(target=work, args=arguments)
+    process = multiprocessing.get_context("spawn").Process(target=observed, args=(work, *arguments))
     process.start()
     process.join(150)
     if process.is_alive():
         process.kill()
         raise AssertionError("it hangs")
     assert process.exitcode == 0, "its error is on standard error"
+
+
+def observed(work: Callable[..., None], *arguments: Any) -> None:
+    """Says where it hangs, if it does."""
+    faulthandler.dump_traceback_later(100, exit=True)
+    work(*arguments)
+    faulthandler.cancel_dump_traceback_later()
 
 
 def raise_at_alarm(kind: type[BaseException]) -> None:
@@ -107,6 +117,34 @@ def signals_during_streams(url: str, id: str) -> None:
 @pytest.mark.parametrize("kind", [KeyboardInterrupt, TimeoutError, ConnectionResetError])
 def test_a_signal_at_any_moment_of_a_call(kind: type[BaseException], server: sg.LocalServer, punch: sg.Result) -> None:
     in_process(signals_during_calls, server.url, punch.job.id, kind)
+
+
+def signals_during_the_first_calls(url: str, id: str, seed: int) -> None:
+    """The HTTP library imports modules when it is first used, under locks that all threads need."""
+    raise_at_alarm(ConnectionResetError)
+    client = sg.Client(url)
+    chance = random.Random(seed)
+    threads = [threading.Thread(target=client.job, args=(id,), daemon=True) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for _ in range(15):
+        try:
+            signal.setitimer(signal.ITIMER_REAL, chance.uniform(1e-5, 0.03))
+            client.job(id)
+            signal.setitimer(signal.ITIMER_REAL, 0)
+        except ConnectionResetError:
+            pass
+    assert client.job(id).id == id
+    for thread in threads:
+        thread.join(30)
+    assert not any(thread.is_alive() for thread in threads)
+
+
+def test_a_signal_during_the_first_calls_of_a_program(server: sg.LocalServer, punch: sg.Result) -> None:
+    # where it hangs, it does in one process of ten
+    with concurrent.futures.ThreadPoolExecutor(4) as pool:
+        ask = functools.partial(in_process, signals_during_the_first_calls, server.url, punch.job.id)
+        assert list(pool.map(ask, range(24))) == [None] * 24
 
 
 def test_a_signal_in_the_middle_of_a_stream(server: sg.LocalServer, punch: sg.Result) -> None:

@@ -83,7 +83,7 @@ def test_a_service_of_ones_own_needs_no_token(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setenv("SIGNORINI_TOKEN", "of_the_lab")
     with sg.Client.local() as client:
         assert client.me()["owner"] == "local"
-        sweep = client.sweep(sg.examples.sheet(refine=0), {"contacts.0.indentation": [0.01, 0.02]})
+        sweep = client.sweep(long_problem(10_000), {"contacts.0.friction.coefficient": [0.1, 0.2]})
         with pytest.raises(sg.WaitTimeout, match="The sweep is lost when this program ends"):
             sweep.wait(timeout=0, progress=False)
 

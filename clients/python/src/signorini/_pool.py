@@ -44,13 +44,17 @@ class Line:
 
     def __init__(self, settings: Settings) -> None:
         self.process = os.getpid()
-        self._http = httpx.Client(limits=ONE, **settings)
+        self._settings = settings
+        self._http: httpx.Client | None = None
         self._socket: socket.socket | None = None
         self._pieces: Iterator[bytes] = iter(())
         self._busy = self._dropped = False
 
     def send(self, request: Request) -> httpx.Response:
         """Sends a request, and reads the head of the answer."""
+        if self._http is None:
+            # not when it is made, in the main thread: it imports modules, under locks that all threads need
+            self._http = httpx.Client(limits=ONE, **self._settings)
         extensions = {"trace": self._trace}
         return self._http.send(self._http.build_request(**request, extensions=extensions), stream=True)
 
@@ -118,7 +122,8 @@ class Line:
         with contextlib.suppress(Exception):
             if isinstance(self._pieces, Generator):
                 self._pieces.close()
-        self._http.close()
+        if self._http is not None:
+            self._http.close()
 
 
 def _start(work: Callable[[], None]) -> None:
