@@ -313,7 +313,7 @@ mod tests {
         let cubic = |x: f64, _: usize| 2.0 + x - x.powi(2) - x.powi(3);
         let highest = highest_of_cubic(&points(&cubic));
         let exact = cubic(1.0 / 3.0, 0);
-        assert!(highest <= exact && highest > exact - 1e-4, "{highest}");
+        assert!(highest <= exact && highest > exact - 1e-3, "{highest}");
         let zigzag = |_: f64, k: usize| 1.0 + [0.1, -0.1][k % 2];
         let highest = highest_of_cubic(&points(&zigzag));
         assert!((0.9..1.05).contains(&highest), "{highest}");
