@@ -87,10 +87,10 @@ fn with_corners<T>(
             both.append(&mut load_history.of_both);
             let end = load_history.last.as_ref().map(|last| &last.state);
             let next = algorithm::better(&load_history.system, end, &both);
-            // what does not come to rest is of both in the end
-            let of_both = wrong.then(Alone::new);
-            let next = [next, of_both].into_iter().flatten();
-            (solved, next.into_iter().find(|next| !tried.contains(next)))
+            let untried = next.filter(|next| !tried.contains(next));
+            // what does not come to rest is of both in the end, also where that was tried at first: in a solution that is
+            // wrong a body passes an obstacle
+            (solved, untried.or(wrong.then(Alone::new)))
         };
         let Some(next) = next else {
             return Ok(solved);

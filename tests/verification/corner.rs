@@ -3,7 +3,7 @@
 
 use serde_json::{Value, json};
 use solver::model::Model;
-use solver::solution::Solution;
+use solver::solution::{Outcome, Solution};
 
 use crate::input::{pair, violations};
 use crate::support::{Lattice, problem, solve};
@@ -138,6 +138,84 @@ fn a_corner_opens_on_one_side() {
     let solution = solved(&value);
     let force = |name: &str| solution.summary.contacts[name].normal_force;
     assert!((force("wall") - 5.0).abs() < 1e-9 && force("floor") == 0.0);
+}
+
+/// A square that a roller holds on the left is pressed down between a floor and a wall on the right, each with friction: in no
+/// load step does a node of either pass its obstacle, whichever of the two the common node is of.
+#[test]
+fn no_node_of_a_corner_passes_an_obstacle() {
+    let nodal = [true, false];
+    let cases = [
+        // (friction, indentations, pressure, radius, friction at nodes, end of the first step)
+        ([0.5, 0.5], [0.0, -0.003], 10.0, 0.1, [false; 2], None),
+        ([0.2, 0.1], [-0.005, 0.014], 2.0, 0.1, [false; 2], None),
+        ([0.6, 0.2], [-0.003, 0.009], 10.0, 0.0, [false; 2], None),
+        ([0.2, 0.8], [0.002, 0.001], 10.0, 0.0, nodal, None),
+        ([0.4, 0.5], [-0.004, 0.007], 2.0, 0.0, [false; 2], None),
+        // only at the end of the first of two steps, after which the body opens
+        (
+            [0.3, 0.2],
+            [0.011, -0.003],
+            10.0,
+            0.0,
+            nodal,
+            Some([0.5, 0.2]),
+        ),
+        (
+            [0.7, 0.4],
+            [0.018, -0.004],
+            10.0,
+            0.0,
+            nodal,
+            Some([0.5, 0.2]),
+        ),
+        (
+            [0.4, 0.5],
+            [-0.001, 0.02],
+            10.0,
+            0.0,
+            nodal,
+            Some([0.5, 0.5]),
+        ),
+    ];
+    for (coefficients, indentations, pressure, radius, nodal, steps) in cases {
+        let contact = |k: usize, boundary: &str| {
+            json!({
+                "boundary": boundary, "obstacle": {"kind": "flat", "along": "arc_length"}, "indentation": indentations[k],
+                "friction": {
+                    "coefficient": coefficients[k], "nonlocal_radius": radius, "elastic_slip": 1e-3,
+                    "points": if nodal[k] { "nodal" } else { "gauss3" },
+                },
+            })
+        };
+        let mut value = json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {
+                "grid": {"x": [0, 0.25, 0.5, 0.75, 1], "y": [0, 0.25, 0.5, 0.75, 1]},
+                "boundaries": {"floor": {"side": "bottom"}, "wall": {"side": "right"}},
+            },
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "supports": [{"boundary": "left", "ux": 0}],
+            "loads": [{"boundary": "top", "pressure": pressure}],
+            "contacts": [contact(0, "floor"), contact(1, "wall")],
+        });
+        if let Some([indentation, loads]) = steps {
+            value["steps"] = json!([{"indentation": indentation}, {"loads": loads}]);
+        }
+        let solution = solved(&value);
+        assert!(solution.summary.outcome == Outcome::Converged);
+        let earlier = solution.steps.iter().map(|step| &step.node_profiles);
+        for (name, profile) in earlier.chain([&solution.node_profiles]).flatten() {
+            let nodes = profile.normal_displacement.iter().zip(&profile.gap);
+            for (k, (u, gap)) in nodes.enumerate() {
+                assert!(
+                    *u <= gap + 1e-10,
+                    "{name}, node {k}: {:.1e} beyond the obstacle in {value}",
+                    u - gap
+                );
+            }
+        }
+    }
 }
 
 /// Half a block under an obstacle that slopes at its line of symmetry is half of the block under a wedge: the same
