@@ -15,8 +15,24 @@ from elastic import GAUSS, Body, arc_lengths, curve_error, edge_shape, edge_way,
 from meshes import ROUNDING, normals
 
 
+# So many roundings an entry of a stiffness may be off by: it is a sum of hundreds of products, of both signs.
+ROUNDINGS = 16
+
+
 class Unsolved(Exception):
     """The reference found no solution."""
+
+
+def without(ends, h):
+    """Shape functions of an edge (start, end, midside) of which some ends take no part in friction: the straight line through the
+    other two nodes goes on there, and of two such ends the midside node alone is left."""
+    a, b, m = h
+    return np.array({
+        (False, False): [a, b, m],
+        (True, False): [0.0, b - a, m + 2 * a],
+        (False, True): [a - b, 0.0, m + 2 * b],
+        (True, True): [0.0, 0.0, a + b + m],
+    }[tuple(map(bool, ends))])  # fmt: skip
 
 
 class Contact:
@@ -28,6 +44,7 @@ class Contact:
         self.obstacle = given["obstacle"]
         edges = mesh.boundaries[given["boundary"]]
         s = arc_lengths(mesh.nodes, edges)
+        self.rounding = ROUNDING * s[-1]
         self.edges, first = self.facing(mesh, edges, s)
         self.s = s[2 * first : 2 * (first + len(self.edges)) + 1]
         self.nodes = [self.edges[0][0]] + [n for _, end, mid in self.edges for n in (mid, end)]
@@ -57,14 +74,14 @@ class Contact:
     def facing(self, mesh, edges, s):
         """The edges that face the obstacle with all three nodes, and the number of the first."""
         low, high = self.obstacle.get("from", -np.inf), self.obstacle.get("to", np.inf)
-        room, ways = ROUNDING * s[-1], self.mean_normals(mesh, edges)
+        room, ways = self.rounding, self.mean_normals(mesh, edges)
         found = []
         for k, edge in enumerate(edges):
             for place, node in zip((2 * k, 2 * k + 2, 2 * k + 1), edge):
                 c = self.coordinate(mesh.nodes[node], s[place])
                 if not low - room <= c <= high + room:
                     break
-                if obstacles.seen(self.obstacle, mesh.nodes[node], ways[place], c) is None:
+                if obstacles.seen(self.obstacle, mesh.nodes[node], ways[place], c, room) is None:
                     break
             else:
                 found.append(k)
@@ -87,11 +104,15 @@ class Contact:
         self.distance, self.push = np.zeros(len(self.nodes)), np.zeros((len(self.nodes), 2))
         self.push[:, 0] = 1
         for i, (position, s) in enumerate(zip(self.positions, self.s)):
-            found = obstacles.seen(self.obstacle, position, self.normals[i], self.coordinate(position, s))
+            found = obstacles.seen(self.obstacle, position, self.normals[i], self.coordinate(position, s), self.rounding)
             if found is None:
                 raise Unsolved("the obstacle is not seen along the contact's own normals")
             distance, slope = found
             if self.given.get("normal") == "obstacle":
+                # where a support holds the node, what its direction may be off by is no slope (3.12)
+                error = self.body.held_error.get(self.nodes[i])
+                if error is not None and abs(slope) <= min(max(error, 1e-9), 1e-3):
+                    slope = 0.0
                 cosine = 1 / np.hypot(1, slope)
                 n, t = self.normals[i], obstacles.turned(self.normals[i])
                 self.normals[i] = cosine * (n - slope * t)
@@ -306,14 +327,7 @@ class Reference:
                     points.append((contact.s[i], own, np.array([float(j == i) for j in own]), contact.areas[i]))
             slips = []
             for s, own, h, weight in points:
-                h = np.array(h)
-                for place, other in ((0, 1), (1, 0)):
-                    if oblique.get(own[place], False):
-                        # along the straight line through the other two
-                        h[2] += 2 * h[place]
-                        h[other] -= h[place]
-                        h[place] = 0
-                slips.append((own, h))
+                slips.append((own, without([oblique.get(own[place], False) for place in (0, 1)], h)))
             rows = np.array([
                 sum(shape * self.row(contact.nodes[j], contact.tangents[j]) for j, shape in zip(own, h)) for own, h in slips
             ])  # fmt: skip
@@ -576,6 +590,38 @@ class Reference:
                 e, length = self.slip(patch, v, level), patch["law"]["elastic_slip"]
                 patch["anchor"] = patch["anchor"] + np.where(tau <= 1e-12 * largest, e, e - np.clip(e, -length, length))
 
+    def strained(self, u):
+        """Stresses at the integration points that are reported, and the strain energy (without 2π)."""
+        stresses, strain_energy = [], 0.0
+        for part in self.body.parts:
+            _, stress, energy = part.stresses(u)
+            strain_energy += energy
+            if part.quadrature == self.body.quadrature:
+                # elements that do not lock are reported at fewer points than they are integrated with, if it is so asked
+                stresses.append((part.x.reshape(2, -1).T, stress.reshape(4, -1).T))
+        return stresses, strain_energy
+
+    def rounding(self, results):
+        """How much rounding of the stiffness may change a body without contact: (displacements, stresses, energies), in any step.
+
+        An entry K_ij is known to some roundings of itself, which changes the force on i by that part of K_ij u_j. What such forces,
+        with random signs, do to the body is large where it moves far and strains little, is thin, or nearly incompressible. The
+        largest of a few trials.
+        """
+        if self.factor is None:
+            return 0.0, 0.0, 0.0
+        random, trials = np.random.default_rng(1), []
+        entries = abs(self.body.matrix)
+        # a step that takes all loads away leaves rounding of the displacements before it
+        terms = np.max([entries @ np.abs(result["whole"]) for result in results], axis=0)
+        for _ in range(8):
+            forces = ROUNDINGS * 2.0**-52 * terms * random.choice([-1.0, 1.0], len(terms))
+            error = self.free @ self.factor.solve(self.free.T @ forces)
+            stresses = max((np.abs(stress).max() for _, stress in self.strained(error)[0]), default=0.0)
+            changes = [self.strained(result["whole"] + error)[1] - self.strained(result["whole"])[1] for result in results]
+            trials.append((np.abs(error[: 2 * len(self.mesh.nodes)]).max(), stresses, self.body.ring * np.abs(changes).max()))
+        return np.max(trials, axis=0)
+
     def result(self, level, v, forces, ties):
         body, ring = self.body, self.body.ring
         whole = level["loads"] * self.loads + level["supports"] * self.pulls
@@ -584,14 +630,8 @@ class Reference:
         if len(self.off):
             y[self.off] = self.factor.solve(whole[self.off] - self.across @ v)
         u = self.free @ y + level["supports"] * self.prescribed
-        found = {"u": u[: 2 * len(self.mesh.nodes)].reshape(-1, 2), "stress": []}
-        strain_energy = 0.0
-        for part in body.parts:
-            _, stress, energy = part.stresses(u)
-            strain_energy += energy
-            if part.quadrature == body.quadrature:
-                # elements that do not lock are reported at fewer points than they are integrated with, if it is so asked
-                found["stress"].append((part.x.reshape(2, -1).T, stress.reshape(4, -1).T))
+        stress, strain_energy = self.strained(u)
+        found = {"u": u[: 2 * len(self.mesh.nodes)].reshape(-1, 2), "whole": u, "stress": stress}
         energy = strain_energy - level["loads"] * body.force @ u
         normal, tangential, total, work = 0.0, 0.0, 0.0, 0.0
         pressures = self.pressures(forces, ties)

@@ -375,11 +375,14 @@ class Body:
                     force[2 * node : 2 * node + 2] += part * shape * stress
 
     def supports(self):
-        """Held directions of each node with their values: node -> [(unit vector, value)]."""
+        """Held directions of each node with their values: node -> [(unit vector, value)]. How far the most exact of them may be
+        off is left in `held_error`."""
         held, mesh = {}, self.mesh
+        self.held_error = {}
         if self.axisymmetric:
             for node in np.flatnonzero(mesh.nodes[:, 0] == 0):
                 held[int(node)] = [(np.array([1.0, 0]), 0.0)]
+                self.held_error[int(node)] = 0.0
         own = self.support_normals()
         for number, support in enumerate(self.problem.get("supports", [])):
             for field in ("ux", "uy", "un", "ut"):
@@ -404,11 +407,13 @@ class Body:
                     }
                 for node, value in found.items():
                     if field in ("ux", "uy"):
-                        way = np.array([1.0, 0] if field == "ux" else [0, 1.0])
+                        way, error = np.array([1.0, 0] if field == "ux" else [0, 1.0]), 0.0
                     else:
-                        way = own[number][node]
+                        way, sides = own[number][node], mesh.boundaries[support["boundary"]]
+                        error = max(curve_error(mesh.nodes[list(side)]) for side in sides if node in side)
                         way = way if field == "un" else np.array([way[1], -way[0]])
                     held.setdefault(node, []).append((way, value))
+                    self.held_error[node] = min(error, self.held_error.get(node, np.inf))
         return held
 
     def support_normals(self):

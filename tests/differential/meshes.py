@@ -254,8 +254,8 @@ def place_on(points, position):
     return xi, np.hypot(*off)
 
 
-def holds(points, position):
-    """Whether an element has a position inside."""
+def inside(points, position):
+    """How far inside of an element a position is, in its master coordinates; negative outside."""
     at, shape = np.array([0.0, 0.0] if len(points) == 8 else [1 / 3, 1 / 3]), quad_shape if len(points) == 8 else triangle_shape
     h = 1e-6
     for _ in range(30):
@@ -264,8 +264,8 @@ def holds(points, position):
         dy = (shape(at[0], at[1] + h) - shape(at[0], at[1] - h)) @ points / (2 * h)
         at = np.clip(at - np.linalg.solve(np.array([dx, dy]).T, off), -2, 2)
     if np.hypot(*(shape(*at) @ points - position)) > 1e-6 * np.ptp(points):
-        return False
-    return abs(at).max() < 1 + 1e-6 if len(points) == 8 else min(at[0], at[1], 1 - at.sum()) > -1e-6
+        return -np.inf
+    return 1 - abs(at).max() if len(points) == 8 else min(at[0], at[1], 1 - at.sum())
 
 
 def descendant(first, nodes, elements):
@@ -277,7 +277,8 @@ def descendant(first, nodes, elements):
     for fine in surface(mesh):
         for edge in coarse:
             found = [place_on(first.nodes[list(edge)], mesh.nodes[n]) for n in fine]
-            if all(off < room and abs(xi) < 1 + 1e-6 for xi, off in found):
+            # small sides near a corner are near to the next side too: the midside is on their own
+            if all(off < room and abs(xi) < 1 + 1e-6 for xi, off in found) and abs(found[2][0]) < 1:
                 parent[fine] = edge
                 places[fine] = [xi for xi, _ in found[:2]]
     for name, edges in first.boundaries.items():
@@ -286,9 +287,12 @@ def descendant(first, nodes, elements):
     # of a curved element, the middle of its corners may lie outside
     middle = lambda e: quad_shape(0, 0) if len(e) == 8 else triangle_shape(1 / 3, 1 / 3)
     centres = [middle(e) @ mesh.nodes[list(e)] for e in mesh.elements]
+    # the most of a small element beside another one is in its own
+    points = [first.nodes[list(e)] for e in first.elements]
+    own = [int(np.argmax([inside(p, c) for p in points])) for c in centres]
     for name, group in first.groups.items():
-        points = [first.nodes[list(first.elements[e])] for e in group]
-        mesh.groups[name] = [i for i, c in enumerate(centres) if any(holds(p, c) for p in points)]
+        members = set(group)
+        mesh.groups[name] = [i for i, e in enumerate(own) if e in members]
     same = lambda n: int(np.argmin(np.hypot(*(mesh.nodes - first.nodes[n]).T)))
     mesh.parts = {fine: (tuple(same(n) for n in edge), *places[fine]) for fine, edge in parent.items()}
     mesh.first_boundaries = {name: [tuple(same(n) for n in e) for e in edges] for name, edges in first.boundaries.items()}

@@ -4,8 +4,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 
-def profile(obstacle, c):
-    """Distance and slope over the coordinate c of the kinds that have one; None where there is no obstacle."""
+def profile(obstacle, c, rounding=1e-9):
+    """Distance and slope over the coordinate c of the kinds that have one; None where there is no obstacle. `rounding`: how near a
+    place is to a kink to be at it."""
     kind, x = obstacle["kind"], c - obstacle.get("center", 0.0)
     if kind == "flat":
         return 0.0, 0.0
@@ -20,7 +21,7 @@ def profile(obstacle, c):
     if kind in ("wedge", "cone"):
         rise = np.tan(np.radians(obstacle["angle"]))
         # at the kink, if only up to rounding, the mean of both sides
-        return abs(x) * rise, (np.sign(x) if abs(x) > 1e-9 else 0.0) * rise
+        return abs(x) * rise, (np.sign(x) if abs(x) > rounding else 0.0) * rise
     if kind == "tilted":
         return obstacle["slope"] * x, obstacle["slope"]
     if kind == "power":
@@ -94,11 +95,11 @@ def in_space(obstacle, position, n):
     return nearest[0], np.mean(same)
 
 
-def seen(obstacle, position, n, c):
+def seen(obstacle, position, n, c, rounding):
     """Distance along n and slope along t as seen from a place with the coordinate c; None where nothing is seen."""
     if obstacle["kind"] in ("line", "polyline"):
         return in_space(obstacle, position, n)
-    found = profile(obstacle, c)
+    found = profile(obstacle, c, rounding)
     if found is None:
         return None
     per_length = 1.0 if obstacle.get("along") == "arc_length" else turned(n)[0]
