@@ -479,7 +479,8 @@ pub enum Waiting {
 /// The progress of a job.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Progress {
-    /// The phase that began last: mesh, assemble, …, recover, and verify.
+    /// The phase that began last: mesh, assemble, …, recover, and verify. `low_disk`: the disk is full, and what the job finds
+    /// is stored once there is space; until then it stays running, also if it is solved.
     pub stage: String,
     /// Iterations so far.
     pub iteration: u32,

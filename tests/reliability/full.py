@@ -2,7 +2,8 @@
 
     full.py [--soak]
 
-The store is on a volume of 64 MiB of its own, which is filled. Submissions are refused within a second; reading,
+The store is on a volume of 64 MiB of its own, which is filled, in the end by the store itself: with the results of jobs, with
+the rows of a sweep, with meshes, which are then deleted. Submissions are refused within a second; reading,
 canceling, deleting and pausing work; a canceled job does not succeed. Two restarts on the full disk work. When there is
 space again jobs are accepted within ten seconds, without a restart, and nothing is damaged. Needs `unshare`, and leave to mount.
 """
@@ -125,6 +126,126 @@ def control(server, ended, running, queued):
     until(lambda: server.json("/v1/jobs/" + running[0])["status"] == "canceled", 5, "the canceled job ends")
 
 
+def many_contacts(count):
+    """A strip with contacts side by side: each member of a sweep over it keeps kilobytes."""
+    parts = {"c%d" % i: {"side": "top", "x": [i / count - 1e-9, (i + 0.5) / count + 1e-9]} for i in range(count)}
+    return {
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grid": {"x": [i / (2 * count) for i in range(2 * count + 1)], "y": [0, 0.5, 1]}, "boundaries": parts},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
+        "contacts": [{"boundary": name, "obstacle": {"kind": "flat"}, "indentation": 0.01} for name in parts],
+    }
+
+
+def mesh(number, lines=60):
+    """A deck with a square of elements of eight nodes, of another size for each number."""
+    side, text, numbers = 2 * lines + 1, ["*NODE"], {}
+    for row in range(side):
+        for column in range(side):
+            if row % 2 == 0 or column % 2 == 0:
+                numbers[row, column] = len(numbers) + 1
+                text.append("%d, %r, %r" % (len(numbers), column * (1 + number / 100) / side, row / side))
+    text.append("*ELEMENT, TYPE=CPE8, ELSET=ALL")
+    places = ((0, 0), (0, 2), (2, 2), (2, 0), (0, 1), (1, 2), (2, 1), (1, 0))
+    for row in range(0, side - 1, 2):
+        for column in range(0, side - 1, 2):
+            nodes = [numbers[row + down, column + right] for down, right in places]
+            text.append(", ".join(map(str, [len(text), *nodes])))
+    return ("\n".join(text) + "\n").encode()
+
+
+class Jobs:
+    """Results of jobs, deleted by a filter."""
+
+    def __init__(self, server):
+        self.server, self.number = server, 0
+
+    def fill(self):
+        self.number += 1
+        problem = example(refine=4)
+        problem["contacts"][0]["indentation"] *= 1 + self.number / 1000
+        answer = self.server.call("POST", "/v1/jobs", submission(problem, labels={"kind": "filling"}), prefer="wait=5")
+        return answer.status
+
+    def remove(self):
+        equal(self.server.call("POST", "/v1/jobs/cancel?label.kind=filling").status, 200, "cancel by a filter")
+        left = lambda: self.server.json("/v1/jobs/count?label.kind=filling&status=queued,running")["total"]
+        until(lambda: left() == 0, 10, "the canceled jobs end")
+        equal(self.server.call("DELETE", "/v1/jobs?label.kind=filling").status, 200, "deletion by a filter")
+
+
+class Meshes:
+    """Meshes, deleted one by one."""
+
+    def __init__(self, server):
+        self.server, self.hashes, self.number = server, [], 0
+
+    def fill(self):
+        self.number += 1
+        answer = self.server.call("POST", "/v1/meshes", mesh(self.number), content_type="application/octet-stream")
+        check(answer.status in (201, 507), "an upload to a disk that fills: %r" % answer)
+        if answer.status == 201:
+            self.hashes.append(answer.json()["hash"])
+        return answer.status
+
+    def remove(self):
+        for name in self.hashes:
+            equal(self.server.call("DELETE", "/v1/meshes/" + name).status, 204, "deletion of a mesh on a full disk")
+
+
+class Sweep:
+    """A sweep, canceled and deleted while its rows cannot be stored."""
+
+    def __init__(self, server):
+        self.server, self.id = server, None
+
+    def fill(self):
+        if self.id is None:
+            values = [0.001 + 1e-6 * n for n in range(10000)]
+            axes = [{"path": "/contacts/0/indentation", "values": values}]
+            answer = self.server.call("POST", "/v1/sweeps", {"base": many_contacts(60), "axes": axes})
+            equal(answer.status, 202, "a sweep, %r" % answer)
+            self.id = answer.json()["id"]
+        time.sleep(0.2)
+        return self.server.call("POST", "/v1/jobs", submission(example())).status
+
+    def remove(self):
+        # a job that cannot store what it has found says why it does not go on
+        jobs = self.server.json("/v1/jobs?status=running")["jobs"]
+        equal([job["progress"]["stage"] for job in jobs], ["low_disk"] * len(jobs), "the stage of running jobs")
+        equal(self.server.call("POST", "/v1/sweeps/%s/cancel" % self.id).status, 200, "cancel of a sweep")
+        deleted = lambda: self.server.call("DELETE", "/v1/sweeps/" + self.id).status == 204
+        until(deleted, 10, "the canceled sweep is deleted")
+
+
+def filled_by_itself(server, kind):
+    """The store fills its disk, and has all of the space again that deletions free."""
+    what = kind(server)
+    # the reserve and little else are left
+    with (server.inside() / "filling").open("wb") as file:
+        file.write(bytes(30 << 20))
+    for _ in range(300):
+        if what.fill() == 507:
+            break
+    else:
+        check(False, "%s: the disk is never full" % kind.__doc__)
+    degraded = lambda: server.call("GET", "/readyz").body.startswith(b"degraded")
+    until(degraded, 5, "readiness tells of the full disk")
+    what.remove()
+    began = time.monotonic()
+    body = submission(example())
+    until(lambda: server.call("POST", "/v1/jobs", body).status == 202, MOST_BACK_S, "jobs are accepted again: %s" % kind.__doc__)
+    slowest["back"] = max(slowest["back"], time.monotonic() - began)
+    size = lambda name: (server.inside() / name).stat().st_size
+    equal(size("signorini.reserve"), 16 << 20, "the reserve")
+    equal(size("signorini.progress"), 81, "the record of the progress")
+    check(size("signorini.db") < 12 << 20, "the database keeps %d MiB" % (size("signorini.db") >> 20))
+    server.free()
+    until(lambda: server.json("/v1/jobs/count?status=queued,running")["total"] == 0, 30, "the jobs end")
+    server.call("DELETE", "/v1/jobs?status=succeeded,canceled,failed")
+
+
 def until(holds, most_s, what):
     began = time.monotonic()
     while not holds():
@@ -139,6 +260,8 @@ def main():
         try:
             for _ in range(ROUNDS):
                 one_round(server)
+            for kind in (Jobs, Meshes, Sweep):
+                filled_by_itself(server, kind)
             check("panicked" not in server.log.read_text(), "no panic")
             server.stop()
             done = subprocess.run([*server.wrapper, BINARY, "doctor", "--data", server.data], capture_output=True, text=True)
@@ -147,7 +270,7 @@ def main():
             server.keeper.kill()
             server.keeper.wait()
     check(slowest["refused"] <= MOST_REFUSED_S, "a refusal took %.2f s" % slowest["refused"])
-    print("figure: %d times a full volume of 64 MiB: refused with 507 within %.2f s, control and reads within %.2f s, "
+    print("figure: %d times a full volume of 64 MiB, and three times one that the store has filled: refused with 507 within %.2f s, control and reads within %.2f s, "
           "jobs accepted again %.1f s after space was freed, nothing damaged" % (
               ROUNDS, slowest["refused"], slowest["control"], slowest["back"]))
 

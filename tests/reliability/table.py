@@ -30,7 +30,7 @@ ROWS = [
     Row("R4", "A panic or an error at every boundary of a job's stages costs that job only", "unit.py failpoints", "unit.py failpoints"),
     Row("R5", "A full disk: 507 within a second, reads and control verbs work, and all is as before when there is space",
         "full.py", "full.py --soak",
-        before="a cancel was answered with `cancel_requested` and the job succeeded later; delete, pause and the cancel of a job in the queue were refused with 507"),
+        before="a store that had filled its disk stayed full when all of it was deleted, and meshes could not be deleted at all; a cancel was answered with `cancel_requested` and the job succeeded later; delete, pause and the cancel of a job in the queue were refused with 507"),
     Row("R6", "A damaged database: nothing wrong is served, and intact jobs are saved", "corrupt.py", "corrupt.py --soak",
         before="138 of 200 corruptions served something changed, such as a force of 97.65 for 96.65 with status 200; with a deleted log or an emptied database it started with jobs missing"),
     Row("R7", "The clock jumps: no negative time, nothing ends early or late, lists stay in order",

@@ -24,9 +24,10 @@ use super::{
     compact,
     damage::Damages,
     error::{Result, StoreError},
-    folder::{Folder, Identity, JOURNAL, LOG},
+    folder::{Folder, Identity, JOURNAL, LOG, LOG_BYTES},
     intact::Intact,
     migrations,
+    pages::Pages,
     progress::{self, Known, LastCommit, Progress},
     reserve::Reserve,
     submission::{Inbox, Pending},
@@ -157,6 +158,7 @@ impl Store {
             .clone()
             .auto_vacuum(SqliteAutoVacuum::Incremental)
             .journal_mode(SqliteJournalMode::Wal)
+            .pragma("journal_size_limit", LOG_BYTES.to_string())
             .synchronous(SqliteSynchronous::Full);
         // Two kinds of connections are replaced by new ones. A full disk makes SQLite end a transaction by itself, which
         // leaves the driver's count of open ones wrong permanently. And SQLite opens a file that it cannot write for
@@ -175,6 +177,9 @@ impl Store {
             // before there are connections that read
             compact::enable_giving_back(&mut *writer.acquire().await?, path).await?;
         }
+        // the service may have died between giving space back and copying the log into the file
+        let pages = Pages::of(&mut *writer.acquire().await?).await?;
+        identity.may_shrink_to(pages.bytes_of(pages.count));
         let record = progress::in_database(&mut *writer.acquire().await?).await?;
         let record = record.ok_or_else(|| StoreError::Unexpected("no progress".into()))?;
         let progress = Progress::start(path, record).map_err(|error| {

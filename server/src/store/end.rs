@@ -157,19 +157,17 @@ impl Store {
     pub async fn expire_queued(&self, now: Time) -> Result<Vec<i64>> {
         let now = self.by_our_clock(now);
         // nearly always there is none, which a reader finds without occupying the writer
-        let expire = async {
-            let some = sqlx::query(EXPIRED).bind(now.micros()).bind(1);
-            match some.fetch_optional(&self.reader).await? {
-                Some(_) => self.end_expired(now).await,
-                None => Ok(vec![]),
-            }
-        };
-        self.writing(expire).await
+        let some = sqlx::query(EXPIRED).bind(now.micros()).bind(1);
+        let some = async { Ok(some.fetch_optional(&self.reader).await?) };
+        match self.writing(some).await? {
+            Some(_) => self.control(|| self.end_expired(now)).await,
+            None => Ok(vec![]),
+        }
     }
 
     async fn end_expired(&self, now: Time) -> Result<Vec<i64>> {
         const AT_ONCE: i64 = 100;
-        let mut change = self.change().await?;
+        let mut change = self.control_change().await?;
         let expired: Vec<i64> = sqlx::query_scalar(EXPIRED)
             .bind(now.micros())
             .bind(AT_ONCE)

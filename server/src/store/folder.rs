@@ -17,6 +17,9 @@ use super::{
 /// The database, and the write-ahead log beside it.
 pub(super) const DATABASE: &str = "signorini.db";
 pub(super) const LOG: &str = "signorini.db-wal";
+/// The write-ahead log is cut to this size where it begins anew: a thousand pages of 4 KiB, and the largest transaction.
+/// It is longer only while somebody reads what was there long ago, as a backup does.
+pub(super) const LOG_BYTES: u64 = 8 << 20;
 /// Beside a database that is being created, before it has a write-ahead log.
 pub(super) const JOURNAL: &str = "signorini.db-journal";
 /// What becomes the database when a restore is complete. Where it is, one was interrupted.

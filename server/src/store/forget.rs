@@ -16,17 +16,17 @@ impl Store {
     pub async fn forget_deleted(&self, now: Time) -> Result<()> {
         let before = now.after_s(-REMEMBERED_S).micros();
         self.forget_up_to(before - 1).await?;
-        let forget = async {
-            let some = "select exists (select 1 from deleted_sweep where deleted_at < ?)";
-            let some = sqlx::query_scalar(some).bind(before);
-            if some.fetch_one(&self.reader).await? {
-                let mut tx = self.begin().await?;
-                sweeps::forget_deleted(&mut tx, before).await?;
-                tx.commit().await?;
-            }
-            Ok(())
-        };
-        self.writing(forget).await
+        let some = "select exists (select 1 from deleted_sweep where deleted_at < ?)";
+        let some = sqlx::query_scalar(some).bind(before);
+        if !some.fetch_one(&self.reader).await? {
+            return Ok(());
+        }
+        self.control(|| async {
+            let mut tx = self.begin_control().await?;
+            sweeps::forget_deleted(&mut tx, before).await?;
+            tx.commit().await
+        })
+        .await
     }
 
     /// Removes the oldest ids of deleted jobs beyond so many.
@@ -49,7 +49,7 @@ impl Store {
             .fetch_one(&self.reader)
             .await?
         {
-            let forget = async {
+            let forget = self.control(|| async {
                 let mut tx = self.begin_control().await?;
                 let gone: Vec<i64> = sqlx::query_scalar(
                     "delete from deleted_job where uuid in (select uuid from deleted_job indexed by deleted_job_by_time
@@ -63,8 +63,8 @@ impl Store {
                     keys::forget(&mut tx, job).await?;
                 }
                 tx.commit().await
-            };
-            self.writing(forget).await?;
+            });
+            forget.await?;
             tokio::time::sleep(PAUSE).await;
         }
         Ok(())

@@ -174,13 +174,16 @@ impl Store {
     /// Removes a mesh of these owners, unless one of their jobs that wait or run needs it. Its content goes with the last
     /// owner, as soon as no job needs it.
     pub async fn remove_mesh(&self, owners: Owners<'_>, hash: &str) -> Result<Removal> {
-        let write = async {
-            let mut tx = self.begin().await?;
-            let only = match owners {
-                Owners::All => None,
-                Owners::Only(owner) => Some(owner),
-            };
-            let theirs: bool = sqlx::query_scalar(
+        self.control(|| self.try_to_remove_mesh(owners, hash)).await
+    }
+
+    async fn try_to_remove_mesh(&self, owners: Owners<'_>, hash: &str) -> Result<Removal> {
+        let mut tx = self.begin_control().await?;
+        let only = match owners {
+            Owners::All => None,
+            Owners::Only(owner) => Some(owner),
+        };
+        let theirs: bool = sqlx::query_scalar(
                 "select exists (select 1 from mesh where hash = ?1
                  and (?2 is null or exists (select 1 from mesh_owner where hash = ?1 and owner = ?2)))",
             )
@@ -188,40 +191,50 @@ impl Store {
             .bind(only)
             .fetch_one(&mut *tx)
             .await?;
-            if !theirs {
-                return Ok(Removal::Unknown);
-            }
-            if is_needed(&mut tx, only, hash).await? {
-                return Ok(Removal::InUse);
-            }
-            sqlx::query("delete from mesh_owner where hash = ?1 and (?2 is null or owner = ?2)")
+        if !theirs {
+            return Ok(Removal::Unknown);
+        }
+        if is_needed(&mut tx, only, hash).await? {
+            return Ok(Removal::InUse);
+        }
+        sqlx::query("delete from mesh_owner where hash = ?1 and (?2 is null or owner = ?2)")
+            .bind(hash)
+            .bind(only)
+            .execute(&mut *tx)
+            .await?;
+        let others: bool =
+            sqlx::query_scalar("select exists (select 1 from mesh_owner where hash = ?)")
                 .bind(hash)
-                .bind(only)
-                .execute(&mut *tx)
+                .fetch_one(&mut *tx)
                 .await?;
-            let others: bool =
-                sqlx::query_scalar("select exists (select 1 from mesh_owner where hash = ?)")
-                    .bind(hash)
-                    .fetch_one(&mut *tx)
-                    .await?;
-            if others {
-                tx.commit().await?;
-                return Ok(Removal::Removed);
-            }
-            // an administrator's, on a mesh that was another's
-            if is_needed(&mut tx, None, hash).await? {
-                return Ok(Removal::InUse);
-            }
-            for statement in [
-                "delete from mesh where hash = ?",
-                "delete from mesh_piece where hash = ?",
-            ] {
-                sqlx::query(statement).bind(hash).execute(&mut *tx).await?;
-            }
+        if others {
             tx.commit().await?;
-            Ok(Removal::Removed)
-        };
-        self.writing(write).await
+            return Ok(Removal::Removed);
+        }
+        // an administrator's, on a mesh that was another's
+        if is_needed(&mut tx, None, hash).await? {
+            return Ok(Removal::InUse);
+        }
+        for statement in [
+            "delete from mesh where hash = ?",
+            "delete from mesh_piece where hash = ?",
+        ] {
+            sqlx::query(statement).bind(hash).execute(&mut *tx).await?;
+        }
+        tx.commit().await?;
+        Ok(Removal::Removed)
+    }
+
+    /// Removes the pieces of an upload that could not be stored, unless another one has completed the mesh. One that is
+    /// being stored meanwhile notices that they are missing.
+    pub async fn remove_incomplete_mesh(&self, hash: &str) -> Result<()> {
+        self.control(|| async {
+            let mut tx = self.begin_control().await?;
+            let delete = "delete from mesh_piece where hash = ?1 and not exists (select 1 from mesh where hash = ?1)";
+            sqlx::query(delete).bind(hash).execute(&mut *tx).await?;
+            tx.commit().await
+        })
+        .await
     }
 
     /// Removes the pieces of uploads that were interrupted.

@@ -133,7 +133,20 @@ impl Store {
         jobs: &mut [Job],
     ) -> Result<()> {
         self.add_queue_positions(connection, jobs).await?;
+        self.add_full_disk(jobs);
         sizes::add_sizes(connection, jobs).await
+    }
+
+    /// What running jobs find cannot be stored while the disk is full: one that is solved stays running.
+    fn add_full_disk(&self, jobs: &mut [Job]) {
+        if !self.reserve.was_disk_full() {
+            return;
+        }
+        for job in jobs.iter_mut().filter(|job| job.status == Status::Running) {
+            let progress = job.progress.get_or_insert_default();
+            progress.stage = <&str>::from(Waiting::LowDisk).to_owned();
+            progress.eta_s = None;
+        }
     }
 
     /// Fills in the queue positions of those that are queued. A coalesced job has the position and the progress of

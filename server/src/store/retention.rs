@@ -77,8 +77,10 @@ pub(super) const KEPT: &str =
            where pinned = 1 and job.finished_at is not null group by job.owner) pinned using (owner)
      order by 3 desc, owner";
 
-/// How often the limits are applied.
+/// How often the limits are applied, and space is given back …
 const INTERVAL: Duration = Duration::from_secs(10);
+/// … and while the disk is full.
+const INTERVAL_WHEN_FULL: Duration = Duration::from_secs(1);
 
 /// Keeps a store within its limits, and gives space back to the file system, until the store is dropped or closed.
 pub async fn keep_within(store: Weak<Store>, retention: Retention) {
@@ -87,7 +89,7 @@ pub async fn keep_within(store: Weak<Store>, retention: Retention) {
         retiring.note(store.announce(&retention).await);
     }
     loop {
-        tokio::time::sleep(INTERVAL).await;
+        pause(&store).await;
         let Some(store) = store.upgrade() else {
             return;
         };
@@ -110,6 +112,19 @@ pub async fn keep_within(store: Weak<Store>, retention: Retention) {
             Ok(_) => {}
             Err(cause) => tracing::debug!(%cause, "space could not be given back: {cause}"),
         }
+    }
+}
+
+/// Waits until the limits are to be applied again.
+async fn pause(store: &Weak<Store>) {
+    let mut left = INTERVAL;
+    while !left.is_zero() {
+        tokio::time::sleep(INTERVAL_WHEN_FULL).await;
+        let full = |store: std::sync::Arc<Store>| store.reserve.was_disk_full();
+        if store.upgrade().is_none_or(full) {
+            return;
+        }
+        left = left.saturating_sub(INTERVAL_WHEN_FULL);
     }
 }
 

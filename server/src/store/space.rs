@@ -7,7 +7,7 @@ use super::{
     database::{Rebuild, Store, with_advice},
     delete::PAUSE,
     error::{Result, StoreError},
-    folder::DATABASE,
+    folder::{DATABASE, LOG, LOG_BYTES},
     pages::Pages,
 };
 
@@ -30,7 +30,7 @@ impl Store {
     pub async fn space(&self) -> Result<Space> {
         let pages = Pages::of(&self.reader).await?;
         let folder = self.folder.path();
-        let log = std::fs::metadata(folder.join(super::folder::LOG)).map_or(0, |log| log.len());
+        let log = std::fs::metadata(folder.join(LOG)).map_or(0, |log| log.len());
         let free = rustix::fs::statvfs(folder).map_or(0, |free| free.f_bavail * free.f_frsize);
         Ok(Space {
             used: pages.bytes_of(pages.count) + log,
@@ -39,28 +39,39 @@ impl Store {
         })
     }
 
-    /// Gives free pages back to the file system, some at a time, as long as there are many; how many were.
+    /// Gives free pages back to the file system, as long as there are many, or all of them if the disk is full; how many were.
     pub async fn give_space_back(&self) -> Result<i64> {
-        if !compact::gives_back(&mut *self.reader.acquire().await?).await? {
-            return Ok(0); // of an earlier version
-        }
+        let given = match compact::gives_back(&mut *self.reader.acquire().await?).await? {
+            true => self.free_pages().await?,
+            false => 0, // of an earlier version
+        };
+        self.shorten_files().await?;
+        Ok(given)
+    }
+
+    /// Takes free pages out of the database, some at a time. Its file still has them until the log is copied into it.
+    async fn free_pages(&self) -> Result<i64> {
+        let kept = match self.has_room() {
+            Ok(()) => KEPT_PAGES,
+            Err(_) => 0,
+        };
         let mut given = 0;
         loop {
             let before = Pages::of(&self.reader).await?;
-            if before.free <= KEPT_PAGES {
+            if before.free <= kept {
                 return Ok(given);
             }
             // the log may be copied into the file with the commit
             self.identity.may_shrink_to(least_bytes(before));
-            let give = async {
+            let give = self.control(|| async {
                 let mut tx = self.begin_control().await?;
                 // 1 MiB; it takes a step for each page
                 sqlx::query("pragma incremental_vacuum(256)")
                     .fetch_all(&mut *tx)
                     .await?;
                 tx.commit().await
-            };
-            self.writing(give).await?;
+            });
+            give.await?;
             let after = Pages::of(&self.reader).await?;
             self.identity.may_shrink_to(after.bytes_of(after.count));
             given += before.free - after.free;
@@ -69,6 +80,29 @@ impl Store {
             }
             tokio::time::sleep(PAUSE).await;
         }
+    }
+
+    /// Makes the files of the database as small as what is in them: SQLite does so only after a thousand more pages were
+    /// written, and never on a disk that is full. Where a reader still needs what is in the log, the next call does it.
+    async fn shorten_files(&self) -> Result<()> {
+        let length =
+            |name| std::fs::metadata(self.folder.path().join(name)).map_or(0, |file| file.len());
+        let pages = Pages::of(&self.reader).await?;
+        let content = pages.bytes_of(pages.count);
+        if length(DATABASE) > content {
+            self.identity.may_shrink_to(content);
+        } else if length(LOG) <= LOG_BYTES {
+            return Ok(());
+        }
+        // waits for nobody
+        sqlx::query("pragma wal_checkpoint(passive)")
+            .fetch_all(&self.writer)
+            .await?;
+        if length(LOG) > LOG_BYTES {
+            // the next transaction begins the log anew
+            self.begin_control().await?.commit().await?;
+        }
+        Ok(())
     }
 }
 

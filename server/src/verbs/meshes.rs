@@ -2,7 +2,7 @@
 
 use std::{
     fs::File,
-    io::{BufReader, BufWriter, Seek, Write},
+    io::{self, BufReader, BufWriter, Seek, Write},
     path::Path,
     sync::Arc,
 };
@@ -15,7 +15,7 @@ use solver::{
     mesh::Mesh,
 };
 use tokio::io::{AsyncReadExt, AsyncSeekExt, AsyncWriteExt};
-use tracing::info;
+use tracing::{info, warn};
 
 use super::{
     page::{Page, Paging},
@@ -120,13 +120,14 @@ pub async fn upload(
     let service = service.clone();
     detached(async move {
         let _upload = upload;
-        let mut encoded = tokio::fs::File::from_std(encoded);
-        let new = loop {
-            let pieces = store(&service, &info.hash, &mut encoded).await?;
-            if let Some(new) = service.store.insert_mesh(&owner, &info, pieces).await? {
-                break new;
-            }
-        };
+        let encoded = tokio::fs::File::from_std(encoded);
+        let stored = store(&service, &owner, &info, encoded).await;
+        if stored.is_err()
+            && let Err(cause) = service.store.remove_incomplete_mesh(&info.hash).await
+        {
+            warn!(%cause, "what was stored of mesh {} stays until the next start: {cause}", info.hash);
+        }
+        let new = stored?;
         info!(
             mesh.hash = info.hash,
             info.nodes, "mesh {} stored", info.hash
@@ -148,13 +149,40 @@ fn parse(
     let reader = BufReader::with_capacity(PIECE_BYTES, file);
     let (format, mesh, warnings) = files::read_mesh(reader).map_err(refused)?;
     let info = MeshInfo::new(hash, bytes, (format, &mesh, warnings));
-    let out = BufWriter::with_capacity(PIECE_BYTES, encoded);
-    let out = crate::mesh::write_stored(&mesh, out).map_err(ApiError::internal)?;
-    let mut encoded = out
-        .into_inner()
-        .map_err(|error| unwritten(error.into_error()))?;
+    let mut out = Kept {
+        out: BufWriter::with_capacity(PIECE_BYTES, encoded),
+        error: None,
+    };
+    if let Err(cause) = crate::mesh::write_stored(&mesh, &mut out) {
+        // which the encoder does not pass on
+        return Err(out
+            .error
+            .map_or_else(|| ApiError::internal(cause), unwritten));
+    }
+    let file = out.out.into_inner();
+    let mut encoded = file.map_err(|error| unwritten(error.into_error()))?;
     encoded.flush().map_err(unwritten)?;
     Ok((info, encoded))
+}
+
+/// A file with the error that has ended its writing.
+struct Kept {
+    out: BufWriter<File>,
+    error: Option<io::Error>,
+}
+
+impl Write for Kept {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.out.write(bytes).map_err(|error| {
+            let kind = error.kind();
+            self.error = Some(error);
+            kind.into()
+        })
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
 }
 
 fn refused(error: ReadError) -> ApiError {
@@ -164,8 +192,23 @@ fn refused(error: ReadError) -> ApiError {
     }
 }
 
-/// Writes all pieces, and counts them.
+/// Stores a mesh; whether it is new to its owner.
 async fn store(
+    service: &Service,
+    owner: &str,
+    info: &MeshInfo,
+    mut encoded: tokio::fs::File,
+) -> Result<bool, ApiError> {
+    loop {
+        let pieces = write_pieces(service, &info.hash, &mut encoded).await?;
+        if let Some(new) = service.store.insert_mesh(owner, info, pieces).await? {
+            return Ok(new);
+        }
+    }
+}
+
+/// Writes all pieces, and counts them.
+async fn write_pieces(
     service: &Service,
     hash: &str,
     encoded: &mut tokio::fs::File,

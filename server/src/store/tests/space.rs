@@ -90,6 +90,15 @@ async fn pin(store: &Store, key: i64) {
     store.edit(Owners::All, job.id, &edit, None).await.unwrap();
 }
 
+fn small_mesh() -> crate::mesh::MeshInfo {
+    serde_json::from_value(serde_json::json!({
+        "hash": "sha256:mesh", "format": "gmsh", "bytes": 1, "nodes": 8, "quadrilaterals": 1, "triangles": 0,
+        "dofs": 16, "extent": [[0, 1], [0, 1]], "boundaries": {}, "groups": {}, "node_sets": {}, "warnings": [],
+        "quality": { "least_jacobian_ratio": 1, "worst_element": 0 }, "created_at": "2023-11-14T22:13:20Z"
+    }))
+    .unwrap()
+}
+
 #[tokio::test]
 async fn what_jobs_and_meshes_take_is_counted_for_their_owners() {
     let folder = tempfile::tempdir().unwrap();
@@ -104,12 +113,7 @@ async fn what_jobs_and_meshes_take_is_counted_for_their_owners() {
         "{:?}",
         again.stored_bytes
     );
-    let mesh: crate::mesh::MeshInfo = serde_json::from_value(serde_json::json!({
-        "hash": "sha256:mesh", "format": "gmsh", "bytes": 1, "nodes": 8, "quadrilaterals": 1, "triangles": 0,
-        "dofs": 16, "extent": [[0, 1], [0, 1]], "boundaries": {}, "groups": {}, "node_sets": {}, "warnings": [],
-        "quality": { "least_jacobian_ratio": 1, "worst_element": 0 }, "created_at": "2023-11-14T22:13:20Z"
-    }))
-    .unwrap();
+    let mesh = small_mesh();
     store
         .write_mesh_pieces(&mesh.hash, 0, &[vec![1; 500]])
         .await
@@ -409,9 +413,6 @@ async fn the_space_of_what_is_removed_is_given_back_to_the_file_system() {
     };
     assert_eq!(store.retire(&all, later()).await.unwrap().jobs, 8);
     assert!(store.give_space_back().await.unwrap() > 2000);
-    // the file itself becomes smaller when the log is copied into it, which is no damage
-    let checkpoint = sqlx::query("pragma wal_checkpoint(truncate)");
-    checkpoint.execute(&store.writer).await.unwrap();
     let path = folder.path().join("signorini.db");
     let cut = std::fs::metadata(&path).unwrap().len();
     assert!(cut < 6 << 20, "{cut} bytes");
@@ -421,6 +422,109 @@ async fn the_space_of_what_is_removed_is_given_back_to_the_file_system() {
     let file = std::fs::File::options().write(true).open(&path).unwrap();
     file.set_len(cut / 2).unwrap();
     assert!(store.identity.check().is_err());
+}
+
+#[tokio::test]
+async fn on_a_full_disk_all_space_of_what_is_removed_is_given_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open_unwatched(folder.path()).await.unwrap();
+    let job = solved(&store, "ada", "1", 3 << 20).await;
+    let path = folder.path().join("signorini.db");
+    let bytes = || std::fs::metadata(&path).unwrap().len();
+    store.delete(Owners::All, job.key).await.unwrap();
+    assert_eq!(
+        store.give_space_back().await.unwrap(),
+        0,
+        "new jobs fill it soon"
+    );
+    assert!(store.reserve.release());
+    assert!(store.give_space_back().await.unwrap() > 700);
+    assert!(bytes() < 1 << 20, "{}", bytes());
+}
+
+#[tokio::test]
+async fn a_log_that_a_reader_has_made_long_is_cut_when_the_reader_is_gone() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open_unwatched(folder.path()).await.unwrap();
+    let log = folder.path().join("signorini.db-wal");
+    let bytes = || std::fs::metadata(&log).unwrap().len();
+    let mut reading = store.reader.begin().await.unwrap();
+    let first = sqlx::query("select * from job").fetch_all(&mut *reading);
+    first.await.unwrap();
+    solved(&store, "ada", "1", 20 << 20).await;
+    store.give_space_back().await.unwrap();
+    assert!(bytes() > 16 << 20, "{}", bytes());
+    reading.rollback().await.unwrap();
+    store.give_space_back().await.unwrap();
+    assert!(bytes() <= crate::store::folder::LOG_BYTES, "{}", bytes());
+}
+
+#[tokio::test]
+async fn a_store_that_died_while_it_became_smaller_goes_on() {
+    let (folder, killed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let store = Store::open_unwatched(folder.path()).await.unwrap();
+    for input in 0..8 {
+        solved(&store, "ada", &input.to_string(), 2 << 20).await;
+    }
+    let checkpoint = sqlx::query("pragma wal_checkpoint(truncate)");
+    checkpoint.execute(&store.writer).await.unwrap();
+    // the file stays as long as it is while this reads
+    let mut reading = store.reader.begin().await.unwrap();
+    let first = sqlx::query("select * from job").fetch_all(&mut *reading);
+    first.await.unwrap();
+    for key in 1..=8 {
+        store.delete(Owners::All, key).await.unwrap();
+    }
+    assert!(store.give_space_back().await.unwrap() > 2000);
+    for name in ["signorini.db", "signorini.db-wal", "signorini.progress"] {
+        std::fs::copy(folder.path().join(name), killed.path().join(name)).unwrap();
+    }
+    reading.rollback().await.unwrap();
+    let path = killed.path().join("signorini.db");
+    let bytes = || std::fs::metadata(&path).unwrap().len();
+    assert!(bytes() > 16 << 20, "{}", bytes());
+    let store = Store::open_unwatched(killed.path()).await.unwrap();
+    store.health().await.unwrap();
+    let checkpoint = sqlx::query("pragma wal_checkpoint(passive)");
+    checkpoint.execute(&store.writer).await.unwrap();
+    assert!(bytes() < 6 << 20, "{}", bytes());
+    store.health().await.unwrap();
+}
+
+#[tokio::test]
+async fn what_frees_space_works_on_a_full_disk() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open_unwatched(folder.path()).await.unwrap();
+    let mesh = small_mesh();
+    let pieces = [vec![1; 500]];
+    for hash in [&mesh.hash, "sha256:incomplete"] {
+        store.write_mesh_pieces(hash, 0, &pieces).await.unwrap();
+    }
+    store.insert_mesh("bob", &mesh, 1).await.unwrap().unwrap();
+    let expiring = NewJob {
+        limits: Limits {
+            queue_ttl_s: 1.0,
+            ..Limits::default()
+        },
+        ..new("1")
+    };
+    let submitted = store.submit(by("bob", vec![expiring], None), false).await;
+    submitted.unwrap();
+    assert!(store.reserve.release());
+    assert!(matches!(store.has_room(), Err(StoreError::Full)));
+    for hash in [&mesh.hash, "sha256:incomplete"] {
+        store.remove_incomplete_mesh(hash).await.unwrap();
+    }
+    let pieces = "select group_concat(hash) from mesh_piece";
+    let pieces: String = sqlx::query_scalar(pieces)
+        .fetch_one(&store.reader)
+        .await
+        .unwrap();
+    assert_eq!(pieces, mesh.hash, "one that is complete stays");
+    let removed = store.remove_mesh(Owners::All, &mesh.hash).await.unwrap();
+    assert_eq!(removed, Removal::Removed);
+    assert_eq!(store.expire_queued(later()).await.unwrap().len(), 1);
+    store.forget_deleted(later()).await.unwrap();
 }
 
 #[tokio::test]
