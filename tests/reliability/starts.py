@@ -3,7 +3,7 @@
     starts.py [--soak]
 
 What cannot be served is refused within a second, with one line and an exit code of its own: two servers in one folder,
-also when files are removed from it; a folder that cannot be written; a port in use; a store that has lost its log or
+also when files are removed from it, or on one database, by links from other folders; a folder that cannot be written; a port in use; a store that has lost its log or
 its database, or has tables of another version. A server whose database is removed, or found damaged when something is
 stored, accepts nothing more and says so. The doctor says what cannot be read, and when it cannot read at all.
 """
@@ -60,6 +60,27 @@ def locks(server):
     for name in ("lock", "signorini.progress", "signorini.reserve"):
         (server.data / name).unlink(missing_ok=True)
     refused(server.data, LOCKED, "a second server, when the small files were removed")
+
+
+def links(server, folder):
+    """The database of a running server by a link from another folder."""
+    link = folder / "linked"
+    (folder / "same").symlink_to(server.data)
+    refused(folder / "same", LOCKED, "a second server, by a link to the folder")
+    (folder / "same").unlink()
+    for what, make in (
+        ("a symbolic link", lambda path: (link / path.name).symlink_to(path)),
+        ("a hard link", lambda path: os.link(path, link / path.name)),
+    ):
+        for names in (["signorini.db"], [path.name for path in server.data.iterdir()]):
+            link.mkdir(mode=0o700)
+            for name in names:
+                make(server.data / name)
+            refused(link, LOCKED, "a second server, by %s" % what)
+            done = subprocess.run([BINARY, "doctor", "--data", link], capture_output=True, text=True)
+            equal(done.returncode, LOCKED, "the doctor, by %s: %r" % (what, done))
+            shutil.rmtree(link)
+    server.finished(server.submit(example()))
 
 
 def lost_files(server, folder):
@@ -264,6 +285,7 @@ def main():
                 doctors(server, folder)
                 damaged_table(server, folder)
                 locks(server)
+                links(server, folder)
                 server.stop()
                 modes(server.data)
                 if not folder.joinpath("closed").exists():

@@ -103,7 +103,7 @@ ROWS = [
         before="any page that a user opened could pause the queue, cancel and delete: there was one user, an administrator"),
     Row("R33", "Two servers on one store, folders and ports that cannot be used: refused at once, with the reason",
         "starts.py", "starts.py --soak",
-        before="with the file `lock` removed a second server was let in"),
+        before="with the file `lock` removed a second server was let in, and one on the same database by a hard link"),
     Row("R34", "The same problem has the same digest, on any thread, after a restart, from the cache",
         missing="tested for a few problems in the unit and service tests; not a hundred times"),
     Row("G9", "Over all these attacks no server takes more memory than the budget of its jobs and 256 MiB", "peaks.py", "peaks.py --soak"),

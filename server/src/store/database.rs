@@ -139,7 +139,7 @@ impl Store {
         path: &Path,
         rebuild: Rebuild,
     ) -> Result<(Store, mpsc::Receiver<Pending>)> {
-        let folder = Folder::lock(path)?;
+        let mut folder = Folder::lock(path)?;
         folder.is_complete()?;
         let known = progress::read(path)?;
         let database = folder.database();

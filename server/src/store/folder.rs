@@ -42,11 +42,13 @@ pub(super) fn unusable(path: &Path, why: impl Display) -> StoreError {
     StoreError::Folder(format!("cannot use the folder {}: {why}", path.display()))
 }
 
-/// The folder, locked as long as this exists.
+/// The folder and the database in it, locked as long as this exists.
 #[derive(Debug)]
 pub(super) struct Folder {
     path: PathBuf,
+    /// The last one, that of the database, is closed after SQLite's files, as that of `Identity`.
     locks: Vec<File>,
+    has_database: bool,
 }
 
 impl Folder {
@@ -78,10 +80,35 @@ impl Folder {
                 TryLockError::Error(error) => named(error),
             })?;
         }
-        Ok(Folder {
+        let mut folder = Folder {
             path: path.to_owned(),
             locks,
-        })
+            has_database: false,
+        };
+        folder.lock_database()?;
+        Ok(folder)
+    }
+
+    /// Locks the database, if there is one: a second server may come to it by a link from another folder. One that cannot be
+    /// read is refused later.
+    fn lock_database(&mut self) -> Result<()> {
+        // elsewhere such a lock is one of those that SQLite takes, too
+        if self.has_database || !cfg!(target_os = "linux") {
+            return Ok(());
+        }
+        let Ok(file) = File::open(self.database()) else {
+            return Ok(());
+        };
+        file.try_lock().map_err(|error| match error {
+            TryLockError::WouldBlock => StoreError::Locked(format!(
+                "another server is using the database {}, to which there is a link in another folder",
+                self.database().display()
+            )),
+            TryLockError::Error(error) => unusable(&self.path, error),
+        })?;
+        self.has_database = true;
+        self.locks.push(file);
+        Ok(())
     }
 
     /// Lets another server in, once nothing is written any more.
@@ -115,15 +142,15 @@ impl Folder {
 
     /// Creates the database as an empty file for its owner alone, unless it is there. SQLite gives its other files the
     /// same mode.
-    pub(super) fn prepare(&self) -> Result<()> {
+    pub(super) fn prepare(&mut self) -> Result<()> {
         let created = OpenOptions::new()
             .write(true)
             .create_new(true)
             .mode(0o600)
             .open(self.database());
         match created {
-            Ok(_) => Ok(()),
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => Ok(()),
+            Ok(_) => self.lock_database(),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => self.lock_database(),
             Err(error) => Err(StoreError::Folder(format!(
                 "cannot write to the folder {}: {error}",
                 self.path.display()
