@@ -12,7 +12,10 @@ use std::{
 };
 
 use anyhow::Context;
-use tokio::{task::JoinHandle, time::timeout};
+use tokio::{
+    task::JoinHandle,
+    time::{Instant, timeout_at},
+};
 use tokio_util::sync::CancellationToken;
 use tonic_health::server::HealthReporter;
 use tracing::{info, warn};
@@ -75,6 +78,9 @@ impl Pulse {
         )
     }
 }
+
+/// How long the store may take to close, even if there is no grace.
+const LEAST_FOR_STORE: Duration = Duration::from_millis(500);
 
 /// The service cannot listen at this address.
 #[derive(Clone, Copy, Debug, thiserror::Error)]
@@ -243,18 +249,21 @@ impl App {
     pub async fn stop(self) {
         grpc::report_draining(&self.health).await;
         self.queue.drain().await;
+        let end = Instant::now() + self.grace;
         self.closing.cancel();
-        match timeout(self.grace, self.server).await {
+        match timeout_at(end, self.server).await {
             Ok(Ok(())) => {}
             Ok(Err(error)) => warn!(%error, "the listener ended with an error: {error}"),
             Err(_) => warn!("connections still open after the grace time are cut"),
         }
-        // The recorder of an unresponsive solver may hold a statement; what it writes no longer counts.
-        if timeout(Duration::from_millis(500), self.store.close())
-            .await
-            .is_err()
-        {
-            warn!("the store did not close in time");
+        // The recorder of an unresponsive solver may hold a statement; what it writes no longer counts. A disk may take long to
+        // flush what is copied from the log: nobody waits for the rest of the grace time.
+        let end = end.max(Instant::now() + LEAST_FOR_STORE);
+        if timeout_at(end, self.store.close()).await.is_err() {
+            warn!(
+                "the store did not close in time: everything that was acknowledged is in it, but its next start takes this for a \
+                 crash"
+            );
         }
         if let Some(exporting) = self.exporting {
             exporting.stop().await;

@@ -16,6 +16,7 @@ import json
 import os
 import random
 import signal
+import sqlite3
 import sys
 import threading
 import time
@@ -220,8 +221,25 @@ def attack(isolation, stops, dice):
                 load.cut_sse, load.cut_grpc, load.events))
 
 
+def beside_a_reader():
+    """Another program reads the store, as one that copies it does: the service stops all the same, and knows that it has."""
+    with Attacked() as server:
+        server.finished_job()
+        with contextlib.closing(sqlite3.connect("file:%s?mode=ro" % (server.data / "signorini.db"), uri=True)) as reader:
+            reader.execute("begin")
+            reader.execute("select count(*) from job").fetchall()
+            server.finished(server.submit(example()))
+            server.stop()
+            check("did not close in time" not in server.log.read_text(), "the store is closed beside a reader")
+            check(" stopped " in (server.data / "signorini.progress").read_text(), "the store knows that the service has stopped")
+        server.start()
+        equal(len(server.every_job(status="succeeded")), 2, "jobs after the restart")
+        server.stop()
+
+
 def main():
     print("seed %d" % SEED, flush=True)
+    beside_a_reader()
     dice = random.Random(SEED)
     print("figure: " + "; ".join(attack(isolation, stops, dice) for isolation, stops in STOPS.items()))
 

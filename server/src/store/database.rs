@@ -240,8 +240,10 @@ impl Store {
     async fn close_as(&self, stopped: bool) {
         self.lists.close().await;
         self.reader.close().await;
-        // SQLite does this with the last connection only, which may be one for reading whose thread ends late
-        let checkpoint = sqlx::query("pragma wal_checkpoint(truncate)");
+        // SQLite does this with the last connection only, which may be one for reading whose thread ends late, or of another
+        // program that makes a backup: what cannot be copied soon, stays for the next start
+        let checkpoint =
+            sqlx::raw_sql("pragma busy_timeout = 100; pragma wal_checkpoint(truncate)");
         if let Err(error) = checkpoint.execute(&self.writer).await {
             tracing::warn!(%error, "the write-ahead log stays and is read at the next start: {error}");
         }
