@@ -75,7 +75,13 @@ pub struct Caller {
     scopes: BTreeSet<Scope>,
     /// The request that they make, as a part of a trace.
     trace: Option<Trace>,
+    /// Its name in the log.
+    request: Option<RequestId>,
 }
+
+/// The name of a request in the log, and in its answer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RequestId(pub String);
 
 impl Caller {
     /// A caller of that name, with these scopes.
@@ -84,6 +90,7 @@ impl Caller {
             owner: owner.into(),
             scopes: scopes.into_iter().collect(),
             trace: None,
+            request: None,
         }
     }
 
@@ -98,8 +105,17 @@ impl Caller {
     }
 
     /// The same caller, making this request.
-    pub fn in_trace(self, trace: Option<Trace>) -> Caller {
-        Caller { trace, ..self }
+    pub fn asking(self, trace: Option<Trace>, request: Option<RequestId>) -> Caller {
+        Caller {
+            trace,
+            request,
+            ..self
+        }
+    }
+
+    /// The name of the request that they make.
+    pub fn request_id(&self) -> Option<&str> {
+        self.request.as_ref().map(|RequestId(id)| id.as_str())
     }
 
     /// The request that they make.

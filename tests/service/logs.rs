@@ -50,9 +50,12 @@ async fn raw(server: &Server, request: &[u8]) -> String {
 async fn each_request_and_each_end_of_a_job_is_one_line() {
     let server = Server::start(SIGNORINI, &["--log-format", "json"]).await;
     let problem = example_json("rectangular_punch");
-    let job = server
-        .solve(&json!({"problem": problem, "cache": "off"}))
-        .await;
+    let submit = server
+        .post("/v1/jobs")
+        .header("x-request-id", "my.submit-1");
+    let submit = submit.header("Prefer", "wait=60");
+    let submit = submit.json(&json!({"problem": problem, "cache": "off"}));
+    let job: Value = submit.send().await.unwrap().json().await.unwrap();
     let id = job["id"].as_str().unwrap();
     let request = server
         .get(&format!("/v1/jobs/{id}?wait=0"))
@@ -123,6 +126,16 @@ async fn each_request_and_each_end_of_a_job_is_one_line() {
     assert_eq!(
         of("rpc", "signorini.v1.JobService/GetServerInfo")[0]["code"],
         "OK"
+    );
+
+    let accepted: Vec<&Value> = lines
+        .iter()
+        .filter(|line| line["job.id"] == id && line["job.input_hash"].is_string())
+        .collect();
+    assert_eq!(accepted.len(), 1, "{log}");
+    assert_eq!(
+        (&accepted[0]["owner"], &accepted[0]["request_id"]),
+        (&json!("local"), &json!("my.submit-1"))
     );
 
     let ended: Vec<&Value> = lines

@@ -17,7 +17,7 @@ use super::{
     while_valid::while_valid,
 };
 use crate::{
-    caller::{Access, Caller, Peer, Scope},
+    caller::{Access, Caller, Peer, RequestId, Scope},
     error::ApiError,
     token::Presented,
     trace::Trace,
@@ -40,7 +40,11 @@ pub(super) async fn authenticate(
         Ok(identified) => identified,
         Err(error) => return refusal(grpc, &path, error),
     };
-    let caller = caller.in_trace(request.extensions().get::<Trace>().cloned());
+    let (trace, id) = (
+        request.extensions().get::<Trace>(),
+        request.extensions().get::<RequestId>(),
+    );
+    let caller = caller.asking(trace.cloned(), id.cloned());
     let answer = match lacks(access, &caller, &by) {
         Some(error) => Err(error),
         None => {

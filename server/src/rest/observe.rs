@@ -24,7 +24,7 @@ use super::{
     service::is_probe,
 };
 use crate::{
-    caller::Caller,
+    caller::{Caller, RequestId},
     metrics::METRICS,
     spans::{self, Span},
     time::Time,
@@ -45,6 +45,8 @@ pub(super) async fn observe(mut request: Request, next: Next) -> Response {
     let mut response = next.run(request).await;
     observed.answered(&response);
     if let Ok(id) = HeaderValue::from_str(&observed.id) {
+    let id = RequestId(observed.id.clone());
+    request.extensions_mut().insert(id);
         response.headers_mut().insert(REQUEST_ID, id);
     }
     response.map(|body| Body::new(ObservedBody { body, observed }))

@@ -277,13 +277,21 @@ pub(super) async fn enqueue_sweep(
             service.queue.remember_origin(&accepted.jobs, trace);
         }
     }
-    if let Some(id) = accepted.jobs.iter().find_map(|job| job.sweep) {
-        let jobs = accepted.jobs.len();
-        info!(sweep.id = %id, jobs, "sweep {id} accepted: {jobs} jobs");
-        return Ok(accepted);
-    }
-    for job in &accepted.jobs {
-        info!(job.id = %job.id, job.input_hash, "job {} accepted", job.id);
+    if !accepted.replayed {
+        log(&accepted.jobs, caller);
     }
     Ok(accepted)
+}
+
+/// Tells of jobs that were accepted.
+fn log(jobs: &[Job], caller: &Caller) {
+    let (owner, request_id) = (caller.owner(), caller.request_id());
+    if let Some(id) = jobs.iter().find_map(|job| job.sweep) {
+        let jobs = jobs.len();
+        info!(sweep.id = %id, jobs, owner, request_id, "sweep {id} of {owner} accepted: {jobs} jobs");
+        return;
+    }
+    for job in jobs {
+        info!(job.id = %job.id, job.input_hash, owner, request_id, "job {} of {owner} accepted", job.id);
+    }
 }

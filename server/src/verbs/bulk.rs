@@ -67,7 +67,12 @@ async fn for_each(
             let Some(end) = keys.last() else {
                 info!(
                     many.matched,
-                    many.changed, "{action:?} by filter: {} of {} jobs", many.changed, many.matched
+                    many.changed,
+                    owner = caller.owner(),
+                    request_id = caller.request_id(),
+                    "{action:?} by filter: {} of {} jobs",
+                    many.changed,
+                    many.matched
                 );
                 return Ok(many);
             };
