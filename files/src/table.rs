@@ -168,13 +168,22 @@ fn column(name: &'static str, values: Values) -> Column {
     Column { name, values }
 }
 
-/// A text as a cell of CSV: in quotes if it would be read as something else.
+/// A text as a cell of CSV: in quotes if it would be read as something else. What a spreadsheet would take for a formula, and
+/// run, begins with an apostrophe, which makes it a text there; numbers stay numbers.
 fn cell(text: &str) -> Cow<'_, str> {
-    match text.contains([',', '"', '\r', '\n']) {
+    let mut text = Cow::Borrowed(text);
+    if text.starts_with(FORMULAS) && !text.parse::<f64>().is_ok_and(f64::is_finite) {
+        text = Cow::Owned(format!("'{text}"));
+    }
+    match text.contains([',', ';', '"', '\t', '\r', '\n']) {
         true => Cow::Owned(format!("\"{}\"", text.replace('"', "\"\""))),
-        false => Cow::Borrowed(text),
+        false => text,
     }
 }
+
+/// How the text of a cell begins that spreadsheets take for a formula, some of them also after a tab or a new line, and with
+/// the wide characters of East Asian keyboards.
+const FORMULAS: [char; 10] = ['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－'];
 
 /// A text as JSON.
 fn quoted(text: &str) -> String {
@@ -259,6 +268,36 @@ pub(crate) mod tests {
         let first = |line: &str| line.split(',').next().unwrap().parse::<f64>().unwrap();
         assert_eq!(first(lines[3]), 0.1 + 0.2);
         assert_eq!(lines[4], "");
+    }
+
+    #[test]
+    fn what_a_spreadsheet_would_run_is_a_text_there() {
+        let cells = |text: &str| {
+            let values = Values::Text(vec![text.to_owned().into()]);
+            let name = text.to_owned().into();
+            let columns = vec![Column { name, values }];
+            let csv = Table { columns }.csv().unwrap();
+            let lines: Vec<&str> = csv.split_terminator("\r\n").collect();
+            assert_eq!(lines[0], lines[1], "its name is written likewise");
+            lines[1].to_owned()
+        };
+        for (text, cell) in [
+            ("=1+1", "'=1+1"),
+            ("@SUM(A1)", "'@SUM(A1)"),
+            ("+cmd", "'+cmd"),
+            ("-2+3", "'-2+3"),
+            ("-inf", "'-inf"),
+            ("\t=1", "\"'\t=1\""),
+            ("＝1", "'＝1"),
+            ("=HYPERLINK(\"a\",1)", "\"'=HYPERLINK(\"\"a\"\",1)\""),
+            ("-1.5e-3", "-1.5e-3"),
+            ("+1", "+1"),
+            ("a=1", "a=1"),
+            ("1;=2", "\"1;=2\""),
+            ("", ""),
+        ] {
+            assert_eq!(cells(text), cell, "{text}");
+        }
     }
 
     #[test]
