@@ -1,6 +1,6 @@
 //! `/v1/jobs/{id}/events`: replayed and then live, as server-sent events or as JSON Lines.
 
-use std::time::Duration;
+use std::{cmp::Ordering, time::Duration};
 
 use axum::{
     body::Body,
@@ -60,22 +60,26 @@ pub(super) fn answer<E: Numbered>(
     let Some(events) = events else {
         return Ok(StatusCode::NO_CONTENT.into_response());
     };
+    Ok(write(events, chosen(headers)?))
+}
+
+/// The format that the client weighs most; of equal ones, and without `Accept`, server-sent events.
+fn chosen(headers: &HeaderMap) -> Result<Encoding, ApiError> {
     let accepted = accepted(headers);
-    let some = |media: &str| weight(&accepted, media).0 > 0.0;
-    if !accepted.is_empty()
-        && ![SSE, LINES[0], LINES[1], "application/json"]
-            .into_iter()
-            .any(some)
-    {
-        return Err(ApiError::NotAcceptable {
+    let most = |media: &[&str]| {
+        let weights = media.iter().map(|media| weight(&accepted, media));
+        let positive = weights.filter(|weight| weight.0 > 0.0);
+        positive.max_by(|one, other| one.partial_cmp(other).unwrap_or(Ordering::Equal))
+    };
+    match (most(&[SSE]), most(&LINES)) {
+        _ if accepted.is_empty() => Ok(Encoding::Stream),
+        (None, None) => Err(ApiError::NotAcceptable {
             got: violations::quoted(&accepted.join(", ")),
             available: format!("{SSE}, {}", LINES[0]),
-        });
+        }),
+        (stream, lines) if lines > stream => Ok(Encoding::Lines),
+        _ => Ok(Encoding::Stream),
     }
-    Ok(write(
-        events,
-        preferred(headers).unwrap_or(Encoding::Stream),
-    ))
 }
 
 /// An event with a number and a type.
@@ -164,4 +168,51 @@ fn line(event: &impl Numbered) -> Result<Vec<u8>, ApiError> {
     let mut line = serde_json::to_vec(event).map_err(ApiError::internal)?;
     line.push(b'\n');
     Ok(line)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn events_come_in_a_format_that_the_client_takes_or_not_at_all() {
+        let chosen = |accept: Option<&str>| {
+            let mut headers = HeaderMap::new();
+            if let Some(accept) = accept {
+                headers.insert(header::ACCEPT, accept.parse().unwrap());
+            }
+            chosen(&headers)
+        };
+        for stream in [
+            None,
+            Some("*/*"),
+            Some("text/event-stream"),
+            Some("application/json, text/event-stream"),
+            Some("application/json, text/plain, */*"),
+            Some("text/event-stream, application/jsonl"),
+            Some("application/jsonl;q=0.5, text/event-stream"),
+        ] {
+            let found = chosen(stream);
+            assert!(matches!(found, Ok(Encoding::Stream)), "{stream:?}");
+        }
+        for lines in [
+            "application/jsonl",
+            "application/x-ndjson",
+            "application/jsonl, */*",
+            "application/*",
+            "text/event-stream;q=0.5, application/jsonl",
+            "text/event-stream;q=0, */*",
+        ] {
+            let found = chosen(Some(lines));
+            assert!(matches!(found, Ok(Encoding::Lines)), "{lines}");
+        }
+        for neither in ["application/json", "text/html", "application/*;q=0"] {
+            let found = chosen(Some(neither));
+            assert!(
+                matches!(found, Err(ApiError::NotAcceptable { .. })),
+                "{neither}"
+            );
+        }
+    }
 }
