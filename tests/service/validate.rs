@@ -123,3 +123,29 @@ fn pointers(judgement: &Value) -> Vec<String> {
         .map(|violation| violation["pointer"].as_str().unwrap().to_string())
         .collect()
 }
+
+/// No client could ask for the profile of such a contact: addresses are shortened where they have these parts.
+#[tokio::test]
+async fn a_contact_has_a_name_that_can_stand_in_an_address() {
+    let server = server().await;
+    for (name, valid) in [
+        ("", false),
+        (".", false),
+        ("..", false),
+        ("...", true),
+        ("a/b", true),
+        ("top edge?", true),
+    ] {
+        let mut problem = example_json("rectangular_punch");
+        problem["mesh"]["boundaries"] = json!({ name: { "side": "top" } });
+        problem["contacts"][0]["boundary"] = json!(name);
+        let judgement = validate(&server, &problem).await;
+        assert_eq!(judgement["valid"], valid, "{name:?}: {judgement:#}");
+        let expected = if valid {
+            vec![]
+        } else {
+            vec!["/problem/contacts/0/boundary"]
+        };
+        assert_eq!(pointers(&judgement), expected, "{name:?}");
+    }
+}

@@ -91,6 +91,15 @@ impl Checks {
             ));
         }
         let edges = self.boundary(mesh, &contact.boundary, format!("{pointer}/boundary"))?;
+        if ["", ".", ".."].contains(&contact.boundary.as_str()) {
+            return Err(self.report(
+                format!("{pointer}/boundary"),
+                Reason::Malformed,
+                format!("{:?}", contact.boundary),
+                "a name that can stand in an address: not empty, and neither . nor ..",
+                "Name the same edges otherwise in the mesh, or as a part under /mesh/boundaries.",
+            ));
+        }
         obstacle?;
         let (run, cut) = self.facing_run(mesh, edges, held, contact, &pointer)?;
         let mut boundary =
