@@ -148,7 +148,9 @@ fn retention(config: &Config) -> Retention {
 pub struct OpenToAll(SocketAddr);
 
 fn refuse_open(config: &Config, store: &Store) -> Result<(), OpenToAll> {
-    let closed = config.listen.ip().is_loopback() || store.has_tokens() || config.trust.is_on();
+    let closed = config.listen.ip().to_canonical().is_loopback()
+        || store.has_tokens()
+        || config.trust.is_on();
     match closed || config.allow_unauthenticated {
         true => Ok(()),
         false => Err(OpenToAll(config.listen)),
@@ -247,9 +249,9 @@ impl App {
     /// answers open requests, closes the store. Solvers may still run on their threads when this returns; their
     /// results are dropped.
     pub async fn stop(self) {
+        let end = Instant::now() + self.grace;
         grpc::report_draining(&self.health).await;
         self.queue.drain().await;
-        let end = Instant::now() + self.grace;
         self.closing.cancel();
         match timeout_at(end, self.server).await {
             Ok(Ok(())) => {}

@@ -96,7 +96,7 @@ impl Caller {
 
     /// The caller of every request to a service without authentication: one owner, with all scopes.
     pub fn local() -> Caller {
-        Caller::new("local", Scope::VARIANTS.iter().copied())
+        Caller::new(LOCAL, Scope::VARIANTS.iter().copied())
     }
 
     /// Someone who is not identified, and may use open operations only.
@@ -151,6 +151,9 @@ impl Caller {
         }
     }
 }
+
+/// The owner of what is submitted to a service without authentication.
+pub const LOCAL: &str = "local";
 
 /// Longest name of an owner.
 pub const MAX_OWNER: usize = 64;

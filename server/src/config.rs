@@ -8,7 +8,7 @@ use std::{
 
 use axum::http::{HeaderName, Uri};
 use clap::{Args, ValueEnum};
-use ipnet::IpNet;
+use ipnet::{IpNet, Ipv4Net, Ipv6Net};
 use schemars::JsonSchema;
 use serde::Serialize;
 use strum::Display;
@@ -430,8 +430,22 @@ impl ProxyTrust {
 /// An address as a network of one, or a network.
 fn network(text: &str) -> Result<IpNet, String> {
     let one = text.parse::<IpAddr>().map(IpNet::from);
-    let found = one.or_else(|_| text.parse());
+    let found = one.or_else(|_| text.parse()).map(|found| match found {
+        IpNet::V6(of_v4) => canonical(of_v4),
+        v4 => v4,
+    });
     found.map_err(|_| "expected an address or a network, such as 127.0.0.1 or 10.0.0.0/8".into())
+}
+
+/// Addresses of IPv4 as IPv6 writes them, ::ffff:10.0.0.0/104: requests from them are compared as IPv4.
+fn canonical(network: Ipv6Net) -> IpNet {
+    const BEFORE_V4: u8 = 96;
+    let within = network.addr().to_ipv4_mapped();
+    let bits = network.prefix_len().checked_sub(BEFORE_V4);
+    match within.zip(bits) {
+        Some((address, bits)) => Ipv4Net::new(address, bits).map_or(IpNet::V6(network), IpNet::V4),
+        None => IpNet::V6(network),
+    }
 }
 
 fn scope(text: &str) -> Result<Scope, String> {

@@ -800,6 +800,11 @@ async fn foreign_hosts_and_origins_are_refused() {
         (vec![("origin", "null")], 403),
         (
             vec![("origin", "http://lab.example"), ("host", "lab.example")],
+        (vec![("host", "[::1]:80")], 200),
+        (vec![("host", "[::1].evil")], 400),
+        (vec![("host", "[::1]evil.example:80")], 400),
+        (vec![("host", "evil@localhost")], 400),
+        (vec![("host", "localhost:evil")], 400),
             200,
         ),
         (
@@ -879,6 +884,16 @@ async fn users_are_those_that_a_trusted_proxy_names() {
         let mut request = server.get("/v1/me");
         for user in users {
             request = request.header("x-remote-user", *user);
+    // as a proxy that listens for both protocols is written, alone and with others
+    for proxies in ["::ffff:127.0.0.1", "::ffff:127.0.0.0/104"] {
+        let mapped = Server::start(SIGNORINI, &["--trusted-proxy", proxies]).await;
+        let me = mapped.get("/v1/me").header("x-remote-user", "ada");
+        assert_eq!(
+            me.send().await.unwrap().status(),
+            StatusCode::OK,
+            "{proxies}"
+        );
+    }
         }
         let response = request.send().await.unwrap();
         (response.status().as_u16(), response.json().await.unwrap())
@@ -889,7 +904,8 @@ async fn users_are_those_that_a_trusted_proxy_names() {
         (200, &json!("ada"), &json!(["read", "submit", "cancel"]))
     );
     assert_eq!(me(&["root"]).await.1["scopes"].as_array().unwrap().len(), 4);
-    for wrong in [&[][..], &["ada", "root"], &["a b"], &[""]] {
+    // local is everybody on a service without tokens
+    for wrong in [&[][..], &["ada", "root"], &["a b"], &[""], &["local"]] {
         assert_eq!(me(wrong).await.0, 401, "{wrong:?}");
     }
     // a user has no token, and is not told of one

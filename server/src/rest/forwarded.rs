@@ -53,10 +53,20 @@ pub(super) fn host(request: &Request, trust: &ProxyTrust) -> Result<Option<Autho
         (Some(text), _) | (None, Some(text)) => text,
         (None, None) => return Ok(None),
     };
-    match Authority::try_from(text.as_bytes()) {
-        Ok(host) => Ok(Some(host)),
-        Err(_) => wrong("the host that the proxy names is not a host"),
+    match authority(text.as_bytes()) {
+        Some(host) => Ok(Some(host)),
+        None => wrong("the host that the proxy names is not a host"),
     }
+}
+
+/// A host, and nothing else than a port (RFC 9110, 7.2): `Authority` also takes users, and text behind an address in brackets,
+/// which is no part of its `host`.
+pub(super) fn authority(text: &[u8]) -> Option<Authority> {
+    let named = Authority::try_from(text).ok()?;
+    let rest = named.as_str().strip_prefix(named.host())?;
+    let is_port = |port: &str| port.bytes().all(|byte| byte.is_ascii_digit());
+    let whole = rest.is_empty() || rest.strip_prefix(':').is_some_and(is_port);
+    (whole && !named.host().is_empty()).then_some(named)
 }
 
 /// Whether the client has used https, by the account of a trusted proxy; `None` if it gives none.

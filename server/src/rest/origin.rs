@@ -71,7 +71,12 @@ fn host_of(request: &Request) -> Result<Option<Authority>, ApiError> {
         [] if request.version() == Version::HTTP_11 => {
             return wrong("the request has no Host header");
         }
-        [] => return Ok(authority.cloned()),
+        [] => {
+            return match authority.map(|named| forwarded::authority(named.as_str().as_bytes())) {
+                Some(None) => wrong("the address does not name a host"),
+                found => Ok(found.flatten()),
+            };
+        }
         [host] => host,
         _ => return wrong("the request has several Host headers"),
     };
@@ -79,9 +84,9 @@ fn host_of(request: &Request) -> Result<Option<Authority>, ApiError> {
         Some(authority) if authority.as_str().as_bytes() != named.as_bytes() => {
             wrong("the Host header differs from the authority of the address")
         }
-        _ => match Authority::try_from(named.as_bytes()) {
-            Ok(host) => Ok(Some(host)),
-            Err(_) => wrong("the Host header is not a host"),
+        _ => match forwarded::authority(named.as_bytes()) {
+            Some(host) => Ok(Some(host)),
+            None => wrong("the Host header is not a host"),
         },
     }
 }

@@ -1,7 +1,7 @@
 //! Who makes a request: by a token, by what a proxy says that is trusted, or, without either, everyone is the same.
 
 use crate::{
-    caller::{Caller, Peer, is_owner},
+    caller::{Caller, LOCAL, Peer, is_owner},
     config::ProxyTrust,
     error::ApiError,
     store::Store,
@@ -69,6 +69,11 @@ pub fn identify(
     }
     if peer.is_some_and(|Peer(address)| trust.includes(address)) {
         match &credentials.users[..] {
+            [user] if user == LOCAL => {
+                return Err(ApiError::Unauthenticated(
+                    "the proxy names the user local, which is everybody's name on a service without tokens",
+                ));
+            }
             [user] if is_owner(user) => {
                 return Ok(Identified {
                     caller: trust.caller(user),
