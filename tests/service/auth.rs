@@ -1,6 +1,9 @@
 //! Who may do what: every operation with every kind of credentials, over both protocols; tokens, hosts and origins.
 
-use std::collections::BTreeMap;
+use std::{
+    collections::BTreeMap,
+    time::{Duration, Instant},
+};
 
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
@@ -422,9 +425,9 @@ async fn metric(server: &Server, admin: &str, name: &str) -> f64 {
     line.unwrap().trim().parse().unwrap()
 }
 
-/// A wait may take a minute, and its answer comes after the token's end.
+/// A wait may take a minute.
 #[tokio::test]
-async fn a_wait_is_not_answered_with_a_token_that_was_revoked_meanwhile() {
+async fn a_wait_ends_with_the_token_that_it_began_with() {
     let server = server().await;
     let token =
         |owner: &str, scopes: &[&str]| json!({"name": "test", "owner": owner, "scopes": scopes});
@@ -457,10 +460,11 @@ async fn a_wait_is_not_answered_with_a_token_that_was_revoked_meanwhile() {
     }
     let revoke = server.request(Method::DELETE, &format!("/v1/tokens/{id}"));
     revoke.bearer_auth(&admin).send().await.unwrap();
-    let cancel = server.post(&format!("/v1/jobs/{job}/cancel"));
-    cancel.bearer_auth(&admin).send().await.unwrap();
+    let revoked = Instant::now();
+    // soon, and not after what is left of the minute
     let answer = wait.await.unwrap().unwrap();
     assert_eq!(answer.status(), StatusCode::UNAUTHORIZED);
+    assert!(revoked.elapsed() < Duration::from_secs(10));
     let document: Value = answer.json().await.unwrap();
     assert_eq!(document["code"], "unauthenticated");
     let answer = called.await.unwrap();
@@ -796,15 +800,15 @@ async fn foreign_hosts_and_origins_are_refused() {
         (vec![], 200),
         (vec![("host", "lab.example:1")], 200),
         (vec![("host", "evil.example")], 403),
-        (vec![("origin", "http://evil.example")], 403),
-        (vec![("origin", "null")], 403),
-        (
-            vec![("origin", "http://lab.example"), ("host", "lab.example")],
         (vec![("host", "[::1]:80")], 200),
         (vec![("host", "[::1].evil")], 400),
         (vec![("host", "[::1]evil.example:80")], 400),
         (vec![("host", "evil@localhost")], 400),
         (vec![("host", "localhost:evil")], 400),
+        (vec![("origin", "http://evil.example")], 403),
+        (vec![("origin", "null")], 403),
+        (
+            vec![("origin", "http://lab.example"), ("host", "lab.example")],
             200,
         ),
         (
@@ -880,10 +884,6 @@ async fn foreign_hosts_and_origins_are_refused() {
 async fn users_are_those_that_a_trusted_proxy_names() {
     let arguments = ["--trusted-proxy", "127.0.0.0/8", "--proxy-admin", "root"];
     let server = Server::start(SIGNORINI, &arguments).await;
-    let me = async |users: &[&str]| -> (u16, Value) {
-        let mut request = server.get("/v1/me");
-        for user in users {
-            request = request.header("x-remote-user", *user);
     // as a proxy that listens for both protocols is written, alone and with others
     for proxies in ["::ffff:127.0.0.1", "::ffff:127.0.0.0/104"] {
         let mapped = Server::start(SIGNORINI, &["--trusted-proxy", proxies]).await;
@@ -894,6 +894,10 @@ async fn users_are_those_that_a_trusted_proxy_names() {
             "{proxies}"
         );
     }
+    let me = async |users: &[&str]| -> (u16, Value) {
+        let mut request = server.get("/v1/me");
+        for user in users {
+            request = request.header("x-remote-user", *user);
         }
         let response = request.send().await.unwrap();
         (response.status().as_u16(), response.json().await.unwrap())

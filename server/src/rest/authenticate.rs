@@ -49,7 +49,7 @@ pub(super) async fn authenticate(
         Some(error) => Err(error),
         None => {
             request.extensions_mut().insert(caller.clone());
-            while_valid(next.run(request).await, service.store.clone(), by)
+            while_valid(next.run(request), service.store.clone(), by).await
         }
     };
     let mut answer = answer.unwrap_or_else(|error| refusal(grpc, &path, error));

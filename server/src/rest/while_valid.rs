@@ -12,7 +12,7 @@ use axum::{
     response::Response,
 };
 use http_body::{Frame, SizeHint};
-use tokio::time::{Instant, Interval, MissedTickBehavior, interval};
+use tokio::time::{Instant, Interval, MissedTickBehavior, interval, sleep};
 
 use crate::{
     error::ApiError,
@@ -24,13 +24,18 @@ use crate::{
 const INTERVAL: Duration = Duration::from_secs(1);
 const NO_LONGER: &str = "the token was revoked or has expired";
 
-/// The answer, which is cut when what identified its caller is no longer valid; an error if it is not already, as the handler
-/// may have waited for a minute.
-pub(super) fn while_valid(
-    answer: Response,
+/// The answer, which is cut when what identified its caller is no longer valid; an error if that happens before, as the
+/// handler may wait for a minute.
+pub(super) async fn while_valid(
+    answer: impl Future<Output = Response>,
     store: Arc<Store>,
     by: By,
 ) -> Result<Response, ApiError> {
+    let answer = tokio::select! {
+        biased;
+        answer = answer => answer,
+        () = invalid(&store, &by) => return Err(ApiError::Unauthenticated(NO_LONGER)),
+    };
     if answer.extensions().get::<TokensChanged>().is_some() {
         return Ok(answer);
     }
@@ -46,6 +51,17 @@ pub(super) fn while_valid(
             ticks: None,
         })
     }))
+}
+
+/// Returns when what identified a caller has been invalid for a while: who revokes their own token is answered meanwhile.
+async fn invalid(store: &Store, by: &By) {
+    loop {
+        sleep(INTERVAL).await;
+        if !by.is_valid(store) {
+            sleep(INTERVAL).await;
+            return;
+        }
+    }
 }
 
 struct WhileValid {
