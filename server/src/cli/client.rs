@@ -1,39 +1,110 @@
 //! An HTTP client for a running service.
 
 use std::{
-    path::{Path, PathBuf},
+    ffi::OsString,
+    fmt::{self, Display, Formatter},
+    net::IpAddr,
+    path::Path,
     time::Duration,
 };
 
 use anyhow::{Context, ensure};
-use clap::Args;
-use reqwest::{Certificate, Client};
+use axum::http::Uri;
+use clap::{Args, builder::OsStringValueParser};
+use hyper_util::client::proxy::matcher::Matcher;
+use reqwest::Client;
+use rustls::pki_types::{CertificateDer, pem::PemObject};
+
+use super::pinned;
 
 /// A connection is made in this time, or not at all.
 const CONNECT: Duration = Duration::from_secs(10);
+/// What a service is told of this program.
+const PROGRAM: &str = concat!("signorini/", env!("CARGO_PKG_VERSION"));
 /// A service that waits for the end of a job, or streams its events, says something at least every 30 s.
 const SILENCE: Duration = Duration::from_secs(90);
 
 /// Whom a client command trusts.
 #[derive(Debug, Args)]
 pub(super) struct Trust {
-    /// File of the certificates, as PEM, of the authority that issued the service's; with https:// [default: those that this
-    /// machine trusts]
-    #[arg(long, env = "SIGNORINI_CA", value_name = "FILE")]
-    ca: Option<PathBuf>,
+    /// File of the certificates, as PEM, of the authority that issued the service's, or of the service's own; with https://
+    /// [default: those that this machine trusts]
+    #[arg(long, env = "SIGNORINI_CA", value_name = "FILE", value_parser = OsStringValueParser::new())]
+    ca: Option<OsString>,
+}
+
+/// A client, and the proxy of the environment through which it goes to the service.
+#[derive(Debug)]
+pub(super) struct Way {
+    pub(super) client: Client,
+    pub(super) proxy: Option<Proxy>,
+}
+
+/// A proxy that is named by a variable of the environment: its address, without a password.
+#[derive(Clone, Debug)]
+pub(super) struct Proxy(String);
+
+impl Display for Proxy {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Proxy(address) = self;
+        write!(
+            f,
+            "the proxy {address} (of http_proxy, https_proxy or all_proxy; no_proxy names what is reached without it)"
+        )
+    }
 }
 
 impl Trust {
     /// A client for the service at this address.
-    pub(super) fn client(&self, url: &str) -> anyhow::Result<Client> {
+    pub(super) fn client(&self, url: &str) -> anyhow::Result<Way> {
+        provide();
+        // an empty variable counts as one that is not set
+        let ca = self.ca.as_deref().filter(|file| !file.is_empty());
         let scheme = url.get(..8).map(str::to_ascii_lowercase);
-        match (&self.ca, scheme.as_deref()) {
-            (Some(file), _) => build(Some(authorities(file)?)),
+        let builder = match (ca, scheme.as_deref()) {
+            (Some(file), _) => Client::builder()
+                .tls_backend_preconfigured(pinned::trusting(authorities(file.as_ref())?)?),
             // the machine's, which it need not have
-            (None, Some("https://")) => build(None),
-            (None, _) => build(Some(vec![])),
-        }
+            (None, Some("https://")) => Client::builder(),
+            (None, _) => Client::builder().tls_certs_only([]),
+        };
+        let proxy = proxy_to(url);
+        // what is on this machine a proxy could not reach, and it would be told the token
+        let builder = match proxy {
+            Some(_) => builder,
+            None => builder.no_proxy(),
+        };
+        let client = builder
+            .user_agent(PROGRAM)
+            .connect_timeout(CONNECT)
+            .read_timeout(SILENCE)
+            .build()
+            .context("a client with TLS cannot be made; --ca names the authority to trust")?;
+        Ok(Way { client, proxy })
     }
+}
+
+/// The proxy that the environment names for this address, unless it is on this machine.
+fn proxy_to(url: &str) -> Option<Proxy> {
+    let url: Uri = url.parse().ok()?;
+    if url.host().is_none_or(is_this_machine) {
+        return None;
+    }
+    let through = Matcher::from_env().intercept(&url)?;
+    let (scheme, authority) = (through.uri().scheme_str()?, through.uri().authority()?);
+    let host = authority.as_str().rsplit('@').next()?;
+    Some(Proxy(format!("{scheme}://{host}")))
+}
+
+fn is_this_machine(host: &str) -> bool {
+    let host = host.trim_end_matches('.').to_ascii_lowercase();
+    let number = host
+        .strip_prefix('[')
+        .and_then(|host| host.strip_suffix(']'));
+    let number = number.unwrap_or(&host).parse::<IpAddr>();
+    host == "localhost"
+        || host.ends_with(".localhost")
+        || number.is_ok_and(|ip| ip.to_canonical().is_loopback())
 }
 
 /// A client for the service on this machine, whatever certificate it shows: only for what is no secret.
@@ -44,33 +115,49 @@ pub(super) fn local() -> anyhow::Result<Client> {
     Ok(builder.tls_danger_accept_invalid_certs(true).build()?)
 }
 
-fn build(authorities: Option<Vec<Certificate>>) -> anyhow::Result<Client> {
-    provide();
-    let builder = match authorities {
-        Some(only) => Client::builder().tls_certs_only(only),
-        None => Client::builder(),
-    };
-    builder
-        .connect_timeout(CONNECT)
-        .read_timeout(SILENCE)
-        .build()
-        .context("a client with TLS cannot be made; --ca names the authority to trust")
-}
-
 /// `reqwest` asks for the process's provider of cryptography, whether it speaks TLS or not.
 fn provide() {
     // an error says that there is one already
     let _ = rustls::crypto::ring::default_provider().install_default();
 }
 
-fn authorities(file: &Path) -> anyhow::Result<Vec<Certificate>> {
+fn authorities(file: &Path) -> anyhow::Result<Vec<CertificateDer<'static>>> {
     let shown = file.display();
     let text = std::fs::read(file).with_context(|| format!("--ca {shown} cannot be read"))?;
-    let found = Certificate::from_pem_bundle(&text)
-        .with_context(|| format!("--ca {shown}: expected certificates as PEM"))?;
+    let found: Result<Vec<_>, _> = CertificateDer::pem_slice_iter(&text).collect();
+    let found = found.with_context(|| format!("--ca {shown}: expected certificates as PEM"))?;
     ensure!(
         !found.is_empty(),
         "--ca {shown}: there is no certificate; expected PEM, with a line -----BEGIN CERTIFICATE-----"
     );
     Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn this_machine_is_reached_without_a_proxy() {
+        for own in [
+            "localhost",
+            "LOCALHOST.",
+            "a.localhost",
+            "127.0.0.1",
+            "127.1.2.3",
+            "[::1]",
+            "[::ffff:127.0.0.1]",
+        ] {
+            assert!(is_this_machine(own), "{own}");
+        }
+        for other in [
+            "lab.example",
+            "10.0.0.1",
+            "[::2]",
+            "localhost.example",
+            "127.0.0.1.example",
+        ] {
+            assert!(!is_this_machine(other), "{other}");
+        }
+    }
 }

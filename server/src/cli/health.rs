@@ -10,7 +10,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 
 use super::{
-    client::{self, Trust},
+    client::{self, Trust, Way},
     exit::Exit,
     output,
     settings::File,
@@ -52,7 +52,7 @@ pub(super) struct Arguments {
 
 /// Prints what `/readyz` answers.
 pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
-    let (client, url) = match arguments.url {
+    let (way, url) = match arguments.url.filter(|url| !url.is_empty()) {
         Some(url) => (arguments.trust.client(&url)?, url),
         None => {
             let address = reachable(arguments.listen);
@@ -60,11 +60,17 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
                 Some(_) => "https",
                 None => "http",
             };
-            (client::local()?, format!("{scheme}://{address}"))
+            let proxy = None;
+            let client = client::local()?;
+            (Way { client, proxy }, format!("{scheme}://{address}"))
         }
     };
+    let Way { client, proxy } = way;
     let url = format!("{}/readyz", url.trim_end_matches('/'));
-    let unanswered = || format!("{url} does not answer");
+    let unanswered = || match &proxy {
+        Some(proxy) => format!("{url} does not answer through {proxy}"),
+        None => format!("{url} does not answer"),
+    };
     let request = client.get(&url).timeout(PATIENCE);
     let answer = request.send().await.with_context(unanswered)?;
     let status = answer.status();

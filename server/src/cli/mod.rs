@@ -15,6 +15,7 @@ mod log_line;
 mod notify;
 mod output;
 mod pages;
+mod pinned;
 mod progress;
 mod report;
 mod restore;

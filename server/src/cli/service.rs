@@ -3,6 +3,7 @@
 use std::{
     error::Error as _,
     fmt::{self, Display, Formatter},
+    sync::OnceLock,
     time::Duration,
 };
 
@@ -15,7 +16,7 @@ use solver::error::Violation;
 use thiserror::Error;
 use uuid::Uuid;
 
-use super::client::Trust;
+use super::client::{Proxy, Trust, Way};
 
 /// The header that makes a repeated submission find what the first one created.
 const IDEMPOTENCY_KEY: &str = "Idempotency-Key";
@@ -49,6 +50,7 @@ impl Connection {
 #[derive(Debug)]
 pub(super) struct Service {
     client: Client,
+    proxy: Option<Proxy>,
     url: String,
     token: Option<String>,
 }
@@ -57,14 +59,14 @@ pub(super) struct Service {
 #[derive(Debug, Error)]
 pub(super) enum CallError {
     /// There is no connection.
-    #[error(
-        "cannot reach {url}: {cause}. Is the service running there? --url or SIGNORINI_URL gives another address"
-    )]
+    #[error("cannot reach {way}: {cause}. {advice}")]
     Unreachable {
-        /// Address of the service.
-        url: String,
+        /// Address of the service, and the proxy on the way to it.
+        way: String,
         /// The innermost cause.
         cause: String,
+        /// What can be done.
+        advice: &'static str,
         /// There was a connection, which broke: something is there, or was.
         connected: bool,
     },
@@ -95,9 +97,15 @@ impl Display for Refusal {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let code = &self.code;
         f.write_str(self.detail.as_deref().unwrap_or(&self.title))?;
-        match code.is_empty() {
-            true => Ok(()),
-            false => write!(f, " ({code}; `signorini explain {code}` says more)"),
+        if !code.is_empty() {
+            write!(f, " ({code}; `signorini explain {code}` says more)")?;
+        }
+        match OTHER_VERSION.get() {
+            // only one of the two may know it; everything else both do
+            Some(other) if matches!(self.status, 400 | 404..=406 | 415 | 422) => {
+                write!(f, ". Note that {other}")
+            }
+            _ => Ok(()),
         }
     }
 }
@@ -107,8 +115,10 @@ impl std::error::Error for Refusal {}
 impl Service {
     /// The service at this address.
     pub(super) fn at(url: &str, trust: &Trust) -> anyhow::Result<Service> {
+        let Way { client, proxy } = trust.client(url)?;
         Ok(Service {
-            client: trust.client(url)?,
+            client,
+            proxy,
             url: url.trim_end_matches('/').to_owned(),
             token: std::env::var("SIGNORINI_TOKEN")
                 .ok()
@@ -129,6 +139,7 @@ impl Service {
     pub(super) async fn send(&self, request: RequestBuilder) -> anyhow::Result<Response> {
         let answer = request.send().await;
         let answer = answer.map_err(|error| self.unreachable(&error))?;
+        note_version(&answer);
         if !answer.status().is_client_error() && !answer.status().is_server_error() {
             return Ok(answer);
         }
@@ -136,7 +147,15 @@ impl Service {
         let text = answer.text().await.unwrap_or_default();
         match serde_json::from_str::<Refusal>(&text) {
             Ok(refusal) => bail!(CallError::Refused(Box::new(refusal))),
-            Err(_) => bail!(CallError::Refused(Box::new(foreign(&self.url, status)))),
+            Err(_) => bail!(CallError::Refused(Box::new(foreign(&self.way(), status)))),
+        }
+    }
+
+    /// The address of the service, and the proxy on the way to it.
+    fn way(&self) -> String {
+        match &self.proxy {
+            Some(proxy) => format!("{} through {proxy}", self.url),
+            None => self.url.clone(),
         }
     }
 
@@ -209,12 +228,8 @@ impl Service {
     ) -> anyhow::Result<T> {
         let text = answer.bytes().await;
         let text = text.map_err(|error| self.unreachable(&error))?;
-        serde_json::from_slice(&text).with_context(|| {
-            format!(
-                "what {} answers is not of this version of signorini",
-                self.url
-            )
-        })
+        let misunderstood = || misunderstood(&format!("what {} answers", self.way()));
+        serde_json::from_slice(&text).with_context(misunderstood)
     }
 
     /// There was no answer, or no whole one.
@@ -227,9 +242,17 @@ impl Service {
             (true, _) => "there was no answer for too long".to_owned(),
             _ => cause.to_string(),
         };
+        let advice = match &self.proxy {
+            _ if cause.contains("UnknownIssuer") || cause.contains("CaUsedAsEndEntity") => {
+                "--ca or SIGNORINI_CA names a file with its certificate, or with that of the authority that has issued it"
+            }
+            Some(_) => "Does the proxy reach it? --url or SIGNORINI_URL gives another address",
+            None => "Is the service running there? --url or SIGNORINI_URL gives another address",
+        };
         CallError::Unreachable {
-            url: self.url.clone(),
+            way: self.way(),
             cause,
+            advice,
             connected: !error.is_connect(),
         }
     }
@@ -263,15 +286,40 @@ pub(super) fn segment(name: &str) -> String {
     escaped.replace('+', "%20")
 }
 
+/// That the service is of another version than this program, once it has said so.
+static OTHER_VERSION: OnceLock<String> = OnceLock::new();
+
+fn note_version(answer: &Response) {
+    const OWN: &str = env!("CARGO_PKG_VERSION");
+    let named = answer.headers().get("signorini-version");
+    if let Some(of_service) = named.and_then(|value| value.to_str().ok())
+        && of_service != OWN
+    {
+        let shown = solver::error::shortened(of_service, 40);
+        // fails if it is known already
+        let _ = OTHER_VERSION.set(format!(
+            "the service is of version {shown}, and this program of version {OWN}"
+        ));
+    }
+}
+
+/// That an answer of the service cannot be read.
+pub(super) fn misunderstood(what: &str) -> String {
+    match OTHER_VERSION.get() {
+        Some(other) => format!("{what} is not understood: {other}"),
+        None => format!("{what} is not of this version of signorini"),
+    }
+}
+
 /// Something that is not this service, or that stands before it, has answered.
-fn foreign(url: &str, status: StatusCode) -> Refusal {
+fn foreign(way: &str, status: StatusCode) -> Refusal {
     Refusal {
         status: status.as_u16(),
         retryable: None,
         code: String::new(),
         title: String::new(),
         detail: Some(format!(
-            "{url} answers {status}, and not as a signorini service does: is the address right?"
+            "{way} answers {status}, and not as a signorini service does: is the address right?"
         )),
         violations: vec![],
     }

@@ -7,7 +7,14 @@ use clap::{ArgMatches, Args, Subcommand, parser::ValueSource};
 use reqwest::Method;
 use serde_json::{Value, json};
 
-use super::{client::Trust, exit::Exit, output, service::Service, settings::Folder, table::table};
+use super::{
+    client::Trust,
+    exit::Exit,
+    output,
+    service::{Service, misunderstood},
+    settings::Folder,
+    table::table,
+};
 use crate::{
     caller::Caller,
     store::{Store, StoreError},
@@ -139,7 +146,7 @@ pub(super) async fn run(arguments: Arguments, folder: bool) -> anyhow::Result<Ex
                 }
                 Target::Service(service) => {
                     let mut answer = service.call(Method::GET, "/v1/tokens").await?;
-                    serde_json::from_value(answer["tokens"].take()).context(NOT_OURS)?
+                    serde_json::from_value(answer["tokens"].take()).with_context(not_ours)?
                 }
             };
             output::print(&listed(&all))?;
@@ -154,7 +161,7 @@ pub(super) async fn run(arguments: Arguments, folder: bool) -> anyhow::Result<Ex
                 Target::Service(service) => {
                     let path = format!("/v1/tokens/{id}");
                     let answer = service.call(Method::DELETE, &path).await?;
-                    serde_json::from_value(answer).context(NOT_OURS)?
+                    serde_json::from_value(answer).with_context(not_ours)?
                 }
             };
             eprintln!("{}", told(&token));
@@ -180,11 +187,13 @@ pub(super) async fn run(arguments: Arguments, folder: bool) -> anyhow::Result<Ex
     Ok(Exit::Ok)
 }
 
-const NOT_OURS: &str = "the answer is not that of this version of signorini";
+fn not_ours() -> String {
+    misunderstood("the answer")
+}
 
 fn new_token(mut answer: Value) -> anyhow::Result<(Token, String)> {
-    let token = serde_json::from_value(answer["token"].take()).context(NOT_OURS)?;
-    let secret = answer["secret"].as_str().context(NOT_OURS)?.to_owned();
+    let token = serde_json::from_value(answer["token"].take()).with_context(not_ours)?;
+    let secret = answer["secret"].as_str().with_context(not_ours)?.to_owned();
     Ok((token, secret))
 }
 

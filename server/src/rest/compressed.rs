@@ -5,7 +5,7 @@
 use axum::{
     body::HttpBody,
     extract::{Request, State},
-    http::{HeaderName, HeaderValue, Method, StatusCode, header},
+    http::{HeaderName, HeaderValue, Method, StatusCode, Version, header},
     middleware::Next,
     response::Response,
 };
@@ -23,7 +23,10 @@ pub(super) async fn compressed(
     request: Request,
     next: Next,
 ) -> Response {
-    let wanted = Coding::accepted(request.headers()).filter(|_| request.method() != Method::HEAD);
+    // over HTTP/1.0 an answer without a length ends with the connection: nobody would notice one that is cut
+    let has_an_end = request.version() >= Version::HTTP_11;
+    let wanted = Coding::accepted(request.headers())
+        .filter(|_| has_an_end && request.method() != Method::HEAD);
     let mut response = next.run(request).await;
     if !is_worth_it(&response) {
         return response;
@@ -112,5 +115,22 @@ mod tests {
         assert_eq!(second.headers()[header::VARY], "Accept-Encoding");
         drop(first);
         assert!(is_encoded(&ask().await));
+    }
+
+    #[tokio::test]
+    async fn an_answer_over_http_1_0_keeps_its_length() {
+        let limit = Limit::new(1 << 20);
+        let large = get(async || "x".repeat(20 << 10));
+        let router = Router::new().route("/", large);
+        let router = router.layer(middleware::from_fn_with_state(limit, compressed));
+        for (version, encoded) in [(Version::HTTP_10, false), (Version::HTTP_11, true)] {
+            let request = Request::get("/").version(version);
+            let request = request.header(header::ACCEPT_ENCODING, "gzip");
+            let request = request.body(Body::empty()).unwrap();
+            let answer = router.clone().oneshot(request).await.unwrap();
+            let found = answer.headers().contains_key(header::CONTENT_ENCODING);
+            assert_eq!(found, encoded, "{version:?}");
+            assert_eq!(answer.body().size_hint().exact().is_some(), !encoded);
+        }
     }
 }

@@ -33,6 +33,9 @@ use crate::{
 
 /// Where a client names its request, and is told the name.
 pub(super) const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
+/// The version of the service, in every answer to a caller who is identified: a client of another version can tell why it
+/// does not understand what it gets.
+pub(super) const VERSION: HeaderName = HeaderName::from_static("signorini-version");
 /// Longest name that is taken from a client.
 const LONGEST_ID: usize = 64;
 /// Requests in the log, for its filter.
@@ -42,11 +45,16 @@ const TARGET: &str = "service::request";
 pub(super) async fn observe(mut request: Request, next: Next) -> Response {
     let mut observed = Observed::new(&request);
     request.extensions_mut().insert(observed.trace.clone());
-    let mut response = next.run(request).await;
-    observed.answered(&response);
-    if let Ok(id) = HeaderValue::from_str(&observed.id) {
     let id = RequestId(observed.id.clone());
     request.extensions_mut().insert(id);
+    let mut response = next.run(request).await;
+    observed.answered(&response);
+    // strangers are not told
+    if !observed.owner.is_empty() {
+        let version = HeaderValue::from_static(env!("CARGO_PKG_VERSION"));
+        response.headers_mut().insert(VERSION, version);
+    }
+    if let Ok(id) = HeaderValue::from_str(&observed.id) {
         response.headers_mut().insert(REQUEST_ID, id);
     }
     response.map(|body| Body::new(ObservedBody { body, observed }))

@@ -150,7 +150,7 @@ const SENT: [&str; 13] = [
     "x-request-id",
 ];
 /// Headers that they may read.
-const READ: [&str; 11] = [
+const READ: [&str; 12] = [
     "accept-ranges",
     "content-digest",
     "content-disposition",
@@ -161,6 +161,7 @@ const READ: [&str; 11] = [
     "preference-applied",
     "result-available",
     "retry-after",
+    "signorini-version",
     "x-request-id",
 ];
 

@@ -12,7 +12,7 @@ use tokio::time::{Instant, sleep, sleep_until, timeout_at};
 use super::{
     super::{
         exit::Exit,
-        service::{CallError, Service},
+        service::{CallError, Service, misunderstood},
     },
     id::Id,
 };
@@ -176,8 +176,8 @@ pub(super) async fn events(
         let mut events = answer.bytes_stream().eventsource();
         // a stream that breaks off is taken up again behind the last event that arrived
         while let Some(Ok(event)) = events.next().await {
-            let event: Value = serde_json::from_str(&event.data)
-                .context("the event is not that of this version of signorini")?;
+            let event: Value =
+                serde_json::from_str(&event.data).with_context(|| misunderstood("the event"))?;
             let Some(seq) = event["seq"].as_i64() else {
                 bail!("an event has no number: {event}");
             };

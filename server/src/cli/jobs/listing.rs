@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use files::table::{Column, Table, Values};
 use serde_json::Value;
 
-use super::super::{output, report, table::table};
+use super::super::{output, report, service::misunderstood, table::table};
 use crate::{
     job::{Job, Status},
     time::Time,
@@ -97,7 +97,7 @@ impl Shown {
 /// A job, read from the service's document.
 pub(super) fn job(document: &Value) -> anyhow::Result<Job> {
     let job = serde_json::from_value(document.clone());
-    job.context("the job is not that of this version of signorini")
+    job.with_context(|| misunderstood("the job"))
 }
 
 fn is_sweep(document: &Value) -> bool {

@@ -16,7 +16,7 @@ use super::{
     super::{
         exit::Exit,
         output,
-        service::{Connection, Service, segment},
+        service::{Connection, Service, misunderstood, segment},
     },
     chart::{Chart, Curve, Scale},
     id::Id,
@@ -200,8 +200,8 @@ async fn profiles(
         Some(step) => step["summary"].take(),
         None => result["summary"].take(),
     };
-    let summary: Summary = serde_json::from_value(summary)
-        .context("the result is not that of this version of signorini")?;
+    let summary: Summary =
+        serde_json::from_value(summary).with_context(|| misunderstood("the result"))?;
     let mut figures = vec![];
     for boundary in summary.contacts.keys() {
         let at = step.map_or(String::new(), |number| format!("&step={number}"));

@@ -20,7 +20,7 @@ use super::{
         exit::Exit,
         output::{self, Look, Output, Part},
         report,
-        service::{Connection, Service, segment},
+        service::{Connection, Service, misunderstood, segment},
     },
     id::Id,
     listing::Format,
@@ -93,8 +93,8 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         return of_sweep(&service, &base, &arguments).await;
     }
     let document: Value = service.get(&format!("{base}/result")).await?;
-    let scalars: Scalars = serde_json::from_value(document.clone())
-        .context("the result is not that of this version of signorini")?;
+    let scalars: Scalars =
+        serde_json::from_value(document.clone()).with_context(|| misunderstood("the result"))?;
     if document["result_available"] == "partial" {
         eprintln!("{PARTIAL}");
     }
@@ -254,8 +254,7 @@ async fn print(
                 .text()
                 .await
                 .map_err(|error| service.unreachable(&error))?;
-            let table =
-                as_table(&text).context("the answer is not that of this version of signorini")?;
+            let table = as_table(&text).with_context(|| misunderstood("the answer"))?;
             output::print(&table)?;
         }
         Format::Json | Format::Jsonl | Format::Csv => {

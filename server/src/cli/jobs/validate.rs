@@ -9,7 +9,11 @@ use serde_json::Value;
 use solver::error::Violation;
 
 use super::{
-    super::{exit::Exit, output, report, service::Connection},
+    super::{
+        exit::Exit,
+        output, report,
+        service::{Connection, misunderstood},
+    },
     file::{Kind, Submitted},
     listing::seconds,
 };
@@ -52,7 +56,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         output::print(&format!("{document:#}\n"))?;
     }
     let violations: Vec<Violation> = serde_json::from_value(document["violations"].clone())
-        .context("the answer is not that of this version of signorini")?;
+        .with_context(|| misunderstood("the answer"))?;
     if !violations.is_empty() {
         submitted.tell(&violations);
         return Ok(Exit::Invalid);

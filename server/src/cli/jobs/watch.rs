@@ -12,7 +12,7 @@ use super::{
         output,
         progress::{To, View},
         report,
-        service::{Connection, Service},
+        service::{Connection, Service, misunderstood},
     },
     follow,
     id::Id,
@@ -68,8 +68,7 @@ pub(super) async fn follow(service: &Service, id: Id, format: Format) -> anyhow:
             (Format::Jsonl, _) if !done => {}
             (_, Id::Job(_)) => {
                 let event = serde_json::from_value(event);
-                let event: Event =
-                    event.context("the event is not that of this version of signorini")?;
+                let event: Event = event.with_context(|| misunderstood("the event"))?;
                 if let Payload::Done { job } = watched.event(event)? {
                     ended = Some(follow::exit_of(&job));
                 }
