@@ -88,8 +88,8 @@ struct Contract {
 }
 
 /// A message of the contract.
-#[derive(Default)]
 struct Kind {
+    name: String,
     fields: HashMap<u32, Field>,
     /// Bytes of an empty one.
     bytes: usize,
@@ -135,10 +135,11 @@ impl Contract {
         let kinds = descriptors
             .iter()
             .enumerate()
-            .map(|(number, (_, message))| {
+            .map(|(number, (name, message))| {
                 let fields = message.field.iter();
                 let fields = fields.map(|f| (f.number() as u32, field(f.r#type(), f.type_name())));
                 Kind {
+                    name: name.clone(),
                     fields: fields.collect(),
                     bytes: size(number, &descriptors, &numbers, 0),
                 }
@@ -157,6 +158,8 @@ impl Contract {
         while bytes.has_remaining() {
             let (number, wire) = decode_key(&mut bytes).map_err(malformed)?;
             let field = kind.fields.get(&number).copied();
+            // to pass over it would be to answer something else than was asked
+            let field = field.ok_or_else(|| unknown_field(number, &kind.name))?;
             let taken = match wire {
                 WireType::Varint => {
                     decode_varint(&mut bytes).map_err(malformed)?;
@@ -169,14 +172,13 @@ impl Contract {
                     }
                     let content = bytes.split_to(length);
                     match field {
-                        Some(Field::Message(child)) => {
+                        Field::Message(child) => {
                             self.count(child, content, left)?;
                             CONTAINER + self.kinds.get(child).map_or(0, |child| child.bytes)
                         }
-                        Some(Field::Text) => CONTAINER + length,
+                        Field::Text => CONTAINER + length,
                         // many numbers in one field: each takes at least a byte
-                        Some(Field::Number) => length.saturating_mul(8),
-                        None => 0,
+                        Field::Number => length.saturating_mul(8),
                     }
                 }
                 WireType::ThirtyTwoBit | WireType::SixtyFourBit => {
@@ -202,6 +204,14 @@ impl Contract {
 
 fn cut_off() -> ApiError {
     ApiError::BadRequest("the message ends in the middle of a field".into())
+}
+
+fn unknown_field(number: u32, message: &str) -> ApiError {
+    ApiError::BadRequest(format!(
+        "the message {message} has a field {number}, which this service (version {}) does not know: its client was made with \
+         the contract of another version; that of this one is at /proto/signorini.proto",
+        env!("CARGO_PKG_VERSION")
+    ))
 }
 
 /// A message and those that are defined inside it, with their full names.
@@ -283,6 +293,18 @@ mod tests {
         ] {
             let refused = decode::<pb::BatchCreateJobsRequest>(Bytes::copy_from_slice(bytes));
             assert!(matches!(refused, Err(ApiError::BadRequest(_))), "{bytes:?}");
+        }
+        // fields that only a later contract has: of the request, and of a job in it
+        for bytes in [
+            &[0xf8, 0x3f, 1][..],
+            &[0x0a, 3, 0xf8, 0x3f, 1],
+            &[0x0a, 4, 0xfa, 0x3f, 1, b'a'],
+        ] {
+            let refused = decode::<pb::BatchCreateJobsRequest>(Bytes::copy_from_slice(bytes));
+            let Err(ApiError::BadRequest(why)) = refused else {
+                panic!("{bytes:?}");
+            };
+            assert!(why.contains("has a field 1023, which"), "{why}");
         }
         // text that is not UTF-8, which only decoding finds
         let refused = decode::<pb::GetJobRequest>(Bytes::from_static(&[0x0a, 1, 0xff]));
