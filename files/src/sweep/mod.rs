@@ -18,6 +18,7 @@ pub use check::{Group, MOST_TOLD, groups, has_own_meshes};
 pub use neighbours::Neighbour;
 pub use numbers::{Problems, Read};
 pub use parametrised::Parametrised;
+pub use path::{MOST_POINTER_BYTES, MOST_POINTER_TOKENS};
 pub use plan::{MOST_BYTES, MOST_MEMBERS, MOST_PATHS, MOST_VALUE_BYTES, Mode, Plan};
 pub use read::{Sweep, read};
 pub use values::Fields;

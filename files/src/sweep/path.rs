@@ -11,13 +11,31 @@ pub(super) struct Path {
     pub(super) tokens: Vec<String>,
 }
 
+/// Most bytes of a pointer: names in a problem are short.
+pub const MOST_POINTER_BYTES: usize = 1 << 10;
+/// Most names and numbers in a pointer: JSON is read to this depth.
+pub const MOST_POINTER_TOKENS: usize = 64;
+
 /// A pointer to a part of a problem; `at` is its place in the definition.
 pub(super) fn path(at: String, text: &str, found: &mut Findings) -> Option<Path> {
+    // before it is divided: each of its parts takes many times the two bytes that it has in the text
+    if text.len() > MOST_POINTER_BYTES || text.matches('/').count() > MOST_POINTER_TOKENS {
+        found.add(Violation::new(
+            at,
+            Reason::TooLong,
+            format!("a pointer of {} bytes: {:?}", text.len(), quoted(text)),
+            format!(
+                "at most {MOST_POINTER_BYTES} bytes and {MOST_POINTER_TOKENS} names or numbers"
+            ),
+            "Point to a value of the problem, such as /contacts/0/indentation.",
+        ));
+        return None;
+    }
     let tokens = || -> Option<Vec<String>> {
         let tokens = text.strip_prefix('/')?.split('/');
         let read = |token: &str| {
-            let escaped = token.split('~').skip(1);
-            let sound = escaped.into_iter().all(|rest| rest.starts_with(['0', '1']));
+            let mut escaped = token.split('~').skip(1);
+            let sound = escaped.all(|rest| rest.starts_with(['0', '1']));
             sound.then(|| token.replace("~1", "/").replace("~0", "~"))
         };
         tokens.map(read).collect()

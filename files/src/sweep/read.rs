@@ -45,8 +45,7 @@ pub fn read(fields: &Fields<'_>) -> Result<Sweep, Vec<Violation>> {
         return Err(found.into_violations());
     };
     let text = fields.base.map_or("", RawValue::get);
-    let tokens: Vec<Vec<String>> = paths.iter().map(|path| path.tokens.clone()).collect();
-    let with_mesh = tokens.iter().any(|tokens| tokens[0] == "mesh");
+    let with_mesh = paths.iter().any(|path| path.tokens[0] == "mesh");
     let text = match locate(text, &["mesh".to_owned()]) {
         Ok(Place::Value(range)) if !with_mesh => Cow::Owned(format!(
             "{}{NO_MESH}{}",
