@@ -202,6 +202,17 @@ fn out_of_memory(
     Ending::failed(Reason::ResourceExhausted, detail)
 }
 
+/// The process that solved a job of this share (bytes) was refused so many bytes more by the system.
+pub(super) fn refused_memory(bytes: u64, share: u64) -> NoSolution {
+    let detail = format!(
+        "it has used its share of {} of the memory, and was refused {} more: use a coarser mesh, fewer contacts or fewer \
+         load steps",
+        size(share),
+        size(bytes)
+    );
+    NoSolution::Failed(Reason::ResourceExhausted, detail)
+}
+
 /// Failed at its time limit, without a result.
 pub(super) fn timed_out(job: &Job) -> Ending {
     let detail = format!(

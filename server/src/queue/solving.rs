@@ -202,14 +202,16 @@ pub(super) fn solve_and_store(
         }
     }
     let document = document?;
-    let parts = Parts::of(&document).map_err(|_| SolveError::NonFinite {
+    let accuracy = document.summary.solution.accuracy.as_ref();
+    let unverified = accuracy.and_then(|accuracy| accuracy.verified) == Some(false);
+    let (ending, iterations) = (ending_of_solution(&document), document.history.len());
+    let parts = Parts::of(document).map_err(|_| SolveError::NonFinite {
         phase: Phase::Recover,
     })?;
-    let accuracy = document.summary.solution.accuracy.as_ref();
     Ok(Solved {
-        ending: ending_of_solution(&document),
-        unverified: accuracy.and_then(|accuracy| accuracy.verified) == Some(false),
-        iterations: document.history.len(),
+        ending,
+        unverified,
+        iterations,
         parts,
     })
 }
@@ -331,13 +333,19 @@ impl Partials {
     fn next(&mut self, partial: &PartialSolution<'_>) -> Option<Report> {
         /// A result of this size is written in one transaction, which occupies the single writer for some 40 ms.
         const MOST_BYTES: usize = 4 << 20;
+        /// Its numbers rarely take less than a fourth of this when they are stored; a copy of them is made.
+        const MOST_COPIED_BYTES: usize = 16 << 20;
         let start = Instant::now();
         if self.next.is_none_or(|next| start < next) {
             return None;
         }
+        if partial.bytes() > MOST_COPIED_BYTES {
+            self.next = None;
+            return None;
+        }
         // numbers that are not finite, and so have no JSON, are reported at the end
         let document = partial.document().ok();
-        let parts = document.and_then(|document| Parts::of(&document).ok());
+        let parts = document.and_then(|document| Parts::of(document).ok());
         self.next = match &parts {
             Some(parts) if parts.bytes() > MOST_BYTES => None,
             _ => Some(start + (start.elapsed() * self.part).max(self.pause)),

@@ -12,7 +12,10 @@ use solver::{
     finite::is_finite,
     mesh::External,
     problem::Problem,
-    solution::{Fields, Observer, Outcome, Phase, Progress, Solution, Warning},
+    solution::{
+        ContactSummary, Fields, Iteration, Observer, Outcome, Phase, Progress, Solution,
+        StepSolution, Warning,
+    },
 };
 
 use crate::event::TimedIteration;
@@ -77,6 +80,27 @@ impl PartialSolution<'_> {
     pub fn document(&self) -> Result<Document, SolveError> {
         Document::new(self.problem, self.solution.clone(), &self.times)
     }
+
+    /// Bytes that its steps have in memory, so that it need not be made to know that it is large.
+    pub fn bytes(&self) -> usize {
+        let steps = self.solution.steps.iter();
+        steps.map(bytes_of_step).sum()
+    }
+}
+
+/// Bytes that a step has in memory: columns, and what its summary says of each contact.
+fn bytes_of_step(step: &StepSolution) -> usize {
+    const COLUMNS: usize = 12;
+    let profiles = [&step.profiles, &step.node_profiles, &step.friction_profiles];
+    let profiles = profiles.iter().flat_map(|of_points| of_points.values());
+    let numbers: usize = profiles.map(|profile| COLUMNS * profile.s.len()).sum();
+    let warnings = step.summary.warnings.iter();
+    let words: usize = warnings
+        .map(|warning| size_of::<Warning>() + warning.message.len())
+        .sum();
+    let contacts = step.summary.contacts.len() * size_of::<ContactSummary>();
+    let rows = step.history.len() * size_of::<Iteration>();
+    numbers * size_of::<f64>() + words + contacts + rows
 }
 
 /// Solves `problem` by `solve`, notes when each iteration was done and measures the phases. `parse_s`: seconds that

@@ -1,6 +1,6 @@
 //! How the pieces of a part of a result hold it: deflated, or as columns.
 
-use std::io::{Read, Write};
+use std::io::{self, BufWriter, Read, Write};
 
 use files::{columns, fields_json::FieldsJson};
 use flate2::{Compression, read::DeflateDecoder, write::DeflateEncoder};
@@ -124,9 +124,55 @@ pub(super) fn info_of_fields(fields: &Fields) -> serde_json::Result<PartInfo> {
     })
 }
 
+/// What is written as JSON: counted, hashed and deflated, and never in memory as a whole.
+pub(super) fn deflated_json(value: &impl Serialize) -> serde_json::Result<(PartInfo, Vec<u8>)> {
+    struct Sink {
+        bytes: u64,
+        hash: Sha256,
+        deflate: DeflateEncoder<Vec<u8>>,
+    }
+    impl Write for Sink {
+        fn write(&mut self, text: &[u8]) -> io::Result<usize> {
+            self.bytes += text.len() as u64;
+            self.hash.update(text);
+            self.deflate.write_all(text)?;
+            Ok(text.len())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+    let sink = Sink {
+        bytes: 0,
+        hash: Sha256::new(),
+        deflate: deflate(),
+    };
+    // numbers and names come one by one
+    let mut sink = BufWriter::with_capacity(AT_ONCE, sink);
+    serde_json::to_writer(&mut sink, value)?;
+    let sink = sink
+        .into_inner()
+        .map_err(|error| serde_json::Error::io(error.into_error()))?;
+    let info = PartInfo {
+        bytes: sink.bytes,
+        digest: sink.hash.finalize().to_vec(),
+    };
+    let mut body = sink.deflate.finish().map_err(serde_json::Error::io)?;
+    body.shrink_to_fit();
+    Ok((info, body))
+}
+
+/// Bytes of JSON that are hashed and deflated at a time.
+const AT_ONCE: usize = 16 << 10;
+
+fn deflate() -> DeflateEncoder<Vec<u8>> {
+    DeflateEncoder::new(Vec::new(), Compression::new(6))
+}
+
 /// A text deflated. Level 6 is the usual one: 9 takes several times as long for a few per cent.
 pub(super) fn deflated(text: &[u8]) -> Vec<u8> {
-    let mut deflate = DeflateEncoder::new(Vec::new(), Compression::new(6));
+    let mut deflate = deflate();
     // writing to memory does not fail
     let _ = deflate.write_all(text);
     deflate.finish().unwrap_or_default()

@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 
 use files::columns;
 use serde::{Deserialize, Serialize};
-use serde_json::json;
 use solver::solution::{ContactProfile, Fields};
 
-use super::encoding::{Encoding, PartInfo, deflated, digest, info_of_fields, info_of_json};
-use crate::run::Document;
+use super::encoding::{
+    Encoding, PartInfo, deflated, deflated_json, digest, info_of_fields, info_of_json,
+};
+use crate::run::{Document, Step};
 
 /// Bytes of one piece of a stored result or mesh: larger rows make SQLite chain pages, and readers need more memory.
 pub const PIECE_BYTES: usize = 256 << 10;
@@ -49,6 +50,18 @@ impl Part {
         }
     }
 
+    /// A part from what its JSON says.
+    fn of_value(name: String, value: &impl Serialize) -> serde_json::Result<Part> {
+        let (info, body) = deflated_json(value)?;
+        Ok(Part {
+            name,
+            encoding: Encoding::Deflated,
+            info,
+            stored_digest: digest(&body),
+            body,
+        })
+    }
+
     /// A part from its JSON.
     pub(super) fn new(name: String, json: &[u8]) -> Part {
         let body = deflated(json);
@@ -76,41 +89,43 @@ impl Part {
     }
 }
 
+/// What is stored of a step in the part `steps`.
+#[derive(Serialize)]
+struct StepPart<'a> {
+    name: &'a str,
+    summary: &'a solver::solution::Summary,
+}
+
 impl Parts {
-    /// Divides a document into the parts that can be requested.
-    pub fn of(document: &Document) -> serde_json::Result<Parts> {
+    /// Divides a document into the parts that can be requested. What was divided is freed at once: both would take twice
+    /// as much.
+    pub fn of(document: Document) -> serde_json::Result<Parts> {
         let mut parts = vec![];
-        let mut add = |name: String, json: serde_json::Result<Vec<u8>>| {
-            parts.push(Part::new(name, &json?));
-            Ok::<_, serde_json::Error>(())
-        };
-        add("summary".into(), serde_json::to_vec(&document.summary))?;
-        add("history".into(), serde_json::to_vec(&document.history))?;
+        parts.push(Part::of_value("summary".into(), &document.summary)?);
+        parts.push(Part::of_value("history".into(), &document.history)?);
+        drop(document.history);
         // the iterations of a step are part of the history; its profiles are requested one by one
-        let steps: Vec<_> = document
-            .steps
-            .iter()
-            .map(|step| json!({"name": step.name, "summary": step.summary}))
+        let steps = document.steps.iter();
+        let steps: Vec<StepPart<'_>> = steps
+            .map(|Step { name, summary, .. }| StepPart { name, summary })
             .collect();
-        add("steps".into(), serde_json::to_vec(&steps))?;
-        let mut add_all = |points, step, profiles: &BTreeMap<String, ContactProfile>| {
-            profiles.iter().try_for_each(|(boundary, profile)| {
-                let name = profile_part(boundary, points, step);
-                add(name, serde_json::to_vec(profile))
+        parts.push(Part::of_value("steps".into(), &steps)?);
+        let mut add_all = |points, step, profiles: BTreeMap<String, ContactProfile>| {
+            profiles.into_iter().try_for_each(|(boundary, profile)| {
+                let name = profile_part(&boundary, points, step);
+                parts.push(Part::of_value(name, &profile)?);
+                Ok::<_, serde_json::Error>(())
             })
         };
-        for (number, step) in document.steps.iter().enumerate() {
-            add_all(ProfilePoints::All, Some(number), &step.profiles)?;
-            add_all(ProfilePoints::Nodes, Some(number), &step.node_profiles)?;
-            add_all(
-                ProfilePoints::Friction,
-                Some(number),
-                &step.friction_profiles,
-            )?;
+        for (number, step) in document.steps.into_iter().enumerate() {
+            let step_number = Some(number);
+            add_all(ProfilePoints::All, step_number, step.profiles)?;
+            add_all(ProfilePoints::Nodes, step_number, step.node_profiles)?;
+            add_all(ProfilePoints::Friction, step_number, step.friction_profiles)?;
         }
-        add_all(ProfilePoints::All, None, &document.profiles)?;
-        add_all(ProfilePoints::Nodes, None, &document.node_profiles)?;
-        add_all(ProfilePoints::Friction, None, &document.friction_profiles)?;
+        add_all(ProfilePoints::All, None, document.profiles)?;
+        add_all(ProfilePoints::Nodes, None, document.node_profiles)?;
+        add_all(ProfilePoints::Friction, None, document.friction_profiles)?;
         if !document.fields.x.is_empty() {
             parts.push(Part::of_fields(&document.fields, &document.law)?);
         }

@@ -71,6 +71,8 @@ struct Size {
     points: f64,
     /// Nodes and friction points on all contacts, with results for each step.
     profile: f64,
+    /// Contacts, each with a summary and warnings for each step.
+    contacts: f64,
     steps: f64,
     increments: f64,
     /// The solution is computed once more so often.
@@ -217,6 +219,7 @@ impl Model {
             weights: all.weights,
             points: all.points,
             profile: all.nodes + all.points,
+            contacts: self.contacts.len() as f64,
             steps: self.steps.len().max(1) as f64,
             increments: increments.max(1.0),
             repeats: f64::from(1 + again),
@@ -278,9 +281,14 @@ impl Size {
     /// Profiles and rows are held as numbers and as text; a step is also part of a partial result, which is a copy of
     /// all steps so far and their text (bytes).
     fn history(&self) -> f64 {
-        1.2e4 * self.increments + self.steps * (1e4 + 1000.0 * self.profile) + 300.0 * self.profile
+        let of_step = 1e4 + PER_CONTACT * self.contacts + 1000.0 * self.profile;
+        1.2e4 * self.increments + self.steps * of_step + 300.0 * self.profile
     }
 }
+
+/// What a step says of a contact beside its profiles: a summary and its warnings, and three profiles with what describes
+/// each as a part of the result (bytes).
+const PER_CONTACT: f64 = 2.5e3;
 
 /// What even the smallest problem takes, most of it to compress its result (bytes).
 const FLOOR: f64 = 393_216.0;

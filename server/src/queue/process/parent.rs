@@ -13,12 +13,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use solver::error::SolveError;
 use tracing::{info, warn};
 
 use super::{
     super::{
-        ending::{NoSolution, Solved},
+        ending::{NoSolution, Solved, refused_memory},
         report::{Report, Told},
     },
     Order, Reply, Task, send, take,
@@ -78,6 +77,7 @@ impl Processes {
         mut tell: impl FnMut(Told) -> ControlFlow<()>,
     ) -> Result<Solved, NoSolution> {
         let mut process = self.take(&mut tell)?;
+        let share = task.share;
         match process.solve(task, tell) {
             Ok(solved) => {
                 self.idle().push(process);
@@ -88,7 +88,7 @@ impl Processes {
                 info!("a worker process did not stop, and was killed");
                 Err(NoSolution::Stopped)
             }
-            Err(Unusable::Dead(error)) => Err(process.cause_of_death(&error)),
+            Err(Unusable::Dead(error)) => Err(process.cause_of_death(&error, share)),
         }
     }
 
@@ -270,7 +270,7 @@ impl Process {
     }
 
     /// Why there is no result of a process that died.
-    fn cause_of_death(mut self, error: &io::Error) -> NoSolution {
+    fn cause_of_death(mut self, error: &io::Error, share: u64) -> NoSolution {
         use io::ErrorKind::{BrokenPipe, ConnectionReset, UnexpectedEof};
         let dead = matches!(error.kind(), UnexpectedEof | ConnectionReset | BrokenPipe);
         if !dead {
@@ -279,7 +279,7 @@ impl Process {
         let status = self.child.wait();
         let refused = self.stderr.take().and_then(|thread| thread.join().ok());
         if let Some(bytes) = refused.flatten() {
-            return SolveError::ResourceExhausted { bytes }.into();
+            return refused_memory(bytes, share);
         }
         NoSolution::Lost(match status {
             Ok(status) if dead => how_it_ended(status),

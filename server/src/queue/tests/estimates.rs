@@ -103,6 +103,15 @@ fn problems() -> Vec<(String, Value)> {
     let mut newton = wall(150, 20.0);
     newton["solver"] = json!({"algorithm": "newton"});
     problems.push(("wall of 150 lines, Newton".into(), newton));
+    for (contacts, steps) in [(60, 100), (20, 300), (3, 1000)] {
+        for friction in [false, true] {
+            let name = match friction {
+                true => format!("{contacts} contacts with friction, {steps} steps"),
+                false => format!("{contacts} contacts, {steps} steps"),
+            };
+            problems.push((name, row_of_contacts(contacts, steps, friction)));
+        }
+    }
     let side: Vec<u32> = (0..80).collect();
     problems.push(("block, two contacts".into(), json!({
         "analysis": {"kind": "plane_stress", "thickness": 1},
@@ -133,6 +142,42 @@ fn wall(lines: u32, radius: f64) -> Value {
             "indentation": 0.01,
             "friction": {"coefficient": 0.3, "nonlocal_radius": radius, "elastic_slip": 1e-4}
         }]
+    })
+}
+
+/// A strip whose upper side touches at so many places, in so many load steps.
+fn row_of_contacts(contacts: u32, steps: u32, friction: bool) -> Value {
+    let count = f64::from(contacts);
+    let x: Vec<f64> = (0..=2 * contacts)
+        .map(|k| f64::from(k) / (2.0 * count))
+        .collect();
+    let place = |k: u32| (format!("c{k}"), f64::from(k) / count);
+    let boundaries: serde_json::Map<String, Value> = (0..contacts)
+        .map(place)
+        .map(|(name, at)| {
+            (
+                name,
+                json!({"side": "top", "x": [at - 1e-9, at + 0.5 / count + 1e-9]}),
+            )
+        })
+        .collect();
+    let contact = |k: u32| {
+        let mut contact =
+            json!({"boundary": format!("c{k}"), "obstacle": {"kind": "flat"}, "indentation": 0.01});
+        if friction {
+            contact["friction"] =
+                json!({"coefficient": 0.3, "nonlocal_radius": 2.0 / count, "elastic_slip": 1e-4});
+        }
+        contact
+    };
+    let step = |k: u32| json!({"indentation": f64::from(k) / f64::from(steps)});
+    json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grid": {"x": x, "y": [0, 0.3, 0.6, 1]}, "boundaries": boundaries},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
+        "contacts": (0..contacts).map(contact).collect::<Vec<_>>(),
+        "steps": (1..=steps).map(step).collect::<Vec<_>>(),
     })
 }
 
