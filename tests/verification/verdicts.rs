@@ -361,8 +361,9 @@ fn rows_of_a_sweep_do_not_depend_on_the_order_of_members() {
     assert!(jammed > 10, "{jammed}");
 }
 
-/// Half of a symmetric problem and the whole of it state the same relative errors of forces and extents, and without friction
-/// have one verdict.
+/// Half of a symmetric problem and the whole of it state the same relative errors of forces, extents and the highest pressure,
+/// and without friction have one verdict. (Peaks of σ_t and ends of stick are those of one side, which a small force on the
+/// whole may move without the other: their errors are not those of the half.)
 #[test]
 fn half_and_whole_state_the_same_errors() {
     let mut seen = Vec::new();
@@ -413,7 +414,16 @@ fn half_and_whole_state_the_same_errors() {
                 let [half, whole] = [model(0), model(-1000)].map(|s| s.summary);
                 assert!((2.0 * half.normal_force / whole.normal_force - 1.0).abs() < 1e-6);
                 let [half, whole] = [half, whole].map(|s| s.accuracy.unwrap());
-                for name in [QuantityName::NormalForce, QuantityName::ContactEnd] {
+                let kink = obstacle["kind"] == "wedge";
+                for (name, most) in [
+                    // what stands out is judged alike, and the rest of the weighted errors cancels or is small
+                    (QuantityName::NormalForce, 0.02),
+                    (QuantityName::ContactEnd, 1e-9),
+                    // at a line of symmetry stresses are recovered from one side only
+                    (QuantityName::PeakNormalStress, 0.2),
+                    // a kink at a node is one edge's, in the whole as well
+                    (QuantityName::FrictionForce, if kink { 0.8 } else { 0.2 }),
+                ] {
                     let of = |all: &[EstimatedQuantity]| {
                         all.iter()
                             .find(|q| q.quantity == name)
@@ -421,9 +431,7 @@ fn half_and_whole_state_the_same_errors() {
                     };
                     let (a, b) = (of(&half.quantities), of(&whole.quantities));
                     let close = match (a, b) {
-                        // at a line of symmetry stresses are recovered from one side only, and whether an element stands
-                        // out from its neighbours is judged by fewer of them
-                        (Some(a), Some(b)) => (a - b).abs() <= 0.3 * b + 1e-9,
+                        (Some(a), Some(b)) => (a - b).abs() <= most * b + 1e-9,
                         (a, b) => a == b,
                     };
                     assert!(

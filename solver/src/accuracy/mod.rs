@@ -214,7 +214,7 @@ fn bounds(
     let errors = weighted_errors(model, body, reported, &influences, observe)?;
     let mut duals = influences.iter().zip(errors);
     let smoothing = smoothing_of_reactions(system, finished);
-    let surroundings = Surroundings::new(&model.mesh);
+    let surroundings = Surroundings::new(model);
     let away = surroundings.away_from(touching(system, finished));
     let mut bounds = Vec::with_capacity(quantities.len());
     for quantity in quantities {

@@ -4,19 +4,30 @@
 //! the elements that meet there hold most of what the body adds to an error, however fine the mesh. Recovery sees only a
 //! part of that: a fifth at a clamped corner of an orthotropic body, where one element has nothing to be compared with. Such
 //! points are found by the errors themselves, whatever they come from.
+//!
+//! A body goes on beyond a line of symmetry: elements there have the mirror images of each other as neighbours too, whose
+//! errors are the same, so that half a model and the whole of it judge alike.
 
-use crate::mesh::Mesh;
+use crate::contact::edge_normals;
+use crate::model::{Held, Model};
 
 /// The elements around every corner node of a mesh.
 pub(super) struct Surroundings {
     /// By node: the elements that meet there.
     stars: Vec<Vec<u32>>,
-    /// By node: the other elements that share a corner with one of these.
+    /// By node: the other elements that share a corner with one of these, images of elements included.
     rings: Vec<Vec<u32>>,
 }
 
+/// Lines of symmetry, one bit each: those across x, and others.
+type Lines = u8;
+
+/// An element, or its image in some lines.
+type Imaged = (u32, Lines);
+
 impl Surroundings {
-    pub(super) fn new(mesh: &Mesh) -> Self {
+    pub(super) fn new(model: &Model) -> Self {
+        let mesh = &model.mesh;
         let corners = |e: u32| {
             let element = &mesh.elements[e as usize];
             &element[..element.family().corners()]
@@ -27,15 +38,23 @@ impl Surroundings {
                 .iter()
                 .for_each(|&node| stars[node as usize].push(e));
         }
-        let ring = |star: &Vec<u32>| {
-            let nodes = star.iter().flat_map(|e| corners(*e));
-            let mut ring: Vec<u32> = nodes.flat_map(|n| stars[*n as usize].clone()).collect();
+        let lines = lines_of_symmetry(model);
+        // of what meets at a node with its images, one of each is enough: all are there as often
+        let ring = |(node, star): (usize, &Vec<u32>)| {
+            let mut ring: Vec<Imaged> = Vec::new();
+            for corner in star.iter().flat_map(|e| corners(*e)) {
+                let own = lines[*corner as usize];
+                for images in (0..=own).filter(|images| images & !own == 0) {
+                    let around = stars[*corner as usize].iter();
+                    ring.extend(around.map(|e| (*e, images & !lines[node])));
+                }
+            }
             ring.sort_unstable();
             ring.dedup();
-            ring.retain(|e| !star.contains(e));
-            ring
+            ring.retain(|(e, images)| *images != 0 || !star.contains(e));
+            ring.into_iter().map(|(e, _)| e).collect()
         };
-        let rings = stars.iter().map(ring).collect();
+        let rings = stars.iter().enumerate().map(ring).collect();
         Surroundings { stars, rings }
     }
 
@@ -73,5 +92,91 @@ impl Surroundings {
             near.for_each(|e| away[*e as usize] = false);
         }
         away
+    }
+}
+
+/// By node, the lines of symmetry through it: straight sides whose nodes do not move across them, and move along them freely.
+fn lines_of_symmetry(model: &Model) -> Vec<Lines> {
+    let mut lines = vec![0; model.mesh.nodes.len()];
+    for side in model.mesh.surface() {
+        let normals = edge_normals(&model.mesh.edge_nodes(&side));
+        let held = |node: u32, normal: [f64; 2]| {
+            let held = model.fixed.get(&node);
+            held.is_some_and(|held| held.along(normal) == Some(0.0))
+        };
+        let free_along = matches!(model.fixed.get(&side[2]), Some(Held::Along { .. }));
+        let across_x = normals[2][0].abs() > normals[2][1].abs();
+        // around an axis the body goes on in a circle
+        let mirrors = free_along && !(across_x && model.section.axisymmetric());
+        if mirrors && side.iter().zip(normals).all(|(node, n)| held(*node, n)) {
+            let line = if across_x { 1 } else { 2 };
+            side.iter().for_each(|node| lines[*node as usize] |= line);
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn surroundings(x: &[i32], y: &[i32], supports: &serde_json::Value) -> (Model, Surroundings) {
+        let problem = serde_json::json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {"grid": {"x": x, "y": y}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "supports": supports,
+            "contacts": [],
+        });
+        let problem = serde_json::from_value(problem).unwrap();
+        let model = Model::new(&problem, None).unwrap();
+        let surroundings = Surroundings::new(&model);
+        (model, surroundings)
+    }
+
+    /// Errors that are the same on all sides of two lines of symmetry stand out alike in a quarter, a half and the whole of a
+    /// body, wherever they are largest; and a clamped side is no line of symmetry.
+    #[test]
+    fn parts_of_a_symmetric_body_judge_as_the_whole() {
+        let (half, whole) = ([0, 1, 2, 3, 4], [-4, -3, -2, -1, 0, 1, 2, 3, 4]);
+        let left = serde_json::json!({"boundary": "left", "ux": 0});
+        let bottom = serde_json::json!({"boundary": "bottom", "uy": 0});
+        let clamped = serde_json::json!({"boundary": "top", "ux": 0, "uy": 0});
+        let bodies = [
+            surroundings(&half, &half, &serde_json::json!([left, bottom, clamped])),
+            surroundings(&whole, &half, &serde_json::json!([bottom, clamped])),
+            surroundings(&half, &whole, &serde_json::json!([left, clamped])),
+            surroundings(&whole, &whole, &serde_json::json!([clamped])),
+        ];
+        let centre = |model: &Model, e: usize| {
+            let corners = model.mesh.elements[e][..4].iter();
+            let sum = corners.fold([0.0; 2], |[a, b], node| {
+                let [x, y] = model.mesh.nodes[*node as usize];
+                [a + x, b + y]
+            });
+            sum.map(|x| 0.25 * x)
+        };
+        for largest in 0..16 {
+            let at = centre(&bodies[0].0, largest);
+            let part = |(model, surroundings): &(Model, Surroundings)| {
+                let count = model.mesh.elements.len();
+                let errors = (0..count).map(|e| {
+                    let [x, y] = centre(model, e).map(f64::abs);
+                    let distance = (x - at[0]).hypot(y - at[1]);
+                    1e-3 * (1.0 + x + 7.0 * y) + (-2.0 * distance).exp()
+                });
+                let out = surroundings.standing_out(&errors.collect::<Vec<_>>());
+                let quarter = (0..count).filter(|e| centre(model, *e).iter().all(|x| *x > 0.0));
+                quarter.map(|e| out[e]).collect::<Vec<f64>>()
+            };
+            let whole = part(&bodies[3]);
+            assert!(whole.iter().any(|part| *part > 0.1), "{whole:?}");
+            for body in &bodies[..3] {
+                let off = part(body).into_iter().zip(&whole).map(|(a, b)| (a - b).abs());
+                let most = off.fold(0.0, f64::max);
+                assert!(most < 1e-12, "{largest}: {most}");
+            }
+        }
     }
 }
