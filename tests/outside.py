@@ -64,6 +64,26 @@ def long_contact(elements):
     }
 
 
+def many_contacts(count, steps=1):
+    """A strip with so many contacts in a row on its top, pressed in load steps: few bytes, and many numbers."""
+    contact = lambda i: {
+        "boundary": "c%d" % i, "obstacle": {"kind": "flat"}, "indentation": 0.01,
+        "friction": {"coefficient": 0.3, "nonlocal_radius": 2 / count, "elastic_slip": 1e-4},
+    }
+    part = lambda i: {"side": "top", "x": [i / count - 1e-9, (i + 0.5) / count + 1e-9]}
+    return {
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {
+            "grid": {"x": [i / (2 * count) for i in range(2 * count + 1)], "y": [0, 0.3, 0.6, 1]},
+            "boundaries": {"c%d" % i: part(i) for i in range(count)},
+        },
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
+        "contacts": [contact(i) for i in range(count)],
+        "steps": [{"indentation": (i + 1) / steps, "increments": 1} for i in range(steps)] if steps > 1 else [],
+    }
+
+
 def submission(problem, **envelope):
     """The body of a submission. No job is answered from the cache, so that every counted job has run."""
     return json.dumps({"cache": "off", **envelope, "problem": problem}).encode()

@@ -12,7 +12,9 @@ use crate::elasticity::{
     self, Axes, Dof, DofMap, ElementStiffness, ElementTables, Elements, Loads, Section,
 };
 use crate::error::SolveError;
-use crate::linear::{Breaks, Cells, Dense, Dissection, ElementMatrix, Factor, FactorError, Fronts};
+use crate::linear::{
+    Breaks, Cells, Dense, Dissection, ElementMatrix, Factor, FactorError, Fronts, Stopped,
+};
 use crate::mesh::Mesh;
 use crate::model::{Alone, Held, Level, Model};
 use crate::solution::{Observer, Phase, Progress};
@@ -409,6 +411,12 @@ fn solve_error(error: FactorError, map: &DofMap) -> SolveError {
         },
         FactorError::TooLarge { bytes } => SolveError::ResourceExhausted { bytes },
         FactorError::Stopped => SolveError::Stopped,
+    }
+}
+
+impl From<Stopped> for SolveError {
+    fn from(_: Stopped) -> Self {
+        SolveError::Stopped
     }
 }
 

@@ -70,8 +70,9 @@ use verify::Verification;
 
 /// Solves a problem: the whole flow on one screen.
 ///
-/// `observe` is called with every phase and iteration and may stop the solution: the result is then the
-/// last state as `Outcome::Canceled`, or `SolveError::Stopped` if there is none yet.
+/// `observe` is called with every phase and iteration, and again and again in long work, and may stop the solution: the
+/// result is then the last state as `Outcome::Canceled`, or `SolveError::Stopped` if there is none yet or its stresses and
+/// profiles are much work.
 pub fn solve(problem: &Problem, observe: &mut Observer<'_>) -> Result<Solution, SolveError> {
     solve_on(problem, None, observe)
 }

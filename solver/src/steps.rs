@@ -119,10 +119,10 @@ fn run_steps<'a>(
         }
         let _ = observe(Progress::Phase(Phase::Iterate));
         let (finished, rows) = load_history.step(number as u32, step, observe);
-        // a stopped solution is reported too: the answer of the observer no longer matters
+        // a stopped solution is reported too, if that is little work
         let _ = observe(Progress::Phase(Phase::Recover));
         load_history.system.threads = body.threads(observe);
-        let reported = report(model, body, &load_history.system, &finished)?;
+        let reported = report(model, body, &load_history.system, &finished, observe)?;
         let outcome = reported.summary.outcome;
         let last = number + 1 == steps.len() || !can_continue(outcome);
         let assessed = last && !model.contacts.is_empty();
@@ -305,7 +305,7 @@ pub fn run_to_numbers(
     if finished.outcome == Outcome::Canceled {
         return Err(SolveError::Stopped);
     }
-    let (contacts, warnings) = algorithm::numbers(model, &load_history.system, &finished);
+    let (contacts, warnings) = algorithm::numbers(model, &load_history.system, &finished, observe)?;
     let others_begin = finished.outcome == Outcome::Converged && model.steps.is_empty();
     let left = others_begin.then(|| End {
         finished: Finished {
@@ -371,7 +371,7 @@ pub fn run_to_compare(
             match load_history.follow(&steps_of(model), observe) {
                 Some(finished) if finished.outcome != Outcome::Canceled => {
                     load_history.system.threads = body.threads(observe);
-                    let reported = report(model, body, &load_history.system, &finished)?;
+                    let reported = report(model, body, &load_history.system, &finished, observe)?;
                     Ok((reported, load_history))
                 }
                 _ => Err(SolveError::Stopped),
@@ -414,7 +414,7 @@ fn again_in<'a>(
         let (finished, _) = second.step(number as u32, step, quiet);
         again.forces.push(EndForces::new(&second.system, &finished));
         if number + 1 == steps.len() && finished.outcome == Outcome::Converged {
-            again.quantities = algorithm::quantities(&second.system, &finished);
+            again.quantities = algorithm::quantities(&second.system, &finished, quiet);
         }
         if !can_continue(finished.outcome) {
             break;
@@ -504,7 +504,8 @@ impl<'a> LoadHistory<'a> {
         let Some(finished) = finished.filter(|end| end.outcome != Outcome::Canceled) else {
             return Err(SolveError::Stopped);
         };
-        let (contacts, warnings) = algorithm::numbers(self.model, &self.system, &finished);
+        let (contacts, warnings) =
+            algorithm::numbers(self.model, &self.system, &finished, observe)?;
         Ok(Numbers {
             finished,
             contacts,

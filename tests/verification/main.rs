@@ -47,6 +47,7 @@ mod overlaps;
 mod pairs;
 mod patch;
 mod profiles;
+mod questions;
 mod random;
 mod record;
 mod refusals;

@@ -265,7 +265,8 @@ fn missed(problem: &Problem) -> Vec<Missed> {
     let (model, body) = (&prepared.model, &prepared.body);
     let system = System::new(model, body, &mut quiet).unwrap();
     let finished = algorithm::run(&system, &model.controls, Place::default(), None, &mut quiet);
-    report(model, body, &system, &finished).unwrap().missed
+    let reported = report(model, body, &system, &finished, &mut quiet);
+    reported.unwrap().missed
 }
 
 /// A ridge of height 0.01 on a flat face, between the nodes 0.05 apart: the body did not feel it, and nothing said so.

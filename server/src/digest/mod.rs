@@ -40,8 +40,13 @@ pub fn of_body(model: &Model) -> postcard::Result<Key> {
 }
 
 /// Fingerprint of a result: equal digests mean equal bits. Times, the program's version and what is said about the
-/// accuracy are not included. All numbers must be finite: others have no canonical form.
-pub fn digest(solution: &Solution, input_hash: &str) -> serde_json::Result<String> {
+/// accuracy are not included. All numbers must be finite: others have no canonical form. `go_on` is asked before
+/// every row and load step; `None` if it says no.
+pub fn digest(
+    solution: &Solution,
+    input_hash: &str,
+    go_on: &mut dyn FnMut() -> bool,
+) -> serde_json::Result<Option<String>> {
     let mut summary = serde_json::to_value(&solution.summary)?;
     summary["input_hash"] = json!(input_hash);
     if let Some(summary) = summary.as_object_mut() {
@@ -52,12 +57,18 @@ pub fn digest(solution: &Solution, input_hash: &str) -> serde_json::Result<Strin
     let mut hash = Hash::new();
     hash.text_of(r#"{"fields":"#);
     hash.fields(&solution.fields)?;
-    hash.text_of(r#","history":"#).json(&solution.history)?;
+    hash.text_of(r#","history":"#);
+    if !hash.array(&solution.history, go_on)? {
+        return Ok(None);
+    }
     hash.text_of(r#","profiles":"#).json(&solution.profiles)?;
-    hash.text_of(r#","steps":"#).json(&solution.steps)?;
+    hash.text_of(r#","steps":"#);
+    if !hash.array(&solution.steps, go_on)? {
+        return Ok(None);
+    }
     hash.text_of(r#","summary":"#).json(&summary)?;
     hash.text_of("}");
-    Ok(hash.finish())
+    Ok(Some(hash.finish()))
 }
 
 /// A finished hash in its text form.
@@ -126,6 +137,24 @@ impl Hash {
 
     fn json(&mut self, value: &impl Serialize) -> serde_json::Result<()> {
         serde_json_canonicalizer::to_writer(value, self)
+    }
+
+    /// An array, one value after the other; false if `go_on` says no before one.
+    fn array(
+        &mut self,
+        values: &[impl Serialize],
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> serde_json::Result<bool> {
+        self.text_of("[");
+        for (number, value) in values.iter().enumerate() {
+            if !go_on() {
+                return Ok(false);
+            }
+            self.text_of(if number == 0 { "" } else { "," })
+                .json(value)?;
+        }
+        self.text_of("]");
+        Ok(true)
     }
 
     /// A problem without its title. As of fields, the mesh is written by hand.
@@ -351,6 +380,10 @@ impl Write for Hash {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+
+    fn digest_of(solution: &Solution, input_hash: &str) -> serde_json::Result<String> {
+        Ok(digest(solution, input_hash, &mut || true)?.unwrap())
+    }
     use std::collections::BTreeMap;
 
     use crate::fake;
@@ -386,12 +419,12 @@ mod tests {
         let mut other = solution.clone();
         other.fields.ux[0] = f64::from_bits(other.fields.ux[0].to_bits() + 1);
         assert_ne!(
-            digest(&solution, "h").unwrap(),
-            digest(&other, "h").unwrap()
+            digest_of(&solution, "h").unwrap(),
+            digest_of(&other, "h").unwrap()
         );
         assert_ne!(
-            digest(&solution, "h").unwrap(),
-            digest(&solution, "i").unwrap()
+            digest_of(&solution, "h").unwrap(),
+            digest_of(&solution, "i").unwrap()
         );
     }
 
@@ -399,7 +432,7 @@ mod tests {
     fn a_number_without_a_canonical_form_has_no_digest() {
         let mut solution = fake::solution();
         solution.fields.uy[0] = f64::NAN;
-        assert!(digest(&solution, "h").is_err());
+        assert!(digest_of(&solution, "h").is_err());
     }
 
     #[test]
@@ -440,7 +473,7 @@ mod tests {
             .remove("accuracy");
         let mut whole = Hash::new();
         whole.json(&document).unwrap();
-        assert_eq!(digest(&solution, "h").unwrap(), whole.finish());
+        assert_eq!(digest_of(&solution, "h").unwrap(), whole.finish());
     }
 
     #[test]

@@ -205,9 +205,11 @@ pub(super) fn solve_and_store(
     let accuracy = document.summary.solution.accuracy.as_ref();
     let unverified = accuracy.and_then(|accuracy| accuracy.verified) == Some(false);
     let (ending, iterations) = (ending_of_solution(&document), document.history.len());
-    let parts = Parts::of(document).map_err(|_| SolveError::NonFinite {
+    let mut go_on = run::patient(|| tell(Told::Nothing));
+    let parts = Parts::of(document, &mut go_on).map_err(|_| SolveError::NonFinite {
         phase: Phase::Recover,
     })?;
+    let parts = parts.ok_or(SolveError::Stopped)?;
     Ok(Solved {
         ending,
         unverified,
@@ -333,19 +335,19 @@ impl Partials {
     fn next(&mut self, partial: &PartialSolution<'_>) -> Option<Report> {
         /// A result of this size is written in one transaction, which occupies the single writer for some 40 ms.
         const MOST_BYTES: usize = 4 << 20;
-        /// Its numbers rarely take less than a fourth of this when they are stored; a copy of them is made.
-        const MOST_COPIED_BYTES: usize = 16 << 20;
+        /// So many points take a tenth of a second to be written, in which nothing is asked.
+        const MOST_POINTS: usize = 20_000;
         let start = Instant::now();
         if self.next.is_none_or(|next| start < next) {
             return None;
         }
-        if partial.bytes() > MOST_COPIED_BYTES {
+        if partial.points() > MOST_POINTS {
             self.next = None;
             return None;
         }
         // numbers that are not finite, and so have no JSON, are reported at the end
         let document = partial.document().ok();
-        let parts = document.and_then(|document| Parts::of(document).ok());
+        let parts = document.and_then(|document| Parts::of(document, &mut || true).ok()?);
         self.next = match &parts {
             Some(parts) if parts.bytes() > MOST_BYTES => None,
             _ => Some(start + (start.elapsed() * self.part).max(self.pause)),

@@ -78,11 +78,12 @@ pub struct Summary {
 }
 
 impl Document {
-    /// A solution with what only its caller knows.
+    /// A solution with what only its caller knows; [`SolveError::Stopped`] if `go_on` says no.
     pub(super) fn new(
         problem: &Problem,
         solution: Solution,
         times: &Times,
+        go_on: &mut dyn FnMut() -> bool,
     ) -> Result<Document, SolveError> {
         let non_finite = SolveError::NonFinite {
             phase: solver::solution::Phase::Recover,
@@ -92,7 +93,8 @@ impl Document {
         }
         let non_finite = |_| non_finite.clone();
         let input_hash = digest::input_hash(problem).map_err(non_finite)?;
-        let digest = digest::digest(&solution, &input_hash).map_err(non_finite)?;
+        let digest = digest::digest(&solution, &input_hash, go_on).map_err(non_finite)?;
+        let digest = digest.ok_or(SolveError::Stopped)?;
         let Solution {
             summary,
             history,

@@ -5,17 +5,18 @@ mod document;
 pub mod members;
 mod stopwatch;
 
-use std::ops::ControlFlow;
+use std::{
+    collections::BTreeMap,
+    ops::ControlFlow,
+    time::{Duration, Instant},
+};
 
 use solver::{
     error::SolveError,
     finite::is_finite,
     mesh::External,
     problem::Problem,
-    solution::{
-        ContactSummary, Fields, Iteration, Observer, Outcome, Phase, Progress, Solution,
-        StepSolution, Warning,
-    },
+    solution::{Fields, Observer, Outcome, Phase, Progress, Solution, StepSolution, Warning},
 };
 
 use crate::event::TimedIteration;
@@ -67,6 +68,18 @@ pub enum Update<'a> {
     },
 }
 
+/// What a profile takes beside its points, in points.
+const OF_A_PROFILE: usize = 5;
+
+/// How long what a stopped job has left may take to be written: a worker is not to be held by what nobody waits for.
+const WRITING: Duration = Duration::from_millis(250);
+
+/// Goes on for [`WRITING`] after the first no.
+pub(crate) fn patient(mut asked: impl FnMut() -> ControlFlow<()>) -> impl FnMut() -> bool {
+    let mut stopped: Option<Instant> = None;
+    move || asked().is_continue() || stopped.get_or_insert_with(Instant::now).elapsed() < WRITING
+}
+
 /// The solution at the end of a load step that is not the last.
 #[derive(Debug)]
 pub struct PartialSolution<'a> {
@@ -78,36 +91,30 @@ pub struct PartialSolution<'a> {
 impl PartialSolution<'_> {
     /// As a document without fields. It costs as much as all that it holds: not for every one of many steps.
     pub fn document(&self) -> Result<Document, SolveError> {
-        Document::new(self.problem, self.solution.clone(), &self.times)
+        Document::new(
+            self.problem,
+            self.solution.clone(),
+            &self.times,
+            &mut || true,
+        )
     }
 
-    /// Bytes that its steps have in memory, so that it need not be made to know that it is large.
-    pub fn bytes(&self) -> usize {
-        let steps = self.solution.steps.iter();
-        steps.map(bytes_of_step).sum()
+    /// Points of all profiles of all load steps: the size of the document.
+    pub fn points(&self) -> usize {
+        let of_step = |step: &StepSolution| -> usize {
+            let profiles = [&step.profiles, &step.node_profiles, &step.friction_profiles];
+            let profiles = profiles.into_iter().flat_map(BTreeMap::values);
+            profiles.map(|profile| OF_A_PROFILE + profile.s.len()).sum()
+        };
+        self.solution.steps.iter().map(of_step).sum()
     }
-}
-
-/// Bytes that a step has in memory: columns, and what its summary says of each contact.
-fn bytes_of_step(step: &StepSolution) -> usize {
-    const COLUMNS: usize = 12;
-    let profiles = [&step.profiles, &step.node_profiles, &step.friction_profiles];
-    let profiles = profiles.iter().flat_map(|of_points| of_points.values());
-    let numbers: usize = profiles.map(|profile| COLUMNS * profile.s.len()).sum();
-    let warnings = step.summary.warnings.iter();
-    let words: usize = warnings
-        .map(|warning| size_of::<Warning>() + warning.message.len())
-        .sum();
-    let contacts = step.summary.contacts.len() * size_of::<ContactSummary>();
-    let rows = step.history.len() * size_of::<Iteration>();
-    numbers * size_of::<f64>() + words + contacts + rows
 }
 
 /// Solves `problem` by `solve`, notes when each iteration was done and measures the phases. `parse_s`: seconds that
 /// reading the problem took, the caller's own phase.
 ///
 /// `solve` is [`solver::solve_on`] for one problem on its own; problems that share a condensed body are each solved
-/// by [`solver::Prepared::solve_other`].
+/// by [`solver::Prepared::solve_other`]. What a stopped solution has left is given up if it is much.
 pub fn run(
     problem: &Problem,
     parse_s: f64,
@@ -176,14 +183,13 @@ pub fn run(
         // within half a second, and writing the fields of a large one takes longer.
         solution.fields = Fields::default();
     }
-    Document::new(problem, solution, &watch.times())
+    let mut go_on = patient(|| report(Update::Pulse));
+    Document::new(problem, solution, &watch.times(), &mut go_on)
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use std::time::Instant;
-
     use solver::problem::{AdaptiveRefine, Refine, Step};
 
     use super::*;

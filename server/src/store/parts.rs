@@ -98,10 +98,16 @@ struct StepPart<'a> {
 
 impl Parts {
     /// Divides a document into the parts that can be requested. What was divided is freed at once: both would take twice
-    /// as much.
-    pub fn of(document: Document) -> serde_json::Result<Parts> {
+    /// as much. `go_on` is asked after every load step; `None` if it says no.
+    pub fn of(
+        document: Document,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> serde_json::Result<Option<Parts>> {
         let mut parts = vec![];
         parts.push(Part::of_value("summary".into(), &document.summary)?);
+        if !go_on() {
+            return Ok(None);
+        }
         parts.push(Part::of_value("history".into(), &document.history)?);
         drop(document.history);
         // the iterations of a step are part of the history; its profiles are requested one by one
@@ -118,6 +124,9 @@ impl Parts {
             })
         };
         for (number, step) in document.steps.into_iter().enumerate() {
+            if !go_on() {
+                return Ok(None);
+            }
             let step_number = Some(number);
             add_all(ProfilePoints::All, step_number, step.profiles)?;
             add_all(ProfilePoints::Nodes, step_number, step.node_profiles)?;
@@ -129,7 +138,7 @@ impl Parts {
         if !document.fields.x.is_empty() {
             parts.push(Part::of_fields(&document.fields, &document.law)?);
         }
-        Ok(Parts(parts))
+        Ok(Some(Parts(parts)))
     }
 
     /// One after the other, for another process.

@@ -193,6 +193,10 @@ fn scale_of(quantity: &Quantity, all: &[Quantity]) -> f64 {
     scale(quantity.name, quantity.value, own, quantity.images)
 }
 
+/// What one element, and one place between nodes, takes for each quantity, in multiplications.
+const WORK_OF_AN_ELEMENT: usize = 100;
+const WORK_OF_A_PLACE: usize = 30;
+
 /// The bounds of the errors of all quantities; none if the linearised problem has no unique solution, or the observer
 /// stops.
 fn bounds(
@@ -216,6 +220,9 @@ fn bounds(
     let smoothing = smoothing_of_reactions(system, finished);
     let surroundings = Surroundings::new(model);
     let away = surroundings.away_from(touching(system, finished));
+    let mut go_on = || observe(Progress::Pulse);
+    let breaks = &mut Breaks::new(&mut go_on);
+    let work = WORK_OF_AN_ELEMENT * away.len() + WORK_OF_A_PLACE * 3 * system.nodes.len();
     let mut bounds = Vec::with_capacity(quantities.len());
     for quantity in quantities {
         let mut parts = Parts {
@@ -230,6 +237,7 @@ fn bounds(
         let mut added = Added::default();
         if let Some(gradient) = &quantity.gradient {
             let (z, errors) = duals.next()?;
+            breaks.after((z.len().pow(2) + work) as f64).ok()?;
             let force = system.stiffness.times(z);
             let moved = gradient.reaction.iter().zip(&smoothing);
             parts.signed = quantity.factor * errors.iter().sum::<f64>();

@@ -173,7 +173,10 @@ mod tests {
             let whole = part(&bodies[3]);
             assert!(whole.iter().any(|part| *part > 0.1), "{whole:?}");
             for body in &bodies[..3] {
-                let off = part(body).into_iter().zip(&whole).map(|(a, b)| (a - b).abs());
+                let off = part(body)
+                    .into_iter()
+                    .zip(&whole)
+                    .map(|(a, b)| (a - b).abs());
                 let most = off.fold(0.0, f64::max);
                 assert!(most < 1e-12, "{largest}: {most}");
             }

@@ -14,7 +14,8 @@ use crate::algorithm::factors::{dense, free_dofs};
 use crate::algorithm::newton::jacobian;
 use crate::algorithm::system::{Point, State, System};
 use crate::elasticity::Dof;
-use crate::solution::Observer;
+use crate::linear::Breaks;
+use crate::solution::{Observer, Progress};
 
 /// The derivatives of a quantity.
 #[derive(Clone, Debug)]
@@ -75,6 +76,9 @@ impl Gradient {
     }
 }
 
+/// What the law at one friction point takes, in multiplications.
+const WORK_OF_A_POINT: usize = 100;
+
 /// z of every quantity, on the contact unknowns: dJ = z · δf̂. None if the linearised problem has no unique solution,
 /// or the observer stops.
 pub fn influences(
@@ -90,6 +94,8 @@ pub fn influences(
     let bound = system.friction_bound(&pressures);
     let mut rhs = Vec::with_capacity(free.len() * gradients.len());
     let mut fixed = Vec::new();
+    let mut go_on = || observe(Progress::Pulse);
+    let breaks = &mut Breaks::new(&mut go_on);
     for gradient in gradients {
         let mut z = vec![0.0; system.load.len()];
         for (i, node) in system.nodes.iter().enumerate() {
@@ -101,6 +107,8 @@ pub fn influences(
             }
         }
         let reflected = system.stiffness.times(&z);
+        let columns = z.iter().filter(|z| **z != 0.0).count().max(1);
+        breaks.after((columns * z.len()) as f64).ok()?;
         rhs.extend(
             free.iter()
                 .map(|&dof| gradient.displacement[dof] - reflected[dof]),
@@ -110,15 +118,20 @@ pub fn influences(
     let solved = dense(free.len(), observe, |breaks| {
         let known = (&bound[..], &pressures[..]);
         let mut h = jacobian(system, state, known, &free, &place, 0.0, breaks)?;
-        h.transpose();
+        h.transpose(breaks)?;
         h.solve(&rhs, breaks)
     })?;
     let mut influences = fixed;
+    let mut go_on = || observe(Progress::Pulse);
+    let breaks = &mut Breaks::new(&mut go_on);
     for (k, z) in influences.iter_mut().enumerate() {
         let own = &solved[k * free.len()..(k + 1) * free.len()];
         free.iter()
             .zip(own)
             .for_each(|(&dof, value)| z[dof] = *value);
+        breaks
+            .after((z.len() + WORK_OF_A_POINT * system.points.len()) as f64)
+            .ok()?;
         // friction follows the reactions: −Bᵀ z_F
         for point in &system.points {
             let law = system.law(point);
@@ -156,7 +169,7 @@ mod tests {
         let finished = run(system, controls, Place::default(), None, quiet);
         // small forces that are none of the model's loads are missing in the balance of the result
         assert_eq!(finished.outcome, crate::solution::Outcome::Converged);
-        let reported = report(system.model, system.body, system, &finished).unwrap();
+        let reported = report(system.model, system.body, system, &finished, quiet).unwrap();
         (finished.state, reported.quantities)
     }
 

@@ -1,6 +1,8 @@
 //! From a final state to a [`Solution`]: forces, extents, profiles, fields and warnings.
 
+use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 
 use crate::algorithm::finished::Finished;
 use crate::algorithm::large_slip::warn_of_large_slip;
@@ -10,10 +12,11 @@ use crate::algorithm::system::System;
 use crate::body::ElasticBody;
 use crate::elasticity::{Dof, Recovered, StressDifference, recover};
 use crate::error::SolveError;
+use crate::linear::{Breaks, Stopped};
 use crate::model::{Hold, Model};
 use crate::solution::{
-    ContactProfile, ContactSummary, Fields, GaussFields, NodeState, Outcome, Phase, Residuals,
-    Summary, Warning, WarningCode, at_all_points,
+    ContactProfile, ContactSummary, Fields, GaussFields, NodeState, Observer, Outcome, Phase,
+    Progress, Residuals, Summary, Warning, WarningCode, at_all_points,
 };
 
 /// Forces with a larger imbalance than this have lost half of their digits: the result is not reliable.
@@ -26,6 +29,10 @@ const OUT_OF_BALANCE_INCOMPRESSIBLE: f64 = 1e-6;
 /// Forces count as more than rounding when they exceed this part of modulus × displacement × depth, and of the problem's
 /// own force: what is at rest again may have borne that.
 const FORCE_FLOOR: f64 = 1e-6;
+
+/// How often the observer is asked on after it has said to stop, until a state is given up: a stopped solution has its last
+/// state if that is little work, and otherwise none.
+const PATIENCE: u32 = 6;
 
 /// q above which the sweeps barely contract.
 const SLOW_CONTRACTION: f64 = 0.9;
@@ -56,39 +63,101 @@ pub fn numbers(
     model: &Model,
     system: &System<'_>,
     finished: &Finished,
-) -> (BTreeMap<String, ContactSummary>, Vec<Warning>) {
+    observe: &mut Observer<'_>,
+) -> Result<(BTreeMap<String, ContactSummary>, Vec<Warning>), SolveError> {
     let forces = Forces::new(system, finished);
+    let mut ask = || observe(Progress::Pulse);
+    let questions = Questions::new(&mut ask);
+    let go_on = &|work: f64| questions.after(work).is_ok();
     let mut warnings = model.warnings.clone();
     let mut contacts = BTreeMap::new();
     for (p, patch) in system.patches.iter().enumerate() {
-        let view = PatchView::new(system, p, finished, &forces);
+        questions.after(work_of_contact(system))?;
+        let view = PatchView::new(system, p, finished, &forces, go_on);
         view.warn(&mut warnings);
         contacts.insert(patch.contact.name.clone(), view.summary());
     }
+    questions.after(0.0)?;
     warn_of_iteration(finished, &mut warnings);
     warn_of_rounding(model, finished, &mut warnings);
     if finished.slide.is_none() {
         let v = &finished.state.v;
         warn_of_large_slip(system, v, &forces.reactions, &mut warnings);
     }
-    (contacts, warnings)
+    Ok((contacts, warnings))
 }
 
-/// The forces, peaks and extents of a final state, without the displacements of the whole body.
-pub fn quantities(system: &System<'_>, finished: &Finished) -> Vec<Quantity> {
+/// The forces, peaks and extents of a final state, without the displacements of the whole body; none if the observer stops.
+pub fn quantities(
+    system: &System<'_>,
+    finished: &Finished,
+    observe: &mut Observer<'_>,
+) -> Vec<Quantity> {
     let forces = Forces::new(system, finished);
-    let views = (0..system.patches.len())
-        .map(|p| PatchView::new(system, p, finished, &forces).quantities());
-    views.flatten().collect()
+    let mut ask = || observe(Progress::Pulse);
+    let questions = Questions::new(&mut ask);
+    let go_on = &|work: f64| questions.after(work).is_ok();
+    let mut found = Vec::new();
+    for p in 0..system.patches.len() {
+        let view = PatchView::new(system, p, finished, &forces, go_on);
+        found.extend(view.quantities());
+        if questions.after(work_of_contact(system)).is_err() {
+            return Vec::new();
+        }
+    }
+    found
 }
 
-/// The results of a final state: forces, extents, profiles, fields and warnings.
+/// [`Breaks`] for many who look at one state, and who are not stopped themselves: what they find then is not used.
+struct Questions<'a> {
+    breaks: RefCell<Breaks<'a>>,
+    stopped: Cell<bool>,
+}
+
+impl<'a> Questions<'a> {
+    fn new(ask: &'a mut dyn FnMut() -> ControlFlow<()>) -> Self {
+        Questions {
+            breaks: RefCell::new(Breaks::new(ask)),
+            stopped: Cell::new(false),
+        }
+    }
+
+    /// As [`Breaks::after`]; after one stop always that.
+    fn after(&self, work: f64) -> Result<(), Stopped> {
+        if self.stopped.get() || self.breaks.borrow_mut().after(work).is_err() {
+            self.stopped.set(true);
+            return Err(Stopped);
+        }
+        Ok(())
+    }
+}
+
+/// What one contact takes beside its averages, in multiplications.
+fn work_of_contact(system: &System<'_>) -> f64 {
+    /// For every node and friction point of all contacts.
+    const WORK: usize = 100;
+    (WORK * (system.nodes.len() + system.points.len())) as f64
+}
+
+/// The results of a final state: forces, extents, profiles, fields and warnings. [`SolveError::Stopped`] if the observer
+/// stops, and goes on to for a while.
 pub fn report(
     model: &Model,
     body: &ElasticBody,
     system: &System<'_>,
     finished: &Finished,
+    observe: &mut Observer<'_>,
 ) -> Result<Reported, SolveError> {
+    let mut patience = PATIENCE;
+    let mut ask = || match observe(Progress::Pulse) {
+        ControlFlow::Break(()) if patience > 0 => {
+            patience -= 1;
+            ControlFlow::Continue(())
+        }
+        answer => answer,
+    };
+    let questions = Questions::new(&mut ask);
+    let go_on = &|work: f64| questions.after(work).is_ok();
     let v = &finished.state.v;
     if system.semidefinite && finished.outcome != Outcome::Canceled {
         held(model, system, finished)?;
@@ -97,9 +166,14 @@ pub fn report(
     let contact_force = contact_force(system, finished, &forces);
     let displacements = body.displacements_on(system.threads, v, &system.level);
     let elements = body.elements(model);
-    let recovered = recover(elements, &displacements, model.body_force(&system.level));
-    let difference = StressDifference::new(elements, &recovered);
-    let errors = difference.norms(elements);
+    let body_force = model.body_force(&system.level);
+    let (recovered, difference, errors) = {
+        let breaks = &mut *questions.breaks.borrow_mut();
+        let recovered = recover(elements, &displacements, body_force, breaks)?;
+        let difference = StressDifference::new(elements, &recovered, breaks)?;
+        let errors = difference.norms(elements, breaks)?;
+        (recovered, difference, errors)
+    };
     let (mut quantities, mut missed) = (Vec::new(), Vec::new());
     let circumference = system.circumference;
 
@@ -108,7 +182,8 @@ pub fn report(
     let (mut contacts, mut profiles) = (BTreeMap::new(), BTreeMap::new());
     let (mut node_profiles, mut friction_profiles) = (BTreeMap::new(), BTreeMap::new());
     for (p, patch) in system.patches.iter().enumerate() {
-        let view = PatchView::new(system, p, finished, &forces);
+        questions.after(work_of_contact(system))?;
+        let view = PatchView::new(system, p, finished, &forces, go_on);
         let summary = view.summary();
         view.warn(&mut warnings);
         quantities.extend(view.quantities());
@@ -129,6 +204,7 @@ pub fn report(
         friction_profiles.insert(name.clone(), friction);
         contacts.insert(name.clone(), summary);
     }
+    questions.after(0.0)?;
     warn_of_iteration(finished, &mut warnings);
     warn_of_rounding(model, finished, &mut warnings);
     // how far a body that slides away has come means nothing

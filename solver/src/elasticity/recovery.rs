@@ -53,7 +53,8 @@ pub fn recover(
     elements: Elements<'_>,
     displacements: &[[f64; 2]],
     body_force: [f64; 2],
-) -> Recovered {
+    breaks: &mut Breaks<'_>,
+) -> Result<Recovered, Stopped> {
     let Elements { mesh, section, .. } = elements;
     let quadrature = elements.tables.quadrature;
     let points = mesh
@@ -74,32 +75,36 @@ pub fn recover(
     };
     let mut at_nodes = Vec::with_capacity(mesh.elements.len());
     let mut stations = elements.stations();
-    pulp::Arch::new().dispatch(|| {
-        for (e, element) in mesh.elements.iter().enumerate() {
-            let u = element.gather(|n| displacements[n as usize]);
-            let material = section.material_of(e);
-            if section.split(material).is_some() {
-                let body = (section, material);
-                let own = found.add_mixed(mesh, body, (element, &u), quadrature, body_force);
-                at_nodes.push(own);
-                continue;
+    for (k, some) in mesh.elements.chunks(ELEMENTS_PER_QUESTION).enumerate() {
+        pulp::Arch::new().dispatch(|| {
+            for (i, element) in some.iter().enumerate() {
+                let e = k * ELEMENTS_PER_QUESTION + i;
+                let u = element.gather(|n| displacements[n as usize]);
+                let material = section.material_of(e);
+                if section.split(material).is_some() {
+                    let body = (section, material);
+                    let own = found.add_mixed(mesh, body, (element, &u), quadrature, body_force);
+                    at_nodes.push(own);
+                    continue;
+                }
+                let stations = stations.of(e);
+                let (ux, uy) = (u.map(|u| u[0]), u.map(|u| u[1]));
+                let moduli = &section.materials()[material];
+                found.add(mesh, (element, stations), moduli, (&ux, &uy));
+                if section.has_split() {
+                    found.dilatation_gap.resize(found.points[0].len(), 0.0);
+                }
+                let mut stresses = [[0.0; COMPONENTS]; 4];
+                for (own, station) in stresses.iter_mut().zip(&stations.stress) {
+                    *own = stress(moduli, &station.strain(&ux, &uy));
+                }
+                at_nodes.push(stations.carried_to_nodes(&stresses));
             }
-            let stations = stations.of(e);
-            let (ux, uy) = (u.map(|u| u[0]), u.map(|u| u[1]));
-            let moduli = &section.materials()[material];
-            found.add(mesh, (element, stations), moduli, (&ux, &uy));
-            if section.has_split() {
-                found.dilatation_gap.resize(found.points[0].len(), 0.0);
-            }
-            let mut stresses = [[0.0; COMPONENTS]; 4];
-            for (own, station) in stresses.iter_mut().zip(&stations.stress) {
-                *own = stress(moduli, &station.strain(&ux, &uy));
-            }
-            at_nodes.push(stations.carried_to_nodes(&stresses));
-        }
-    });
+        });
+        breaks.after((WORK_OF_AN_ELEMENT * some.len()) as f64)?;
+    }
     found.average(mesh, section, &at_nodes);
-    found
+    Ok(found)
 }
 
 impl Recovered {
@@ -211,6 +216,9 @@ fn average(
 
 /// Elements between two questions whether to go on.
 pub(super) const ELEMENTS_PER_QUESTION: usize = 1 << 14;
+
+/// What the stresses of an element take, in multiplications.
+pub(super) const WORK_OF_AN_ELEMENT: usize = 3000;
 
 /// The components of a stress in each of several fields.
 pub(super) type Stresses<const FIELDS: usize> = [[f64; FIELDS]; COMPONENTS];

@@ -6,7 +6,9 @@
 use crate::elasticity::geometry::{Elements, Stations};
 use crate::elasticity::material::{COMPONENTS, Moduli, inverse, stress};
 use crate::elasticity::mixed::{Mixed, OfNodes, dilatation};
-use crate::elasticity::recovery::{ELEMENTS_PER_QUESTION, Stresses, recover_nodal_stresses};
+use crate::elasticity::recovery::{
+    ELEMENTS_PER_QUESTION, Stresses, WORK_OF_AN_ELEMENT, recover_nodal_stresses,
+};
 use crate::elasticity::{Recovered, Section};
 use crate::element::{AtNodes, Element, Family, GaussPoint};
 use crate::linear::{Breaks, Stopped};
@@ -20,7 +22,11 @@ pub struct StressDifference {
 
 impl StressDifference {
     /// That of what was recovered of the same elements.
-    pub fn new(elements: Elements<'_>, recovered: &Recovered) -> Self {
+    pub fn new(
+        elements: Elements<'_>,
+        recovered: &Recovered,
+        breaks: &mut Breaks<'_>,
+    ) -> Result<Self, Stopped> {
         let (mesh, quadrature) = (elements.mesh, elements.tables.quadrature);
         let mut differences = Vec::with_capacity(recovered.points[0].len());
         let shapes = [Family::Quad, Family::Triangle].map(|family| {
@@ -29,19 +35,22 @@ impl StressDifference {
                 .map(|point| family.shape(point.place))
                 .collect::<Vec<_>>()
         });
-        pulp::Arch::new().dispatch(|| {
-            for (e, element) in mesh.elements.iter().enumerate() {
-                let smooth = recovered.at_nodes_of(e, element);
-                for shape in &shapes[element.family() as usize] {
-                    let own = recovered.at_point(differences.len());
-                    differences.push(difference(shape, &smooth, &own));
+        for (k, some) in mesh.elements.chunks(ELEMENTS_PER_QUESTION).enumerate() {
+            pulp::Arch::new().dispatch(|| {
+                for (i, element) in some.iter().enumerate() {
+                    let smooth = recovered.at_nodes_of(k * ELEMENTS_PER_QUESTION + i, element);
+                    for shape in &shapes[element.family() as usize] {
+                        let own = recovered.at_point(differences.len());
+                        differences.push(difference(shape, &smooth, &own));
+                    }
                 }
-            }
-        });
-        StressDifference {
+            });
+            breaks.after((WORK_OF_AN_ELEMENT * some.len()) as f64)?;
+        }
+        Ok(StressDifference {
             stress: differences,
             dilatation_gap: recovered.dilatation_gap.clone(),
-        }
+        })
     }
 
     /// ∫ (σ* − σ) : C⁻¹ (σ* − σ)′ of every element, with the difference of another field (force × length, without 2π).
@@ -50,8 +59,13 @@ impl StressDifference {
     /// of both fields have in common is more: with g = θ̄ − div u and t = tr C⁻¹ (σ* − σ),
     ///
     ///   … + κ (g t′ + t g′) − κ (1 − κ mᵀC⁻¹m) g g′
-    pub fn products(&self, elements: Elements<'_>, other: &StressDifference) -> Vec<f64> {
-        integrate(elements, self.points().zip(other.points()))
+    pub fn products(
+        &self,
+        elements: Elements<'_>,
+        other: &StressDifference,
+        breaks: &mut Breaks<'_>,
+    ) -> Result<Vec<f64>, Stopped> {
+        integrate(elements, self.points().zip(other.points()), breaks)
     }
 
     /// The difference at every integration point.
@@ -127,12 +141,16 @@ impl StressDifference {
     }
 
     /// The norm of the difference in every element ((force × length)^½, without 2π).
-    pub fn norms(&self, elements: Elements<'_>) -> Vec<f64> {
+    pub fn norms(
+        &self,
+        elements: Elements<'_>,
+        breaks: &mut Breaks<'_>,
+    ) -> Result<Vec<f64>, Stopped> {
         let stress = self.points().map(|point| Difference { gap: 0.0, ..point });
         let pairs = stress.map(|point| (point, point));
-        let squares = integrate(elements, pairs);
+        let squares = integrate(elements, pairs, breaks)?;
         let norm = |square: f64| square.max(0.0).sqrt();
-        squares.into_iter().map(norm).collect()
+        Ok(squares.into_iter().map(norm).collect())
     }
 }
 
@@ -218,17 +236,19 @@ impl InCommon {
 fn integrate(
     elements: Elements<'_>,
     mut pairs: impl Iterator<Item = (Difference, Difference)>,
-) -> Vec<f64> {
+    breaks: &mut Breaks<'_>,
+) -> Result<Vec<f64>, Stopped> {
     let Elements { mesh, section, .. } = elements;
     let weights = weights(section);
     let mut stations = elements.stations();
     let product = |e: usize| {
         let weights = &weights[section.material_of(e)];
+        breaks.after(WORK_OF_AN_ELEMENT as f64)?;
         let mut sum = 0.0;
         for (station, (own, other)) in stations.of(e).rule.iter().zip(&mut pairs) {
             sum += station.weight * weights.density(&own, &other);
         }
-        sum
+        Ok(sum)
     };
     (0..mesh.elements.len()).map(product).collect()
 }
@@ -353,17 +373,21 @@ mod tests {
                     .map(|n| [at(n, 0), at(n, 1)])
                     .collect()
             };
-            let difference =
-                |u: &[[f64; 2]]| StressDifference::new(elements, &recover(elements, u, [0.0; 2]));
-            let own = difference(&field(0));
+            let go_on = &mut || ControlFlow::Continue(());
+            let breaks = &mut Breaks::new(go_on);
+            let difference = |u: &[[f64; 2]], breaks: &mut Breaks<'_>| {
+                let recovered = recover(elements, u, [0.0; 2], breaks).unwrap();
+                StressDifference::new(elements, &recovered, breaks).unwrap()
+            };
+            let own = difference(&field(0), breaks);
             let fields: Vec<_> = (1..=5).map(field).collect();
             let together: Vec<[[f64; 5]; 2]> = (0..mesh.nodes.len())
                 .map(|n| [0, 1].map(|a| std::array::from_fn(|k| fields[k][n][a])))
                 .collect();
-            let go_on = &mut || ControlFlow::Continue(());
-            let found = own.products_with_fields(elements, &together, &mut Breaks::new(go_on));
+            let found = own.products_with_fields(elements, &together, breaks);
             for (found, u) in found.unwrap().iter().zip(&fields) {
-                let expected = own.products(elements, &difference(u));
+                let other = difference(u, breaks);
+                let expected = own.products(elements, &other, breaks).unwrap();
                 let size: f64 = expected.iter().map(|p| p.abs()).sum();
                 for (a, b) in found.iter().zip(&expected) {
                     assert!((a - b).abs() <= 1e-12 * size, "{kind}: {a} for {b}");

@@ -47,7 +47,15 @@ impl Source {
         }
     }
 
-    /// The same with nodes numbered from `first` on.
+    /// Pressures that it is made of.
+    pub fn weight_count(&self) -> usize {
+        match self {
+            Source::Average(row) => row.weights.len(),
+            Source::Given(_) => 0,
+        }
+    }
+
+    /// With nodes numbered from `first` on.
     pub fn shifted(mut self, first: usize) -> Self {
         // rows are shared with the operator: those of the first contact stay so
         if let Source::Average(row) = &mut self

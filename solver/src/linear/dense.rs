@@ -67,7 +67,7 @@ impl Dense {
         Ok(())
     }
 
-    /// A v.
+    /// A v; where blocks of v are zero it takes as much less time.
     pub fn times(&self, v: &[f64]) -> Vec<f64> {
         let mut product = vec![0.0; self.size];
         pulp::Arch::new().dispatch(|| add_columns(&self.values, v, &mut product));
@@ -84,6 +84,7 @@ fn add_columns(columns: &[f64], v: &[f64], sum: &mut [f64]) {
     let n = sum.len();
     for (columns, v) in columns.chunks(TOGETHER * n.max(1)).zip(v.chunks(TOGETHER)) {
         match <[f64; TOGETHER]>::try_from(v) {
+            Ok(v) if v == [0.0; TOGETHER] => {}
             Ok(v) => {
                 let column: [&[f64]; TOGETHER] =
                     std::array::from_fn(|j| &columns[j * n..(j + 1) * n]);
@@ -212,12 +213,16 @@ impl General {
     }
 
     /// Exchanges rows and columns.
-    pub fn transpose(&mut self) {
+    pub fn transpose(&mut self, breaks: &mut Breaks<'_>) -> Result<(), Stopped> {
+        /// A number that is read across the columns takes as long as so many multiplications.
+        const ACROSS: usize = 8;
         for j in 0..self.size {
             for i in 0..j {
                 self.values.swap(j * self.size + i, i * self.size + j);
             }
+            breaks.after((ACROSS * j) as f64)?;
         }
+        Ok(())
     }
 
     /// Solves A x = b for one b, or for several, one after the other; the factors take the place of A.

@@ -22,6 +22,9 @@ use crate::friction::largest_pressure;
 use crate::problem::{Condition, FrictionPoints};
 use crate::solution::{ContactProfile, NodeState};
 
+/// What one weight of an average takes, in multiplications.
+const WORK_OF_A_WEIGHT: usize = 500;
+
 /// One contact in the final state.
 pub(super) struct PatchView<'a> {
     system: &'a System<'a>,
@@ -40,6 +43,8 @@ pub(super) struct PatchView<'a> {
     anchors: Vec<[f64; 3]>,
     /// Where materials meet in the contact, once that is known.
     worst_junction: OnceCell<Option<Junction>>,
+    /// Told what work was done (multiplications); false: nobody needs the rest, which may be anything.
+    go_on: &'a dyn Fn(f64) -> bool,
     /// σ_t likewise, if it does not follow from the law: in the thesis's own iteration and in bonded contacts.
     tractions: Option<Vec<[f64; 3]>>,
 }
@@ -80,6 +85,7 @@ impl<'a> PatchView<'a> {
         p: usize,
         finished: &'a Finished,
         forces: &'a Forces,
+        go_on: &'a dyn Fn(f64) -> bool,
     ) -> Self {
         let patch = &system.patches[p];
         let mut view = PatchView {
@@ -100,6 +106,7 @@ impl<'a> PatchView<'a> {
             pressed: None,
             anchors: Vec::new(),
             worst_junction: OnceCell::new(),
+            go_on,
             tractions: None,
         };
         view.pressed = view.pressed();
@@ -227,7 +234,12 @@ impl<'a> PatchView<'a> {
         {
             return (0.0, 0.0);
         }
+        // a wide average along a long contact takes long, and there are many places
+        if !(self.go_on)(0.0) {
+            return (0.0, 0.0);
+        }
         let source = law.bound.source(s);
+        (self.go_on)((WORK_OF_A_WEIGHT * source.weight_count()) as f64);
         let pressures = self.own_pressures();
         (
             source.nonlocal_pressure(pressures),
