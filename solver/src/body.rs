@@ -4,7 +4,7 @@
 //! contact and friction iteration runs on it; [`ElasticBody::displacements`] computes
 //! the whole field by one back-substitution. The factor is private to this module.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
@@ -56,6 +56,7 @@ pub struct Source<'a> {
     fixed: &'a BTreeMap<u32, Held>,
     loads: &'a Loads,
     alone: &'a Alone,
+    open_on_axis: &'a BTreeSet<u32>,
     /// Nodes and normals of each contact.
     contacts: Vec<(&'a [u32], &'a [[f64; 2]])>,
 }
@@ -71,6 +72,7 @@ impl<'a> Source<'a> {
             fixed: &model.fixed,
             loads: &model.loads,
             alone: &model.alone,
+            open_on_axis: &model.open_on_axis,
             contacts: boundaries
                 .map(|boundary| (&boundary.nodes[..], &boundary.normals[..]))
                 .collect(),
@@ -279,11 +281,15 @@ fn all_finite(values: &[f64]) -> bool {
     values.iter().all(|value| value.is_finite())
 }
 
-/// Normal unknowns of contact nodes on the axis, each with that of the midside node beside it, if both are free.
+/// Normal unknowns of contact nodes on the axis, each with that of the midside node beside it, if both are free; none of
+/// those that stay open.
 fn axis_ends(model: &Model, contact_dofs: &[[Dof; 2]]) -> Vec<[usize; 2]> {
     let (mut first, mut ends) = (0, Vec::new());
     for contact in &model.contacts {
-        for pair in model.axis.ends(&contact.boundary.positions) {
+        let nodes = &contact.boundary.nodes;
+        let closed = |[end, _]: &[usize; 2]| !model.open_on_axis.contains(&nodes[*end]);
+        let pairs = model.axis.ends(&contact.boundary.positions);
+        for pair in pairs.into_iter().filter(closed) {
             if let [Dof::Free(end), Dof::Free(beside)] = pair.map(|i| contact_dofs[first + i][0]) {
                 ends.push([end, beside]);
             }

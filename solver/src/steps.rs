@@ -30,7 +30,7 @@ pub fn run(
     mut origins: Option<&mut Origins>,
     observe: &mut Observer<'_>,
 ) -> Result<Solution, SolveError> {
-    if model.common_nodes().is_empty() {
+    if !has_uncertain_ends(model) {
         let load_history = LoadHistory::new(model, System::new(model, body, observe)?);
         let (solution, _) = run_steps(load_history, body, origins, observe)?;
         return Ok(solution);
@@ -42,7 +42,7 @@ pub fn run(
             if let Some(origins) = origins.as_deref_mut() {
                 origins.forget();
             }
-            // which contacts the nodes are of may change, and with it the solution
+            // which contacts the nodes are of may change, and which are open, and with it the solution
             let tentative: &mut Observer<'_> = &mut |progress| match progress {
                 Progress::Iteration(row) => observe(Progress::Tentative(row)),
                 Progress::Step(_) => observe(Progress::Pulse),
@@ -65,8 +65,14 @@ type SolveOn<'s, T> = dyn for<'a> FnMut(
     ) -> Result<(T, LoadHistory<'a>), SolveError>
     + 's;
 
+/// Whether the solution has to show which contact a common end of two is of, or whether an end on the axis stays open.
+fn has_uncertain_ends(model: &Model) -> bool {
+    !model.common_nodes().is_empty() || model.hollow_at_axis()
+}
+
 /// Solves with the common ends of contacts as the model has them, and again while the solution shows that they are of other
-/// contacts: each is tried as one contact's or the other's, and in the end as that of both.
+/// contacts: each is tried as one contact's or the other's, and in the end as that of both. Where the node on the axis is
+/// open and the midside node presses, once more with that node left open; if it touches then, the solution before stands.
 fn with_corners<T>(
     (model, body): (&Model, &ElasticBody),
     observe: &mut Observer<'_>,
@@ -75,12 +81,13 @@ fn with_corners<T>(
     let mut tried = vec![model.alone.clone()];
     let mut both: BTreeSet<u32> = BTreeSet::new();
     let mut other: Option<(Model, ElasticBody)> = None;
+    let mut closed: Option<T> = None;
     loop {
         let (model, body) = match &other {
             Some((model, body)) => (model, body),
             None => (model, body),
         };
-        let (solved, next) = {
+        let (solved, next, open) = {
             let load_history = LoadHistory::new(model, System::new(model, body, observe)?);
             let (solved, mut load_history) = solve(load_history, body, observe)?;
             let wrong = !load_history.of_both.is_empty();
@@ -90,13 +97,28 @@ fn with_corners<T>(
             let untried = next.filter(|next| !tried.contains(next));
             // what does not come to rest is of both in the end, also where that was tried at first: in a solution that is
             // wrong a body passes an obstacle
-            (solved, untried.or(wrong.then(Alone::new)))
+            let next = untried.or(wrong.then(Alone::new));
+            let system = &load_history.system;
+            if end.is_some_and(|end| algorithm::closed_on_axis(system, end))
+                && let Some(closed) = closed.take()
+            {
+                return Ok(closed);
+            }
+            let open = end.map(|end| algorithm::open_on_axis(system, end));
+            let open = open.filter(|open| closed.is_none() && !open.is_empty());
+            (solved, next, open)
         };
-        let Some(next) = next else {
-            return Ok(solved);
+        let next = match (next, open) {
+            (Some(next), _) => {
+                tried.push(next.clone());
+                model.with_alone(next)
+            }
+            (None, Some(open)) => {
+                closed = Some(solved);
+                model.with_open_on_axis(open)
+            }
+            (None, None) => return Ok(solved),
         };
-        tried.push(next.clone());
-        let next = model.with_alone(next);
         let body = ElasticBody::new(&next, observe)?;
         other = Some((next, body));
     }
@@ -260,7 +282,7 @@ pub fn run_to_numbers(
     start: Start<'_>,
     observe: &mut Observer<'_>,
 ) -> Result<(Numbers, Option<End>), SolveError> {
-    if !model.common_nodes().is_empty() {
+    if has_uncertain_ends(model) {
         let numbers = with_corners(
             (model, body),
             observe,

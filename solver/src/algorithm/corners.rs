@@ -1,8 +1,8 @@
-//! What a solution says of the common ends of contacts: which of them each node is of.
+//! What a solution says of the ends of contacts: which contact each common end is of, and which ends on the axis are open.
 
 use std::collections::BTreeSet;
 
-use crate::algorithm::system::{State, System};
+use crate::algorithm::system::{Patch, State, System};
 use crate::model::Alone;
 
 /// An obstacle reaches into a body if it does so by more than this part of its contact's length.
@@ -56,4 +56,26 @@ pub fn better(system: &System<'_>, state: Option<&State>, both: &BTreeSet<u32>) 
         alone.insert(node, only);
     }
     (alone != model.alone).then_some(alone)
+}
+
+/// Nodes on the axis that are open while the midside node beside them presses: the obstacle is hollow there.
+pub fn open_on_axis(system: &System<'_>, state: &State) -> BTreeSet<u32> {
+    let beside = |patch: &Patch<'_>, i: usize| {
+        let end = system.nodes[i].beside_axis?;
+        let pressed = state.active[i] && !state.active[end];
+        pressed.then(|| patch.contact.boundary.nodes[end - patch.first])
+    };
+    let patches = system.patches.iter();
+    let found = patches.flat_map(|patch| system.range(patch).filter_map(|i| beside(patch, i)));
+    found.collect()
+}
+
+/// Whether a node on the axis that was to stay open touches.
+pub fn closed_on_axis(system: &System<'_>, state: &State) -> bool {
+    let open = &system.model.open_on_axis;
+    system.patches.iter().any(|patch| {
+        let nodes = patch.contact.boundary.nodes.iter();
+        let mut nodes = nodes.zip(system.range(patch));
+        nodes.any(|(node, i)| state.active[i] && open.contains(node))
+    })
 }

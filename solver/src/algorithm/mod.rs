@@ -25,7 +25,7 @@ mod uniqueness;
 
 pub use adjoint::{Gradient, influences};
 pub use convex::{Minimum, minimise};
-pub use corners::{better, touched_by_both};
+pub use corners::{better, closed_on_axis, open_on_axis, touched_by_both};
 pub use finished::Finished;
 pub use near::{Extent, Region, run_near, settle_near};
 pub use profile::{Estimable, Missed, Quantity};

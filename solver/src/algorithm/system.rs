@@ -299,7 +299,8 @@ impl<'a> System<'a> {
             let [end, beside] = [first + end, first + beside];
             self.nodes[end].weight = AXIS_SHARE * self.nodes[beside].weight;
             let free = [end, beside].map(|i| matches!(self.nodes[i].normal, Dof::Free(_)));
-            self.nodes[beside].beside_axis = (free == [true; 2]).then_some(end);
+            let open = model.open_on_axis.contains(&boundary.nodes[end - first]);
+            self.nodes[beside].beside_axis = (free == [true; 2] && !open).then_some(end);
         }
         let symmetric = |i: usize| on_axis(i) || self.nodes[first + i].symmetric();
         let chain = Chain {

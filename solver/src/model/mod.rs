@@ -31,7 +31,7 @@ pub use level::Level;
 pub use supports::Held;
 pub use variable::VariableModel;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use checks::Checks;
 use nodes::FirstSides;
@@ -39,8 +39,11 @@ use nodes::FirstSides;
 use crate::elasticity::{self, Loads, Section};
 use crate::error::{AllChecks, Checked, Violation};
 use crate::mesh::{External, ExternalMesh, Mesh};
-use crate::problem::{Algorithm, History, Problem, SolverControls, Step};
+use crate::problem::{Algorithm, Condition, History, Problem, SolverControls, Step};
 use crate::solution::Warning;
+
+/// A hollow is deeper than this part of the contact's length.
+const HOLLOW: f64 = 1e-10;
 
 /// A problem that can be solved.
 #[derive(Clone, Debug)]
@@ -64,6 +67,9 @@ pub struct Model {
     pub oblique: BTreeMap<u32, [[f64; 2]; 2]>,
     /// Common ends of two contacts that are of one of them alone, since the other one does not touch there.
     pub alone: Alone,
+    /// Contact nodes on the axis that stay open under a hollow of the obstacle: their bounds and those of the midside nodes beside
+    /// them are plain ones (formulation 3.5).
+    pub open_on_axis: BTreeSet<u32>,
     /// The supports leave a rigid motion free, which contact must prevent.
     pub held_by_contact: bool,
     /// Load steps; none: one step to the values as given.
@@ -110,6 +116,28 @@ impl Model {
             alone,
             ..self.clone()
         }
+    }
+
+    /// The same problem with other open nodes on the axis.
+    pub fn with_open_on_axis(&self, open_on_axis: BTreeSet<u32>) -> Model {
+        Model {
+            open_on_axis,
+            ..self.clone()
+        }
+    }
+
+    /// Whether an obstacle is hollow at the axis: before deformation it is further from the node there than from the midside
+    /// node beside it.
+    pub fn hollow_at_axis(&self) -> bool {
+        self.contacts.iter().any(|contact| {
+            let ends = self.axis.ends(&contact.boundary.positions);
+            let gap = |i: usize| contact.gap(i, contact.indentation);
+            let least = HOLLOW * contact.boundary.length();
+            contact.condition == Condition::Unilateral
+                && ends
+                    .iter()
+                    .any(|[end, beside]| gap(*end) - gap(*beside) > least)
+        })
     }
 
     /// Whether the end depends on the increments that lead to it: some friction is incremental.
@@ -211,6 +239,7 @@ impl Checks {
             quadrature: problem.quadrature,
             oblique: contacts::oblique(&contacts, &fixed, &alone),
             alone,
+            open_on_axis: BTreeSet::new(),
             fixed,
             loads,
             contacts,
