@@ -39,6 +39,16 @@ impl Time {
         SIMULATED.set(Some(self.0));
     }
 
+    /// What the clock of the machine says now, also if it was set since the start: for tokens, which expire at a time that
+    /// others have been told.
+    pub fn of_the_machine() -> Self {
+        #[cfg(test)]
+        if let Some(micros) = SIMULATED.get() {
+            return Time(micros);
+        }
+        Time(wall_clock())
+    }
+
     /// How far the clock of the machine is ahead of [`Time::now`], in seconds, because it was set since.
     pub fn clock_was_set_by_s() -> f64 {
         wall_clock().saturating_sub(Time::now().0) as f64 / 1e6

@@ -241,7 +241,7 @@ fn told(token: &Token) -> String {
     format!(
         "token {id} ({name}) of {owner}, for {}; {}",
         scopes(token),
-        state(token, Time::now())
+        state(token, Time::of_the_machine())
     )
 }
 
@@ -261,7 +261,7 @@ fn state(token: &Token, now: Time) -> String {
 
 /// A line for each, below their headings.
 fn listed(tokens: &[Token]) -> String {
-    let now = Time::now();
+    let now = Time::of_the_machine();
     let row = |token: &Token| {
         let Token {
             id, owner, name, ..

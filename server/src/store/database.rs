@@ -28,6 +28,7 @@ use super::{
     intact::Intact,
     migrations,
     pages::Pages,
+    pauses::Pauses,
     progress::{self, Known, LastCommit, Progress},
     reserve::Reserve,
     submission::{Inbox, Pending},
@@ -71,6 +72,8 @@ pub struct Store {
     pub(super) intact: Arc<Intact>,
     /// How far its clock is ahead of that of the machine, in microseconds: see `clock`.
     pub(super) ahead: AtomicI64,
+    /// Time that it has not seen pass.
+    pub(super) pauses: Pauses,
     /// How far the store has come.
     pub(super) progress: Progress,
     /// The service that had it before this one stopped, and did not die.
@@ -210,6 +213,7 @@ impl Store {
             cancels: Mutex::default(),
             intact: Arc::default(),
             ahead: AtomicI64::default(),
+            pauses: Pauses::default(),
             progress,
             was_stopped: matches!(known, Known::Last(LastCommit { stopped: true, .. })),
             reserve,
@@ -238,6 +242,7 @@ impl Store {
     }
 
     async fn close_as(&self, stopped: bool) {
+        self.note_alive().await;
         self.lists.close().await;
         self.reader.close().await;
         // SQLite does this with the last connection only, which may be one for reading whose thread ends late, or of another

@@ -14,7 +14,7 @@ const FORGOTTEN_AT_ONCE: u32 = 250;
 impl Store {
     /// Removes the ids of jobs and sweeps that were deleted long ago.
     pub async fn forget_deleted(&self, now: Time) -> Result<()> {
-        let before = now.after_s(-REMEMBERED_S).micros();
+        let before = self.cutoff(self.by_our_clock(now), REMEMBERED_S).micros();
         self.forget_up_to(before - 1).await?;
         let some = "select exists (select 1 from deleted_sweep where deleted_at < ?)";
         let some = sqlx::query_scalar(some).bind(before);

@@ -25,6 +25,7 @@ mod submission;
 mod damage;
 mod folder;
 mod intact;
+mod pauses;
 mod progress;
 mod reserve;
 
@@ -137,6 +138,7 @@ impl Store {
         store.read_settings().await?;
         store.read_tokens().await?;
         store.read_clock().await?;
+        store.read_pauses().await?;
         let store = Arc::new(store);
         let committing = submit::commit_submissions(Arc::downgrade(&store), submissions);
         tokio::spawn(committing);

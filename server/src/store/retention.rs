@@ -59,6 +59,12 @@ struct Kept {
 pub(super) const OLD_JOBS: &str = "select id from job indexed by job_to_retire
      where finished_at is not null and pinned = 0 and finished_at < ? order by finished_at, id limit ?";
 
+const COUNT_OLD: &str = "select count(*) from job indexed by job_to_retire
+     where finished_at is not null and pinned = 0 and finished_at < ?";
+
+const COUNT_YOUNG: &str = "select count(*) from job indexed by job_to_retire
+     where finished_at is not null and pinned = 0 and finished_at >= ?";
+
 pub(super) const OLD_FIELDS: &str =
     "select job_id from job_size indexed by job_size_with_fields join job on job.id = job_id
      where fields = 1 and job_size.finished_at < ? and pinned = 0 order by job_size.finished_at limit ?";
@@ -81,6 +87,11 @@ pub(super) const KEPT: &str =
 const INTERVAL: Duration = Duration::from_secs(10);
 /// … and while the disk is full.
 const INTERVAL_WHEN_FULL: Duration = Duration::from_secs(1);
+/// How often it is noted that time passes, in intervals.
+const NOTED_EVERY: u32 = 6;
+
+/// What is removed for its age at once is told as a warning where it is at least so many jobs, and half of all.
+const MUCH: i64 = 10;
 
 /// Keeps a store within its limits, and gives space back to the file system, until the store is dropped or closed.
 pub async fn keep_within(store: Weak<Store>, retention: Retention) {
@@ -88,11 +99,16 @@ pub async fn keep_within(store: Weak<Store>, retention: Retention) {
     if let Some(store) = store.upgrade() {
         retiring.note(store.announce(&retention).await);
     }
+    let mut rounds = 0u32;
     loop {
         pause(&store).await;
         let Some(store) = store.upgrade() else {
             return;
         };
+        rounds = rounds.wrapping_add(1);
+        if rounds.is_multiple_of(NOTED_EVERY) {
+            store.note_alive().await;
+        }
         let retired = store.retire(&retention, Time::now()).await;
         if store.writer.is_closed() {
             return;
@@ -139,20 +155,21 @@ impl Store {
         }
         let mut left_alone = HashSet::new();
         if let Some(age_s) = retention.age_s {
-            let before = now.after_s(-age_s);
+            let before = self.cutoff(now, age_s);
+            self.tell_if_much(before).await?;
             let old = Discard::OldJobs(before);
             retired.jobs += self
                 .discard_old(OLD_JOBS, before, old, &mut left_alone)
                 .await?;
         }
         if let Some(age_s) = retention.fields_age_s {
-            let before = now.after_s(-age_s);
+            let before = self.cutoff(now, age_s);
             let old = Discard::OldFields(before);
             retired.fields += self
                 .discard_old(OLD_FIELDS, before, old, &mut left_alone)
                 .await?;
         }
-        let not_young = now.after_s(-YOUNG_S);
+        let not_young = self.cutoff(now, YOUNG_S);
         let mut compared = false;
         loop {
             let jobs = self.too_much(retention, not_young, &left_alone).await?;
@@ -167,6 +184,24 @@ impl Store {
             retired.jobs += self.discard(old, &jobs, &mut left_alone).await?;
             tokio::time::sleep(PAUSE).await;
         }
+    }
+
+    /// Warns before much is removed for its age.
+    async fn tell_if_much(&self, before: Time) -> Result<()> {
+        let count = |statement| sqlx::query_scalar(statement).bind(before.micros());
+        let old: i64 = count(COUNT_OLD).fetch_one(&self.reader).await?;
+        if old < MUCH {
+            return Ok(());
+        }
+        let young: i64 = count(COUNT_YOUNG).fetch_one(&self.reader).await?;
+        if old >= young {
+            tracing::warn!(
+                jobs = old, kept = young, %before,
+                "retention removes {old} of {} jobs that have ended, all that ended before {before} (--retain-days)",
+                old.saturating_add(young)
+            );
+        }
+        Ok(())
     }
 
     /// Discards all that a statement finds from before this time; how many jobs.
@@ -371,7 +406,7 @@ impl Store {
     pub(super) async fn foreseen(&self, retention: &Retention, at: Time) -> Result<(u64, u64)> {
         let oldest = retention
             .age_s
-            .map_or(i64::MIN, |age_s| at.after_s(-age_s).micros());
+            .map_or(i64::MIN, |age_s| self.cutoff(at, age_s).micros());
         let rows: Vec<(bool, i64, i64)> = sqlx::query_as(
             "select job.finished_at < ? as old, count(*), sum(bytes) from job indexed by job_to_retire join job_size on job_id = id
              where job.finished_at is not null and pinned = 0 group by old, job.owner",

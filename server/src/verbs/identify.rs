@@ -44,7 +44,9 @@ impl By {
     /// Whether it still allows what it has allowed.
     pub fn is_valid(&self, store: &Store) -> bool {
         match self {
-            By::Token(Presented { id, hash }) => store.is_valid_token(id, Some(*hash), Time::now()),
+            By::Token(Presented { id, hash }) => {
+                store.is_valid_token(id, Some(*hash), Time::of_the_machine())
+            }
             By::NoTokensNeeded => !store.has_tokens(),
             By::Proxy | By::OpenOperation => true,
         }
@@ -60,7 +62,7 @@ pub fn identify(
 ) -> Result<Identified, ApiError> {
     const UNKNOWN: &str = "the token is unknown, was revoked or has expired";
     if let Some(Ok(presented)) = &credentials.token {
-        let token = store.find_token(presented, Time::now());
+        let token = store.find_token(presented, Time::of_the_machine());
         let token = token.ok_or(ApiError::Unauthenticated(UNKNOWN))?;
         return Ok(Identified {
             caller: token.caller(),

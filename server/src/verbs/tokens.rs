@@ -166,7 +166,7 @@ pub async fn create(
     caller: &Caller,
     request: TokenRequest,
 ) -> Result<NewToken, ApiError> {
-    let now = Time::now();
+    let now = Time::of_the_machine();
     let scopes = checked(&request, !store.has_tokens())?;
     let valid = store.tokens().iter().filter(|t| t.is_valid(now)).count();
     if valid >= MAX_TOKENS {
@@ -214,7 +214,7 @@ pub fn list(store: &Store, _caller: &Caller) -> Vec<Token> {
 pub async fn revoke(store: &Arc<Store>, caller: &Caller, id: &str) -> Result<Token, ApiError> {
     let (store, by, id) = (store.clone(), caller.owner().to_owned(), id.to_owned());
     detached(async move {
-        let revoked = store.revoke_token(&id, Time::now()).await?;
+        let revoked = store.revoke_token(&id, Time::of_the_machine()).await?;
         let token = revoked.ok_or_else(|| unknown(&id))?;
         info!(token.id = id, by, "token {id} was revoked by {by}");
         Ok(token)
@@ -227,7 +227,9 @@ pub async fn rotate(store: &Arc<Store>, caller: &Caller, id: &str) -> Result<New
     let (store, by, id) = (store.clone(), caller.owner().to_owned(), id.to_owned());
     let (secret, hash) = Secret::new(&id).map_err(ApiError::internal)?;
     detached(async move {
-        let rotated = store.rotate_token(&id, hash, Time::now()).await?;
+        let rotated = store
+            .rotate_token(&id, hash, Time::of_the_machine())
+            .await?;
         let token =
             rotated.ok_or_else(|| ApiError::NotFound(format!("there is no valid token {id}")))?;
         info!(token.id = id, by, "token {id} has a new secret, by {by}");

@@ -593,3 +593,120 @@ fn fields_are_stored_as_columns_and_everything_else_deflated() {
     assert_eq!(info, part.info);
     assert!(matches!(content, encoding::Content::Fields(found) if *found == fields));
 }
+
+const DAY_S: f64 = 86_400.0;
+
+/// A machine without a battery begins with an old time, and hears of the right one later.
+#[tokio::test]
+async fn what_ended_under_a_wrong_clock_is_kept_as_long_as_anything_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let right = Time::now();
+    right.after_s(-120.0 * DAY_S).simulate();
+    let store = Store::open(folder.path()).await.unwrap();
+    solved(&store, "ada", "1", 10).await;
+    let deleted = solved(&store, "ada", "2", 10).await;
+    store.delete(Owners::All, deleted.key).await.unwrap();
+    let waits = || by("ada", vec![new("3")], Some("key"));
+    store.submit(waits(), false).await.unwrap();
+    store.close().await;
+    drop(store);
+
+    right.simulate();
+    let store = Store::open(folder.path()).await.unwrap();
+    let month = Retention {
+        age_s: Some(90.0 * DAY_S),
+        fields_age_s: Some(30.0 * DAY_S),
+        ..Retention::default()
+    };
+    let retire = async |days| {
+        let now = right.after_s(days * DAY_S);
+        store.retire(&month, now).await.unwrap()
+    };
+    assert_eq!(retire(0.0).await, Retired::default());
+    assert_eq!(store.expire_queued(right).await.unwrap(), [0; 0]);
+    let again = store.submit(waits(), false).await.unwrap();
+    assert!(again.replayed);
+    let ttl_s = again.jobs[0].limits.queue_ttl_s;
+    let later = right.after_s(ttl_s + 10.0);
+    assert_eq!(store.expire_queued(later).await.unwrap().len(), 1);
+    store
+        .forget_deleted(right.after_s(6.9 * DAY_S))
+        .await
+        .unwrap();
+    assert!(store.was_deleted(Owners::All, deleted.id).await.unwrap());
+    store
+        .forget_deleted(right.after_s(7.1 * DAY_S))
+        .await
+        .unwrap();
+    assert!(!store.was_deleted(Owners::All, deleted.id).await.unwrap());
+    assert_eq!(retire(89.0).await.jobs, 0);
+    assert_eq!(retire(90.1).await.jobs, 2);
+    // the jobs that are left are intact: a row that was changed has a new checksum
+    store.close().await;
+    let report = inspect(folder.path(), None).await.unwrap();
+    assert!(report.findings.is_empty(), "{:?}", report.findings);
+}
+
+/// The clock is wrong now, and was right before.
+#[tokio::test]
+async fn a_start_with_a_clock_that_is_ahead_removes_nothing_and_leaves_no_trace() {
+    let folder = tempfile::tempdir().unwrap();
+    let right = Time::now();
+    right.simulate();
+    let store = Store::open(folder.path()).await.unwrap();
+    solved(&store, "ada", "1", 10).await;
+    store.close().await;
+    drop(store);
+    let month = Retention {
+        age_s: Some(30.0 * DAY_S),
+        ..Retention::default()
+    };
+    let ahead = right.after_s(400.0 * DAY_S);
+    ahead.simulate();
+    let store = Store::open(folder.path()).await.unwrap();
+    assert_eq!(store.retire(&month, ahead).await.unwrap().jobs, 0);
+    store.close().await;
+    drop(store);
+    let soon = right.after_s(60.0);
+    soon.simulate();
+    let store = Store::open(folder.path()).await.unwrap();
+    let before = soon.after_s(29.0 * DAY_S);
+    assert_eq!(store.retire(&month, before).await.unwrap().jobs, 0);
+    let after = soon.after_s(30.1 * DAY_S);
+    assert_eq!(store.retire(&month, after).await.unwrap().jobs, 1);
+}
+
+#[tokio::test]
+async fn nights_count_and_a_damaged_record_of_pauses_removes_nothing_early() {
+    let folder = tempfile::tempdir().unwrap();
+    let start = Time::now();
+    start.simulate();
+    let store = Store::open(folder.path()).await.unwrap();
+    solved(&store, "ada", "1", 10).await;
+    store.close().await;
+    drop(store);
+    let month = Retention {
+        age_s: Some(30.0 * DAY_S),
+        ..Retention::default()
+    };
+    let night = start.after_s(0.5 * DAY_S);
+    night.simulate();
+    let store = Store::open(folder.path()).await.unwrap();
+    let now = start.after_s(30.1 * DAY_S);
+    sqlx::query("update setting set value = replace(value, ']]', '9]]') where name = 'pauses'")
+        .execute(&store.writer)
+        .await
+        .unwrap();
+    let early = start.after_s(29.9 * DAY_S);
+    assert_eq!(store.retire(&month, early).await.unwrap().jobs, 0);
+    store.close().await;
+    drop(store);
+    let store = Store::open(folder.path()).await.unwrap();
+    assert_eq!(
+        store.retire(&month, now).await.unwrap().jobs,
+        0,
+        "nothing is known of the time before"
+    );
+    let later = night.after_s(30.1 * DAY_S);
+    assert_eq!(store.retire(&month, later).await.unwrap().jobs, 1);
+}

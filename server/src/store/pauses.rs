@@ -1,0 +1,85 @@
+//! Time that the store has not seen pass: no service ran, or a clock was wrong.
+//!
+//! Nobody can tell which: a service that finds the clock a hundred days later may have been off for so long, or one of two
+//! starts had a wrong clock (a machine without a battery begins with an old time, until it hears of the right one). So what
+//! is removed for its age, and what expires in the queue, counts the time while the service ran, which no clock can set.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use serde::{Deserialize, Serialize};
+
+/// Pauses that are kept: beyond that the oldest ones become one, which also covers what is between them.
+const MOST: usize = 200;
+/// A pause of so small a part of an age counts: a wrong clock makes that little difference, and machines are off at night.
+const SMALL_PART: i64 = 30;
+
+/// A pause, by the times of the store (µs).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Pause(pub(super) i64, pub(super) i64);
+
+/// All pauses, the oldest first.
+#[derive(Debug, Default)]
+pub(super) struct Pauses(Mutex<Vec<Pause>>);
+
+impl Pauses {
+    /// Replaces them. What lies after `now` is left out: a clock that was ahead is right again.
+    pub(super) fn set(&self, pauses: Vec<Pause>, now: i64) -> Vec<Pause> {
+        let until_now = pauses
+            .into_iter()
+            .map(|Pause(from, to)| Pause(from, to.min(now)));
+        let mut kept: Vec<Pause> = until_now.filter(|Pause(from, to)| from < to).collect();
+        while kept.len() > MOST {
+            let oldest = kept.remove(0);
+            kept[0].0 = oldest.0;
+        }
+        *self.all() = kept.clone();
+        kept
+    }
+
+    /// When was what is now of this age, as far as the store has seen the time since then pass (µs)?
+    pub(super) fn cutoff(&self, now: i64, age: i64) -> i64 {
+        cutoff(&self.all(), now, age)
+    }
+
+    fn all(&self) -> MutexGuard<'_, Vec<Pause>> {
+        // No code panics while it holds this lock.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Back from `now` by an age, without the pauses that are more than a small part of it (µs).
+fn cutoff(pauses: &[Pause], now: i64, age: i64) -> i64 {
+    let (mut at, mut left) = (now, age.max(0));
+    for Pause(from, to) in pauses.iter().rev() {
+        if at.saturating_sub(left) >= *to {
+            break;
+        }
+        if to.saturating_sub(*from) > age / SMALL_PART {
+            left -= at.saturating_sub(*to).max(0);
+            at = at.min(*from);
+        }
+    }
+    at.saturating_sub(left)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_age_counts_the_time_that_was_seen_and_short_pauses() {
+        assert_eq!(cutoff(&[], 1000, 300), 700);
+        // seen: 1000 to 900 and 200 to 0
+        let long = [Pause(200, 900)];
+        assert_eq!(cutoff(&long, 1000, 90), 910);
+        assert_eq!(cutoff(&long, 1000, 100), 900);
+        assert_eq!(cutoff(&long, 1000, 150), 150);
+        assert_eq!(cutoff(&long, 1000, 300), 0);
+        // a thirtieth of the age
+        assert_eq!(cutoff(&[Pause(690, 700)], 1000, 301), 699);
+        assert_eq!(cutoff(&[Pause(680, 700)], 1000, 301), 679);
+        let two = [Pause(100, 400), Pause(500, 900)];
+        assert_eq!(cutoff(&two, 1000, 250), 50);
+        assert_eq!(cutoff(&[Pause(i64::MIN, 900)], 1000, 5000), i64::MIN);
+    }
+}
