@@ -76,6 +76,10 @@ impl Npz {
             letters
                 .take(width)
                 .for_each(|letter| letter.put(&mut bytes));
+            if bytes.len() >= CHUNK {
+                self.zip.write_all(&bytes).map_err(failed)?;
+                bytes.clear();
+            }
         }
         self.zip.write_all(&bytes).map_err(failed)
     }

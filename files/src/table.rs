@@ -114,6 +114,18 @@ impl Table {
         }
     }
 
+    /// Bytes of all texts where each is as wide as the longest of its column, as NumPy has them.
+    pub fn padded_bytes(&self) -> u64 {
+        let of_column = |column: &Column| match &column.values {
+            Values::Text(values) => {
+                let width = values.iter().map(|text| text.chars().count()).max();
+                4 * width.unwrap_or(0) as u64 * values.len() as u64
+            }
+            Values::Real(_) | Values::Whole(_) => 0,
+        };
+        self.columns.iter().map(of_column).sum()
+    }
+
     /// RFC 4180: a line of names, then a line per row. A number is the shortest text that reads back
     /// as the same; a missing one is empty.
     pub fn csv(&self) -> Result<String, String> {

@@ -9,11 +9,15 @@ use files::{
     table::{Column, Table, Values},
 };
 use serde::Serialize;
-use serde_json::Value;
 use solver::solution::{ContactProfile, Fields, Residuals};
 use strum::{IntoStaticStr, VariantArray};
 
-use crate::{event::TimedIteration, run::Document, sweep::MemberRow};
+use crate::{
+    error::size,
+    event::TimedIteration,
+    run::Document,
+    sweep::{MemberRow, ParameterValue},
+};
 
 /// A format of data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, VariantArray)]
@@ -126,34 +130,49 @@ fn rows<T: Serialize + ?Sized>(
 ) -> Result<Vec<u8>, String> {
     match format {
         Format::Json => serde_json::to_vec(part).map_err(|error| error.to_string()),
-        Format::Csv => table(part).csv().map(String::into_bytes),
-        Format::Jsonl => table(part).jsonl().map(String::into_bytes),
-        Format::Arrow => files::arrow::file(&table(part)),
-        Format::Npz => files::npz::file(&table(part)),
-        Format::Vtu | Format::Svg | Format::Png | Format::Pdf => {
-            Err(format!("rows are not written as {}", format.name()))
-        }
+        _ => write_table(&table(part), format),
     }
 }
+
+/// Most bytes of texts as NumPy has them, each as wide as the longest of its column: who reads them needs as many.
+pub const MOST_PADDED_BYTES: u64 = 256 << 20;
 
 /// The rows of a sweep in that format; `paths` are what its members differ in. The table has a column for each number
 /// of a row; nested ones have both names, as in `residuals_kkt`, and the parameters their pointers.
 pub fn members(paths: &[String], rows: &[MemberRow], format: Format) -> Result<Vec<u8>, String> {
-    let table = || members_table(paths, rows);
     match format {
         Format::Json => serde_json::to_vec(rows).map_err(|error| error.to_string()),
-        Format::Csv => table().csv().map(String::into_bytes),
-        Format::Jsonl => table().jsonl().map(String::into_bytes),
-        Format::Arrow => files::arrow::file(&table()),
-        Format::Npz => files::npz::file(&table()),
-        Format::Vtu | Format::Svg | Format::Png | Format::Pdf => {
+        _ => write_table(&members_table(paths, rows), format),
+    }
+}
+
+/// A table in one of the formats of tables but JSON.
+pub fn write_table(table: &Table, format: Format) -> Result<Vec<u8>, String> {
+    match format {
+        Format::Csv => table.csv().map(String::into_bytes),
+        Format::Jsonl => table.jsonl().map(String::into_bytes),
+        Format::Arrow => files::arrow::file(table),
+        Format::Npz => match table.padded_bytes() {
+            bytes if bytes > MOST_PADDED_BYTES => Err(too_wide(bytes)),
+            _ => files::npz::file(table),
+        },
+        Format::Json | Format::Vtu | Format::Svg | Format::Png | Format::Pdf => {
             Err(format!("rows are not written as {}", format.name()))
         }
     }
 }
 
+/// Why a table is not written as npz.
+pub fn too_wide(bytes: u64) -> String {
+    format!(
+        "npz, where each text is as wide as the longest of its column: that would be {}",
+        size(bytes)
+    )
+}
+
+/// The rows of a sweep as a table.
 #[rustfmt::skip] // a column in a row
-fn members_table(paths: &[String], rows: &[MemberRow]) -> Table {
+pub fn members_table(paths: &[String], rows: &[MemberRow]) -> Table {
     let column = |name: &'static str, values| Column { name: name.into(), values };
     let real = |name, value: fn(&MemberRow) -> Option<f64>| {
         column(name, Values::Real(rows.iter().map(|row| value(row).unwrap_or(f64::NAN)).collect()))
@@ -198,26 +217,37 @@ fn members_table(paths: &[String], rows: &[MemberRow]) -> Table {
 /// The values of one parameter: numbers, or texts if one of them is something else.
 fn parameter(path: &str, rows: &[MemberRow]) -> Column {
     let values = rows.iter().map(|row| row.parameters.get(path));
-    let numbers = values.clone().flatten().all(|value| value.is_number());
+    let number = |value: &ParameterValue| value.json().parse::<f64>().ok();
+    let numbers = values
+        .clone()
+        .flatten()
+        .all(|value| is_number(value.json()));
     let values = match numbers {
         true => Values::Real(
             values
-                .map(|value| value.and_then(Value::as_f64).unwrap_or(f64::NAN))
+                .map(|value| value.and_then(number).unwrap_or(f64::NAN))
                 .collect(),
         ),
         false => {
-            let text = |value: Option<&Value>| match value {
-                Some(Value::String(text)) => text.clone(),
-                Some(other) => other.to_string(),
-                None => String::new(),
+            let text = |value: &ParameterValue| {
+                let json = value.json();
+                let string = serde_json::from_str(json)
+                    .ok()
+                    .filter(|_| json.starts_with('"'));
+                string.unwrap_or_else(|| json.to_owned())
             };
-            Values::Text(values.map(|value| text(value).into()).collect())
+            let texts = values.map(|value| value.map_or_else(String::new, text).into());
+            Values::Text(texts.collect())
         }
     };
     Column {
         name: path.to_owned().into(),
         values,
     }
+}
+
+fn is_number(json: &str) -> bool {
+    json.starts_with(|c: char| c == '-' || c.is_ascii_digit())
 }
 
 /// Fields in that format.
@@ -256,8 +286,14 @@ pub fn everything_as_npz(document: &Document) -> Result<Vec<u8>, String> {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use serde_json::{Value, json};
+
     use super::*;
     use crate::fake;
+
+    fn value(value: Value) -> ParameterValue {
+        serde_json::from_value(value).unwrap()
+    }
 
     #[test]
     fn rows_are_written_in_every_format_of_tables_and_in_no_other() {
@@ -295,10 +331,10 @@ mod tests {
     fn rows_of_a_sweep_have_a_column_for_each_parameter_whatever_its_type() {
         let (number, other) = ("/contacts/0/indentation", "/contacts/0/obstacle");
         let mut rows = vec![MemberRow::default(), MemberRow::default()];
-        rows[0].parameters.insert(number.into(), 0.5.into());
+        rows[0].parameters.insert(number.into(), value(json!(0.5)));
         rows[0]
             .parameters
-            .insert(other.into(), serde_json::json!({"kind": "flat", "to": 1}));
+            .insert(other.into(), value(json!({"kind": "flat", "to": 1})));
         rows[1].number = 1;
         rows[1].normal_force = Some(7.5);
         rows[1].detail = Some("after 3 iterations, and \"so on\"".to_owned());

@@ -1,10 +1,11 @@
 //! A sweep: many problems that differ in a few values, and the numbers of each. No I/O.
 
-use std::collections::BTreeMap;
+use std::{borrow::Cow, collections::BTreeMap};
 
-use schemars::JsonSchema;
+use files::sweep::Plan;
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Value, value::RawValue};
 use solver::{
     error::Violation,
     family::Member,
@@ -73,7 +74,7 @@ pub struct MemberRow {
     pub number: u32,
     /// Its values by JSON Pointer, without those that are the base's.
     #[serde(default)]
-    pub parameters: BTreeMap<String, Value>,
+    pub parameters: BTreeMap<String, ParameterValue>,
     /// Its status.
     pub status: Status,
     /// Why it failed or was canceled.
@@ -104,14 +105,70 @@ pub struct MemberRow {
     pub iterations: u32,
     /// Dimensionless residuals of its final state.
     pub residuals: Option<Residuals>,
-    /// What to consider before relying on the numbers.
+    /// What to consider before relying on the numbers: each kind once.
     pub warnings: Vec<WarningCode>,
+}
+
+/// A value that a member of a sweep has, as JSON.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct ParameterValue(Box<RawValue>);
+
+impl ParameterValue {
+    /// The text.
+    pub fn json(&self) -> &str {
+        self.0.get()
+    }
+}
+
+impl From<Box<RawValue>> for ParameterValue {
+    fn from(text: Box<RawValue>) -> Self {
+        ParameterValue(text)
+    }
+}
+
+impl PartialEq for ParameterValue {
+    fn eq(&self, other: &Self) -> bool {
+        self.json() == other.json()
+    }
+}
+
+impl JsonSchema for ParameterValue {
+    fn schema_name() -> Cow<'static, str> {
+        Value::schema_name()
+    }
+
+    fn inline_schema() -> bool {
+        Value::inline_schema()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        Value::json_schema(generator)
+    }
 }
 
 /// Most violations of a member that are kept.
 const MOST_VIOLATIONS: usize = 5;
 
 impl MemberRow {
+    /// With its values, from the plan of its sweep.
+    pub fn with_values(&mut self, plan: &Plan) {
+        let values = plan.parameters(self.number as usize).into_iter();
+        self.parameters = values.map(|(path, value)| (path, value.into())).collect();
+    }
+
+    /// With each kind of warning once, however many contacts have it.
+    pub fn tidied(mut self) -> MemberRow {
+        let mut kinds: Vec<WarningCode> = vec![];
+        for code in std::mem::take(&mut self.warnings) {
+            if !kinds.contains(&code) {
+                kinds.push(code);
+            }
+        }
+        self.warnings = kinds;
+        self
+    }
+
     /// A member that was solved, converged or not.
     pub fn solved(number: usize, member: Member) -> MemberRow {
         let Member {
@@ -155,6 +212,7 @@ impl MemberRow {
             warnings,
             ..MemberRow::default()
         }
+        .tidied()
     }
 
     /// A member without a solution.

@@ -288,6 +288,15 @@ fn length(frame: Option<&Result<Frame<Bytes>, axum::Error>>) -> usize {
 #[derive(Clone, Copy, Debug)]
 pub struct HasShare;
 
+/// Bytes with the share that was taken before they were made.
+pub fn with_own_share(bytes: Vec<u8>, mut share: Share) -> Bytes {
+    share.shrink_to(bytes.len());
+    Bytes::from_owner(Owner {
+        bytes: bytes.into(),
+        _share: Arc::new(share),
+    })
+}
+
 /// What happens to an answer for which there is no room.
 #[derive(Clone, Copy, Debug)]
 pub enum NoRoom {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::value::RawValue;
 use solver::error::{Reason, Violation, escape};
 use solver::problem::{MeshInput, Problem};
 
@@ -103,17 +103,24 @@ impl Plan {
         }
     }
 
-    /// The values of a member by path, without those of the base.
-    pub fn parameters(&self, number: usize) -> BTreeMap<String, Value> {
+    /// The values of a member by path, without those of the base: as JSON without spaces, since many are kept at a time, and
+    /// a tree of values takes twenty times as much.
+    pub fn parameters(&self, number: usize) -> BTreeMap<String, Box<RawValue>> {
         let values = self.paths.iter().zip(self.values(number));
         let read = |(path, value): (&String, Option<&str>)| {
-            // it was read before
-            Some((
-                path.clone(),
-                serde_json::from_str(value?).unwrap_or(Value::Null),
-            ))
+            let text = RawValue::from_string(without_spaces(value?));
+            Some((path.clone(), text.ok()?)) // it was read before
         };
         values.filter_map(read).collect()
+    }
+
+    /// Bytes of the values of a member, as text.
+    pub fn bytes_of(&self, number: usize) -> usize {
+        self.values(number)
+            .into_iter()
+            .flatten()
+            .map(str::len)
+            .sum()
     }
 
     /// The problem of a member, or its violations: pointers are relative to it. Without a mesh of its own it has an
@@ -197,6 +204,39 @@ impl Plan {
                 let values = points.iter().flatten().flatten();
                 values.map(|value| value.len() as u64).sum()
             }
+        }
+    }
+}
+
+/// A JSON text without the white space between its parts.
+fn without_spaces(json: &str) -> String {
+    let (mut inside, mut escaped) = (false, false);
+    let keeps = |c: &char| {
+        let kept = inside || !c.is_ascii_whitespace();
+        match c {
+            '"' if !escaped => inside = !inside,
+            _ => {}
+        }
+        escaped = inside && *c == '\\' && !escaped;
+        kept
+    };
+    json.chars().filter(keeps).collect()
+}
+
+#[cfg(test)]
+mod spaces {
+    #[test]
+    fn only_white_space_outside_of_strings_is_left_out() {
+        for (text, expected) in [
+            ("[1, 2,\n 3]", "[1,2,3]"),
+            (
+                r#"{"a b" : "c \" d\\" , "e":1}"#,
+                r#"{"a b":"c \" d\\","e":1}"#,
+            ),
+            (r#" "\\" "#, r#""\\""#),
+            ("1e3", "1e3"),
+        ] {
+            assert_eq!(super::without_spaces(text), expected);
         }
     }
 }

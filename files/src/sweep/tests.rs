@@ -461,3 +461,29 @@ fn a_member_of_a_grid_begins_from_one_that_differs_by_one_place_of_one_axis() {
     let from = |place: usize| sweep.plan.neighbour(&group, place).map(|n| n.number);
     assert_eq!([1, 64, 65, 128].map(from), [0, 0, 64, 0].map(Some));
 }
+
+/// Millions of names in one pointer: it is refused before it is divided into them.
+#[test]
+fn a_pointer_of_megabytes_is_refused_by_its_length() {
+    let swept = |path: &str| {
+        let definition = json!({"base": base(), "axes": [{"path": path, "values": [1]}]});
+        refused(&definition)
+    };
+    for text in ["/a".repeat(1 << 20), "/".repeat(1 << 20), "/~1".repeat(400)] {
+        assert_eq!(swept(&text), at("/axes/0/path", Reason::TooLong));
+    }
+    // too many names, and as many as there may be
+    assert_eq!(
+        swept(&"/a".repeat(MOST_POINTER_TOKENS + 1)),
+        at("/axes/0/path", Reason::TooLong)
+    );
+    assert_eq!(
+        swept(&"/a".repeat(MOST_POINTER_TOKENS)),
+        at("/axes/0/path", Reason::UnknownName)
+    );
+    let point = json!({ "/a".repeat(1 << 20): 1 });
+    let definition = json!({"base": base(), "mode": "list", "points": [point]});
+    let found = refused(&definition);
+    assert_eq!(found.len(), 1);
+    assert_eq!(found[0].1, Reason::TooLong);
+}

@@ -123,9 +123,9 @@ impl From<Event> for pb::Event {
 }
 
 /// Values of any type, as JSON.
-impl IntoMessage<String> for serde_json::Value {
+impl IntoMessage<String> for crate::sweep::ParameterValue {
     fn into_message(self) -> String {
-        self.to_string()
+        self.json().to_owned()
     }
 }
 

@@ -217,7 +217,7 @@ impl JobService for Grpc {
     async fn get_result(&self, request: Request<pb::GetResultRequest>) -> Reply<pb::Result> {
         let (caller, request) = caller_and_message(request)?;
         let result = results::result(&self.service, &caller, ID.read(&request.id)?).await?;
-        Ok(Response::new(result.into()))
+        Ok(Response::new(result.content.into()))
     }
 
     async fn get_profile(

@@ -85,15 +85,15 @@ pub(super) fn whole(
     part: &Part,
     format: Format,
     name: String,
-    bytes: Vec<u8>,
+    bytes: impl Into<Bytes>,
 ) -> Result<Response, ApiError> {
+    let bytes = bytes.into();
     let file = File {
         format,
         name,
         bytes: bytes.len() as u64,
         digest: Sha256::digest(&bytes).to_vec(),
     };
-    let bytes = Bytes::from(bytes);
     answer(part, &file, |range| {
         Body::from(bytes.slice(range.start as usize..range.end as usize))
     })
@@ -268,7 +268,7 @@ mod tests {
     #[test]
     fn a_file_has_a_plain_name_whatever_the_boundary_is_called() {
         let name = "job_1.profile.a\"; b/\r\nñ".to_owned();
-        let response = whole(&Part::default(), Format::Csv, name, vec![]).unwrap();
+        let response = whole(&Part::default(), Format::Csv, name, Bytes::new()).unwrap();
         let headers = response.headers();
         assert_eq!(
             headers["content-disposition"],

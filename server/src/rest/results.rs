@@ -1,6 +1,11 @@
 //! `/v1/jobs/{id}/result`, `/history`, `/profiles/{boundary}` and `/fields`.
 
-use axum::{Json, body::Body, http::StatusCode, response::Response};
+use axum::{
+    Extension, Json,
+    body::Body,
+    http::{StatusCode, header::CONTENT_TYPE},
+    response::Response,
+};
 
 use super::{
     call::Call,
@@ -10,6 +15,7 @@ use crate::{
     error::ApiError,
     formats::{self, Format},
     job::JobId,
+    transfer::{HasShare, with_own_share},
     verbs::{
         fields as stored, history as rows, jobs,
         profiles::{self, Points},
@@ -18,9 +24,16 @@ use crate::{
 };
 
 pub(super) async fn result(call: Call, id: JobId) -> Result<Response, ApiError> {
-    let result = results::result(&call.service, &call.caller, id).await?;
-    let available = result.result_available;
-    Ok(marked(Json(result), available))
+    let found = results::result(&call.service, &call.caller, id).await?;
+    let (available, result, share) = (found.available, found.content, found.share);
+    let Some(share) = share else {
+        return Ok(marked(Json(result), available));
+    };
+    let written = call.service.work(move || serde_json::to_vec(&result));
+    let bytes = written.await?.map_err(ApiError::internal)?;
+    let json = [(CONTENT_TYPE, Format::Json.content_type())];
+    let answer = (json, Extension(HasShare), with_own_share(bytes, share));
+    Ok(marked(answer, available))
 }
 
 pub(super) async fn history(
@@ -31,11 +44,15 @@ pub(super) async fn history(
     part: Part,
 ) -> Result<Response, ApiError> {
     let found = rows::history(&call.service, &call.caller, id, max_points).await?;
-    let (available, rows) = (found.available, found.content);
+    let (available, rows, share) = (found.available, found.content, found.share);
     let bytes = call.service.work(move || formats::history(&rows, format));
     let bytes = bytes.await?.map_err(ApiError::internal)?;
-    let whole = data::whole(&part, format, format!("{id}.history"), bytes)?;
-    Ok(marked(whole, available))
+    let name = format!("{id}.history");
+    let Some(share) = share else {
+        return Ok(marked(data::whole(&part, format, name, bytes)?, available));
+    };
+    let whole = data::whole(&part, format, name, with_own_share(bytes, share))?;
+    Ok(marked((Extension(HasShare), whole), available))
 }
 
 pub(super) async fn profile(

@@ -19,10 +19,11 @@ use super::{
 use crate::{
     address::link,
     error::ApiError,
-    formats::{self, Format},
+    formats::Format,
     job::SweepId,
     parameters::{Integers, Parameter},
     sweep::{MemberRow, Sweep},
+    transfer::HasShare,
     verbs::{
         key::Key,
         page::{PAGE_SIZE, PAGE_TOKEN, Paging},
@@ -117,14 +118,15 @@ pub(super) async fn results(
     let Call {
         service, caller, ..
     } = &call;
-    let bytes = if format == Format::Json {
+    if format == Format::Json {
         let paging = Paging { size, token };
         let page = verbs::rows(service, caller, id, &paging).await?;
         let rows = Rows {
             members: page.items,
             next_page_token: page.next,
         };
-        serde_json::to_vec(&rows).map_err(ApiError::internal)?
+        let bytes = serde_json::to_vec(&rows).map_err(ApiError::internal)?;
+        data::whole(&part, format, format!("{id}.results"), bytes)
     } else {
         for (name, expected, given) in [
             (PAGE_SIZE.name, PAGE_SIZE.meaning, size.is_some()),
@@ -138,11 +140,11 @@ pub(super) async fn results(
                 });
             }
         }
-        let (paths, rows) = verbs::all_rows(service, caller, id).await?;
-        let bytes = service.work(move || formats::members(&paths, &rows, format));
-        bytes.await?.map_err(ApiError::internal)?
-    };
-    data::whole(&part, format, format!("{id}.results"), bytes)
+        let bytes = verbs::table(service, caller, id, format).await?;
+        let mut response = data::whole(&part, format, format!("{id}.results"), bytes)?;
+        response.extensions_mut().insert(HasShare);
+        Ok(response)
+    }
 }
 
 /// A browser that reconnects requests the same address again and adds this header.

@@ -6,10 +6,12 @@
 //! others are checked on the rows that it finds: a filter that matches few jobs, which are then sorted if
 //! necessary, or else one whose index has the order of the list, since then a page is soon full.
 
+use futures_util::TryStreamExt;
 use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
 
 use super::{
     database::Store,
+    entries::{Entries, bytes_of},
     error::Result,
     filter::{Cursor, Filter, GroupBy, Order, OrderBy},
     rows::from_row,
@@ -44,6 +46,7 @@ const ENDED: [Status; 3] = [Status::Succeeded, Status::Failed, Status::Canceled]
 
 impl Store {
     /// At most `limit` jobs of a list, after `cursor`.
+    #[cfg(test)]
     pub async fn jobs(
         &self,
         owners: Owners<'_>,
@@ -52,8 +55,21 @@ impl Store {
         cursor: Option<Cursor>,
         limit: i64,
     ) -> Result<Vec<Job>> {
+        let found = self.some_jobs(owners, filter, order, cursor, limit).await?;
+        Ok(found.items)
+    }
+
+    /// At most `limit` jobs of a list, after `cursor`; fewer if their labels are large.
+    pub async fn some_jobs(
+        &self,
+        owners: Owners<'_>,
+        filter: &Filter,
+        order: Order,
+        cursor: Option<Cursor>,
+        limit: i64,
+    ) -> Result<Entries<Job>> {
         let Some(filter) = &filter.among(owners) else {
-            return Ok(vec![]);
+            return Ok(Entries::default());
         };
         let read = async {
             let mut connection = self.lists.acquire().await?;
@@ -62,9 +78,17 @@ impl Store {
                 None => ordered_paths(filter, order),
             };
             let mut query = page_of_jobs(filter, &paths, order, cursor, limit);
-            let rows = query.build().fetch_all(&mut *connection).await?;
-            let mut jobs = rows.iter().map(from_row).collect::<Result<Vec<Job>>>()?;
-            self.complete(&mut connection, &mut jobs).await?;
+            let mut jobs = Entries::default();
+            let mut rows = query.build().fetch(&mut *connection);
+            while let Some(row) = rows.try_next().await? {
+                let job = from_row(&row)?;
+                let bytes = bytes_of(&job.labels);
+                if jobs.add(job, bytes).is_break() {
+                    break;
+                }
+            }
+            drop(rows);
+            self.complete(&mut connection, &mut jobs.items).await?;
             self.damages.indexes_are_intact()?;
             Ok(jobs)
         };

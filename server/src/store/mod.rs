@@ -16,6 +16,7 @@
 mod checksum;
 mod complaint;
 mod encoding;
+mod entries;
 mod error;
 mod filter;
 mod parts;
@@ -103,6 +104,7 @@ pub use self::{
     edit::Edit,
     encoding::PartInfo,
     end::CancelOutcome,
+    entries::Entries,
     error::{Damage, Record, Result, StoreError},
     events::FinalBatch,
     filter::{Cursor, Filter, GroupBy, Order, OrderBy},

@@ -38,9 +38,14 @@ impl Store {
 
     /// The memory that reading the fields under this key takes at most, in bytes; `None` if there are none.
     pub async fn fields_memory(&self, key: i64) -> Result<Option<usize>> {
+        self.part_memory(key, FIELDS).await
+    }
+
+    /// The same of another part.
+    pub async fn part_memory(&self, key: i64, part: &str) -> Result<Option<usize>> {
         let read = async {
             let mut connection = self.reader.acquire().await?;
-            intact::memory_to_read(&mut connection, key, FIELDS).await
+            intact::memory_to_read(&mut connection, key, part).await
         };
         self.damages.noting(read).await
     }

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use files::sweep::MOST_VALUE_BYTES;
+use futures_util::TryStreamExt;
 use serde::{Deserialize, Serialize};
 use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 use uuid::Uuid;
@@ -10,6 +12,7 @@ use super::{
     change::Change,
     checksum::{self, Checksum},
     database::Store,
+    entries::{Entries, bytes_of},
     error::{Record, Result, StoreError},
     rows::is_current,
     submission::NewSweep,
@@ -64,26 +67,33 @@ impl Store {
         owners: Owners<'_>,
         before: Option<i64>,
         limit: i64,
-    ) -> Result<Vec<Sweep>> {
+    ) -> Result<Entries<Sweep>> {
         let read = async {
             let mut connection = self.lists.acquire().await?;
             let rows = match owners {
                 Owners::All => {
-                    sqlx::query("select * from sweep where id < ? order by id desc limit ?")
+                    sqlx::query_scalar("select id from sweep where id < ? order by id desc limit ?")
                         .bind(before.unwrap_or(i64::MAX))
                         .bind(limit)
                 }
-                Owners::Only(owner) => sqlx::query(
-                    "select * from sweep where owner = ? and id < ? order by id desc limit ?",
+                Owners::Only(owner) => sqlx::query_scalar(
+                    "select id from sweep where owner = ? and id < ? order by id desc limit ?",
                 )
                 .bind(owner)
                 .bind(before.unwrap_or(i64::MAX))
                 .bind(limit),
             };
-            let rows = rows.fetch_all(&mut *connection).await?;
-            let mut sweeps = vec![];
-            for row in &rows {
-                sweeps.push(described(&mut connection, row).await?);
+            let keys: Vec<i64> = rows.fetch_all(&mut *connection).await?;
+            let mut sweeps = Entries::default();
+            for key in keys {
+                let Some(sweep) = find(&mut connection, key).await? else {
+                    continue; // deleted a moment ago
+                };
+                let paths: usize = sweep.paths.iter().map(String::len).sum();
+                let bytes = bytes_of(&sweep.labels) + paths;
+                if sweeps.add(sweep, bytes).is_break() {
+                    break;
+                }
             }
             Ok(sweeps)
         };
@@ -112,7 +122,7 @@ impl Store {
     /// At most `limit` members from this number on, in order; without their parameters.
     pub async fn members(&self, key: i64, from: i64, limit: i64) -> Result<Vec<MemberRow>> {
         let read = async {
-            let rows = sqlx::query(
+            let mut rows = sqlx::query(
                 "select sweep_member.*, job.status as job_status, job.reason as job_reason
                  from sweep_member left join job on job.id = sweep_member.job
                  where sweep_member.sweep = ? and number >= ? order by number limit ?",
@@ -120,11 +130,54 @@ impl Store {
             .bind(key)
             .bind(from)
             .bind(limit)
-            .fetch_all(&self.lists)
-            .await?;
-            rows.iter().map(member).collect()
+            .fetch(&self.lists);
+            // one at a time: as text they take several times as much
+            let mut members = vec![];
+            while let Some(row) = rows.try_next().await? {
+                let number: i64 = row.try_get("number")?;
+                if number != from + members.len() as i64 {
+                    return Err(record(key, "members").damaged("some are missing"));
+                }
+                members.push(member(&row)?);
+            }
+            drop(rows);
+            let end = from + members.len() as i64;
+            if (members.len() as i64) < limit {
+                let total = sqlx::query_scalar("select members from sweep where id = ?").bind(key);
+                let total: Option<i64> = total.fetch_optional(&self.lists).await?;
+                if total.is_some_and(|total| end.max(from) < total) {
+                    return Err(record(key, "members").damaged("some are missing"));
+                }
+            }
+            Ok(members)
         };
         self.damages.noting(read).await
+    }
+
+    /// About the memory (bytes) that all members of a sweep take as rows and as a table, overestimated rather than
+    /// underestimated.
+    pub async fn members_memory(&self, key: i64) -> Result<usize> {
+        const OF_ROW: i64 = 1500;
+        const OF_BODY: i64 = 3;
+        const OF_VALUES: i64 = 5;
+        let (members, bodies): (i64, i64) = sqlx::query_as(
+            "select count(*), coalesce(sum(octet_length(body)), 0) from sweep_member where sweep = ?",
+        )
+        .bind(key)
+        .fetch_one(&self.lists)
+        .await?;
+        let definition: Option<i64> =
+            sqlx::query_scalar("select octet_length(body) from sweep_definition where sweep = ?")
+                .bind(key)
+                .fetch_optional(&self.lists)
+                .await?;
+        let definition = definition.unwrap_or_default();
+        // of a grid each value is many members'
+        let values = definition
+            .saturating_mul(members)
+            .min(MOST_VALUE_BYTES as i64);
+        let bytes = OF_ROW * members + OF_BODY * bodies + OF_VALUES * (definition + values);
+        Ok(usize::try_from(bytes).unwrap_or(usize::MAX))
     }
 
     /// Members that have ended, after event number `after`; `None`: the sweep was deleted.
@@ -518,7 +571,7 @@ fn checked(row: &SqliteRow) -> Result<(i64, i64, Option<&str>)> {
 fn member(row: &SqliteRow) -> Result<MemberRow> {
     let (sweep, n, body) = checked(row)?;
     if let Some(body) = body {
-        let read = serde_json::from_str(body);
+        let read = serde_json::from_str(body).map(MemberRow::tidied);
         return read.map_err(|error| record(sweep, &format!("member {n}")).damaged(error));
     }
     let status: Option<&str> = row.try_get("job_status")?;

@@ -55,10 +55,7 @@ pub async fn fields(
         result_key,
         loaded,
     };
-    Ok(Found {
-        available: job.result_available,
-        content,
-    })
+    Ok(Found::new(job.result_available, content))
 }
 
 /// An error if the fields of a job that has ended were deleted.
@@ -150,10 +147,7 @@ pub async fn converted_fields(
     let loaded = loaded.ok_or_else(|| no_result(&job))?;
     let written = service.work(move || formats::fields(&loaded.fields, format));
     let content = written.await?.map_err(ApiError::internal)?;
-    Ok(Found {
-        available: job.result_available,
-        content,
-    })
+    Ok(Found::new(job.result_available, content))
 }
 
 #[cfg(test)]

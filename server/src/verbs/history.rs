@@ -1,6 +1,10 @@
 //! The iterations of a job, a row each.
 
-use super::{jobs, results::Found, service::Service};
+use super::{
+    jobs,
+    results::{Found, room_for},
+    service::Service,
+};
 use crate::{
     caller::Caller,
     error::ApiError,
@@ -25,16 +29,29 @@ pub async fn history(
     id: JobId,
     max_points: Option<i64>,
 ) -> Result<Found<Vec<TimedIteration>>, ApiError> {
+    let share = room_for(service, caller, id, &["history"]).await?;
     let load = async {
         let mut found = jobs::snapshot(service, caller, id).await?;
         let available = found.job.result_available;
         let content = StoredHistory::load(service, &mut found).await?;
-        Ok(Found { available, content })
+        Ok(Found {
+            available,
+            content,
+            share,
+        })
     };
     let read = |found: Found<StoredHistory>| {
-        let available = found.available;
-        let content = found.content.read()?;
-        Ok::<_, ApiError>(Found { available, content })
+        let Found {
+            available,
+            content,
+            share,
+        } = found;
+        let content = content.read()?;
+        Ok::<_, ApiError>(Found {
+            available,
+            content,
+            share,
+        })
     };
     let mut rows = service.work_on(load, read).await??;
     if let Some(most) = max_points {

@@ -81,7 +81,7 @@ pub async fn list(
     let order = order.unwrap_or(Order::NEWEST_FIRST);
     let list = page::list_of_jobs(filter, order);
     let (store, cursor) = (&service.store, paging.cursor(&list)?);
-    let jobs = store.jobs(
+    let jobs = store.some_jobs(
         caller.visible_owners(),
         filter,
         order,

@@ -8,7 +8,7 @@ use crate::{
     error::ApiError,
     job::Job,
     parameters::{Integers, Parameter, Text},
-    store::{Cursor, Filter, Order, OrderBy},
+    store::{Cursor, Entries, Filter, Order, OrderBy},
 };
 
 /// The size of a page.
@@ -47,6 +47,25 @@ pub struct Page<T> {
     pub next: Option<String>,
 }
 
+/// What the store has found for a page.
+pub(super) struct Found<T> {
+    items: Vec<T>,
+    /// There are more, whatever the size of the page is.
+    cut: bool,
+}
+
+impl<T> From<Vec<T>> for Found<T> {
+    fn from(items: Vec<T>) -> Self {
+        Found { items, cut: false }
+    }
+}
+
+impl<T> From<Entries<T>> for Found<T> {
+    fn from(Entries { items, cut, .. }: Entries<T>) -> Self {
+        Found { items, cut }
+    }
+}
+
 impl Paging {
     /// Where the page of this list begins.
     pub(super) fn cursor(&self, list: &str) -> Result<Option<Cursor>, ApiError> {
@@ -65,10 +84,14 @@ impl Paging {
     pub(super) fn page<T>(
         &self,
         list: &str,
-        mut found: Vec<T>,
+        found: impl Into<Found<T>>,
         at: impl Fn(&T) -> Cursor,
     ) -> Page<T> {
-        let more = found.len() as i64 > self.size();
+        let Found {
+            items: mut found,
+            cut,
+        } = found.into();
+        let more = cut || found.len() as i64 > self.size();
         found.truncate(self.size() as usize);
         let last = found.last().filter(|_| more);
         let next = last.map(|last| token(at(last), list));

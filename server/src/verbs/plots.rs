@@ -182,7 +182,7 @@ pub async fn plot(
         let content = content.map_err(|reason| {
             ApiError::NotFound(format!("{id} has no plot {}: {reason}", plot.as_str()))
         })?;
-        Ok(Found { available, content })
+        Ok(Found::new(available, content))
     };
     service.work_on(load, draw).await?
 }

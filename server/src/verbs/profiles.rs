@@ -1,10 +1,11 @@
 //! Columns along a contact boundary.
 
-use serde_json::json;
+use serde::Deserialize;
+use serde_json::{json, value::RawValue};
 use solver::solution::{ContactProfile, sample};
 
 use super::{
-    results::{Found, StepResult, read, with_result},
+    results::{Found, StepResult, read, room_for, with_result},
     service::Service,
 };
 use crate::{
@@ -96,6 +97,10 @@ pub async fn profile(
     step: Option<&str>,
     points: Points,
 ) -> Result<Found<ContactProfile>, ApiError> {
+    let _room = match step {
+        Some(_) => room_for(service, caller, id, &["steps"]).await?,
+        None => None,
+    };
     let mut found = with_result(service, caller, id).await?;
     let available = found.job.result_available;
     let step = match step {
@@ -135,7 +140,7 @@ pub async fn profile(
     drop(found);
     let Points::Spaced(count) = points else {
         let content = read(&bytes)?;
-        return Ok(Found { available, content });
+        return Ok(Found::new(available, content));
     };
     let sampling = service.work(move || {
         let nodes = read(&bytes)?;
@@ -143,7 +148,7 @@ pub async fn profile(
         Ok(sample(&nodes, &friction, count))
     });
     let content = sampling.await?;
-    content.map(|content| Found { available, content })
+    content.map(|content| Found::new(available, content))
 }
 
 /// The stored profile at all points; in results of older versions, that at nodes.
@@ -166,15 +171,26 @@ pub(super) async fn find_step(
     wanted: &str,
     id: JobId,
 ) -> Result<Option<(usize, StepResult)>, ApiError> {
-    let mut steps = steps(found).await?;
+    let bytes = found.part("steps").await?;
+    let bytes = bytes.as_deref().unwrap_or(b"[]");
+    // the summaries of a thousand steps are large, and one of them is wanted
+    let steps: Vec<Named> = read(bytes)?;
     if steps.is_empty() && wanted == "0" {
         return Ok(None);
     }
     let number = step_number(&steps, wanted, id)?;
-    Ok(Some((number, steps.swap_remove(number))))
+    let all: Vec<&RawValue> = serde_json::from_slice(bytes).map_err(ApiError::internal)?;
+    let step = all.get(number).map_or("", |step| step.get());
+    Ok(Some((number, read(step.as_bytes())?)))
 }
 
-fn step_number(steps: &[StepResult], wanted: &str, id: JobId) -> Result<usize, ApiError> {
+/// A step, of which the name is read alone.
+#[derive(Deserialize)]
+struct Named {
+    name: String,
+}
+
+fn step_number(steps: &[Named], wanted: &str, id: JobId) -> Result<usize, ApiError> {
     let named = steps.iter().position(|step| step.name == wanted);
     let numbered = wanted.parse().ok().filter(|n| *n < steps.len());
     named.or(numbered).ok_or_else(|| {
@@ -193,10 +209,4 @@ fn step_number(steps: &[StepResult], wanted: &str, id: JobId) -> Result<usize, A
             names.join(", ")
         ))
     })
-}
-
-/// The load steps of a result.
-async fn steps(found: &mut Snapshot) -> Result<Vec<StepResult>, ApiError> {
-    let bytes = found.part("steps").await?;
-    bytes.map_or(Ok(vec![]), |bytes| read(&bytes))
 }

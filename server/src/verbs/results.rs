@@ -10,6 +10,7 @@ use crate::{
     job::{Job, JobId, ResultAvailable},
     run::Summary,
     store::Snapshot,
+    transfer::Share,
 };
 
 /// The summary of one load step.
@@ -41,13 +42,54 @@ pub struct Found<T> {
     pub available: ResultAvailable,
     /// What was asked for.
     pub content: T,
+    /// The share of the memory for answers that it has, if it is large.
+    pub share: Option<Share>,
+}
+
+impl<T> Found<T> {
+    /// Something small.
+    pub(super) fn new(available: ResultAvailable, content: T) -> Found<T> {
+        Found {
+            available,
+            content,
+            share: None,
+        }
+    }
+}
+
+/// Parts of a result that take so many bytes to read are read without asking for room.
+const SMALL: usize = 4 << 20;
+
+/// Room in memory for parts of a result, before they are read: none if they are small. A job of many contacts and steps has
+/// summaries of a hundred megabytes, and many may ask for them at once.
+pub(super) async fn room_for(
+    service: &Service,
+    caller: &Caller,
+    id: JobId,
+    parts: &[&str],
+) -> Result<Option<Share>, ApiError> {
+    // without the connection that a snapshot holds: others need that while this waits
+    let key = jobs::snapshot(service, caller, id).await?.job.result_key;
+    let mut bytes = 0;
+    for part in parts {
+        bytes += service.store.part_memory(key, part).await?.unwrap_or(0);
+    }
+    match bytes {
+        ..=SMALL => Ok(None),
+        _ => service.sent.wait_for(bytes).await.map(Some),
+    }
 }
 
 /// The header, and over gRPC the metadata, of answers with it.
 pub const RESULT_AVAILABLE: &str = "result-available";
 
 /// The scalars of a job that has a result.
-pub async fn result(service: &Service, caller: &Caller, id: JobId) -> Result<JobResult, ApiError> {
+pub async fn result(
+    service: &Service,
+    caller: &Caller,
+    id: JobId,
+) -> Result<Found<JobResult>, ApiError> {
+    let share = room_for(service, caller, id, &["summary", "steps"]).await?;
     let load = async {
         let mut found = with_result(service, caller, id).await?;
         let summary = found.part("summary").await?;
@@ -55,12 +97,17 @@ pub async fn result(service: &Service, caller: &Caller, id: JobId) -> Result<Job
         let steps = found.part("steps").await?;
         Ok((found.job.result_available, summary, steps))
     };
-    let read = |(result_available, summary, steps): (_, Vec<u8>, Option<Vec<u8>>)| {
+    let read = move |(result_available, summary, steps): (_, Vec<u8>, Option<Vec<u8>>)| {
         let steps = steps.map_or(Ok(vec![]), |steps| read(&steps));
-        Ok(JobResult {
+        let content = JobResult {
             result_available,
             summary: read(&summary)?,
             steps: steps?,
+        };
+        Ok(Found {
+            available: result_available,
+            content,
+            share,
         })
     };
     service.work_on(load, read).await?

@@ -3,6 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use async_stream::try_stream;
+use axum::body::Bytes;
 use files::sweep::{Plan, Sweep as Definition, groups};
 use futures_util::Stream;
 use serde::Serialize;
@@ -26,10 +27,13 @@ use crate::{
     caller::Caller,
     digest,
     error::ApiError,
+    formats::{self, Format},
     job::{Cache, Job, Limits, SweepId},
     parameters::{Integers, Parameter, Seconds, Variable},
     store::{Accepted, Cursor, Filter, MemberEvents, NewJob, NewSweep, RequestKey},
     sweep::{MemberRow, Sweep, SweepEvent, SweepPayload, limits_for},
+    time::Time,
+    transfer::with_own_share,
     violations::{PROBLEM, prefixed},
 };
 
@@ -67,6 +71,9 @@ const PULSE: Duration = Duration::from_millis(250);
 
 /// Events and rows that are read at a time.
 const AT_ONCE: i64 = 500;
+
+/// Bytes of values of the events that are read at a time; of one event more, if it alone has more.
+const MOST_EVENT_BYTES: usize = 64 << 10;
 
 /// A request for a sweep.
 #[derive(Debug)]
@@ -386,15 +393,55 @@ pub async fn rows(
     Ok(paging.page(&list, found, at))
 }
 
-/// All members of a sweep, in the order of their numbers; and what they differ in.
-pub async fn all_rows(
+/// All members of a sweep as a table in this format, in the order of their numbers. Its memory is a share of that for
+/// answers from before it is made until it is sent.
+pub async fn table(
     service: &Service,
     caller: &Caller,
     id: SweepId,
-) -> Result<(Vec<String>, Vec<MemberRow>), ApiError> {
+    format: Format,
+) -> Result<Bytes, ApiError> {
     let sweep = get(service, caller, id).await?;
-    let rows = members(service, &sweep, 0, i64::MAX).await?;
-    Ok((sweep.paths, rows))
+    // before there is a permit to work: who has that must not wait for memory
+    let bytes = service.store.members_memory(sweep.key).await?;
+    let share = service.sent.wait_for(bytes).await?;
+    let write = move |loaded| {
+        let (_, rows) = with_values(loaded)?;
+        let table = formats::members_table(&sweep.paths, &rows);
+        drop(rows);
+        let padded = table.padded_bytes();
+        if format == Format::Npz && padded > formats::MOST_PADDED_BYTES {
+            return Err(ApiError::NotAcceptable {
+                got: formats::too_wide(padded),
+                available: "csv, jsonl, arrow".into(),
+            });
+        }
+        let bytes = formats::write_table(&table, format).map_err(ApiError::internal)?;
+        Ok(with_own_share(bytes, share))
+    };
+    let load = load_members(service, (sweep.id, sweep.key), 0, i64::MAX);
+    service.work_on(load, write).await?
+}
+
+/// Members from this number on, without their values, and the definition that has these.
+async fn load_members(
+    service: &Service,
+    (id, key): (SweepId, i64),
+    from: i64,
+    limit: i64,
+) -> Result<(String, Vec<MemberRow>), ApiError> {
+    let definition = service.store.sweep_definition(key).await?;
+    let definition = definition.ok_or(ApiError::SweepDeleted(id))?;
+    let rows = service.store.members(key, from, limit).await?;
+    Ok((definition, rows))
+}
+
+fn with_values(
+    (definition, mut rows): (String, Vec<MemberRow>),
+) -> Result<(Plan, Vec<MemberRow>), ApiError> {
+    let plan = plan_of(&definition)?;
+    rows.iter_mut().for_each(|row| row.with_values(&plan));
+    Ok((plan, rows))
 }
 
 async fn members(
@@ -403,20 +450,9 @@ async fn members(
     from: i64,
     limit: i64,
 ) -> Result<Vec<MemberRow>, ApiError> {
-    let load = async {
-        let definition = service.store.sweep_definition(sweep.key).await?;
-        let definition = definition.ok_or(ApiError::SweepDeleted(sweep.id))?;
-        let rows = service.store.members(sweep.key, from, limit).await?;
-        Ok((definition, rows))
-    };
-    let add = |(definition, mut rows): (String, Vec<MemberRow>)| {
-        let plan = plan_of(&definition)?;
-        for row in &mut rows {
-            row.parameters = plan.parameters(row.number as usize);
-        }
-        Ok(rows)
-    };
-    service.work_on(load, add).await?
+    let load = load_members(service, (sweep.id, sweep.key), from, limit);
+    let (_, rows) = service.work_on(load, with_values).await??;
+    Ok(rows)
 }
 
 fn plan_of(definition: &str) -> Result<Plan, ApiError> {
@@ -507,8 +543,19 @@ async fn with_parameters(
     };
     let add = |definition: String| {
         let plan = plan_of(&definition)?;
+        // hundreds of watchers that do not read would keep as many copies of all values
+        let mut bytes = 0;
+        let fits = |(_, _, row): &&(i64, Time, MemberRow)| {
+            bytes += plan.bytes_of(row.number as usize);
+            bytes <= MOST_EVENT_BYTES
+        };
+        let fitting = found.events.iter().take_while(fits).count().max(1);
+        if fitting < found.events.len() {
+            found.events.truncate(fitting);
+            found.more = true;
+        }
         for (_, _, row) in &mut found.events {
-            row.parameters = plan.parameters(row.number as usize);
+            row.with_values(&plan);
         }
         Ok(found)
     };

@@ -340,7 +340,8 @@ async fn a_sweep_of_another_owner_does_not_exist() {
         "rows",
         sweeps::rows(service, bob, id, &Paging::default()).await,
     );
-    unknown("all_rows", sweeps::all_rows(service, bob, id).await);
+    let csv = crate::formats::Format::Csv;
+    unknown("table", sweeps::table(service, bob, id, csv).await);
     unknown(
         "watch",
         sweeps::watch(service, bob, id, 0).await.map(|_| ()),

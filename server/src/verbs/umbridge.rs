@@ -624,7 +624,11 @@ async fn evaluation<T>(
         };
         return Err(no_output(format!("{id} {}: {why}", job.status)));
     }
-    let summary = results::result(service, caller, id).await?.summary.solution;
+    let summary = results::result(service, caller, id)
+        .await?
+        .content
+        .summary
+        .solution;
     if !summary.converged {
         return Err(no_output(format!("{id} did not converge")));
     }

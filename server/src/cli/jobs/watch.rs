@@ -166,7 +166,7 @@ impl Watched {
         let values = row
             .parameters
             .iter()
-            .map(|(path, value)| format!("{path} = {value}"));
+            .map(|(path, value)| format!("{path} = {}", value.json()));
         let values: Vec<String> = values.collect();
         let force = row.normal_force.map_or(String::new(), |force| {
             format!("  Y {}", report::number(force))

@@ -1,0 +1,48 @@
+//! Entries of a list, as many as have room.
+
+use std::{collections::BTreeMap, ops::ControlFlow};
+
+/// Most bytes of labels of the entries of a list that are read at a time: a page of a thousand jobs might have a hundred times
+/// as many.
+const MOST_LABEL_BYTES: usize = 2 << 20;
+
+/// Entries of a list.
+#[derive(Debug)]
+pub struct Entries<T> {
+    /// In the order of the list.
+    pub items: Vec<T>,
+    /// There are more, which were not read since the labels of these are large.
+    pub cut: bool,
+    bytes: usize,
+}
+
+impl<T> Default for Entries<T> {
+    fn default() -> Self {
+        Entries {
+            items: vec![],
+            cut: false,
+            bytes: 0,
+        }
+    }
+}
+
+impl<T> Entries<T> {
+    /// Adds an entry with labels of so many bytes, if they have room beside those of the others.
+    pub(super) fn add(&mut self, entry: T, bytes: usize) -> ControlFlow<()> {
+        self.bytes = self.bytes.saturating_add(bytes);
+        if self.bytes > MOST_LABEL_BYTES && !self.items.is_empty() {
+            self.cut = true;
+            return ControlFlow::Break(());
+        }
+        self.items.push(entry);
+        ControlFlow::Continue(())
+    }
+}
+
+/// Bytes of labels.
+pub(super) fn bytes_of(labels: &BTreeMap<String, String>) -> usize {
+    labels
+        .iter()
+        .map(|(key, value)| key.len() + value.len())
+        .sum()
+}
