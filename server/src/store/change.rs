@@ -11,6 +11,7 @@ use tokio::sync::MutexGuard;
 use tracing::info;
 
 use super::{
+    damage::Damages,
     database::{Store, Writing},
     error::{Result, StoreError},
     intact::{self, WHOLE},
@@ -90,6 +91,11 @@ impl Change<'_> {
     /// The connection, for statements.
     pub(super) fn sql(&mut self) -> &mut SqliteConnection {
         &mut self.tx
+    }
+
+    /// What was found damaged.
+    pub(super) fn damages(&self) -> &Damages {
+        &self.store.damages
     }
 
     /// The memory that running jobs share.

@@ -1,11 +1,8 @@
 //! What has been found damaged: told to the client that asked, once in the log, and by `/readyz`.
 
 use std::{
-    collections::BTreeMap,
-    sync::{
-        Mutex, OnceLock, PoisonError,
-        atomic::{AtomicBool, Ordering},
-    },
+    collections::{BTreeMap, BTreeSet},
+    sync::{Mutex, OnceLock, PoisonError},
 };
 
 use sqlx::SqlitePool;
@@ -17,12 +14,42 @@ use crate::job::JobId;
 /// Most parts that are remembered; the log has all of them.
 const MOST: usize = 1000;
 
+/// What is found by a key, a name or a hash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Table {
+    Jobs,
+    Labels,
+    Keys,
+    Meshes,
+    Models,
+    Sweeps,
+    Deleted,
+}
+
+impl Table {
+    /// The error that it is damaged.
+    pub(super) fn damaged(self, cause: impl ToString) -> StoreError {
+        let of = match self {
+            Table::Jobs => "jobs",
+            Table::Labels => "labels",
+            Table::Keys => "request keys",
+            Table::Meshes => "meshes",
+            Table::Models => "models",
+            Table::Sweeps => "sweeps",
+            Table::Deleted => "deleted jobs",
+        };
+        Record::named(format!("index of the {of}")).damaged(cause)
+    }
+}
+
 /// The parts that were found damaged since the store was opened.
 #[derive(Debug)]
 pub(super) struct Damages {
     found: Mutex<BTreeMap<Record, (Uuid, Option<JobId>)>>,
-    /// The indexes of the jobs cannot be trusted: a job that is not found may exist.
-    indexes: AtomicBool,
+    /// Tables that cannot be trusted: what is not found in them may exist.
+    tables: Mutex<BTreeSet<Table>>,
+    /// The fingerprints of requests whose key was damaged.
+    suspects: Mutex<BTreeSet<String>>,
     /// Why nothing is written any more.
     broken: OnceLock<String>,
     /// Finds the public id of a job.
@@ -33,7 +60,8 @@ impl Damages {
     pub(super) fn new(reader: SqlitePool) -> Self {
         Damages {
             found: Mutex::default(),
-            indexes: AtomicBool::default(),
+            tables: Mutex::default(),
+            suspects: Mutex::default(),
             broken: OnceLock::new(),
             reader,
         }
@@ -113,16 +141,40 @@ impl Damages {
         (found.len(), incidents.take(SHOWN).collect())
     }
 
-    /// The indexes of the jobs were found damaged.
-    pub(super) async fn note_indexes(&self, cause: &str) {
-        self.indexes.store(true, Ordering::Relaxed);
-        self.note(Damage::of_indexes(cause)).await;
+    /// A table was found damaged, or differs from its indexes.
+    pub(super) async fn note_table(&self, table: Table, cause: &str) {
+        {
+            let mut tables = self.tables.lock().unwrap_or_else(PoisonError::into_inner);
+            tables.insert(table);
+        }
+        if let StoreError::Damaged(damage) = table.damaged(cause) {
+            self.note(*damage).await;
+        }
     }
 
-    /// An error if something that was not found may exist nevertheless.
-    pub(super) fn indexes_are_intact(&self) -> Result<()> {
-        match self.indexes.load(Ordering::Relaxed) {
-            true => Err(StoreError::Damaged(Box::new(Damage::of_indexes("")))),
+    /// An error if what was not found in these tables may exist nevertheless.
+    pub(super) fn have_all(&self, tables: &[Table]) -> Result<()> {
+        let damaged = self.tables.lock().unwrap_or_else(PoisonError::into_inner);
+        match tables.iter().find(|table| damaged.contains(table)) {
+            Some(table) => Err(table.damaged("")),
+            None => Ok(()),
+        }
+    }
+
+    /// The key of a request with this fingerprint was damaged.
+    pub(super) fn suspect(&self, payload: String) {
+        let mut suspects = self.suspects.lock().unwrap_or_else(PoisonError::into_inner);
+        if suspects.len() < MOST {
+            suspects.insert(payload);
+        }
+    }
+
+    /// An error if the key of a request with this fingerprint, which was not found, may exist nevertheless.
+    pub(super) fn have_all_keys(&self, payload: &str) -> Result<()> {
+        self.have_all(&[Table::Keys])?;
+        let suspects = self.suspects.lock().unwrap_or_else(PoisonError::into_inner);
+        match suspects.contains(payload) {
+            true => Err(Table::Keys.damaged("")),
             false => Ok(()),
         }
     }

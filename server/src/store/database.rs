@@ -18,7 +18,7 @@ use sqlx::{
         SqliteSynchronous,
     },
 };
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, watch};
 
 use super::{
     compact,
@@ -68,6 +68,8 @@ pub struct Store {
     pub(super) cancels: Mutex<HashSet<i64>>,
     /// What was found damaged.
     pub(super) damages: Arc<Damages>,
+    /// Whether the request keys were read since it was opened.
+    pub(super) keys_read: watch::Sender<bool>,
     /// Results that were found intact.
     pub(super) intact: Arc<Intact>,
     /// How far its clock is ahead of that of the machine, in microseconds: see `clock`.
@@ -198,6 +200,7 @@ impl Store {
         let (inbox, submissions) = Inbox::new();
         let store = Store {
             damages: Arc::new(Damages::new(reader.clone())),
+            keys_read: watch::Sender::new(true),
             writer,
             cannot_begin,
             reader,

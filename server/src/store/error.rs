@@ -136,18 +136,6 @@ impl Record {
     }
 }
 
-impl Damage {
-    /// Indexes of the table of jobs that differ from it.
-    pub(super) fn of_indexes(cause: &str) -> Damage {
-        Damage {
-            record: Record::named("index of the jobs"),
-            job: None,
-            cause: cause.to_owned(),
-            incident: None,
-        }
-    }
-}
-
 /// SQLite's numbers of errors.
 mod code {
     pub(super) const READ_ONLY: u32 = 8;

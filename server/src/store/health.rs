@@ -2,14 +2,13 @@
 
 use std::{sync::Weak, time::Duration};
 
-use sqlx::{ConnectOptions, Connection};
 use uuid::Uuid;
 
 use crate::{error::number_of, time::Time};
 
 use super::{
     database::Store,
-    error::{Record, Result, StoreError},
+    error::{Result, StoreError},
     rows::from_row,
 };
 
@@ -147,29 +146,5 @@ pub(super) async fn watch(store: Weak<Store>) {
             _ => {}
         }
         was_full = full;
-    }
-}
-
-/// Compares the table of jobs with its indexes, once, beside the work: a job that an index lacks would not be found.
-pub(super) async fn check_indexes(store: Weak<Store>) {
-    let Some(options) = store.upgrade().map(|store| store.reader.connect_options()) else {
-        return;
-    };
-    let checked = async {
-        let mut connection = options.connect().await?;
-        // one finding is enough
-        let found: String = sqlx::query_scalar("pragma integrity_check(job)")
-            .fetch_one(&mut connection)
-            .await?;
-        connection.close().await?;
-        match found.as_str() {
-            "ok" => Ok(()),
-            _ => Err(Record::named("index").damaged(found)),
-        }
-    };
-    if let Err(StoreError::Damaged(damage)) = checked.await
-        && let Some(store) = store.upgrade()
-    {
-        store.damages.note_indexes(&damage.cause).await;
     }
 }

@@ -7,6 +7,7 @@ use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 use super::{
     change::Change,
     checksum::Checksum,
+    damage::Table,
     database::Store,
     delete::{deleted_id, owner_of_deleted},
     error::{Record, Result, StoreError},
@@ -21,12 +22,15 @@ use crate::{
 impl Store {
     /// The jobs that this owner has submitted under a key.
     pub async fn replay(&self, owner: &str, key: &RequestKey) -> Result<Option<Vec<Job>>> {
+        self.keys_were_read().await;
         let read = async {
             let mut connection = self.reader.acquire().await?;
             let Some(keys) = jobs_of_key(&mut connection, owner, key).await? else {
+                self.damages.have_all_keys(&key.payload)?;
                 return Ok(None);
             };
             let Some(mut jobs) = remaining(&mut connection, keys).await? else {
+                self.damages.have_all(&[Table::Jobs, Table::Deleted])?;
                 return Ok(None);
             };
             self.complete(&mut connection, &mut jobs).await?;
@@ -50,7 +54,10 @@ impl Store {
                 .await?;
         match same {
             Some(_) => self.job(Owners::Only(owner), id).await,
-            None => Ok(None),
+            None => {
+                self.damages.have_all(&[Table::Jobs])?;
+                Ok(None)
+            }
         }
     }
 }
@@ -62,11 +69,14 @@ pub(super) async fn already_submitted(
     jobs: &[NewJob],
     key: Option<&RequestKey>,
 ) -> Result<Option<Vec<Job>>> {
-    if let Some(key) = key
-        && let Some(keys) = jobs_of_key(change.sql(), owner, key).await?
-        && let Some(old) = remaining(change.sql(), keys).await?
-    {
-        return Ok(Some(old));
+    if let Some(key) = key {
+        match jobs_of_key(change.sql(), owner, key).await? {
+            None => change.damages().have_all_keys(&key.payload)?,
+            Some(keys) => match remaining(change.sql(), keys).await? {
+                Some(old) => return Ok(Some(old)),
+                None => change.damages().have_all(&[Table::Jobs, Table::Deleted])?,
+            },
+        }
     }
     let mut old = vec![];
     for new in jobs {
@@ -87,7 +97,7 @@ pub(super) async fn already_submitted(
                 Some(theirs) if theirs == owner => return Err(StoreError::Deleted(id)),
                 // of another owner: whether that job still exists is not revealed
                 Some(_) => return Err(StoreError::IdConflict(id)),
-                None => {}
+                None => change.damages().have_all(&[Table::Jobs, Table::Deleted])?,
             },
         }
     }

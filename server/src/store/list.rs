@@ -10,6 +10,7 @@ use futures_util::TryStreamExt;
 use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
 
 use super::{
+    damage::Table,
     database::Store,
     entries::{Entries, bytes_of},
     error::Result,
@@ -89,7 +90,7 @@ impl Store {
             }
             drop(rows);
             self.complete(&mut connection, &mut jobs.items).await?;
-            self.damages.indexes_are_intact()?;
+            self.damages.have_all(tables_of(filter))?;
             Ok(jobs)
         };
         self.damages.noting(read).await
@@ -108,7 +109,7 @@ impl Store {
         let read = async {
             let mut query = counted(filter, group_by);
             let rows = query.build().fetch_all(&self.lists).await?;
-            self.damages.indexes_are_intact()?;
+            self.damages.have_all(tables_of(filter))?;
             rows.iter()
                 .map(|row| Ok((row.try_get("kind")?, row.try_get("jobs")?)))
                 .collect()
@@ -129,7 +130,17 @@ impl Store {
             return Ok(vec![]);
         };
         let mut query = keys_of_jobs(filter, after, up_to, limit);
-        Ok(query.build_query_scalar().fetch_all(&self.lists).await?)
+        let keys = query.build_query_scalar().fetch_all(&self.lists).await?;
+        self.damages.have_all(tables_of(filter))?;
+        Ok(keys)
+    }
+}
+
+/// Where jobs are found by this filter.
+fn tables_of(filter: &Filter) -> &'static [Table] {
+    match filter.labels.is_empty() {
+        true => &[Table::Jobs],
+        false => &[Table::Jobs, Table::Labels],
     }
 }
 

@@ -1,6 +1,7 @@
 //! One job: found by its public id; details of it by its key.
 
 use super::{
+    damage::Table,
     database::Store,
     error::Result,
     problems,
@@ -17,7 +18,7 @@ impl Store {
         let read = async {
             let mut connection = self.reader.acquire().await?;
             let Some(mut job) = with_id(&mut connection, owners, id).await? else {
-                self.damages.indexes_are_intact()?;
+                self.damages.have_all(&[Table::Jobs])?;
                 return Ok(None);
             };
             self.complete(&mut connection, std::slice::from_mut(&mut job))

@@ -4,6 +4,7 @@ use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 
 use super::{
     checksum::{self, Checksum},
+    damage::Table,
     database::Store,
     error::{Record, Result, StoreError},
 };
@@ -42,6 +43,9 @@ impl Store {
                 .bind(owner),
             };
             let row = row.fetch_optional(&self.reader).await?;
+            if row.is_none() {
+                self.damages.have_all(&[Table::Meshes])?;
+            }
             row.as_ref().map(|row| Ok(described(row)?.info)).transpose()
         };
         self.damages.noting(read).await

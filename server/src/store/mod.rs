@@ -75,6 +75,9 @@ mod lookup;
 mod positions;
 mod snapshot;
 
+// What is found by keys and hashes, read from time to time.
+mod scrub;
+
 // What is not a job.
 mod meshes;
 mod models;
@@ -129,7 +132,8 @@ impl Store {
         let store = Store::open_unwatched(folder).await;
         let store = store.map_err(|error| with_advice(error, folder))?;
         tokio::spawn(health::watch(Arc::downgrade(&store)));
-        tokio::spawn(health::check_indexes(Arc::downgrade(&store)));
+        store.keys_read.send_replace(false);
+        tokio::spawn(scrub::scrub(Arc::downgrade(&store)));
         Ok(store)
     }
 

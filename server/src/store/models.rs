@@ -4,6 +4,7 @@ use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 
 use super::{
     checksum::{self, Checksum},
+    damage::Table,
     database::{Store, Writing},
     error::{Record, Result},
 };
@@ -23,7 +24,11 @@ impl Store {
     ) -> Result<Option<Model>> {
         let read = async {
             let mut connection = self.reader.acquire().await?;
-            find(&mut connection, owners, first, name).await
+            let found = find(&mut connection, owners, first, name).await?;
+            if found.is_none() {
+                self.damages.have_all(&[Table::Models])?;
+            }
+            Ok(found)
         };
         self.damages.noting(read).await
     }
@@ -38,6 +43,7 @@ impl Store {
         let read = async {
             let mut tx = self.reader.begin().await?;
             let Some(model) = find(&mut tx, owners, first, name).await? else {
+                self.damages.have_all(&[Table::Models])?;
                 return Ok(None);
             };
             let problem = problem(&mut tx, model.key).await?;

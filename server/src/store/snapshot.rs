@@ -6,7 +6,7 @@ use solver::solution::Fields;
 use sqlx::{Sqlite, Transaction};
 
 use super::{
-    damage::Damages,
+    damage::{Damages, Table},
     database::Store,
     encoding::{Content, PartInfo},
     error::Result,
@@ -81,7 +81,7 @@ impl Store {
             let mut tx = self.reader.begin().await?;
             let job = with_id(&mut tx, owners, id).await?;
             if job.is_none() {
-                self.damages.indexes_are_intact()?;
+                self.damages.have_all(&[Table::Jobs])?;
             }
             Ok(job.map(|job| Snapshot {
                 job,

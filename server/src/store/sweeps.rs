@@ -11,6 +11,7 @@ use uuid::Uuid;
 use super::{
     change::Change,
     checksum::{self, Checksum},
+    damage::Table,
     database::Store,
     entries::{Entries, bytes_of},
     error::{Record, Result, StoreError},
@@ -56,7 +57,11 @@ impl Store {
     pub async fn sweep(&self, owners: Owners<'_>, id: SweepId) -> Result<Option<Sweep>> {
         let read = async {
             let mut connection = self.reader.acquire().await?;
-            with_id(&mut connection, owners, id).await
+            let found = with_id(&mut connection, owners, id).await?;
+            if found.is_none() {
+                self.damages.have_all(&[Table::Sweeps])?;
+            }
+            Ok(found)
         };
         self.damages.noting(read).await
     }

@@ -8,7 +8,8 @@ use super::*;
 use crate::{
     job::{JobId, ResultAvailable},
     mesh::MeshInfo,
-    store::parts::Part as ResultPart,
+    model::Description,
+    store::{damage::Table, parts::Part as ResultPart},
 };
 
 const PARTS: [&str; 4] = ["summary", "history", "steps", "fields"];
@@ -320,13 +321,123 @@ async fn an_index_that_lacks_a_job_is_noticed() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
     let job = solved(&store, new("1")).await;
-    store.damages.note_indexes("row 1 missing from index").await;
+    store
+        .damages
+        .note_table(Table::Jobs, "row 1 missing from index")
+        .await;
     assert!(store.job(Owners::All, job.id).await.is_ok());
     let unknown = store.job(Owners::All, JobId::default()).await;
     assert!(
         matches!(unknown, Err(StoreError::Damaged(_))),
         "{unknown:?}"
     );
+}
+
+/// Every place of a text in the database.
+fn places(folder: &Path, text: &str) -> Vec<usize> {
+    let bytes = std::fs::read(folder.join("signorini.db")).unwrap();
+    let found = bytes.windows(text.len()).enumerate();
+    let found = found.filter(|(_, window)| *window == text.as_bytes());
+    found.map(|(place, _)| place).collect()
+}
+
+/// Changes a bit of a store, opens it and reads it once in the background.
+async fn opened_with_changed_bit(folder: &Path, place: usize) -> Result<Arc<Store>> {
+    let file = folder.join("signorini.db");
+    let mut bytes = std::fs::read(&file).unwrap();
+    bytes[place] ^= 1;
+    std::fs::write(&file, bytes).unwrap();
+    let store = Store::open(folder).await?;
+    scrub::read_once(&Arc::downgrade(&store)).await;
+    Ok(store)
+}
+
+/// Wherever the bit lies: in a row, in an index, or in neither.
+#[tokio::test]
+async fn a_changed_bit_makes_no_second_job_and_hides_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let job = NewJob {
+        name: Some("namezero".into()),
+        labels: [("key".to_string(), "valzero".to_string())].into(),
+        ..new("1")
+    };
+    let submission = || by("ada", vec![job.clone()], Some("keyzero"));
+    let first = store
+        .submit(submission(), false)
+        .await
+        .unwrap()
+        .jobs
+        .remove(0);
+    let model = Description {
+        title: None,
+        inputs: vec![],
+        outputs: vec![],
+        base_input: vec![],
+    };
+    let put = store.put_model(("ada", "modzero"), &model, "{}", 9);
+    put.await.unwrap().unwrap();
+    store.close().await;
+    drop(store);
+    let labeled = Filter {
+        labels: vec![("key".into(), "valzero".into())],
+        ..Filter::default()
+    };
+    let named = Filter {
+        name: Some("namezero".into()),
+        ..Filter::default()
+    };
+    let (mut told, mut tried) = (0, 0);
+    for text in ["valzero", "namezero", "keyzero", "modzero"] {
+        let places = places(folder.path(), text);
+        assert!(places.len() > 1, "{text}");
+        for place in places {
+            let copy = tempfile::tempdir().unwrap();
+            for name in ["signorini.db", "signorini.progress"] {
+                std::fs::copy(folder.path().join(name), copy.path().join(name)).unwrap();
+            }
+            tried += 1;
+            let Ok(store) = opened_with_changed_bit(copy.path(), place).await else {
+                told += 1;
+                continue;
+            };
+            for filter in [&labeled, &named] {
+                match store
+                    .jobs(Owners::All, filter, Order::NEWEST_FIRST, None, 10)
+                    .await
+                {
+                    Ok(found) => assert_eq!(found.len(), 1, "{text} at {place}"),
+                    Err(error) => assert!(matches!(error, StoreError::Damaged(_)), "{error}"),
+                }
+            }
+            match store.model(Owners::All, "ada", "modzero").await {
+                Ok(found) => assert!(found.is_some(), "{text} at {place}"),
+                Err(error) => assert!(matches!(error, StoreError::Damaged(_)), "{error}"),
+            }
+            match store.submit(submission(), false).await {
+                Ok(again) => assert_eq!(again.jobs[0].id, first.id, "{text} at {place}"),
+                Err(error) => assert!(matches!(error, StoreError::Damaged(_)), "{error}"),
+            }
+            // others are not held up by one damaged key
+            if text == "keyzero" {
+                let other = NewJob {
+                    payload: "other".into(),
+                    ..new("2")
+                };
+                let other = Submission {
+                    key: Some(RequestKey {
+                        key: "other".into(),
+                        payload: "other".into(),
+                    }),
+                    ..by("ada", vec![other], None)
+                };
+                store.submit(other, false).await.unwrap();
+            }
+            told += usize::from(store.damages.summary().0 > 0);
+            store.close().await;
+        }
+    }
+    assert!(told >= 8, "{told} of {tried}");
 }
 
 #[tokio::test]
