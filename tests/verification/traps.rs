@@ -2,9 +2,9 @@
 
 use serde_json::{Value, json};
 use solver::problem::{Problem, Refine};
-use solver::solution::{QuantityName, Summary, Verdict, WarningCode};
+use solver::solution::{Outcome, QuantityName, Summary, Verdict, WarningCode};
 
-use crate::support::{example, problem, solve};
+use crate::support::{example, problem, quiet, solve};
 
 /// A whole block of half-width 2 and height 2 under an obstacle, in plane strain.
 fn block(x: &[f64], obstacle: Value, indentation: f64, friction: Value) -> Problem {
@@ -37,6 +37,36 @@ fn cohesion_keeps_a_symmetric_problem_symmetric() {
             off < 1e-9,
             "asymmetric by {off:.1e} at δ = {indentation}, ρ = {radius}"
         );
+    }
+}
+
+/// A beam that touches an obstacle above its end without friction, and that the cohesion which acts as soon as it touches bends away
+/// from it, has no equilibrium, whatever the radius: the cohesion is named, and not the stiffness.
+#[test]
+fn a_body_that_its_cohesion_lifts_off_has_no_equilibrium() {
+    let beam = |radius: f64, cohesion: f64| {
+        let text = json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {"grid": {"x": [0, 0.5, 1, 1.5, 2], "y": [0, 0.25, 0.5]}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "supports": [{"boundary": "left", "ux": 0, "uy": 0}],
+            "contacts": [{
+                "boundary": "top", "obstacle": {"kind": "flat", "from": 1}, "indentation": 0.001, "tangential_displacement": 0.02,
+                "friction": {"coefficient": 0.3, "cohesion": cohesion, "nonlocal_radius": radius, "elastic_slip": 1e-3},
+            }],
+        });
+        solver::solve(&problem(&text.to_string()), &mut quiet)
+            .unwrap()
+            .summary
+    };
+    for radius in [0.0, 0.5, 2.0] {
+        let without = beam(radius, 0.0);
+        assert!(without.outcome == Outcome::Converged && without.normal_force > 0.01);
+        let lifted = beam(radius, 1.0);
+        assert_eq!(lifted.outcome, Outcome::ContactCycling, "{radius}");
+        let told = |code: WarningCode| lifted.warnings.iter().any(|w| w.code == code);
+        assert!(told(WarningCode::CohesionJumps), "{:#?}", lifted.warnings);
+        assert!(!told(WarningCode::OutOfBalance), "{:#?}", lifted.warnings);
     }
 }
 

@@ -248,7 +248,9 @@ pub fn report(
         Outcome::Converged if equilibrium > out_of_balance => Outcome::FalseConvergence,
         outcome => outcome,
     };
-    if equilibrium > out_of_balance && finished.slide.is_none() {
+    // the state of a cycle is no equilibrium, whatever the stiffness
+    let cycling = finished.outcome == Outcome::ContactCycling;
+    if equilibrium > out_of_balance && finished.slide.is_none() && !cycling {
         warnings.push(Warning {
             code: WarningCode::OutOfBalance,
             pointer: String::new(),

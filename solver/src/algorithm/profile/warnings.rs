@@ -49,20 +49,29 @@ impl PatchView<'_> {
                 message,
             });
         };
+        // the radius of a law whose bound jumps
         let jumps = |law: &FrictionLaw<Average>| match &law.bound {
             BoundLaw::Pressure {
                 cohesion, average, ..
-            } => *cohesion > 0.0 && average.radius == 0.0,
-            BoundLaw::Prescribed(_) => false,
+            } => (*cohesion > 0.0).then_some(average.radius),
+            BoundLaw::Prescribed(_) => None,
         };
         let settled = matches!(
             self.finished.outcome,
             Outcome::Converged | Outcome::Canceled
         );
-        if !settled && contact.friction.as_ref().is_some_and(jumps) {
+        if let Some(radius) = contact
+            .friction
+            .as_ref()
+            .and_then(jumps)
+            .filter(|_| !settled)
+        {
             warn(
                 WarningCode::CohesionJumps,
-                "The friction bound jumps by the cohesion where the pressure ends; without a nonlocal radius the nodes there may enter and leave contact endlessly. Give a radius of at least one element.".to_owned(),
+                match radius {
+                    0.0 => "The friction bound jumps by the cohesion where the pressure ends; without a nonlocal radius the nodes there may enter and leave contact endlessly. Give a radius of at least one element.".to_owned(),
+                    _ => "The friction bound jumps by the cohesion where the averaged pressure ends, and from nothing as soon as the body touches at all: where that friction lifts it off again, there is no equilibrium. Press it further, or give less cohesion.".to_owned(),
+                },
             );
         }
         let touching = (0..self.count()).filter(|&i| self.active(i)).count();
