@@ -281,14 +281,14 @@ impl Size {
     /// Profiles and rows are held as numbers and as text; a step is also part of a partial result, which is a copy of
     /// all steps so far and their text (bytes).
     fn history(&self) -> f64 {
-        let of_step = 1e4 + PER_CONTACT * self.contacts + 1000.0 * self.profile;
+        let of_step = 2e4 + PER_CONTACT * self.contacts + 1000.0 * self.profile;
         1.2e4 * self.increments + self.steps * of_step + 300.0 * self.profile
     }
 }
 
 /// What a step says of a contact beside its profiles: a summary and its warnings, and three profiles with what describes
 /// each as a part of the result (bytes).
-const PER_CONTACT: f64 = 2.5e3;
+const PER_CONTACT: f64 = 4e3;
 
 /// What even the smallest problem takes, most of it to compress its result (bytes).
 const FLOOR: f64 = 393_216.0;
