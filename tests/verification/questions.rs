@@ -1,8 +1,9 @@
 //! How often a solution asks whether to go on. Who stops it waits for the next question.
 //!
 //! Work of one kind takes the same part of the whole on any machine, so the longest time without a question is held to a part
-//! of the whole time; of several runs the best counts, since the machine may pause. Where the stated errors and the averages
-//! at the points of profiles were computed without a question, that part was a third and more.
+//! of the whole time, of problems that take about a second: the work between two questions takes some hundredths of one. Of
+//! several runs the best counts, since the machine may pause. Where the stated errors and the averages at the points of
+//! profiles were computed without a question, that part was a third and more.
 
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
@@ -71,8 +72,8 @@ fn longest_pause(problem: &Problem) -> f64 {
 fn no_stage_is_long_without_a_question() {
     for (name, value) in [
         ("contacts", many_contacts(180)),
-        ("averages", wide_averages(60, "estimate")),
-        ("averages on two meshes", wide_averages(40, "verify")),
+        ("averages", wide_averages(150, "estimate")),
+        ("averages on two meshes", wide_averages(90, "verify")),
     ] {
         let problem = problem(&value.to_string());
         let asked = |_| longest_pause(&problem) < 0.1;

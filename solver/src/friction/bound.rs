@@ -47,14 +47,6 @@ impl Source {
         }
     }
 
-    /// Pressures that it is made of.
-    pub fn weight_count(&self) -> usize {
-        match self {
-            Source::Average(row) => row.weights.len(),
-            Source::Given(_) => 0,
-        }
-    }
-
     /// With nodes numbered from `first` on.
     pub fn shifted(mut self, first: usize) -> Self {
         // rows are shared with the operator: those of the first contact stay so
@@ -138,6 +130,14 @@ impl BoundLaw {
         match self {
             BoundLaw::Pressure { average, .. } => Some(average.radius()),
             BoundLaw::Prescribed(_) => None,
+        }
+    }
+
+    /// What computing a source takes (multiplications).
+    pub fn work(&self, source: &Source) -> usize {
+        match (self, source) {
+            (BoundLaw::Pressure { average, .. }, Source::Average(row)) => average.work(row),
+            _ => 0,
         }
     }
 

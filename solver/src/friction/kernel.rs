@@ -215,6 +215,15 @@ impl Averaging {
         row
     }
 
+    /// What computing a row takes (multiplications).
+    pub fn work(&self, row: &Row) -> usize {
+        let of_a_weight = match self.measure {
+            Measure::Line => 500,
+            Measure::Surface => 3000,
+        };
+        of_a_weight * row.weights.len()
+    }
+
     fn integrated_row(&self, s: f64) -> Row {
         let mut parts: Vec<(usize, [f64; 3])> = Vec::new();
         let mut add = |edge: usize, weights: [f64; 3]| parts.push((edge, weights));

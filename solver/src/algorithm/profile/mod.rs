@@ -22,9 +22,6 @@ use crate::friction::largest_pressure;
 use crate::problem::{Condition, FrictionPoints};
 use crate::solution::{ContactProfile, NodeState};
 
-/// What one weight of an average takes, in multiplications.
-const WORK_OF_A_WEIGHT: usize = 500;
-
 /// One contact in the final state.
 pub(super) struct PatchView<'a> {
     system: &'a System<'a>,
@@ -239,7 +236,7 @@ impl<'a> PatchView<'a> {
             return (0.0, 0.0);
         }
         let source = law.bound.source(s);
-        (self.go_on)((WORK_OF_A_WEIGHT * source.weight_count()) as f64);
+        (self.go_on)(law.bound.work(&source) as f64);
         let pressures = self.own_pressures();
         (
             source.nonlocal_pressure(pressures),
