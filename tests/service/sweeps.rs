@@ -497,11 +497,16 @@ async fn everything_that_is_wrong_is_told_before_anything_is_stored() {
         [("/axes/0/values", "too_many")]
     );
     let mut deep = punch();
-    deep["axes"][0]["path"] = json!("/contacts/0".repeat(1000));
-    assert_eq!(
-        violations(&refused(deep).await),
-        [("/axes/0/path", "unknown_name")]
-    );
+    for (path, reason) in [
+        ("/contacts/0".repeat(20), "unknown_name"),
+        ("/contacts/0".repeat(1000), "too_long"),
+    ] {
+        deep["axes"][0]["path"] = json!(path);
+        assert_eq!(
+            violations(&refused(deep.clone()).await),
+            [("/axes/0/path", reason)]
+        );
+    }
     let nested = format!(
         r#"{{"base": {}, "axes": {}1{}}}"#,
         example("sheet"),
