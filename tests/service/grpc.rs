@@ -1,7 +1,7 @@
 //! Calls of `signorini.v1.JobService`, health and reflection.
 
 use reqwest::StatusCode;
-use serde_json::json;
+use serde_json::{Value, json};
 use service::pb::{self, job_service_client::JobServiceClient};
 use suite::{
     example, example_json,
@@ -220,8 +220,8 @@ async fn errors_carry_codes_and_details() {
     assert_eq!(details.error_info().unwrap().reason, "payload-too-large");
 }
 
-/// Jobs and problems that REST returns in one response may be too large for a message.
-/// Operations: ListJobs, GetJobProblem
+/// Jobs, problems and results that REST returns in one response may be too large for a message.
+/// Operations: ListJobs, GetJobProblem, GetResult
 #[tokio::test]
 async fn no_answer_exceeds_the_limit_of_a_message() {
     use prost::Message;
@@ -263,6 +263,44 @@ async fn no_answer_exceeds_the_limit_of_a_message() {
     let refused = grpc.get_job_problem(pb::GetJobProblemRequest { id }).await;
     let details = refused.unwrap_err().get_error_details();
     assert_eq!(details.error_info().unwrap().reason, "payload-too-large");
+
+    server.post("/v1/queue/resume").send().await.unwrap();
+    let id = server.submit(&many_contacts_and_steps()).await;
+    server.until_done(&id).await;
+    let whole = server.get(&format!("/v1/jobs/{id}/result")).send().await;
+    assert!(whole.unwrap().bytes().await.unwrap().len() > MOST);
+    let refused = grpc.get_result(pb::GetResultRequest { id }).await;
+    let refused = refused.unwrap_err();
+    let words = "GET /v1/jobs/{id}/result";
+    assert!(refused.message().contains(words), "{}", refused.message());
+    let details = refused.get_error_details();
+    assert_eq!(details.error_info().unwrap().reason, "payload-too-large");
+}
+
+/// A strip with a flat obstacle on every second edge, pressed in small steps: little to solve, much to tell.
+fn many_contacts_and_steps() -> Value {
+    const CONTACTS: usize = 20;
+    const STEPS: usize = 150;
+    let x: Vec<f64> = (0..=2 * CONTACTS).map(|n| n as f64).collect();
+    let mut boundaries = serde_json::Map::new();
+    let mut contacts = vec![];
+    for n in 0..CONTACTS {
+        let (name, from) = (format!("part {n}"), 2 * n);
+        let rule = json!({ "side": "top", "x": [from as f64 - 0.01, from as f64 + 1.01] });
+        boundaries.insert(name.clone(), rule);
+        let obstacle = json!({ "kind": "flat" });
+        contacts.push(json!({ "boundary": name, "obstacle": obstacle, "indentation": 0.01 }));
+    }
+    let step =
+        |n: usize| json!({ "name": format!("step {n}"), "indentation": n as f64 / STEPS as f64 });
+    json!({
+        "analysis": { "kind": "plane_strain" },
+        "mesh": { "grid": { "x": x, "y": [0, 1] }, "boundaries": boundaries },
+        "materials": [{ "youngs_modulus": 1000, "poissons_ratio": 0.3 }],
+        "supports": [{ "boundary": "bottom", "ux": 0, "uy": 0 }],
+        "contacts": contacts,
+        "steps": (1..=STEPS).map(step).collect::<Vec<Value>>(),
+    })
 }
 
 /// Operations: WatchJob

@@ -1,7 +1,7 @@
 //! Reading the fields of messages, by the same parameters as over REST; and what fits into a message.
 
 use prost::Message;
-use tonic::{Request, Response, metadata::MetadataValue};
+use tonic::{Request, Response, Status, metadata::MetadataValue};
 
 use crate::{
     caller::Caller,
@@ -30,6 +30,17 @@ pub(super) fn messages_that_fit<M: Message>(messages: &[M]) -> usize {
         bytes <= MAX_MESSAGE_BYTES
     };
     messages.iter().take_while(fits).count().max(1)
+}
+
+/// An answer that cannot be divided into pages, or, if it is larger than a message may be, where REST has it.
+pub(super) fn one_message<M: Message>(
+    message: M,
+    instead: &'static str,
+) -> Result<Response<M>, Status> {
+    if message.encoded_len() > MAX_MESSAGE_BYTES {
+        return Err(ApiError::AnswerTooLarge { instead }.into());
+    }
+    Ok(Response::new(message))
 }
 
 /// The caller and the message of a request.

@@ -3,13 +3,12 @@
 use std::{pin::Pin, sync::Arc};
 
 use futures_util::{Stream, StreamExt};
-use prost::Message;
 use sha2::{Digest, Sha256};
 use tonic::{Request, Response, Status, Streaming, metadata::MetadataValue};
 
 use super::messages::{
-    MAX_ROWS, caller_and_message, check_offset, key, messages_that_fit, noting_replay, paging,
-    points, read_if_set,
+    MAX_ROWS, caller_and_message, check_offset, key, messages_that_fit, noting_replay, one_message,
+    paging, points, read_if_set,
 };
 use crate::{
     caller::Caller,
@@ -22,7 +21,7 @@ use crate::{
     store::PIECE_BYTES,
     transfer::HasShare,
     verbs::{
-        MAX_MESSAGE_BYTES, Service,
+        Service,
         bulk::{self, BulkResult},
         envelope::JobRequest,
         fields,
@@ -134,14 +133,7 @@ impl JobService for Grpc {
     ) -> Reply<pb::Problem> {
         let (caller, request) = caller_and_message(request)?;
         let problem = jobs::problem(&self.service, &caller, ID.read(&request.id)?).await?;
-        let message = pb::Problem::from(problem);
-        if message.encoded_len() > MAX_MESSAGE_BYTES {
-            return Err(ApiError::AnswerTooLarge {
-                instead: "GET /v1/jobs/{id}/problem",
-            }
-            .into());
-        }
-        Ok(Response::new(message))
+        one_message(pb::Problem::from(problem), "GET /v1/jobs/{id}/problem")
     }
 
     async fn list_jobs(
@@ -217,7 +209,7 @@ impl JobService for Grpc {
     async fn get_result(&self, request: Request<pb::GetResultRequest>) -> Reply<pb::Result> {
         let (caller, request) = caller_and_message(request)?;
         let result = results::result(&self.service, &caller, ID.read(&request.id)?).await?;
-        Ok(Response::new(result.content.into()))
+        one_message(pb::Result::from(result.content), "GET /v1/jobs/{id}/result")
     }
 
     async fn get_profile(
@@ -435,14 +427,8 @@ impl JobService for Grpc {
     ) -> Reply<pb::ListTokensResponse> {
         let (caller, _) = caller_and_message(request)?;
         let all = tokens::list(&self.service.store, &caller);
-        let fitting: Vec<pb::Token> = all.into_iter().map(Into::into).collect();
-        if messages_that_fit(&fitting) < fitting.len() {
-            return Err(ApiError::AnswerTooLarge {
-                instead: "GET /v1/tokens",
-            }
-            .into());
-        }
-        Ok(Response::new(pb::ListTokensResponse { tokens: fitting }))
+        let tokens = all.into_iter().map(Into::into).collect();
+        one_message(pb::ListTokensResponse { tokens }, "GET /v1/tokens")
     }
 
     async fn revoke_token(&self, request: Request<pb::RevokeTokenRequest>) -> Reply<pb::Token> {
