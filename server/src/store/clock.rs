@@ -5,14 +5,18 @@ use std::{borrow::Cow, sync::atomic::Ordering};
 use super::{
     database::Store,
     error::{Result, StoreError},
+    events,
     pauses::Pause,
-    rows::read,
+    rows::{from_row, read},
 };
 use crate::{event::Payload, time::Time};
 
 /// The settings with the last moment that the store has seen, and with the pauses.
 const SEEN: &str = "seen_until";
 const PAUSES: &str = "pauses";
+
+/// How often the moment is noted.
+pub(super) const NOTED_MICROS: i64 = 60 * 1_000_000;
 
 /// Shorter pauses are not kept: they are a small part of the shortest age that matters.
 const LEAST_MICROS: i64 = 1_000_000;
@@ -72,11 +76,19 @@ impl Store {
             Sealed::Damaged => vec![Pause(i64::MIN, now)],
         };
         let before = pauses.clone();
+        let latest = self.latest_time().await?;
         let seen = match self.sealed_setting(SEEN).await? {
-            Sealed::Intact(text) => text.parse().ok(),
-            Sealed::Absent | Sealed::Damaged => None,
+            // jobs may have been stored since it was noted, but none long after
+            Sealed::Intact(text) => text.parse().ok().map(|seen: i64| {
+                let since = latest.unwrap_or(seen).saturating_sub(seen);
+                seen + if since < 2 * NOTED_MICROS {
+                    since.max(0)
+                } else {
+                    0
+                }
+            }),
+            Sealed::Absent | Sealed::Damaged => latest,
         };
-        let seen = seen.max(self.latest_time().await?);
         let pause = now.saturating_sub(seen.unwrap_or(now));
         if pause >= LEAST_MICROS {
             pauses.push(Pause(now - pause, now));
@@ -118,16 +130,28 @@ impl Store {
         Time::from_micros(self.pauses.cutoff(now.micros(), (age_s * 1e6) as i64))
     }
 
-    /// The latest time in the store.
+    /// The latest time in the store, of records that are intact: a changed bit in a row or an index would set the clock.
     pub(super) async fn latest_time(&self) -> Result<Option<i64>> {
-        let latest = sqlx::query_scalar(
-            "select max(t) from (select max(created_at) as t from job
-                                 union all select max(finished_at) from job
-                                 union all select max(event.t) from job join event
-                                           on event.job_id = job.id and event.seq = job.last_seq
-                                           where job.status in ('queued', 'running'))",
-        );
-        Ok(latest.fetch_one(&self.reader).await?)
+        // the first of each, and some more for those that are damaged
+        const CREATED: &str = "select * from job order by created_at desc limit 10";
+        const FINISHED: &str =
+            "select * from job where finished_at is not null order by finished_at desc limit 10";
+        const OF_ACTIVE: &str =
+            "select event.* from job join event on event.job_id = job.id and event.seq = job.last_seq
+             where job.status in ('queued', 'running') order by event.t desc limit 10";
+        let mut times = vec![];
+        for query in [CREATED, FINISHED] {
+            for row in sqlx::query(query).fetch_all(&self.reader).await? {
+                if let Ok(job) = from_row(&row) {
+                    times.push(job.created_at.micros());
+                    times.extend(job.finished_at.map(Time::micros));
+                }
+            }
+        }
+        for row in sqlx::query(OF_ACTIVE).fetch_all(&self.reader).await? {
+            times.extend(events::intact_time(&row));
+        }
+        Ok(times.into_iter().max())
     }
 
     /// Jobs that would expire within as much time as was not seen may wait for that much longer.

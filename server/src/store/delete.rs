@@ -4,7 +4,10 @@ use std::time::Duration;
 
 use sqlx::SqliteConnection;
 
-use super::{change::Change, database::Store, error::Result, results, rows::find, sizes, sweeps};
+use super::{
+    change::Change, damage::Table, database::Store, error::Result, results, rows::find, sizes,
+    sweeps,
+};
 use crate::{
     caller::Owners,
     job::{Job, JobId},
@@ -44,6 +47,9 @@ impl Store {
         let read = async {
             let mut connection = self.reader.acquire().await?;
             let owner = owner_of_deleted(&mut connection, id).await?;
+            if owner.is_none() {
+                self.damages.have_all(&[Table::Deleted])?;
+            }
             Ok(owner.is_some_and(|owner| owners.include(&owner)))
         };
         self.damages.noting(read).await

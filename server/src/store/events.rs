@@ -123,6 +123,12 @@ pub(super) async fn read(
     }
 }
 
+/// The time of an event (µs), if its row is as it was written.
+pub(super) fn intact_time(row: &SqliteRow) -> Option<i64> {
+    checked(row.try_get("job_id").ok()?, row).ok()?;
+    row.try_get("t").ok()
+}
+
 /// The number of an event and its body, if the row is as it was written.
 fn checked(key: i64, row: &SqliteRow) -> Result<(i64, &str)> {
     let read = || {

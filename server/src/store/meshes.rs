@@ -74,6 +74,7 @@ impl Store {
                 .bind(limit)
                 .fetch_all(&self.reader)
                 .await?;
+            self.damages.have_all(&[Table::Meshes])?;
             rows.iter().map(described).collect()
         };
         self.damages.noting(read).await

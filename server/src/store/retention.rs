@@ -8,6 +8,7 @@ use std::{collections::HashSet, num::ParseIntError, sync::Weak, time::Duration};
 
 use super::{
     bulk::{Batch, Discard},
+    clock::NOTED_MICROS,
     complaint::Complaint,
     database::Store,
     delete::PAUSE,
@@ -88,7 +89,7 @@ const INTERVAL: Duration = Duration::from_secs(10);
 /// … and while the disk is full.
 const INTERVAL_WHEN_FULL: Duration = Duration::from_secs(1);
 /// How often it is noted that time passes, in intervals.
-const NOTED_EVERY: u32 = 6;
+const NOTED_EVERY: u32 = (NOTED_MICROS / INTERVAL.as_micros() as i64) as u32;
 
 /// What is removed for its age at once is told as a warning where it is at least so many jobs, and half of all.
 const MUCH: i64 = 10;
@@ -352,12 +353,15 @@ impl Store {
         Ok(found)
     }
 
-    /// An error unless the sums by owner are those of the jobs.
-    async fn compare_sums(&self) -> Result<()> {
+    /// An error unless the sums by owner are those of the jobs and meshes.
+    pub(super) async fn compare_sums(&self) -> Result<()> {
         let differ: bool = sqlx::query_scalar(
-            "with of_jobs as (select owner, count(*) as jobs, sum(bytes) as bytes from job_size group by owner)
-             select exists (select 1 from owner_size left join of_jobs using (owner)
-                            where owner_size.jobs <> coalesce(of_jobs.jobs, 0) or job_bytes <> coalesce(bytes, 0))
+            "with of_jobs as (select owner, count(*) as jobs, sum(bytes) as bytes from job_size group by owner),
+                  of_meshes as (select owner, sum(length(body)) as bytes
+                                from mesh_owner join mesh_piece using (hash) group by owner)
+             select exists (select 1 from owner_size left join of_jobs using (owner) left join of_meshes using (owner)
+                            where owner_size.jobs <> coalesce(of_jobs.jobs, 0) or job_bytes <> coalesce(of_jobs.bytes, 0)
+                                  or mesh_bytes <> coalesce(of_meshes.bytes, 0))
                     or exists (select 1 from of_jobs where owner not in (select owner from owner_size))",
         )
         .fetch_one(&self.reader)

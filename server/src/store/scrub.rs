@@ -93,6 +93,9 @@ pub(super) async fn read_once(store: &Weak<Store>) {
         }
     }
     let _ = read_jobs(store).await; // what is damaged was noted
+    if let Some(store) = store.upgrade() {
+        let _ = store.damages.noting(store.compare_sums()).await;
+    }
 }
 
 /// Compares a table with its indexes, and its rows with their checksums.

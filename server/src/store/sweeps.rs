@@ -58,9 +58,9 @@ impl Store {
         let read = async {
             let mut connection = self.reader.acquire().await?;
             let found = with_id(&mut connection, owners, id).await?;
-            if found.is_none() {
-                self.damages.have_all(&[Table::Sweeps])?;
-            }
+            // what a sweep is doing its jobs tell
+            let needed = found.as_ref().map_or(Table::Sweeps, |_| Table::Jobs);
+            self.damages.have_all(&[needed])?;
             Ok(found)
         };
         self.damages.noting(read).await
@@ -100,6 +100,7 @@ impl Store {
                     break;
                 }
             }
+            self.damages.have_all(&[Table::Sweeps, Table::Jobs])?;
             Ok(sweeps)
         };
         self.damages.noting(read).await
@@ -112,6 +113,9 @@ impl Store {
                 .bind(id.0.to_string())
                 .fetch_optional(&self.reader)
                 .await?;
+        if owner.is_none() {
+            self.damages.have_all(&[Table::Deleted])?;
+        }
         Ok(owner.is_some_and(|owner| owners.include(&owner)))
     }
 
@@ -198,6 +202,7 @@ impl Store {
             let Some(sweep) = find(&mut tx, key).await? else {
                 return Ok(None);
             };
+            self.damages.have_all(&[Table::Jobs])?;
             let rows = sqlx::query(
                 "select *, null as job_status, null as job_reason from sweep_member
                  where sweep = ? and seq > ? order by seq limit ?",
@@ -217,7 +222,10 @@ impl Store {
             }
             let more = events.len() as i64 >= limit;
             let last = sqlx::query_scalar("select last_seq from sweep where id = ?");
-            let last = last.bind(key).fetch_one(&mut *tx).await?;
+            let last: i64 = last.bind(key).fetch_one(&mut *tx).await?;
+            if !more && after.saturating_add(events.len() as i64) < last {
+                return Err(record(key, "events").damaged("some are missing"));
+            }
             Ok(Some(MemberEvents {
                 sweep,
                 events,

@@ -710,3 +710,46 @@ async fn nights_count_and_a_damaged_record_of_pauses_removes_nothing_early() {
     let later = night.after_s(30.1 * DAY_S);
     assert_eq!(store.retire(&month, later).await.unwrap().jobs, 1);
 }
+
+/// Nothing that a disk changes sets the clock: jobs would be removed as too old.
+#[tokio::test]
+async fn a_changed_time_in_a_row_or_an_index_removes_nothing() {
+    let far = 1_i64 << 61;
+    let harms = [
+        format!("update job set finished_at = {far} where id = 1"),
+        format!("update job set created_at = {far} where id = 1"),
+        format!("update event set t = {far} where job_id = 3"),
+        // more than a row and its index: the time was right when it was written
+        format!("update job set finished_at = {far}, checksum = null where id = 1"),
+    ];
+    for harm in harms {
+        let folder = tempfile::tempdir().unwrap();
+        let right = Time::now();
+        right.simulate();
+        let store = Store::open(folder.path()).await.unwrap();
+        solved(&store, "ada", "1", 10).await;
+        solved(&store, "ada", "2", 10).await;
+        let waits = by("ada", vec![new("3")], None);
+        store.submit(waits, false).await.unwrap();
+        sqlx::query(sqlx::AssertSqlSafe(harm.as_str()))
+            .execute(&store.writer)
+            .await
+            .unwrap();
+        store.close().await;
+        drop(store);
+        let store = Store::open(folder.path()).await.unwrap();
+        let month = Retention {
+            age_s: Some(30.0 * DAY_S),
+            ..Retention::default()
+        };
+        let retired = store.retire(&month, right).await.unwrap();
+        assert_eq!(retired.jobs, 0, "{harm}");
+        if !harm.contains("null") {
+            assert!(store.now().seconds_until(right) > -1.0, "{harm}");
+        }
+        assert!(
+            store.expire_queued(right).await.unwrap().is_empty(),
+            "{harm}"
+        );
+    }
+}
