@@ -16,7 +16,7 @@ mod verdict;
 
 pub use halved::{OnOtherMesh, unverified, verified};
 pub use increments::Increments;
-pub use verdict::doubt_choice;
+pub use verdict::limit_by;
 
 use crate::algorithm::{Estimable, Finished, Quantity, Reported, System, influences};
 use crate::body::{AXIS_SHARE, ElasticBody};

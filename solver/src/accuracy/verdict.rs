@@ -2,7 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use crate::solution::{Accuracy, ErrorMethod, EstimatedQuantity, Outcome, QuantityName, Verdict};
+use crate::solution::{
+    Accuracy, ErrorMethod, EstimatedQuantity, Outcome, QuantityName, Verdict, Warning, WarningCode,
+};
 
 /// Relative errors up to which a verdict is `good`, and `fair`: of forces, and of peaks and extents. `good` promises 1 %
 /// and 5 %: since one stated error in twenty is too small, it takes three quarters of that for forces and three fifths for the
@@ -103,12 +105,28 @@ pub(super) fn conclude(
     }
 }
 
-/// Lowers the verdict on one of several solutions: errors of the mesh do not tell which of them occurs.
-pub fn doubt_choice(accuracy: &mut Accuracy) {
-    let reason = "There is a second solution, with other forces: the errors say nothing of which of the two occurs.";
-    accuracy.verdict = Verdict::Poor;
-    if accuracy.reasons.iter().all(|known| known != reason) {
-        accuracy.reasons.insert(0, reason.to_owned());
+/// Warnings that say that stated errors cannot be relied on: the best verdict beside each, and why.
+#[rustfmt::skip] // a table
+const DOUBTFUL: [(WarningCode, Verdict, &str); 3] = [
+    (WarningCode::NotUnique, Verdict::Poor,
+        "There is a second solution, with other forces: the errors say nothing of which of the two occurs."),
+    (WarningCode::MeshTooCoarseForContact, Verdict::Fair,
+        "The mesh is too coarse for a contact (`mesh_too_coarse_for_contact`), so that the stated errors may be too small."),
+    (WarningCode::MeshTooCoarseForRadius, Verdict::Fair,
+        "The mesh is too coarse for a nonlocal radius (`mesh_too_coarse_for_radius`), so that the stated errors of friction may be too small."),
+];
+
+/// Lowers the verdict to the best one beside these warnings.
+pub fn limit_by(warnings: &[Warning], accuracy: &mut Accuracy) {
+    for (code, best, reason) in DOUBTFUL {
+        let given = warnings.iter().any(|warning| warning.code == code);
+        if !given || accuracy.verdict > best {
+            continue;
+        }
+        accuracy.verdict = best;
+        if accuracy.reasons.iter().all(|known| known != reason) {
+            accuracy.reasons.insert(0, reason.to_owned());
+        }
     }
 }
 

@@ -41,9 +41,9 @@ pub enum Verdict {
     /// quarters of that, since one in twenty is too small.
     Good,
     /// To 5 % and 20 %; also where a contact has too many ends of stick to follow, or another number of ends on the mesh
-    /// split in two.
+    /// split in two, or a warning says that the mesh is too coarse.
     Fair,
-    /// Something else is known to less than that, or not at all.
+    /// Something else is known to less than that, or not at all, or a second solution was found.
     Poor,
 }
 
