@@ -57,8 +57,10 @@ struct Parts {
     between: f64,
     /// [`Quantity::cut`].
     cut: f64,
-    /// [`Quantity::unseen`], and what the same shape of the obstacle changes by its mean.
+    /// [`Quantity::unseen`].
     unseen: f64,
+    /// What the same shape of the obstacle changes by its mean.
+    unseen_mean: f64,
     /// The quantity itself: rounding, and what no other part sees.
     value: f64,
 }
@@ -88,8 +90,12 @@ impl Parts {
             + between * self.between
             + of_cut(name) * self.cut
             + value * self.value;
-        // what the obstacle does between the nodes is in the other parts as far as the nodes see it
-        sum.max(self.unseen)
+        // the shape of the obstacle between the nodes is in the other parts as far as the nodes see it; its mean, which moves
+        // the whole body, is in none, but changes the peak of the pressure less than the shape does
+        match name {
+            QuantityName::PeakNormalStress => sum.max(self.unseen + self.unseen_mean),
+            _ => sum.max(self.unseen) + self.unseen_mean,
+        }
     }
 }
 
@@ -251,7 +257,7 @@ fn bounds(
             parts.consistency = (quantity.factor * moved.map(|(a, b)| a * b).sum::<f64>()).abs();
             parts.gap = quantity.factor * gap_between_nodes(system, finished, &force);
             if !quantity.unseen_at.is_empty() {
-                parts.unseen += (quantity.factor * unseen_gap(system, finished, &force)).abs();
+                parts.unseen_mean = (quantity.factor * unseen_gap(system, finished, &force)).abs();
             }
             if origins.is_some() {
                 added = by_weight(quantity, system, (&errors, &away, &out), &smoothing);
@@ -370,7 +376,7 @@ fn by_spacing(quantity: &Quantity, all: &[Quantity], parts: &Parts, added: &mut 
     added.spread(gap * parts.gap.abs() + ends * parts.ends, &at_ends);
     added.spread(spacing * parts.spacing, &quantity.spacing_at);
     added.spread(between * parts.between, &quantity.between_at);
-    added.spread(parts.unseen, &quantity.unseen_at);
+    added.spread(parts.unseen + parts.unseen_mean, &quantity.unseen_at);
 }
 
 /// The mesh nodes in contact.

@@ -1,6 +1,7 @@
 //! The quantities of a contact for which an error is stated, and what they depend on.
 
 use super::PatchView;
+use super::between::Wave;
 use crate::algorithm::adjoint::Gradient;
 use crate::algorithm::system::Point;
 use crate::contact::edge_nodes;
@@ -131,20 +132,28 @@ impl PatchView<'_> {
         }
     }
 
-    /// What the shape of the obstacle between the nodes means for the peaks. An average over ρ hardly feels it.
+    /// What the shape of the obstacle between the nodes means for the peaks.
     fn add_unseen(&self, quantities: &mut [Quantity]) {
-        let by_edge = self.unseen_pressures();
-        let most = by_edge.iter().fold(0.0f64, |most, (_, p)| most.max(*p));
-        let local = self.averages_nothing();
+        let waves = self.unseen_waves();
+        let most = |of_wave: &dyn Fn(&Wave) -> f64| waves.iter().map(of_wave).fold(0.0, f64::max);
         for quantity in quantities {
             quantity.unseen = match quantity.name {
-                QuantityName::PeakNormalStress => most,
-                QuantityName::PeakTangentialStress if local && self.largest > 0.0 => {
-                    most * quantity.value.abs() / self.largest
+                QuantityName::PeakNormalStress => most(&|wave| wave.pressure),
+                QuantityName::PeakTangentialStress => {
+                    let room = self.shear_cap() - quantity.value.abs();
+                    most(&|wave| self.friction_of(wave)).min(room.max(0.0))
                 }
                 _ => 0.0,
             };
-            quantity.unseen_at.clone_from(&by_edge);
+            quantity.unseen_at = waves.iter().map(|w| (w.edge, w.pressure)).collect();
+        }
+    }
+
+    /// The largest τ that the law allows (stress); infinite without a cap.
+    fn shear_cap(&self) -> f64 {
+        match self.patch.law.as_ref().map(|law| &law.bound) {
+            Some(BoundLaw::Pressure { shear_cap, .. }) => *shear_cap,
+            _ => f64::INFINITY,
         }
     }
 
@@ -306,7 +315,7 @@ impl PatchView<'_> {
     }
 
     /// The pressure grows without limit at a sharp end of the obstacle, where materials meet and, slowly, at a kink.
-    fn pressure_without_limit(&self) -> bool {
+    pub(super) fn pressure_without_limit(&self) -> bool {
         let sharp = |i: usize| self.active(i) && self.may_be_sharp(i);
         sharp(0) || sharp(self.count() - 1) || !self.kinks().is_empty() || self.junction().is_some()
     }
