@@ -189,6 +189,21 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
                 ),
             ))
         }
+        (Some(error), relative, _) if q.direction.is_some_and(|part| part > 0.5 * error) => {
+            let relative = relative.unwrap_or(f64::INFINITY);
+            Some((
+                judged(relative),
+                (
+                    relative / good,
+                    format!(
+                        "`{name}` of contact `{contact}`, {:.5e}, may be off by {}{}, that is {error:.1e}, most of it because gaps are linear in an indentation along `direction`: draw the obstacle where that leaves it, with an `indentation` of 0, or push it by less.",
+                        q.value,
+                        percent(relative),
+                        if end { " of the length of the contact" } else { "" },
+                    ),
+                ),
+            ))
+        }
         (Some(error), relative, ErrorMethod::NodeSpacing) => {
             let relative = relative.unwrap_or(f64::INFINITY);
             Some((

@@ -332,6 +332,8 @@ pub enum WarningCode {
     FrictionLostAtEnd,
     /// An obstacle that reaches into the body between two nodes, or recedes from it.
     ObstacleBetweenNodes,
+    /// An obstacle that is pushed along its direction so far that its gaps, which are linear in that, are others.
+    DirectionIsLinear,
     /// A kink of the obstacle, or a corner of the body, in the contact.
     KinkInContact,
     /// A nonlocal radius larger than the contact.

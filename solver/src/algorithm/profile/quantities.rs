@@ -32,6 +32,9 @@ pub struct Quantity {
     /// What the part of the contact beyond its last node means, where an end of the obstacle lies inside an edge and that edge
     /// is left out: its length for extents, else the quantity times that length in lengths of the contact.
     pub cut: f64,
+    /// What a direction of the indentation leaves open beside what [`Reported::displaced`](crate::algorithm::Reported) says of it by
+    /// `gradient`, in the unit of the value.
+    pub displaced: f64,
     /// Of a peak: the pressure of a shape of the obstacle between the nodes that they do not see.
     pub unseen: f64,
     /// The edges of the contact that `spacing` comes from, with their parts in any unit.
@@ -62,7 +65,9 @@ pub enum Estimable {
 /// An end of an interval of contact.
 pub(super) struct EndOfContact {
     name: QuantityName,
-    /// Of the outermost node in contact.
+    /// The outermost node in contact.
+    pub(super) node: usize,
+    /// Where that is.
     s: f64,
     /// From there to the end of the obstacle, if that lies inside the next edge, which is left out of the contact (length).
     cut: f64,
@@ -99,7 +104,8 @@ impl PatchView<'_> {
         found.extend(self.ends());
         self.add_cuts(&mut found);
         self.add_unseen(&mut found);
-        if !self.missed().is_empty() {
+        self.add_displaced(&mut found);
+        if !self.missed().is_empty() || self.overlap_without_contact() > 0.0 {
             for quantity in &mut found {
                 if quantity.estimable == Estimable::Yes {
                     quantity.estimable = Estimable::Unseen;
@@ -129,6 +135,19 @@ impl PatchView<'_> {
                 }
                 _ => part * quantity.value.abs(),
             };
+        }
+    }
+
+    /// What a direction of the indentation means where the displaced obstacle ends elsewhere.
+    fn add_displaced(&self, quantities: &mut [Quantity]) {
+        let part = self.displaced_part();
+        for quantity in quantities {
+            use QuantityName::{ContactEnd, ContactStart, StickEnd};
+            match quantity.name {
+                ContactStart | ContactEnd => {}
+                StickEnd => quantity.displaced = part * self.contact_length(),
+                _ => quantity.displaced = part * quantity.value.abs(),
+            }
         }
     }
 
@@ -197,6 +216,7 @@ impl PatchView<'_> {
             spacing: 0.0,
             between: 0.0,
             cut: 0.0,
+            displaced: 0.0,
             unseen: 0.0,
             spacing_at: Vec::new(),
             between_at: Vec::new(),
@@ -332,6 +352,7 @@ impl PatchView<'_> {
         let quantity = |end: EndOfContact| Quantity {
             spacing: end.spacing,
             cut: end.cut,
+            displaced: self.displaced_end(end.node),
             spacing_at: vec![(end.edge, 1.0)],
             ..self.quantity(end.name, end.s, None)
         };
@@ -388,6 +409,7 @@ impl PatchView<'_> {
             if i == 0 || !self.active(i - 1) {
                 found.push(EndOfContact {
                     name: QuantityName::ContactStart,
+                    node: i,
                     s: s[i],
                     cut: if i == 0 { self.left_out(0) } else { 0.0 },
                     spacing: if i == 0 { 0.0 } else { s[i] - s[i - 1] },
@@ -397,6 +419,7 @@ impl PatchView<'_> {
             if i == last || !self.active(i + 1) {
                 found.push(EndOfContact {
                     name: QuantityName::ContactEnd,
+                    node: i,
                     s: s[i],
                     cut: if i == last { self.left_out(last) } else { 0.0 },
                     spacing: if i == last { 0.0 } else { s[i + 1] - s[i] },

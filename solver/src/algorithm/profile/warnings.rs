@@ -35,6 +35,7 @@ impl PatchView<'_> {
     pub(in crate::algorithm) fn warn(&self, warnings: &mut Vec<Warning>) {
         self.warn_of_oscillation(warnings);
         self.warn_of_missed(warnings);
+        self.warn_of_displaced(warnings);
         self.warn_of_kinks(warnings);
         self.warn_of_junction(warnings);
         self.warn_of_contact(warnings);
