@@ -1,5 +1,7 @@
 //! Where the errors of quantities come from: the elements that adaptive refinement divides.
 
+use std::collections::BTreeSet;
+
 use crate::model::Model;
 
 /// A quantity with an error above this many times the tolerance counts no more than one with so much.
@@ -12,6 +14,8 @@ pub struct Origins {
     /// The parts: of each quantity they add up to its relative error in tolerances. All 0 if no error is above the
     /// tolerance, or none is known.
     pub elements: Vec<f64>,
+    /// Elements at which nothing is known before there are more nodes.
+    pub unresolved: BTreeSet<usize>,
     /// The element at every edge of each contact.
     at_edge: Vec<Vec<u32>>,
 }
@@ -53,6 +57,7 @@ impl Origins {
         Origins {
             tolerance,
             elements: vec![0.0; model.mesh.elements.len()],
+            unresolved: BTreeSet::new(),
             at_edge: at_edge.collect(),
         }
     }
@@ -60,6 +65,7 @@ impl Origins {
     /// Forgets what was added.
     pub fn forget(&mut self) {
         self.elements.fill(0.0);
+        self.unresolved.clear();
     }
 
     /// Adds a place of a contact at which the obstacle between the nodes is not resolved: no error is known before there are nodes.
@@ -68,7 +74,7 @@ impl Origins {
         let covers = |edge: &usize| boundary.edge_arc(*edge)[1] >= s;
         let last = boundary.edge_count() - 1;
         let edge = (0..last).find(covers).unwrap_or(last);
-        self.elements[self.at_edge[patch][edge] as usize] += MOST_EXCESS;
+        self.unresolved.insert(self.at_edge[patch][edge] as usize);
     }
 
     /// Adds what is known of a quantity of a contact with this relative error.

@@ -219,12 +219,9 @@ fn run_steps<'a>(
         load_history = note_doubled(model, load_history, steps, summary, observe);
     }
     tell_of_earlier_steps(&mut solution);
-    if solution.has_second() {
-        solution
-            .summary
-            .accuracy
-            .iter_mut()
-            .for_each(accuracy::doubt_choice);
+    let summary = &mut solution.summary;
+    if let Some(accuracy) = &mut summary.accuracy {
+        accuracy::limit_by(&summary.warnings, accuracy);
     }
     if model.steps.is_empty() {
         solution.steps.clear();
@@ -349,8 +346,8 @@ pub fn run_to_numbers(
     Ok((numbers, left))
 }
 
-/// Adds to the end of the path what was told of an earlier step alone and the end rests on: kinematics that were not small, and
-/// increments that were too few.
+/// Adds to the end of the path what was told of an earlier step alone and the end rests on: kinematics that were not small,
+/// increments that were too few, and another solution.
 fn tell_of_earlier_steps(solution: &mut Solution) {
     let Some((_, earlier)) = solution.steps.split_last() else {
         return;
@@ -363,6 +360,7 @@ fn tell_of_earlier_steps(solution: &mut Solution) {
                     | WarningCode::LargeStrain
                     | WarningCode::LargeDisplacement
                     | WarningCode::IncrementsMatter
+                    | WarningCode::NotUnique
             );
             let told = &mut solution.summary.warnings;
             let known = told

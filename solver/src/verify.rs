@@ -51,8 +51,8 @@ impl Verification {
         observe: &mut Observer<'_>,
     ) {
         let converged = solution.summary.outcome == Outcome::Converged;
-        let second = solution.has_second();
-        let Some(estimated) = &mut solution.summary.accuracy else {
+        let summary = &mut solution.summary;
+        let Some(estimated) = &mut summary.accuracy else {
             return;
         };
         if !converged {
@@ -63,9 +63,7 @@ impl Verification {
             Ok(verified) => verified,
             Err(why) => accuracy::unverified(estimated.clone(), &why),
         };
-        if second {
-            accuracy::doubt_choice(estimated);
-        }
+        accuracy::limit_by(&summary.warnings, estimated);
     }
 
     /// The errors by comparison; or why there are none, in words.

@@ -20,6 +20,7 @@ mod curves;
 mod cylinder;
 mod deck_forces;
 mod decks;
+mod directions;
 mod disc_pressure;
 mod element_errors;
 mod even_profiles;

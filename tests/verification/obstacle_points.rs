@@ -455,6 +455,108 @@ fn low_waves_between_nodes_are_in_the_errors() {
     );
 }
 
+/// A block under a shape with waves of a height and a length, shifted by a phase, that is pressed and dragged with friction μ, ρ:
+/// a parabola, or a flat that ends with the block, where the peak of σ_n has no limit.
+fn waves(
+    base: &str,
+    [height, length, phase]: [f64; 3],
+    friction: [f64; 2],
+    spacing: f64,
+) -> Problem {
+    let count = (64.0 / length) as i32;
+    let x: Vec<f64> = (0..=count)
+        .map(|k| -1.0 + 2.0 * f64::from(k) / f64::from(count))
+        .collect();
+    let wave =
+        |x: f64| 0.5 * height * (1.0 - (2.0 * std::f64::consts::PI * x / length + phase).cos());
+    let gap = |x: f64| match base {
+        "parabola" => parabola(x) + wave(x),
+        _ => wave(x),
+    };
+    let gaps = x.iter().map(|x| gap(*x)).collect();
+    let indentation = if base == "parabola" { 0.04 } else { 0.02 };
+    let mut problem = block(&lines(spacing, &[]), cubic(table((x, gaps))), indentation);
+    let contact = &mut problem.contacts[0];
+    contact.tangential_displacement = 0.01;
+    let [coefficient, radius] = friction;
+    if coefficient > 0.0 {
+        let law =
+            json!({"coefficient": coefficient, "nonlocal_radius": radius, "elastic_slip": 1e-3});
+        contact.friction = Some(serde_json::from_value(law).unwrap());
+    }
+    problem
+}
+
+/// Waves as long as the nodes are apart, and half as long, on coarse meshes: what they do to forces and to both peaks, by a mesh
+/// that resolves them, is within the stated errors, whatever the radius that friction is averaged over, and where σ_n has no limit.
+#[test]
+fn waves_between_nodes_are_in_the_errors_of_friction() {
+    let (mut compared, mut friction) = (0, 0);
+    for base in ["parabola", "flat"] {
+        for [height, length, phase] in [
+            [1e-3, 0.125, 0.0],
+            [1e-3, 0.0625, 0.0],
+            [2e-4, 0.125, 2.0],
+            [2e-4, 0.0625, 2.0],
+        ] {
+            for law in [[0.0, 0.0], [0.1, 0.0], [0.1, 0.02], [0.5, 0.02], [0.5, 0.1]] {
+                let mut problem = waves(base, [height, length, phase], law, 0.25);
+                let coarse = solve(&problem).summary;
+                problem.mesh.refine = Refine::Times(3);
+                let fine = solve(&problem).summary.accuracy.unwrap().quantities;
+                let verdict = coarse.accuracy.as_ref().unwrap().verdict;
+                assert_ne!(verdict, Verdict::Good, "{base} {height} {length} {law:?}");
+                for own in &coarse.accuracy.unwrap().quantities {
+                    use QuantityName::*;
+                    let Some(error) = own.error.filter(|error| *error > 0.0) else {
+                        continue;
+                    };
+                    if matches!(own.quantity, ContactStart | ContactEnd | StickEnd) {
+                        continue;
+                    }
+                    let other = fine.iter().find(|q| q.quantity == own.quantity).unwrap();
+                    let off = (own.value.abs() - other.value.abs()).abs();
+                    assert!(
+                        off <= error,
+                        "{base} {height} {length} {phase} {law:?}: off {off} of {own:?}"
+                    );
+                    compared += 1;
+                    friction += i32::from(own.quantity == PeakTangentialStress);
+                }
+            }
+        }
+    }
+    assert!(compared > 60 && friction > 15, "{compared} {friction}");
+}
+
+/// Where the peak of σ_n has no limit, waves that the nodes do not see are told by the mean pressure, and refinement sees them.
+#[test]
+fn refinement_finds_waves_where_the_pressure_has_no_limit() {
+    let size = [1e-3, 0.125, 0.0];
+    let smooth = solve(&waves("flat", [0.0, 0.125, 0.0], [0.0; 2], 0.25));
+    assert_eq!(warning(&smooth, WarningCode::ObstacleBetweenNodes), None);
+    for law in [[0.0, 0.0], [0.3, 0.02]] {
+        let mut problem = waves("flat", size, law, 0.25);
+        let coarse = solve(&problem);
+        assert!(unlimited(&coarse));
+        assert!(warning(&coarse, WarningCode::ObstacleBetweenNodes).is_some());
+        let accuracy = coarse.summary.accuracy.as_ref().unwrap();
+        assert_eq!(accuracy.verdict, Verdict::Poor);
+        problem.mesh.refine = Refine::Times(4);
+        let fine = solve(&problem).summary;
+        problem.mesh.refine = serde_json::from_value(json!({"tolerance": 0.05})).unwrap();
+        let adaptive = solve(&problem);
+        assert!(adaptive.summary.refinements.len() > 2);
+        assert_eq!(warning(&adaptive, WarningCode::ObstacleBetweenNodes), None);
+        close(adaptive.summary.normal_force, fine.normal_force, 0.01);
+        let friction = [&adaptive.summary, &fine].map(|s| s.friction_force);
+        assert!((friction[0] - friction[1]).abs() <= 0.02 * friction[1]);
+        // each crest touches on its own
+        let crests = [&adaptive.summary, &fine].map(|s| s.contacts["top"].contact.len());
+        assert!(crests[0] == crests[1] && crests[0] > 10, "{crests:?}");
+    }
+}
+
 /// A smooth tooth in space, between the nodes of the upright side of a body: places are found along any boundary.
 #[test]
 fn a_curve_in_space_is_seen_between_nodes() {

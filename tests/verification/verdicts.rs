@@ -326,6 +326,64 @@ fn the_verdict_on_one_of_two_solutions_is_not_good() {
     }
 }
 
+/// Where a warning says that the mesh is too coarse, stated errors promise too much: a flat on four elements is 1.9 of them off,
+/// and was `good`. On six elements and more, and where they are shorter than the radius, they hold and the verdict is `good`.
+#[test]
+fn beside_the_warning_of_a_coarse_mesh_no_verdict_is_good() {
+    let block = |across: u32, friction: Option<f64>, accuracy: &str| {
+        let side = 4.0 / f64::from(across);
+        let lines = |count: u32| -> Vec<f64> { (0..=count).map(|i| side * f64::from(i)).collect() };
+        let mut contact =
+            json!({"boundary": "top", "obstacle": {"kind": "flat"}, "indentation": 0.05});
+        if let Some(radius) = friction {
+            contact["friction"] =
+                json!({"coefficient": 0.05, "nonlocal_radius": radius, "elastic_slip": 0.01});
+        }
+        let solution = solved(&json!({
+            "analysis": {"kind": "plane_stress", "thickness": 0.5},
+            "mesh": {"grid": {"x": lines(across), "y": lines(across / 2)}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
+            "contacts": [contact],
+            "solver": {"accuracy": accuracy},
+        }));
+        let coarse = [
+            WarningCode::MeshTooCoarseForContact,
+            WarningCode::MeshTooCoarseForRadius,
+        ]
+        .into_iter()
+        .filter(|code| warns(&solution, *code))
+        .map(|code| code.as_str())
+        .collect::<Vec<_>>();
+        let accuracy = solution.summary.accuracy.clone().unwrap();
+        for code in &coarse {
+            let told = accuracy.reasons.iter().any(|r| r.contains(code));
+            assert!(told, "{code}: {:?}", accuracy.reasons);
+        }
+        (coarse, accuracy.verdict, solution.summary.normal_force)
+    };
+    // of 64 and 128 elements, whose force converges like the side
+    let right = 51.2838;
+    for accuracy in ["estimate", "verify"] {
+        let (coarse, verdict, force) = block(4, None, accuracy);
+        assert_eq!(coarse, ["mesh_too_coarse_for_contact"]);
+        assert_eq!(verdict, Verdict::Fair);
+        assert!((force - right).abs() > 0.12);
+    }
+    for across in [6, 8, 16] {
+        let (coarse, verdict, force) = block(across, None, "estimate");
+        assert_eq!((coarse.len(), verdict), (0, Verdict::Good));
+        assert!((force - right).abs() < 0.01 * right);
+    }
+    for (radius, coarse, verdict) in [
+        (0.1, &["mesh_too_coarse_for_radius"][..], Verdict::Fair),
+        (0.3, &[][..], Verdict::Good),
+    ] {
+        let found = block(16, Some(radius), "estimate");
+        assert_eq!((&found.0[..], found.1), (coarse, verdict));
+    }
+}
+
 /// Across the fold, from either side, every row is its member's own solution.
 #[test]
 fn rows_of_a_sweep_do_not_depend_on_the_order_of_members() {

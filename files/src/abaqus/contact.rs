@@ -228,7 +228,7 @@ impl Source<'_> {
         let friction = interaction.and_then(|i| i.friction.as_ref());
         let friction =
             friction.and_then(|friction| self.friction(friction, edges, refused, warnings));
-        let shape = placed.shape(motion, friction.is_some(), others, self.axisymmetric);
+        let shape = placed.shape(motion, others, self.axisymmetric);
         let shape = match shape {
             Ok(shape) => shape,
             Err((got, expected)) => {
@@ -500,7 +500,6 @@ impl Placed<'_> {
     fn shape(
         &self,
         motion: &Motion,
-        friction: bool,
         others: &[[f64; 2]],
         axisymmetric: bool,
     ) -> Result<Shape, Unlike> {
@@ -514,7 +513,7 @@ impl Placed<'_> {
         match (self.straight(), self.flat()) {
             (Some(n), _) => Ok(self.before_a_straight_side(n, ends, others)),
             (None, Some(q)) => Ok(self.straight_before_a_curve(q, ends)),
-            (None, None) => self.curve_before_a_curve(ends, friction),
+            (None, None) => self.curve_before_a_curve(ends),
         }
     }
 
@@ -631,7 +630,7 @@ impl Placed<'_> {
     }
 
     /// A curved rigid surface before a curved boundary, which moves in one direction.
-    fn curve_before_a_curve(&self, ends: &[Point], friction: bool) -> Result<Shape, Unlike> {
+    fn curve_before_a_curve(&self, ends: &[Point]) -> Result<Shape, Unlike> {
         let most =
             ends.iter().copied().fold(
                 [0.0; 2],
@@ -658,7 +657,6 @@ impl Placed<'_> {
                 "one direction",
             ));
         }
-        self.is_linear(most, friction)?;
         let moved = ends.iter().map(|u| [dot(*u, direction), 0.0]).collect();
         Ok(Shape {
             obstacle,
@@ -666,43 +664,6 @@ impl Placed<'_> {
             moved,
             message,
         })
-    }
-
-    /// Whether the gaps of the moved surface are those that follow from its normals before, where it comes near.
-    fn is_linear(&self, u: Point, friction: bool) -> Result<(), Unlike> {
-        /// Of the largest overlap.
-        const ALLOWED: f64 = 0.02;
-        let moved: Vec<Point> = self
-            .outline
-            .points
-            .iter()
-            .map(|p| [p[0] + u[0], p[1] + u[1]])
-            .collect();
-        let gaps: Vec<[f64; 2]> = self
-            .looks()
-            .filter_map(|look| {
-                let (distance, m) = self.met(look)?;
-                let (after, of) = met(&moved, look.0, look.1, 0.1 * self.size)?;
-                let along = -dot(m, look.1);
-                Some([distance * along - dot(u, m), after * -dot(of, look.1)])
-            })
-            .collect();
-        let deepest = gaps.iter().map(|g| -g[1]).fold(0.0, f64::max);
-        let off = gaps
-            .iter()
-            .filter(|g| g[0].min(g[1]) < 0.0)
-            .map(|g| (g[0] - g[1]).abs())
-            .fold(0.0, f64::max);
-        match off <= ALLOWED * deepest {
-            true => Ok(()),
-            false => Err((
-                format!(
-                    "a motion so large that the gaps of the curved surface change by {off:.2e} more than its normals before it say, with an overlap of {deepest:.2e}{}",
-                    if friction { " and with friction" } else { "" }
-                ),
-                "a motion that is small beside the radii of both surfaces",
-            )),
-        }
     }
 
     fn nodes(&self) -> Vec<Point> {

@@ -88,6 +88,7 @@ fn gravity(code: WarningCode) -> u8 {
         | ContactReachesObstacleEnd
         | FrictionLostAtEnd
         | ObstacleBetweenNodes
+        | DirectionIsLinear
         | SymmetricDrag
         | RadialDrag
         | BoundBeyondContact

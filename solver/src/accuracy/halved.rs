@@ -89,7 +89,7 @@ pub fn verified(
         let mut quantity = own.clone();
         let too_many = there.iter().any(|q| q.estimable == Estimable::TooMany);
         if too_many || own.method == ErrorMethod::TooMany {
-            (quantity.error, quantity.relative, quantity.increments) = (None, None, None);
+            forget_error(&mut quantity);
             quantity.method = ErrorMethod::TooMany;
             quantities.push(quantity);
             doubts.push(None);
@@ -178,26 +178,32 @@ fn compare(
         .map(|before| (before / difference).log2());
     if quantity.method == ErrorMethod::NoLimit || finer.estimable == Estimable::NoLimit {
         quantity.method = ErrorMethod::NoLimit;
-        (quantity.error, quantity.relative, quantity.increments) = (None, None, None);
+        forget_error(quantity);
         return None;
     }
     let estimate = match quantity.of_mesh() {
         Some(estimate) if finer.estimable != Estimable::Unseen => estimate,
         _ => {
             quantity.method = ErrorMethod::Unknown;
-            (quantity.error, quantity.relative, quantity.increments) = (None, None, None);
+            forget_error(quantity);
             return Some(match finer.estimable {
                 Estimable::Unseen => Doubt::Unseen,
                 _ => Doubt::Unestimated,
             });
         }
     };
-    let error = bound(quantity.quantity, difference, quantity.order, estimate)
-        + quantity.increments.unwrap_or(0.0);
+    let error =
+        bound(quantity.quantity, difference, quantity.order, estimate) + quantity.beside_mesh();
     quantity.method = ErrorMethod::MeshHalved;
     quantity.error = Some(error);
     quantity.relative = relative(error, scale);
     None
+}
+
+/// Nothing is known of it.
+fn forget_error(quantity: &mut EstimatedQuantity) {
+    (quantity.error, quantity.relative) = (None, None);
+    (quantity.increments, quantity.direction) = (None, None);
 }
 
 /// The bound of an error by the difference to the finer mesh and the estimate on this one.

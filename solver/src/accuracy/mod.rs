@@ -16,9 +16,11 @@ mod verdict;
 
 pub use halved::{OnOtherMesh, unverified, verified};
 pub use increments::Increments;
-pub use verdict::doubt_choice;
+pub use verdict::limit_by;
 
-use crate::algorithm::{Estimable, Finished, Quantity, Reported, System, influences};
+use crate::algorithm::{
+    DisplacedNode, Estimable, Finished, Quantity, Reported, System, influences,
+};
 use crate::body::{AXIS_SHARE, ElasticBody};
 use crate::contact::edge_nodes;
 use crate::elasticity::Dof;
@@ -57,8 +59,10 @@ struct Parts {
     between: f64,
     /// [`Quantity::cut`].
     cut: f64,
-    /// [`Quantity::unseen`], and what the same shape of the obstacle changes by its mean.
+    /// [`Quantity::unseen`].
     unseen: f64,
+    /// What the same shape of the obstacle changes by its mean.
+    unseen_mean: f64,
     /// The quantity itself: rounding, and what no other part sees.
     value: f64,
 }
@@ -88,8 +92,12 @@ impl Parts {
             + between * self.between
             + of_cut(name) * self.cut
             + value * self.value;
-        // what the obstacle does between the nodes is in the other parts as far as the nodes see it
-        sum.max(self.unseen)
+        // the shape of the obstacle between the nodes is in the other parts as far as the nodes see it; its mean, which moves
+        // the whole body, is in none, but changes the peak of the pressure less than the shape does
+        match name {
+            QuantityName::PeakNormalStress => sum.max(self.unseen + self.unseen_mean),
+            _ => sum.max(self.unseen) + self.unseen_mean,
+        }
     }
 }
 
@@ -144,7 +152,7 @@ pub fn assess(
     };
     let mut found = Vec::with_capacity(quantities.len());
     for (i, quantity) in quantities.iter().enumerate() {
-        let error = bounds.as_ref().map(|bounds| bounds[i]);
+        let error = bounds.as_ref().map(|bounds| bounds[i].mesh);
         let (error, method) = match (quantity.estimable, error, quantity.name) {
             (Estimable::NoLimit, ..) => (None, ErrorMethod::NoLimit),
             (Estimable::TooMany, ..) => (None, ErrorMethod::TooMany),
@@ -162,7 +170,8 @@ pub fn assess(
         let scale = scale_of(quantity, quantities);
         // without a counterpart in more increments nothing is known of it
         let open = increments.map(|more| more.left_open(quantity, quantities).unwrap_or(scale));
-        let error = error.map(|error| error + open.unwrap_or(0.0));
+        let linear = bounds.as_ref().map_or(0.0, |bounds| bounds[i].displaced);
+        let error = error.map(|error| error + open.unwrap_or(0.0) + linear);
         found.push(EstimatedQuantity {
             quantity: quantity.name,
             contact: system.patches[quantity.patch].contact.name.clone(),
@@ -172,6 +181,7 @@ pub fn assess(
             order: None,
             error,
             increments: error.and(open),
+            direction: error.and((linear > 0.0).then_some(linear)),
             relative: error.and_then(|error| relative(error, scale)),
             method,
         });
@@ -193,6 +203,22 @@ fn scale_of(quantity: &Quantity, all: &[Quantity]) -> f64 {
     scale(quantity.name, quantity.value, own, quantity.images)
 }
 
+/// What may be wrong with a quantity, in its unit.
+#[derive(Clone, Copy)]
+struct Bounds {
+    /// By the mesh.
+    mesh: f64,
+    /// Because gaps are linear in an indentation along a direction.
+    displaced: f64,
+}
+
+/// A difference of gaps changes quantities by more than to the first order of it: contact grows or shrinks
+/// (`tests/verification/directions.rs`).
+const SECOND_ORDER: f64 = 2.0;
+
+/// What parts that cancel to the first order leave open, in parts of their sum without signs.
+const UNSURE: f64 = 0.05;
+
 /// What one element, and one place between nodes, takes for each quantity, in multiplications.
 const WORK_OF_AN_ELEMENT: usize = 100;
 const WORK_OF_A_PLACE: usize = 30;
@@ -207,7 +233,7 @@ fn bounds(
     reported: &Reported,
     mut origins: Option<&mut Origins>,
     observe: &mut Observer<'_>,
-) -> Option<Vec<f64>> {
+) -> Option<Vec<Bounds>> {
     let quantities = &reported.quantities;
     let influencing: Vec<&Quantity> = quantities.iter().filter(|q| q.gradient.is_some()).collect();
     let gradients: Vec<_> = influencing
@@ -218,6 +244,7 @@ fn bounds(
     let errors = weighted_errors(model, body, reported, &influences, observe)?;
     let mut duals = influences.iter().zip(errors);
     let smoothing = smoothing_of_reactions(system, finished);
+    let reactions = system.reactions(&finished.state);
     let surroundings = Surroundings::new(model);
     let away = surroundings.away_from(touching(system, finished));
     let mut go_on = || observe(Progress::Pulse);
@@ -234,6 +261,7 @@ fn bounds(
             value: quantity.value.abs(),
             ..Parts::default()
         };
+        let mut displaced = quantity.displaced;
         let mut added = Added::default();
         if let Some(gradient) = &quantity.gradient {
             let (z, errors) = duals.next()?;
@@ -251,8 +279,12 @@ fn bounds(
             parts.consistency = (quantity.factor * moved.map(|(a, b)| a * b).sum::<f64>()).abs();
             parts.gap = quantity.factor * gap_between_nodes(system, finished, &force);
             if !quantity.unseen_at.is_empty() {
-                parts.unseen += (quantity.factor * unseen_gap(system, finished, &force)).abs();
+                parts.unseen_mean = (quantity.factor * unseen_gap(system, finished, &force)).abs();
             }
+            let dual = (&z[..], &force[..]);
+            let active = &finished.state.active;
+            let [sum, size] = by_displaced(system, active, &reported.displaced, &reactions, dual);
+            displaced += quantity.factor.abs() * (SECOND_ORDER * sum.abs() + UNSURE * size);
             if origins.is_some() {
                 added = by_weight(quantity, system, (&errors, &away, &out), &smoothing);
             }
@@ -267,9 +299,12 @@ fn bounds(
                 &added,
             );
         }
-        bounds.push(bound);
+        bounds.push(Bounds {
+            mesh: bound,
+            displaced,
+        });
     }
-    let one_way = |(quantity, bound): (&Quantity, f64)| match quantity.name {
+    let one_way = |(quantity, bound): (&Quantity, Bounds)| match quantity.name {
         // all friction acts the same way: its sum and its size are one quantity
         QuantityName::TangentialForce => quantities
             .iter()
@@ -279,8 +314,12 @@ fn bounds(
                     && other.name == QuantityName::FrictionForce
                     && quantity.value.abs() >= (1.0 - ONE_WAY) * other.value
             })
-            .map_or(bound, |(_, other)| bound.min(*other)),
-        _ => bound,
+            .map_or(bound.mesh, |(_, other)| bound.mesh.min(other.mesh)),
+        _ => bound.mesh,
+    };
+    let one_way = |(quantity, bound): (&Quantity, Bounds)| Bounds {
+        mesh: one_way((quantity, bound)),
+        ..bound
     };
     let of_quantities = quantities.iter().zip(bounds.iter().copied());
     Some(of_quantities.map(one_way).collect())
@@ -370,7 +409,7 @@ fn by_spacing(quantity: &Quantity, all: &[Quantity], parts: &Parts, added: &mut 
     added.spread(gap * parts.gap.abs() + ends * parts.ends, &at_ends);
     added.spread(spacing * parts.spacing, &quantity.spacing_at);
     added.spread(between * parts.between, &quantity.between_at);
-    added.spread(parts.unseen, &quantity.unseen_at);
+    added.spread(parts.unseen + parts.unseen_mean, &quantity.unseen_at);
 }
 
 /// The mesh nodes in contact.
@@ -443,6 +482,31 @@ fn dual_pressures(system: &System<'_>, finished: &Finished, force: &[f64]) -> Ve
     };
     let reactions: Vec<f64> = (0..system.nodes.len()).map(reaction).collect();
     system.pressures(&reactions)
+}
+
+/// What displaced obstacles change under the dual solution z with this force, by other gaps at the nodes in contact and by
+/// reactions that are turned; and the sum of its parts without signs.
+fn by_displaced(
+    system: &System<'_>,
+    active: &[bool],
+    displaced: &[DisplacedNode],
+    reactions: &[f64],
+    (z, force): (&[f64], &[f64]),
+) -> [f64; 2] {
+    let mut found = [0.0; 2];
+    for (i, node) in system.nodes.iter().enumerate().filter(|(i, _)| active[*i]) {
+        let by_gap = match node.normal {
+            Dof::Free(dof) => -force[dof] * displaced[i].gap,
+            Dof::Fixed(_) => 0.0,
+        };
+        let by_turn = match node.tangent {
+            Dof::Free(dof) => z[dof] * reactions[i] * displaced[i].turn,
+            Dof::Fixed(_) => 0.0,
+        };
+        found[0] += by_gap + by_turn;
+        found[1] += by_gap.abs() + by_turn.abs();
+    }
+    found
 }
 
 /// ∫ p_z (gap − parabola through the gap at the nodes) over edges that touch with all nodes, by the trapezoidal rule

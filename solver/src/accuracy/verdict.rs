@@ -2,7 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use crate::solution::{Accuracy, ErrorMethod, EstimatedQuantity, Outcome, QuantityName, Verdict};
+use crate::solution::{
+    Accuracy, ErrorMethod, EstimatedQuantity, Outcome, QuantityName, Verdict, Warning, WarningCode,
+};
 
 /// Relative errors up to which a verdict is `good`, and `fair`: of forces, and of peaks and extents. `good` promises 1 %
 /// and 5 %: since one stated error in twenty is too small, it takes three quarters of that for forces and three fifths for the
@@ -103,12 +105,28 @@ pub(super) fn conclude(
     }
 }
 
-/// Lowers the verdict on one of several solutions: errors of the mesh do not tell which of them occurs.
-pub fn doubt_choice(accuracy: &mut Accuracy) {
-    let reason = "There is a second solution, with other forces: the errors say nothing of which of the two occurs.";
-    accuracy.verdict = Verdict::Poor;
-    if accuracy.reasons.iter().all(|known| known != reason) {
-        accuracy.reasons.insert(0, reason.to_owned());
+/// Warnings that say that stated errors cannot be relied on: the best verdict beside each, and why.
+#[rustfmt::skip] // a table
+const DOUBTFUL: [(WarningCode, Verdict, &str); 3] = [
+    (WarningCode::NotUnique, Verdict::Poor,
+        "There is a second solution, with other forces: the errors say nothing of which of the two occurs."),
+    (WarningCode::MeshTooCoarseForContact, Verdict::Fair,
+        "The mesh is too coarse for a contact (`mesh_too_coarse_for_contact`), so that the stated errors may be too small."),
+    (WarningCode::MeshTooCoarseForRadius, Verdict::Fair,
+        "The mesh is too coarse for a nonlocal radius (`mesh_too_coarse_for_radius`), so that the stated errors of friction may be too small."),
+];
+
+/// Lowers the verdict to the best one beside these warnings.
+pub fn limit_by(warnings: &[Warning], accuracy: &mut Accuracy) {
+    for (code, best, reason) in DOUBTFUL {
+        let given = warnings.iter().any(|warning| warning.code == code);
+        if !given || accuracy.verdict > best {
+            continue;
+        }
+        accuracy.verdict = best;
+        if accuracy.reasons.iter().all(|known| known != reason) {
+            accuracy.reasons.insert(0, reason.to_owned());
+        }
     }
 }
 
@@ -164,6 +182,21 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
                     relative / good,
                     format!(
                         "`{name}` of contact `{contact}`, {:.5e}, may be off by {}{}, that is {error:.1e}, most of it because the load grows in too few increments: give `steps` more `increments` (without `steps` there is one).",
+                        q.value,
+                        percent(relative),
+                        if end { " of the length of the contact" } else { "" },
+                    ),
+                ),
+            ))
+        }
+        (Some(error), relative, _) if q.direction.is_some_and(|part| part > 0.5 * error) => {
+            let relative = relative.unwrap_or(f64::INFINITY);
+            Some((
+                judged(relative),
+                (
+                    relative / good,
+                    format!(
+                        "`{name}` of contact `{contact}`, {:.5e}, may be off by {}{}, that is {error:.1e}, most of it because gaps are linear in an indentation along `direction`: draw the obstacle where that leaves it, with an `indentation` of 0, or push it by less.",
                         q.value,
                         percent(relative),
                         if end { " of the length of the contact" } else { "" },

@@ -367,10 +367,13 @@ fn marks(
     let known = origins.elements.iter().any(|part| *part > 0.0);
     let mut marked = match known {
         true => bulk(&origins.elements),
-        false if cut.is_empty() => bulk(&solution.fields.element_error),
+        false if cut.is_empty() && origins.unresolved.is_empty() => {
+            bulk(&solution.fields.element_error)
+        }
         false => vec![false; origins.elements.len()],
     };
-    cut.iter().for_each(|e| marked[*e] = true);
+    let unresolved = origins.unresolved.iter();
+    unresolved.chain(cut).for_each(|e| marked[*e] = true);
     under_peaks(contacts, solution, &mut marked);
     marked
 }

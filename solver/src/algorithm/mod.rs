@@ -28,7 +28,7 @@ pub use convex::{Minimum, minimise};
 pub use corners::{better, closed_on_axis, open_on_axis, touched_by_both};
 pub use finished::Finished;
 pub use near::{Extent, Region, run_near, settle_near};
-pub use profile::{Estimable, Missed, Quantity};
+pub use profile::{DisplacedNode, Estimable, Missed, Quantity};
 pub use report::{Reported, numbers, quantities, report};
 pub use rounding::Rounding;
 pub use slides::Slide;

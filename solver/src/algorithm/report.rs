@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 
 use crate::algorithm::finished::Finished;
 use crate::algorithm::large_slip::warn_of_large_slip;
-use crate::algorithm::profile::{Forces, Missed, PatchView, Quantity};
+use crate::algorithm::profile::{DisplacedNode, Forces, Missed, PatchView, Quantity};
 use crate::algorithm::small_strain::warn_of_large_strain;
 use crate::algorithm::system::System;
 use crate::body::ElasticBody;
@@ -53,6 +53,8 @@ pub struct Reported {
     pub quantities: Vec<Quantity>,
     /// Places between the nodes at which the obstacle reaches into the body, of all contacts: where a mesh needs nodes.
     pub missed: Vec<Missed>,
+    /// What obstacles that were pushed along a direction are beside the linear ones, at all contact nodes.
+    pub displaced: Vec<DisplacedNode>,
     /// What recovered stresses differ by from those of the elements.
     pub difference: StressDifference,
 }
@@ -174,7 +176,7 @@ pub fn report(
         let errors = difference.norms(elements, breaks)?;
         (recovered, difference, errors)
     };
-    let (mut quantities, mut missed) = (Vec::new(), Vec::new());
+    let (mut quantities, mut missed, mut displaced) = (Vec::new(), Vec::new(), Vec::new());
     let circumference = system.circumference;
 
     let mut contact_state = vec![-1; model.mesh.nodes.len()];
@@ -188,6 +190,7 @@ pub fn report(
         view.warn(&mut warnings);
         quantities.extend(view.quantities());
         missed.extend(view.missed());
+        displaced.extend_from_slice(&view.displaced_gaps().nodes);
         let profile = view.profile();
         for (&node, state) in patch.contact.boundary.nodes.iter().zip(&profile.state) {
             let seen: &mut i8 = &mut contact_state[node as usize];
@@ -315,6 +318,7 @@ pub fn report(
         fields,
         quantities,
         missed,
+        displaced,
         difference,
     })
 }

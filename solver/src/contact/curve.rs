@@ -154,6 +154,14 @@ impl<'a> Curve<'a> {
         })
     }
 
+    /// The profile where a normal of the body crosses the curve, at the distance that is nearest to this one.
+    pub(super) fn crossing_near(&self, ray: &Ray, rounding: f64, distance: f64) -> Option<Profile> {
+        let crossings = self.crossings(ray, rounding).into_iter();
+        let profiles = crossings.map(|crossing| crossing.profile);
+        let off = |profile: &Profile| (profile.distance - distance).abs();
+        profiles.min_by(|a, b| off(a).total_cmp(&off(b)))
+    }
+
     /// The side of the curve that is rigid, as it looks along one normal; none if it does not cross the curve. `reach`: how
     /// far the body extends along −n (length).
     pub(super) fn rigid_side(&self, ray: &Ray, reach: f64, rounding: f64) -> Option<Side> {

@@ -2,10 +2,12 @@
 //! normals, weights and the points where friction is evaluated.
 
 mod curve;
+mod displaced;
 pub mod obstacle;
 mod shape;
 pub mod smooth;
 
+pub use displaced::Displaced;
 pub use smooth::edge_normals;
 
 use std::collections::BTreeMap;

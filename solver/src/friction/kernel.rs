@@ -7,6 +7,7 @@
 //! two, 3.4.2).
 
 use std::collections::HashMap;
+use std::f64::consts::TAU;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
 use super::moments::{moments_up_to, shape};
@@ -192,6 +193,20 @@ impl Averaging {
                 .sum()
         };
         (half(before) + half(after)) / (2.0 * half(1.0))
+    }
+
+    /// The part of a wave of the pressure with this length that is left of it in S_ρ, beside what is left of a uniform one.
+    pub fn part_of_wave(&self, length: f64) -> f64 {
+        if self.radius == 0.0 {
+            return 1.0;
+        }
+        let (mut wave, mut whole) = (0.0, 0.0);
+        for (xi, w) in FULL_RULE.iter() {
+            let distance = 0.5 * (1.0 + xi) * self.radius;
+            whole += w * self.omega(distance);
+            wave += w * self.omega(distance) * (TAU * distance / length).cos();
+        }
+        wave / whole
     }
 
     /// ρ, or 0 where the law is local (length).
@@ -522,6 +537,23 @@ mod tests {
                 .map(|k| length * k as f64 / edges as f64)
                 .collect::<Vec<_>>(),
         )
+    }
+
+    #[test]
+    fn waves_are_averaged_as_rows_average_them() {
+        let s = even(400, 2.0);
+        for kernel in [Kernel::Bump, Kernel::Parabola] {
+            for (radius, length) in [(0.0, 0.3), (0.02, 0.3), (0.3, 0.3), (0.3, 1.0)] {
+                let average = averaging(radius, kernel, s.clone(), false, false);
+                let wave: Vec<f64> = s.iter().map(|s| (TAU * (s - 1.0) / length).cos()).collect();
+                let left = average.row(1.0).apply(&wave);
+                let part = average.part_of_wave(length);
+                assert!(
+                    (part - left).abs() < 1e-5,
+                    "{radius} {length}: {part} {left}"
+                );
+            }
+        }
     }
 
     /// Forty points leave 1.4e-11 of the bump's integral: hence 1e-10 here and below. The average

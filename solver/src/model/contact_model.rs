@@ -1,12 +1,23 @@
 //! A checked contact, ready to be solved.
 
+use std::sync::Arc;
+
 use super::checks::ALIGNED;
 use super::level::Level;
 use crate::contact::ContactBoundary;
 use crate::contact::obstacle::Place;
 use crate::friction::{Average, FrictionLaw};
 use crate::mesh::Edge;
-use crate::problem::{Condition, NormalOf};
+use crate::problem::{Condition, NormalOf, Obstacle};
+
+/// An obstacle that is pushed along one direction.
+#[derive(Clone, Debug)]
+pub struct AlongDirection {
+    /// A unit vector.
+    pub direction: [f64; 2],
+    /// What is pushed: gaps are of first order in the indentation, and those of the displaced obstacle are not.
+    pub obstacle: Arc<Obstacle>,
+}
 
 /// A contact boundary, its obstacle and its friction law.
 #[derive(Clone, Debug)]
@@ -32,6 +43,8 @@ pub struct ContactModel {
     /// The parts of that push against the contact's normal and along its t, at each node: without a direction of its own 1
     /// and 0 with the body's normal, and with the obstacle's the cosine and minus the sine of the slope.
     pub push: Vec<[f64; 2]>,
+    /// The direction of the indentation, if it has one of its own.
+    pub along: Option<AlongDirection>,
     /// The body's own normal at each node.
     pub outward: Vec<[f64; 2]>,
     /// The obstacle's own displacement along the contact's t (length).

@@ -1,10 +1,11 @@
 //! Contact boundaries and the obstacles they face.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use super::axis::Axis;
 use super::checks::{ALIGNED, Checks};
-use super::contact_model::ContactModel;
+use super::contact_model::{AlongDirection, ContactModel};
 use super::corners::Alone;
 use super::level::Level;
 use super::sliding;
@@ -130,6 +131,10 @@ impl Checks {
             end_slopes,
             indentation: contact.indentation,
             push,
+            along: contact.direction.map(|[x, y]| AlongDirection {
+                direction: [x / x.hypot(y), y / x.hypot(y)],
+                obstacle: Arc::new(contact.obstacle.clone()),
+            }),
             outward,
             tangential_displacement: contact.tangential_displacement,
             normal: contact.normal,

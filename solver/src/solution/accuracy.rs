@@ -41,16 +41,21 @@ pub enum Verdict {
     /// quarters of that, since one in twenty is too small.
     Good,
     /// To 5 % and 20 %; also where a contact has too many ends of stick to follow, or another number of ends on the mesh
-    /// split in two.
+    /// split in two, or a warning says that the mesh is too coarse.
     Fair,
-    /// Something else is known to less than that, or not at all.
+    /// Something else is known to less than that, or not at all, or a second solution was found.
     Poor,
 }
 
 impl EstimatedQuantity {
+    /// The parts of the error that no mesh makes smaller.
+    pub fn beside_mesh(&self) -> f64 {
+        self.increments.unwrap_or(0.0) + self.direction.unwrap_or(0.0)
+    }
+
     /// The part of the error that the mesh causes.
     pub fn of_mesh(&self) -> Option<f64> {
-        Some(self.error? - self.increments.unwrap_or(0.0))
+        Some(self.error? - self.beside_mesh())
     }
 }
 
@@ -87,12 +92,16 @@ pub struct EstimatedQuantity {
     /// there is no such mesh (`refine` of 0 or by a tolerance), or a difference is only rounding.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub order: Option<f64>,
-    /// The error that the mesh causes, and under the incremental law the number of increments, in the unit of the value;
+    /// The error that the mesh causes, under the incremental law the number of increments, and a linear `direction`, in the unit of the value;
     /// absent where the quantity has no limit, or nothing is known.
     pub error: Option<f64>,
     /// The part of `error` that the increments cause; absent where nothing depends on them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub increments: Option<f64>,
+    /// The part of `error` that an indentation along a `direction` causes, in which gaps are linear; absent where they are those of
+    /// the displaced obstacle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub direction: Option<f64>,
     /// The error as a part: of the value; of the friction force for a tangential one; of the length of the contact for
     /// an extent.
     pub relative: Option<f64>,

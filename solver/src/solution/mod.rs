@@ -44,18 +44,6 @@ pub struct Solution {
 }
 
 impl Solution {
-    /// Whether another solution was found, with other forces, at the end of any step.
-    pub fn has_second(&self) -> bool {
-        let ends = self.steps.iter().map(|step| &step.summary);
-        let mut all = ends.chain([&self.summary]);
-        all.any(|summary| {
-            summary
-                .warnings
-                .iter()
-                .any(|w| w.code == WarningCode::NotUnique)
-        })
-    }
-
     /// Whether every number is finite, also those that are not part of the document.
     pub fn is_finite(&self) -> bool {
         // all of them by name, here and below, so that a new one is not forgotten
@@ -344,6 +332,8 @@ pub enum WarningCode {
     FrictionLostAtEnd,
     /// An obstacle that reaches into the body between two nodes, or recedes from it.
     ObstacleBetweenNodes,
+    /// An obstacle that is pushed along its direction so far that its gaps, which are linear in that, are others.
+    DirectionIsLinear,
     /// A kink of the obstacle, or a corner of the body, in the contact.
     KinkInContact,
     /// A nonlocal radius larger than the contact.

@@ -9,6 +9,7 @@ use crate::contact::edge_nodes;
 use crate::contact::obstacle::Place;
 use crate::elasticity::Dof;
 use crate::element::edge3;
+use crate::friction::BoundLaw;
 use crate::problem::{Condition, NormalOf};
 use crate::solution::{Outcome, Warning, WarningCode};
 
@@ -39,14 +40,29 @@ const PARTIAL: f64 = 1.5;
 /// less on any mesh that resolves its contact.
 const SLIGHT: f64 = 1e-3;
 
-/// Most places that are reported of one contact.
-const MOST_MISSED: usize = 20;
+/// Where no error of a peak would contain it, what the obstacle does between the nodes is told if it adds more than this part of
+/// the mean pressure: peaks of a `fair` result are known to as much.
+const TELLING: f64 = 0.2;
+
+/// Rises within less than this part of the distance of the nodes are not steeper than over it.
+const SHORTEST: f64 = 1.0 / 16.0;
 
 /// Penetration counts as more than rounding above this part of the length of the contact.
 const ROUNDING: f64 = 1e-9;
 
 /// A kink shapes the pressure if each halving of the mesh adds more than this part to its peak.
 const SHAPING: f64 = 0.01;
+
+/// A shape of the obstacle between the nodes of an edge that they do not see.
+pub(super) struct Wave {
+    pub(super) edge: usize,
+    /// How far it is off the parabola through the nodes (length).
+    height: f64,
+    /// Distance between the nodes on either side (length).
+    spacing: f64,
+    /// What it may add to the pressure (stress).
+    pub(super) pressure: f64,
+}
 
 /// A kink of the obstacle in contact, or a corner of the body.
 pub(super) struct Kink {
@@ -79,10 +95,14 @@ impl PatchView<'_> {
         let least = ROUNDING * s[s.len() - 1];
         let reactions = &self.forces.reactions[self.system.range(self.patch)];
         let largest = reactions.iter().fold(0.0f64, |most, r| most.max(*r));
+        let without_error = self.waves_without_error();
         for place in &contact.places {
             // it counts by the nearer of the two, and one of them is known
             let stiffness = self.stiffness(place.edge);
-            let slight = |unseen: f64| unseen <= least || stiffness * unseen / largest < SERIOUS;
+            let slight = |unseen: f64| {
+                let serious = stiffness * unseen / largest >= SERIOUS;
+                unseen <= least || !(serious || without_error.contains(&place.edge))
+            };
             if slight(place.nearer.abs()) {
                 continue;
             }
@@ -119,38 +139,115 @@ impl PatchView<'_> {
         let mut found: Vec<Missed> = found.into_iter().map(|(_, missed)| missed).collect();
         let depth = |missed: &Missed| missed.penetration.abs();
         found.sort_by(|a, b| depth(b).total_cmp(&depth(a)));
-        found.truncate(MOST_MISSED);
         found
     }
 
-    /// The pressure that the obstacle between the nodes of an edge may add and that they do not see, at the edges where there
-    /// is one (stress). A wave of height h = |nearer| whose length λ is the distance of the nodes presses with the amplitude
-    /// π E* h/(2 λ) on a half-plane in full contact; where it touches with its crests only, with more.
-    pub(super) fn unseen_pressures(&self) -> Vec<(usize, f64)> {
+    /// The shape of the obstacle between the nodes of an edge that they do not see, at the edges where there is one. A wave of
+    /// height h and length λ presses with the amplitude π E* h/(2 λ) on a half-plane in full contact; where it touches with its
+    /// crests only, with more. It is as long as the nodes are apart, or shorter if it is steeper than that.
+    pub(super) fn unseen_waves(&self) -> Vec<Wave> {
         let contact = self.patch.contact;
         if contact.condition != Condition::Unilateral {
             return Vec::new();
         }
         let s = &contact.boundary.s;
         let least = ROUNDING * s[s.len() - 1];
-        let touched = |place: &&Place| place.nearer.abs() > least && self.touched_beside(place);
-        let mut found: Vec<(usize, f64)> = Vec::new();
-        for place in contact.places.iter().filter(touched) {
-            let steepness = place.nearer.abs() / self.spacing(place);
-            match found.last_mut() {
-                Some((edge, most)) if *edge == place.edge => *most = most.max(steepness),
-                _ => found.push((place.edge, steepness)),
+        let mut found: Vec<Wave> = Vec::new();
+        for places in contact.places.chunk_by(|a, b| a.edge == b.edge) {
+            let edge = places[0].edge;
+            for [from, to] in [[-1.0, 0.0], [0.0, 1.0]] {
+                let within = |place: &&Place| place.xi > from && place.xi < to;
+                let own: Vec<&Place> = places.iter().filter(within).collect();
+                let height = own.iter().fold(0.0f64, |most, p| most.max(p.nearer.abs()));
+                if height <= least || !self.touched_beside(own[0]) {
+                    continue;
+                }
+                let spacing = self.spacing(own[0]);
+                let inside = own.iter().map(|place| (place.xi, place.nearer));
+                let at_nodes = |xi: f64| std::iter::once((xi, 0.0));
+                let heights = at_nodes(from).chain(inside).chain(at_nodes(to));
+                let turns = turning_points(heights);
+                // from hollow to crest it is half a wave; what begins at a node may be no wave
+                let inside = &turns[1..turns.len() - 1];
+                let rise = |pair: &[(f64, f64)]| {
+                    let length = (pair[1].0 - pair[0].0).max(SHORTEST) * spacing;
+                    (pair[1].1 - pair[0].1).abs() / (2.0 * length)
+                };
+                let steepest = inside.windows(2).map(rise).fold(0.0, f64::max);
+                let wave = Wave {
+                    edge,
+                    height,
+                    spacing,
+                    pressure: steepest.max(height / spacing),
+                };
+                match found.last_mut() {
+                    Some(most) if most.edge == edge => {
+                        if wave.pressure > most.pressure {
+                            *most = wave;
+                        }
+                    }
+                    _ => found.push(wave),
+                }
             }
         }
         if found.is_empty() {
             return found;
         }
         let moduli = self.contact_moduli();
-        let pressure =
-            |(edge, steepness): (usize, f64)| (edge, PARTIAL * 0.5 * PI * moduli[edge] * steepness);
-        let mut pressures: Vec<(usize, f64)> = found.into_iter().map(pressure).collect();
-        pressures.retain(|(_, pressure)| *pressure > SLIGHT * self.largest);
-        pressures
+        for wave in &mut found {
+            wave.pressure *= PARTIAL * 0.5 * PI * moduli[wave.edge];
+        }
+        found.retain(|wave| wave.pressure > SLIGHT * self.largest);
+        found
+    }
+
+    /// The edges with waves that matter and that no stated error contains: where the peak of the pressure has no limit it has no
+    /// error, and is no measure of them. A kink between the nodes is told as such.
+    fn waves_without_error(&self) -> Vec<usize> {
+        let contact = self.patch.contact;
+        let mut waves = self.unseen_waves();
+        if waves.is_empty() || !self.pressure_without_limit() {
+            return Vec::new();
+        }
+        let weights = &contact.boundary.weights;
+        let nodes = (0..self.count()).filter(|i| self.active(*i));
+        let (force, area) = nodes.fold((0.0, 0.0), |(force, area), i| {
+            (force + weights[i] * self.pressure(i), area + weights[i])
+        });
+        let mean = force / area;
+        let moduli = self.contact_moduli();
+        let kinked = |edge: usize| {
+            contact.places.iter().any(|place| {
+                let [before, after] = self.beside(place);
+                let growth = Self::growth(&moduli, edge, place.kink);
+                place.edge == edge && before != after && growth > SHAPING * mean
+            })
+        };
+        waves.retain(|wave| wave.pressure > TELLING * mean && !kinked(wave.edge));
+        waves.iter().map(|wave| wave.edge).collect()
+    }
+
+    /// What an unseen wave may add to |σ_t|: μ times what is left in S_ρ of a wave twice as long, the longest that nodes do not see,
+    /// in that part that the largest slip reaches. The wave itself moves the surface along t by less than its height.
+    pub(super) fn friction_of(&self, wave: &Wave) -> f64 {
+        let Some(law) = &self.patch.law else {
+            return 0.0;
+        };
+        let BoundLaw::Pressure {
+            coefficient,
+            average,
+            ..
+        } = &law.bound
+        else {
+            return 0.0;
+        };
+        let own = self.system.points.iter().filter(|g| g.patch == self.p);
+        let slips = own.map(|point| self.system.slip(self.v, point).abs());
+        let slip = slips.fold(0.0, f64::max) + wave.height;
+        let [start, end, _] = self.patch.contact.boundary.edge_arc(wave.edge);
+        let uniform: f64 = average.row(0.5 * (start + end)).weights.iter().sum();
+        let left = uniform * average.part_of_wave(2.0 * wave.spacing).abs();
+        coefficient * left * wave.pressure * law.phi(slip)
     }
 
     /// Whether the nodes on either side of a place are in contact.
@@ -163,7 +260,6 @@ impl PatchView<'_> {
         let Some(worst) = missed.first() else { return };
         let others = match missed.len() {
             1 => String::new(),
-            MOST_MISSED => format!(", and at {MOST_MISSED} other places or more"),
             count => format!(", and at {} other places", count - 1),
         };
         let Missed {
@@ -454,5 +550,36 @@ impl PatchView<'_> {
             }
         }
         moduli
+    }
+}
+
+/// The first and the last of some points (place, height) and those between at which the height ceases to rise or to fall.
+fn turning_points(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
+    let mut found: Vec<(f64, f64)> = Vec::new();
+    for point in points {
+        if let [.., (_, before), (_, last)] = found[..]
+            && (last - before) * (point.1 - last) >= 0.0
+        {
+            found.pop();
+        }
+        found.push(point);
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::turning_points;
+
+    #[test]
+    fn only_crests_and_hollows_are_turning_points() {
+        let points = |heights: &[f64]| {
+            let all = heights.iter().enumerate().map(|(k, h)| (k as f64, *h));
+            let turns = turning_points(all).into_iter();
+            turns.map(|(k, _)| k as usize).collect::<Vec<_>>()
+        };
+        assert_eq!(points(&[0.0, 1.0, 2.0, 1.0, 0.0]), [0, 2, 4]);
+        assert_eq!(points(&[0.0, -1.0, 1.0, 0.0]), [0, 1, 2, 3]);
+        assert_eq!(points(&[0.0, 0.0, 1.0, 1.0, 0.0]), [0, 3, 4]);
     }
 }

@@ -2,6 +2,7 @@
 //! their own.
 
 mod between;
+mod displaced;
 mod extents;
 mod junction;
 mod quantities;
@@ -40,6 +41,8 @@ pub(super) struct PatchView<'a> {
     anchors: Vec<[f64; 3]>,
     /// Where materials meet in the contact, once that is known.
     worst_junction: OnceCell<Option<Junction>>,
+    /// What a direction of the indentation leaves open, once that is known.
+    displaced_gaps: OnceCell<DisplacedGaps>,
     /// Told what work was done (multiplications); false: nobody needs the rest, which may be anything.
     go_on: &'a dyn Fn(f64) -> bool,
     /// σ_t likewise, if it does not follow from the law: in the thesis's own iteration and in bonded contacts.
@@ -54,6 +57,24 @@ pub(super) struct Junction {
     exponent: Option<f64>,
     /// What each halving of the mesh adds to the pressure there (stress).
     growth: f64,
+}
+
+/// What a displaced obstacle is at a contact node beside the linear one.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DisplacedNode {
+    /// By how much the gap along the contact's normal is larger (length).
+    pub gap: f64,
+    /// By how much the contact's normal is turned away from t (angle); 0 where it is the body's.
+    pub turn: f64,
+}
+
+/// The same of a contact.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(in crate::algorithm) struct DisplacedGaps {
+    /// By node; nothing where it is not known.
+    pub(in crate::algorithm) nodes: Vec<DisplacedNode>,
+    /// How far the obstacle is displaced along t at a node in contact that it does not face any more (length).
+    past_end: f64,
 }
 
 /// Nodal forces of a state, all contacts in a row.
@@ -103,6 +124,7 @@ impl<'a> PatchView<'a> {
             pressed: None,
             anchors: Vec::new(),
             worst_junction: OnceCell::new(),
+            displaced_gaps: OnceCell::new(),
             go_on,
             tractions: None,
         };

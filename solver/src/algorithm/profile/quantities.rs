@@ -1,6 +1,7 @@
 //! The quantities of a contact for which an error is stated, and what they depend on.
 
 use super::PatchView;
+use super::between::Wave;
 use crate::algorithm::adjoint::Gradient;
 use crate::algorithm::system::Point;
 use crate::contact::edge_nodes;
@@ -31,6 +32,9 @@ pub struct Quantity {
     /// What the part of the contact beyond its last node means, where an end of the obstacle lies inside an edge and that edge
     /// is left out: its length for extents, else the quantity times that length in lengths of the contact.
     pub cut: f64,
+    /// What a direction of the indentation leaves open beside what [`Reported::displaced`](crate::algorithm::Reported) says of it by
+    /// `gradient`, in the unit of the value.
+    pub displaced: f64,
     /// Of a peak: the pressure of a shape of the obstacle between the nodes that they do not see.
     pub unseen: f64,
     /// The edges of the contact that `spacing` comes from, with their parts in any unit.
@@ -61,7 +65,9 @@ pub enum Estimable {
 /// An end of an interval of contact.
 pub(super) struct EndOfContact {
     name: QuantityName,
-    /// Of the outermost node in contact.
+    /// The outermost node in contact.
+    pub(super) node: usize,
+    /// Where that is.
     s: f64,
     /// From there to the end of the obstacle, if that lies inside the next edge, which is left out of the contact (length).
     cut: f64,
@@ -98,7 +104,8 @@ impl PatchView<'_> {
         found.extend(self.ends());
         self.add_cuts(&mut found);
         self.add_unseen(&mut found);
-        if !self.missed().is_empty() {
+        self.add_displaced(&mut found);
+        if !self.missed().is_empty() || self.overlap_without_contact() > 0.0 {
             for quantity in &mut found {
                 if quantity.estimable == Estimable::Yes {
                     quantity.estimable = Estimable::Unseen;
@@ -131,20 +138,41 @@ impl PatchView<'_> {
         }
     }
 
-    /// What the shape of the obstacle between the nodes means for the peaks. An average over ρ hardly feels it.
+    /// What a direction of the indentation means where the displaced obstacle ends elsewhere.
+    fn add_displaced(&self, quantities: &mut [Quantity]) {
+        let part = self.displaced_part();
+        for quantity in quantities {
+            use QuantityName::{ContactEnd, ContactStart, StickEnd};
+            match quantity.name {
+                ContactStart | ContactEnd => {}
+                StickEnd => quantity.displaced = part * self.contact_length(),
+                _ => quantity.displaced = part * quantity.value.abs(),
+            }
+        }
+    }
+
+    /// What the shape of the obstacle between the nodes means for the peaks.
     fn add_unseen(&self, quantities: &mut [Quantity]) {
-        let by_edge = self.unseen_pressures();
-        let most = by_edge.iter().fold(0.0f64, |most, (_, p)| most.max(*p));
-        let local = self.averages_nothing();
+        let waves = self.unseen_waves();
+        let most = |of_wave: &dyn Fn(&Wave) -> f64| waves.iter().map(of_wave).fold(0.0, f64::max);
         for quantity in quantities {
             quantity.unseen = match quantity.name {
-                QuantityName::PeakNormalStress => most,
-                QuantityName::PeakTangentialStress if local && self.largest > 0.0 => {
-                    most * quantity.value.abs() / self.largest
+                QuantityName::PeakNormalStress => most(&|wave| wave.pressure),
+                QuantityName::PeakTangentialStress => {
+                    let room = self.shear_cap() - quantity.value.abs();
+                    most(&|wave| self.friction_of(wave)).min(room.max(0.0))
                 }
                 _ => 0.0,
             };
-            quantity.unseen_at.clone_from(&by_edge);
+            quantity.unseen_at = waves.iter().map(|w| (w.edge, w.pressure)).collect();
+        }
+    }
+
+    /// The largest τ that the law allows (stress); infinite without a cap.
+    fn shear_cap(&self) -> f64 {
+        match self.patch.law.as_ref().map(|law| &law.bound) {
+            Some(BoundLaw::Pressure { shear_cap, .. }) => *shear_cap,
+            _ => f64::INFINITY,
         }
     }
 
@@ -188,6 +216,7 @@ impl PatchView<'_> {
             spacing: 0.0,
             between: 0.0,
             cut: 0.0,
+            displaced: 0.0,
             unseen: 0.0,
             spacing_at: Vec::new(),
             between_at: Vec::new(),
@@ -306,7 +335,7 @@ impl PatchView<'_> {
     }
 
     /// The pressure grows without limit at a sharp end of the obstacle, where materials meet and, slowly, at a kink.
-    fn pressure_without_limit(&self) -> bool {
+    pub(super) fn pressure_without_limit(&self) -> bool {
         let sharp = |i: usize| self.active(i) && self.may_be_sharp(i);
         sharp(0) || sharp(self.count() - 1) || !self.kinks().is_empty() || self.junction().is_some()
     }
@@ -323,6 +352,7 @@ impl PatchView<'_> {
         let quantity = |end: EndOfContact| Quantity {
             spacing: end.spacing,
             cut: end.cut,
+            displaced: self.displaced_end(end.node),
             spacing_at: vec![(end.edge, 1.0)],
             ..self.quantity(end.name, end.s, None)
         };
@@ -379,6 +409,7 @@ impl PatchView<'_> {
             if i == 0 || !self.active(i - 1) {
                 found.push(EndOfContact {
                     name: QuantityName::ContactStart,
+                    node: i,
                     s: s[i],
                     cut: if i == 0 { self.left_out(0) } else { 0.0 },
                     spacing: if i == 0 { 0.0 } else { s[i] - s[i - 1] },
@@ -388,6 +419,7 @@ impl PatchView<'_> {
             if i == last || !self.active(i + 1) {
                 found.push(EndOfContact {
                     name: QuantityName::ContactEnd,
+                    node: i,
                     s: s[i],
                     cut: if i == last { self.left_out(last) } else { 0.0 },
                     spacing: if i == last { 0.0 } else { s[i + 1] - s[i] },

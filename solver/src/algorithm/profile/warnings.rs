@@ -28,13 +28,14 @@ const MOST_LOST: f64 = 0.05;
 /// A node may press so far from the obstacle, as a part of the largest displacement along the normal.
 const MOST_EARLY: f64 = 0.01;
 
-/// With fewer edges than this across a contact, its pressure is not reliable.
+/// With fewer edges than this across a contact, of which a half may be modelled, its pressure is not reliable.
 const FEWEST_EDGES: usize = 6;
 
 impl PatchView<'_> {
     pub(in crate::algorithm) fn warn(&self, warnings: &mut Vec<Warning>) {
         self.warn_of_oscillation(warnings);
         self.warn_of_missed(warnings);
+        self.warn_of_displaced(warnings);
         self.warn_of_kinks(warnings);
         self.warn_of_junction(warnings);
         self.warn_of_contact(warnings);
@@ -128,12 +129,14 @@ impl PatchView<'_> {
         let edges = (0..contact.boundary.edge_count())
             .filter(|k| edge_nodes(*k).iter().all(|&i| self.active(i)))
             .count();
-        if edges < FEWEST_EDGES {
+        // with those beyond lines of symmetry
+        let across = edges * (1 + self.mirrored_ends());
+        if across < FEWEST_EDGES {
             warn(
                 WarningCode::MeshTooCoarseForContact,
                 format!(
-                    "Only {edges} whole element(s) lie in the contact; at least {FEWEST_EDGES} are needed for a pressure to rely on. {} Refine the mesh there.",
-                    self.peak_uncertainty(edges)
+                    "Only {across} whole element(s) lie in the contact; at least {FEWEST_EDGES} are needed for a pressure to rely on. {} Refine the mesh there.",
+                    self.peak_uncertainty(across)
                 ),
             );
         }
@@ -219,15 +222,11 @@ impl PatchView<'_> {
 
     /// The possible error of the peak pressure with so few elements in contact. The worst of many meshes
     /// of Hertz's cylinder is .28/n², n elements across the whole contact (`tests/verification`).
-    fn peak_uncertainty(&self, edges: usize) -> String {
-        let count = self.count();
-        let ends = |i: &usize| self.active(*i) && (self.symmetric(*i) || self.may_be_sharp(*i));
-        let pressed = [0, count - 1].into_iter().filter(ends);
-        let (mirrored, sharp): (Vec<usize>, Vec<usize>) = pressed.partition(|&i| self.symmetric(i));
-        let across = edges * (1 + mirrored.len());
+    fn peak_uncertainty(&self, across: usize) -> String {
+        let mut ends = [0, self.count() - 1].into_iter();
         if across == 0 {
             "Nothing is known of its peak.".to_owned()
-        } else if !sharp.is_empty() {
+        } else if ends.any(|i| self.active(i) && self.may_be_sharp(i)) {
             "At the obstacle's end its peak has no limit.".to_owned()
         } else {
             let off = 100.0 * SMOOTH_PEAK / (across * across) as f64;

@@ -1,0 +1,189 @@
+//! What a push along a direction of its own leaves open: gaps are linear in the indentation, as if the obstacle kept the normal
+//! and the slope that each node faced before, and those of the displaced obstacle are not.
+
+use super::{DisplacedGaps, DisplacedNode, PatchView};
+use crate::contact::Displaced;
+use crate::problem::{Condition, NormalOf};
+use crate::solution::{Warning, WarningCode};
+
+/// What is told: a difference whose mean over the pressure is more than this part of the largest gap or overlap in contact, which
+/// changes forces by as much or twice as much; or an end of the contact that is more than this part of its length off.
+const TOLD_OF_FORCES: f64 = 0.004;
+const TOLD_OF_ENDS: f64 = 0.025;
+
+/// Parts of the length of the contact boundary that are rounding: those of the place on a curve.
+const ROUNDING: f64 = 1e-8;
+
+/// What a node takes, in multiplications.
+const WORK_OF_A_NODE: f64 = 2e3;
+
+impl PatchView<'_> {
+    /// Without a direction, nothing.
+    pub(in crate::algorithm) fn displaced_gaps(&self) -> &DisplacedGaps {
+        self.displaced_gaps.get_or_init(|| {
+            let contact = self.patch.contact;
+            let mut found = DisplacedGaps {
+                nodes: vec![DisplacedNode::default(); self.count()],
+                past_end: 0.0,
+            };
+            let (Some(along), true) = (&contact.along, contact.condition != Condition::None) else {
+                return found;
+            };
+            let pushed = self.system.level.indentation * contact.indentation;
+            let by = along.direction.map(|x| pushed * x);
+            let displaced = Displaced::new(&along.obstacle, &contact.boundary, &contact.outward);
+            let least = ROUNDING * contact.boundary.length();
+            for i in 0..self.count() {
+                if !(self.go_on)(WORK_OF_A_NODE) {
+                    return found;
+                }
+                match self.beside_linear(i, by, &displaced) {
+                    Some(node) if node.gap.abs() > least => found.nodes[i] = node,
+                    Some(_) => {}
+                    None if self.active(i) => {
+                        let n = contact.outward[i];
+                        let ahead = (by[0] * n[1] - by[1] * n[0]).abs();
+                        found.past_end = found.past_end.max(ahead);
+                    }
+                    None => {}
+                }
+            }
+            found
+        })
+    }
+
+    /// u_n ≤ gap is a condition on the displacement along m; where m is the obstacle's, the displaced obstacle has another one.
+    fn beside_linear(
+        &self,
+        i: usize,
+        by: [f64; 2],
+        displaced: &Displaced<'_>,
+    ) -> Option<DisplacedNode> {
+        let contact = self.patch.contact;
+        let (m, n) = (contact.boundary.normals[i], contact.outward[i]);
+        let t = [n[1], -n[0]];
+        let cosine = dot(m, n);
+        let distance = contact.profile[i] / cosine;
+        let before = displaced.profile(i, [0.0; 2], distance)?;
+        let near = before.distance + dot(by, n) - before.slope * dot(by, t);
+        let after = displaced.profile(i, by, near)?;
+        let (slope, change, moved) = match contact.normal {
+            NormalOf::Body => (0.0, 0.0, 0.0),
+            NormalOf::Obstacle => {
+                let slope = -dot(m, t) / cosine;
+                let tangent = contact.boundary.tangent(i);
+                let u_n = self
+                    .system
+                    .normal_displacement(self.v, self.patch.first + i);
+                let moved = u_n * dot(m, t) + self.u_t(i) * dot(tangent, t);
+                (slope, after.slope - slope, moved)
+            }
+        };
+        let linear = distance + dot(by, n) - slope * dot(by, t);
+        Some(DisplacedNode {
+            gap: cosine * (after.distance - linear + change * moved),
+            turn: cosine * cosine * change,
+        })
+    }
+
+    /// The largest difference at a node in contact, and the largest gap or overlap there (lengths), if the difference is to be told.
+    fn told(&self) -> Option<(f64, f64)> {
+        let found = self.displaced_gaps();
+        let level = self.system.level.indentation;
+        let reactions = &self.forces.reactions[self.system.range(self.patch)];
+        let (mut most, mut largest, mut moment, mut force) = (0.0f64, 0.0f64, 0.0, 0.0);
+        for i in (0..self.count()).filter(|i| self.active(*i)) {
+            most = most.max(found.nodes[i].gap.abs());
+            largest = largest.max(self.patch.contact.gap(i, level).abs());
+            moment += reactions[i] * found.nodes[i].gap;
+            force += reactions[i];
+        }
+        let ends = self.ends_of_contact();
+        let ends = ends.iter().map(|end| self.displaced_end(end.node));
+        let farthest = ends.fold(0.0, f64::max);
+        let told = f64::abs(moment) > TOLD_OF_FORCES * force * largest
+            || farthest > TOLD_OF_ENDS * self.contact_length();
+        (told && (most > 0.0 || found.past_end > 0.0))
+            .then_some((most.max(found.past_end), largest))
+    }
+
+    /// How far into the body the displaced obstacle reaches where nothing touches the linear one (length).
+    pub(super) fn overlap_without_contact(&self) -> f64 {
+        let found = self.displaced_gaps();
+        if (0..self.count()).any(|i| self.active(i)) {
+            return 0.0;
+        }
+        let overlap = |i: usize| match found.nodes[i].gap {
+            0.0 => 0.0,
+            more => -(self.system.opening(self.v, self.patch.first + i) + more),
+        };
+        (0..self.count()).map(overlap).fold(0.0, f64::max)
+    }
+
+    /// What the difference changes where contact begins or ends at a node (length): as much as the linear gap changes by it on
+    /// the way from where it is least. An obstacle of which nothing is left there ends elsewhere.
+    pub(super) fn displaced_end(&self, end: usize) -> f64 {
+        let found = self.displaced_gaps();
+        let level = self.system.level.indentation;
+        let s = &self.patch.contact.boundary.s;
+        let gap = |i: usize| self.patch.contact.gap(i, level);
+        let touching = (0..self.count()).filter(|i| self.active(*i));
+        let (Some(deepest), more) = (
+            touching.min_by(|a, b| gap(*a).total_cmp(&gap(*b))),
+            found.nodes[end].gap.abs(),
+        ) else {
+            return 0.0;
+        };
+        if more == 0.0 {
+            return found.past_end;
+        }
+        let (rise, length) = (gap(end) - gap(deepest), (s[end] - s[deepest]).abs());
+        // of a parabola the slope at the end is twice the mean one; no farther than the contact is long
+        let slope = 2.0 * rise / length;
+        let all = self.contact_length();
+        found.past_end.max((more / slope).min(all)).min(all)
+    }
+
+    /// From the first node in contact to the last.
+    pub(super) fn contact_length(&self) -> f64 {
+        let s = &self.patch.contact.boundary.s;
+        let first = (0..self.count()).find(|i| self.active(*i));
+        let last = (0..self.count()).rfind(|i| self.active(*i));
+        match (first, last) {
+            (Some(first), Some(last)) => s[last] - s[first],
+            _ => 0.0,
+        }
+    }
+
+    /// The part of the contact that the displaced obstacle does not cover, or covers beside it.
+    pub(super) fn displaced_part(&self) -> f64 {
+        let past_end = self.displaced_gaps().past_end;
+        match past_end > 0.0 {
+            true => (past_end / self.contact_length()).min(1.0),
+            false => 0.0,
+        }
+    }
+
+    pub(super) fn warn_of_displaced(&self, warnings: &mut Vec<Warning>) {
+        let instead = "Gaps are linear in the indentation. Draw the obstacle where the push leaves it, with an `indentation` of 0, or push it by less.";
+        let overlap = self.overlap_without_contact();
+        let message = match (overlap > 0.0, self.told()) {
+            (true, _) => format!(
+                "Nothing touches, but the obstacle that is pushed along its `direction` would reach {overlap:.3e} into the body. {instead}"
+            ),
+            (false, Some((most, largest))) => format!(
+                "The obstacle is pushed along its `direction` so far that where it touches its gaps are off by up to {most:.3e}; the largest gap or overlap there is {largest:.3e}. {instead} What it changes is in the stated errors."
+            ),
+            (false, None) => return,
+        };
+        warnings.push(Warning {
+            code: WarningCode::DirectionIsLinear,
+            pointer: format!("{}/direction", self.patch.contact.pointer),
+            message,
+        });
+    }
+}
+
+fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
