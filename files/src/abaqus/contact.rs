@@ -1,4 +1,4 @@
-//! Contact between a surface of the body and a rigid surface of a refused, as contacts with obstacles.
+//! Contact between a surface of the body and a rigid surface of a deck, as contacts with obstacles.
 
 use super::contact_parts::{Adjust, Behavior, DeckContact, DeckFriction, Pair, WRITTEN_INSTEAD};
 use super::rigid::{MOST_POINTS, Tools};
@@ -25,7 +25,7 @@ const CLOSED: f64 = 1e-6;
 /// Nodes of a boundary that are looked at.
 const MOST_LOOKS: usize = 1000;
 
-/// The contacts of a refused, its steps, and what is done differently here.
+/// The contacts of a deck, its steps, and what is done differently here.
 pub(super) struct Translated {
     pub(super) contacts: Vec<Contact>,
     pub(super) steps: Vec<Step>,
