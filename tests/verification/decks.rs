@@ -620,13 +620,6 @@ fn keywords_without_effect_are_passed_over_and_others_refused_by_name() {
     );
     let plastic = MATERIAL.to_owned() + "*PLASTIC\n5., 0.\n";
     for (deck, got) in [
-        (
-            block(
-                &format!("*MATERIAL, NAME=M2\n*EXPANSION\n1E-5\n{warm}{HELD}"),
-                "*TEMPERATURE\nNALL, 90.\n",
-            ),
-            "temperatures",
-        ),
         (block(HELD, load).replace(MATERIAL, &plastic), "*PLASTIC"),
         (
             block(&format!("*EQUATION\n2\n1, 1, 1., 5, 1, 1.\n{HELD}"), load),
@@ -664,8 +657,102 @@ fn keywords_without_effect_are_passed_over_and_others_refused_by_name() {
             "{got}: {found:?}"
         );
     }
+    for (change, hint) in [
+        ("TYPE=ELEMENT, REMOVE\nE2\n", "Leave them out of the deck"),
+        ("TYPE=ELEMENT, ADD\nE2\n", "Delete this keyword"),
+        (
+            "TYPE=CONTACT PAIR, REMOVE\nA, B\n",
+            "Delete this keyword if the pair still acts",
+        ),
+        (
+            "TYPE=CONTACT PAIR, ADD\nA, B\n",
+            "a pair acts from the first step",
+        ),
+    ] {
+        let list = abaqus::problem(&block(HELD, &format!("*MODEL CHANGE, {change}{load}")));
+        let list = list.expect_err(change);
+        let what = change.split('\n').next().unwrap();
+        assert_eq!(list.len(), 1, "{list:?}");
+        assert!(
+            list[0].got.ends_with(what) && list[0].hint.contains(hint),
+            "{list:?}"
+        );
+    }
     let linear = block(HELD, load).replace("*STEP", "*STEP, NLGEOM=NO, NAME=Pull, PERTURBATION");
     assert!(abaqus::problem(&linear).is_ok());
+}
+
+/// Only a change of temperature strains a material that expands, as in CalculiX: 20 degrees from the beginning to the end
+/// change nothing.
+#[test]
+fn temperatures_count_where_they_change_and_the_body_expands() {
+    let load = "*CLOAD\nR, 1, 2.\n";
+    let warm = "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nNALL, 20.\n";
+    let expanding = |model: &str, step: &str| {
+        let deck = block(&format!("{model}{HELD}"), &format!("{step}{load}"));
+        deck.replace(
+            MATERIAL,
+            &format!("{MATERIAL}*EXPANSION, ZERO=100.\n1E-3\n"),
+        )
+    };
+    let other = "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nL, 20.\nR, 30.\n";
+    for deck in [
+        expanding("", ""),
+        expanding(warm, ""),
+        expanding(other, ""),
+        expanding(warm, "*TEMPERATURE\nnall, 20.\n"),
+        expanding("", "*TEMPERATURE\nNALL,\n"),
+        expanding("*INITIAL CONDITIONS, TYPE=VELOCITY\nNALL, 1, 5.\n", ""),
+        // nothing expands that the body is made of
+        block(
+            &format!("*MATERIAL, NAME=M2\n*EXPANSION\n1E-3\n{warm}{HELD}"),
+            &format!("*TEMPERATURE\nNALL, 90.\n{load}"),
+        ),
+    ] {
+        near(corner(&deck), [0.01315672, -0.002800575]);
+    }
+    for (model, step, got) in [
+        (
+            warm,
+            "*TEMPERATURE\nNALL, 20.\nR, 90.\n",
+            "a temperature of 90 for `R`",
+        ),
+        (
+            "",
+            "*TEMPERATURE\nNALL, 20.\n",
+            "a temperature of 20 for `NALL`",
+        ),
+        (
+            other,
+            "*TEMPERATURE\nL, 20.\n",
+            "a temperature of 20 for `L`",
+        ),
+        (
+            warm,
+            "*TEMPERATURE, AMPLITUDE=A\nNALL, 20.\n",
+            "*TEMPERATURE with AMPLITUDE",
+        ),
+        (warm, "*TEMPERATURE\nNALL, warm\n", "`warm`"),
+    ] {
+        let found = refused(&expanding(model, step));
+        assert!(
+            found.len() == 1 && found[0].contains(got),
+            "{got}: {found:?}"
+        );
+    }
+    let found = refused(&expanding(warm, "*TEMPERATURE\nNALL, 90.\n"));
+    assert!(
+        found[0].ends_with("and the material `M` of the body has *EXPANSION (line 29)"),
+        "{found:?}"
+    );
+    let found = refused(&expanding(
+        "*INITIAL CONDITIONS, TYPE=STRESS\nE, 5., 5., 0., 0.\n",
+        "",
+    ));
+    assert!(
+        found.len() == 1 && found[0].ends_with("TYPE=STRESS"),
+        "{found:?}"
+    );
 }
 
 /// A material turned by an orientation; displacements by CalculiX.

@@ -52,6 +52,8 @@ pub(super) enum Block {
     Orientation(Name),
     Amplitude(Name),
     Thickness,
+    InitialTemperatures,
+    Temperatures,
     Period,
     Contact(ContactBlock),
     /// Rows of `*BOUNDARY`, and the name of their amplitude.
@@ -184,6 +186,8 @@ impl Deck {
                 }
                 *block = Block::Skip;
             }
+            Block::InitialTemperatures => self.temperature(true, line, text),
+            Block::Temperatures => self.temperature(false, line, text),
             Block::Period => {
                 // a period of 0 stands for that of 1 that a step has by itself
                 let words = fields(text);

@@ -4,6 +4,7 @@ use super::block::{Block, Rows};
 use super::deck::{Deck, Inside};
 use super::element::{ElementType, Shape};
 use super::part::{Part, RigidLines};
+use super::replaced::{Replacement, Replaces};
 use super::written::{
     Amplitude, Elastic, Incomplete, MOST_NAMES, Name, Orientation, Section, fields,
 };
@@ -259,8 +260,8 @@ impl Deck {
                 }
                 Block::Skip
             }
-            "TEMPERATURE" => self.temperature(line),
-            "INITIAL CONDITIONS" if keyword.is("TYPE", "TEMPERATURE") => self.temperature(line),
+            "TEMPERATURE" => self.temperature_block(keyword, line),
+            "INITIAL CONDITIONS" => self.initial_conditions(keyword, line),
             "ORIENTATION" => self.orientation_block(keyword),
             "AMPLITUDE" => self.amplitude_block(keyword, line),
             "SOLID SECTION" => {
@@ -292,22 +293,33 @@ impl Deck {
                 }
             }
             "BOUNDARY" => {
-                // the first in a step decides whether those of the model remain
-                if self.steps > 0
-                    && !std::mem::replace(&mut self.supported_in_step, true)
-                    && keyword.is("OP", "NEW")
-                {
-                    self.here.prescribed.clear();
-                    for (_, part) in &mut self.instances {
+                // the first in the first step decides whether those of the model remain
+                let is_first = !std::mem::replace(&mut self.supported_in_step, true);
+                if self.steps == 1 && is_first && keyword.is("OP", "NEW") {
+                    let instances = self.instances.iter_mut().map(|(_, part)| part);
+                    for part in instances.chain(self.parts.values_mut()) {
                         part.prescribed.clear();
+                        part.held.clear();
                     }
+                    self.here.prescribed.clear();
+                    self.here.held.clear();
                 }
+                self.note_replacement(keyword, Replaces::Supports, line);
                 Block::Boundary(self.amplitude(keyword, line))
             }
-            // they only add to one another, and nothing comes before the first step
-            "DLOAD" => Block::Load(Rows::Sides, self.amplitude(keyword, line)),
-            "DSLOAD" => Block::Load(Rows::Surfaces, self.amplitude(keyword, line)),
-            "CLOAD" => Block::Load(Rows::Nodes, self.amplitude(keyword, line)),
+            // those of one step only add to one another
+            "DLOAD" => {
+                self.note_replacement(keyword, Replaces::Pressures, line);
+                Block::Load(Rows::Sides, self.amplitude(keyword, line))
+            }
+            "DSLOAD" => {
+                self.note_replacement(keyword, Replaces::Pressures, line);
+                Block::Load(Rows::Surfaces, self.amplitude(keyword, line))
+            }
+            "CLOAD" => {
+                self.note_replacement(keyword, Replaces::Forces, line);
+                Block::Load(Rows::Nodes, self.amplitude(keyword, line))
+            }
             "STEP" => {
                 self.steps += 1;
                 self.supported_in_step = false;
@@ -363,13 +375,19 @@ impl Deck {
         }
     }
 
-    pub(super) fn named(&mut self, keyword: &Keyword, parameter: &str) -> Option<Name> {
-        keyword.get(parameter).map(|name| self.spelled(name))
+    /// Keeps a keyword that replaces what earlier steps prescribe.
+    fn note_replacement(&mut self, keyword: &Keyword, what: Replaces, line: u64) {
+        if self.steps > 1 && keyword.is("OP", "NEW") {
+            self.replacements.push(Replacement {
+                line,
+                keyword: keyword.name.clone(),
+                what,
+            });
+        }
     }
 
-    fn temperature(&mut self, line: u64) -> Block {
-        self.temperatures.get_or_insert(line);
-        Block::Skip
+    pub(super) fn named(&mut self, keyword: &Keyword, parameter: &str) -> Option<Name> {
+        keyword.get(parameter).map(|name| self.spelled(name))
     }
 
     pub(super) fn nameless(&mut self, line: u64, keyword: &str, parameter: &str) -> Block {

@@ -20,10 +20,12 @@ mod names;
 mod part;
 mod problem;
 mod read;
+mod replaced;
 mod rigid;
 mod scope;
 mod steps;
 mod supports;
+mod temperature;
 mod tool;
 mod written;
 

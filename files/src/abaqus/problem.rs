@@ -7,9 +7,7 @@ use super::contact;
 use super::element::{Mechanics, Theory};
 use super::read::read;
 use super::supports::supports;
-use super::written::{
-    Elastic, MOST_CONSTANTS, MaterialDefinition, Name, Orientation, Section, on_line,
-};
+use super::written::{Elastic, MOST_CONSTANTS, Name, Orientation, Section, on_line};
 use crate::source::ReadError;
 use solver::error::{Findings, Reason, Violation};
 use solver::problem::{
@@ -41,7 +39,7 @@ pub fn problem_with_warnings(text: &str) -> Result<(Problem, Vec<Warning>), Vec<
     let axisymmetric = matches!(analysis, Analysis::Axisymmetric {});
     let quadrature = quadrature(&mut built);
     let motions = built.take_motions(axisymmetric);
-    let factors = built.factors();
+    let factors = built.factors_of_steps();
     built.keep_last_loads();
     let thickness = match analysis {
         Analysis::PlaneStrain {} => built.sections.first().and_then(|s| s.row.thickness),
@@ -49,7 +47,6 @@ pub fn problem_with_warnings(text: &str) -> Result<(Problem, Vec<Warning>), Vec<
     };
     let thickness = thickness.unwrap_or(1.0);
     let materials = materials(&mut built);
-    built.check_steps();
     let supports = supports(&built);
     for (line, name) in supports.of_no_element {
         built.doubt(
@@ -127,32 +124,28 @@ impl Built {
         });
     }
 
-    fn check_steps(&mut self) {
+    /// The factors of loads and supports at the end of each step, of steps that are understood.
+    fn factors_of_steps(&mut self) -> Vec<[f64; 2]> {
         let steps = self.deck.steps;
-        if steps == 0 || steps != 1 && self.pairs.is_empty() {
-            self.doubt(
-                0,
-                format!("{steps} steps"),
+        if steps == 1 || steps > 1 && !self.pairs.is_empty() {
+            self.check_replaced();
+            return self.factors();
+        }
+        match self.deck.contact.steps.get(1).map(|step| step.0) {
+            Some(second) => self.doubt(
+                second,
+                format!("the second of {steps} steps"),
                 "one *STEP",
-                match steps {
-                    0 => "A deck without a step is a mesh: upload it, or quote it in a problem as JSON, \"mesh\": {\"abaqus\": \"…\"}.",
-                    _ => "Several steps are read where they move a rigid body (*CONTACT PAIR). Give others in a problem as JSON, with this deck as its mesh.",
-                },
-            );
+                "Several steps are read where they move a rigid body (*CONTACT PAIR). Delete the others, or write a problem as JSON for each, with this deck as its mesh.",
+            ),
+            None => self.doubt(
+                0,
+                "a deck without *STEP",
+                "one *STEP",
+                "A deck without a step is a mesh: upload it, or quote it in a problem as JSON, \"mesh\": {\"abaqus\": \"…\"}.",
+            ),
         }
-        // without one of the two there are no thermal strains
-        let expansion = |material: &MaterialDefinition| material.expansion;
-        if let (Some(line), Some(_)) = (
-            self.deck.temperatures,
-            self.deck.materials.values().find_map(expansion),
-        ) {
-            self.doubt(
-                line,
-                "temperatures of a material with *EXPANSION",
-                "no thermal strains",
-                "Remove the temperatures, or the expansion.",
-            );
-        }
+        vec![[1.0; 2]; steps.max(1)]
     }
 }
 
@@ -242,6 +235,20 @@ fn materials(built: &mut Built) -> Vec<Material> {
         };
         if told.contains(&row.material) {
             continue;
+        }
+        if let Some(expansion) = definition.expansion
+            && let Some((line, got)) = built.deck.temperatures.changed.take()
+        {
+            let got = format!(
+                "{got}, and the material `{:.60}` of the body has *EXPANSION (line {expansion})",
+                row.material
+            );
+            built.doubt(
+                line,
+                got,
+                "temperatures that stay as *INITIAL CONDITIONS give them, 0 where they give none, or a material without *EXPANSION",
+                "Thermal strains are not computed. Remove the change of temperature or *EXPANSION if they may be neglected.",
+            );
         }
         for (line, got) in &definition.other {
             told.insert(&row.material);
