@@ -487,6 +487,16 @@ fn what_is_no_contact_with_a_rigid_obstacle_is_refused() {
         ("FACE, TOOL", "TOOL, TOOL", "two rigid surfaces"),
         ("FACE, TOOL", "FAC, TOOL", "`FAC` in a contact pair"),
         (
+            "FACE, TOOL\n",
+            "FACE, TOOL\nFACE, TOOL2\n*SURFACE, TYPE=SEGMENTS, NAME=TOOL2\nSTART, 9., 4.\nLINE, 5., 4.\n*RIGID BODY, ANALYTICAL SURFACE=TOOL2, REF NODE=9000\n",
+            "`FACE` in a second contact pair: the first is on line",
+        ),
+        (
+            "FACE, TOOL\n",
+            "FACE, TOOL\nPART, TOOL2\n*SURFACE, NAME=PART\n49, S3\n*SURFACE, TYPE=SEGMENTS, NAME=TOOL2\nSTART, 9., 4.\nLINE, 5., 4.\n*RIGID BODY, ANALYTICAL SURFACE=TOOL2, REF NODE=9000\n",
+            "of which 1 of 1 sides belong to `FACE` too",
+        ),
+        (
             "START, 4., 4.\nCIRCL, 0., 0., 0., 4.\nCIRCL, -4.",
             "START, -4., 4.\nCIRCL, 0., 0., 0., 4.\nCIRCL, 4.",
             "whose outer side does not face",
@@ -508,7 +518,7 @@ fn what_is_no_contact_with_a_rigid_obstacle_is_refused() {
         (
             "*END STEP",
             "*CLOAD\n9000, 2, -5.\n*END STEP",
-            "which has no node of an element",
+            "a force on `9000`, the reference node of the *RIGID BODY on line",
         ),
         ("*FRICTION, ELASTIC SLIP=1e-4", "*FRICTION, ROUGH", "ROUGH"),
         (
