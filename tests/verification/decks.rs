@@ -221,7 +221,7 @@ fn blanks_mean_what_they_mean_in_both_programs() {
     }
     for (from, to, got) in [
         ("1000., .3", "1000.,", "1 elastic constants"),
-        ("1000., .3", ", .3", "a blank constant"),
+        ("1000., .3", ", .3", "constant 1 is blank"),
         ("MATERIAL=M\n", "MATERIAL=M\nthick\n", "`thick`"),
     ] {
         let found = refused(&block(HELD, "").replacen(from, to, 1));
@@ -458,12 +458,12 @@ fn what_a_row_names_must_exist_and_have_something() {
         (
             "*NSET, NSET=N\n",
             "*CLOAD\nN, 1, 2.\n",
-            "no node of an element",
+            "a force on `N`, a set without nodes",
         ),
         (
             "*NODE, NSET=REF\n99, 7, 7, 3\n",
             "*CLOAD\nREF, 1, 2.\n",
-            "no node of an element",
+            "a force on `REF`, where node 99 belongs to no plane element",
         ),
         (
             "*NODE, NSET=REF\n99, 7, 7, 3\n",
@@ -487,6 +487,170 @@ fn what_a_row_names_must_exist_and_have_something() {
         "*CLOAD\nR, 1, 2.\n",
     );
     near(corner(&held), [0.01315672, -0.002800575]);
+}
+
+/// Each message says what was found where, and what to do: numbers and names that there are, fields that are blank.
+#[test]
+fn messages_say_what_to_do() {
+    let all = |model: &str, step: &str| {
+        abaqus::problem(&block(&format!("{HELD}{model}"), step)).expect_err(step)
+    };
+    let known = "The nodes have numbers from 1 to 13, not necessarily all of them. Correct the number, or define it by *NODE.";
+    for (model, step, got, hint) in [
+        ("", "*CLOAD\n99, 1, 2.\n", "`99`", known),
+        (
+            "",
+            "*CLOAD\nX, 1, 2.\n",
+            "`X`",
+            "Known names: B, L, NALL, R. Correct the name",
+        ),
+        ("*NSET, NSET=N\n99\n", "", "node 99 in the set `N`", known),
+        (
+            "*NSET, NSET=N, GENERATE\n20, 30\n",
+            "",
+            "nodes 20 to 30 in",
+            known,
+        ),
+        (
+            "*NSET, NSET=N, INSTANCE=P\n1\n",
+            "",
+            "the instance `P`",
+            "leave it out",
+        ),
+        (
+            "*ELSET, ELSET=N\nX\n",
+            "",
+            "`X` in the set `N`",
+            "by *ELSET",
+        ),
+        (
+            "",
+            "*DLOAD\n9, P1, 2.\n",
+            "`9`",
+            "elements have numbers from 1 to 2",
+        ),
+        (
+            "",
+            "*DSLOAD\nS, P, 2.\n",
+            "`S`",
+            "define the surface by *SURFACE",
+        ),
+        (
+            "",
+            "*BOUNDARY\nR,, 1, 2.\n",
+            "the first component is blank",
+            "A blank last component",
+        ),
+        (
+            "",
+            "*BOUNDARY\n, 1, 1, 2.\n",
+            "the node or set is blank",
+            "a blank value 0",
+        ),
+        (
+            "",
+            "*BOUNDARY\nR, 1, 1, .1, 2.\n",
+            ": 5 fields",
+            "Components are 1 (x)",
+        ),
+        (
+            "",
+            "*BOUNDARY\nR, 1, 1, x\n",
+            "the value `x`",
+            "Components are",
+        ),
+        (
+            "",
+            "*BOUNDARY\nR, 3, 3, .1\n",
+            "a component that a plane body does not have",
+            "Components are",
+        ),
+        (
+            "",
+            "*BOUNDARY\nR, 2, 3, .1\n",
+            "for components up to 3",
+            "Components are",
+        ),
+        (
+            "",
+            "*BOUNDARY\nR, 2, 1, .1\n",
+            "components 2 to 1",
+            "Components are",
+        ),
+        (
+            "",
+            "*BOUNDARY\nR, XSIM\n",
+            "`XSIM` in place of a component",
+            "Components are",
+        ),
+        (
+            "",
+            "*CLOAD\nR,, 2.\n",
+            "the component is blank, which",
+            "A blank value is 0",
+        ),
+        (
+            "",
+            "*CLOAD\n, 1, 2.\n",
+            "what it acts on is blank",
+            "A blank value is 0",
+        ),
+        ("", "*CLOAD\nR, 6, 2.\n", "the component `6`", "Moments"),
+        (
+            "",
+            "*DLOAD\nE, , 2.\n",
+            "the kind of load is blank",
+            "A blank value is 0",
+        ),
+        (
+            "",
+            "*DLOAD\nE, GRAV, 9.81, 0., -1.\n",
+            "5 fields, with the kind of load `GRAV`",
+            "`body_force`",
+        ),
+        (
+            "",
+            "*DLOAD\nE, P1, x\n",
+            "the value `x` is no number",
+            "A blank value is 0",
+        ),
+        (
+            "*MATERIAL, NAME=M2\n*ELASTIC\n, .3\n",
+            "",
+            "constant 1 is blank",
+            "no default",
+        ),
+    ] {
+        let list = all(model, step);
+        assert_eq!(list.len(), 1, "{model}{step}: {list:#?}");
+        assert!(
+            list[0].got.contains(got) && list[0].hint.contains(hint),
+            "{model}{step}: {list:#?}"
+        );
+        assert!(list[0].line().is_some(), "{list:#?}");
+    }
+    // each unknown keyword once, and what is known once
+    let list = all("*FOO\n*BAR\n*FOO, A=1\n*foo\n", "*BAR\n");
+    let got: Vec<&str> = list
+        .iter()
+        .map(|v| v.got.split_once(": ").unwrap().1)
+        .collect();
+    assert_eq!(
+        got,
+        ["*FOO, here and 2 times more", "*BAR, here and 1 times more"]
+    );
+    assert!(
+        list[0].hint.contains("*RIGID BODY, *CONTACT PAIR") && !list[1].hint.contains("*RIGID"),
+        "{list:#?}"
+    );
+    // up to five elements of those that are meant
+    let list = all("", "*DLOAD\nE, P2, 5.\n");
+    assert!(
+        list[0]
+            .got
+            .ends_with("1 of its 2 sides lie inside the body, those of elements 1, 2"),
+        "{list:#?}"
+    );
 }
 
 /// As a mesh a deck may contain anything; lines name boundaries.

@@ -254,7 +254,7 @@ impl Deck {
                 line,
                 format!("{name}={written:.40}"),
                 "a number > 0",
-                "Correct it.",
+                &format!("Write it like {name}=0.005, or leave it out."),
             );
         }
         value
@@ -433,7 +433,7 @@ impl Deck {
                 line,
                 format!("`{text:.60}`"),
                 "START, x, y; LINE, x, y of its end; CIRCL, x, y of its end, x, y of its centre (less than half a circle, both ends equally far from it); PARAB, x, y of its middle, x, y of its end",
-                "Correct that line of the rigid surface.",
+                "Begin by START; each line goes on where the one before ends, and no number may be blank.",
             ),
         }
     }

@@ -24,6 +24,7 @@ mod replaced;
 mod rigid;
 mod scope;
 mod steps;
+mod supported;
 mod supports;
 mod temperature;
 mod tool;

@@ -143,6 +143,27 @@ impl Names<'_> {
         self.scopes.iter().position(named)
     }
 
+    /// What to do about a target that is nothing.
+    pub(super) fn remedy(&self, kind: Kind, scope: usize, target: &Target) -> String {
+        match target {
+            Target::Label(_) => self.scopes[scope].hint_of_numbers(kind),
+            _ => kind.remedy().to_owned(),
+        }
+    }
+
+    /// The names that a target might be instead: a number is no name.
+    pub(super) fn known(&self, kind: Kind, target: &Target) -> Vec<String> {
+        match target {
+            Target::Label(_) => Vec::new(),
+            _ => self.all_sets(kind),
+        }
+    }
+
+    fn instances(&self) -> Vec<String> {
+        let names = self.scopes.iter().filter_map(|scope| scope.name.as_deref());
+        names.take(MOST_LISTED).map(str::to_owned).collect()
+    }
+
     pub(super) fn all_sets(&self, kind: Kind) -> Vec<String> {
         let names = (0..self.scopes.len()).flat_map(|scope| {
             let sets = self.scopes[scope].sets(kind).keys();
@@ -242,6 +263,7 @@ impl<'a> Members<'a> {
                     &got,
                     "a set of elements (*ELSET)",
                     || self.names.all_sets(Kind::Elements),
+                    Kind::Elements.remedy(),
                 );
             }
         }
@@ -259,7 +281,8 @@ impl<'a> Members<'a> {
                         self.line,
                         &got,
                         "the name of an *INSTANCE",
-                        Vec::new,
+                        || self.names.instances(),
+                        "Correct INSTANCE=…, or leave it out where the deck has no *INSTANCE.",
                     );
                 }
             }
@@ -296,8 +319,9 @@ impl<'a> Members<'a> {
                         faults,
                         self.line,
                         &got,
-                        &format!("numbers that {what}s have"),
+                        &format!("a range that contains numbers of {what}s"),
                         Vec::new,
+                        &place.hint_of_numbers(kind),
                     );
                 }
                 self.found.extend(inside);
@@ -321,8 +345,9 @@ impl<'a> Members<'a> {
                     faults,
                     self.line,
                     &format!("`{other:.60}` in the set `{:.60}`", self.name),
-                    &format!("a {what} or a set (*{})", kind.keyword()),
+                    &format!("{} or a set (*{})", kind.one(), kind.keyword()),
                     || names.all_sets(kind),
+                    kind.remedy(),
                 ),
                 (Target::Label(label), None) if !numbers => {
                     let got = format!("{what} {label} in the set `{:.60}`", self.name);
@@ -330,8 +355,9 @@ impl<'a> Members<'a> {
                         faults,
                         self.line,
                         &got,
-                        &format!("a number that a {what} has"),
+                        &format!("the number of {}", kind.one()),
                         Vec::new,
+                        &place.hint_of_numbers(kind),
                     );
                 }
                 _ => {}
@@ -387,13 +413,14 @@ impl Room {
 /// Names that a hint lists.
 const MOST_LISTED: usize = 20;
 
-/// Reports a name or number that nothing has; `known`: the names that there are.
+/// Reports a name or number that nothing has; `known`: the names that there are; `remedy`: what to do.
 pub(super) fn unknown(
     faults: &mut Findings,
     line: u64,
     got: &str,
     expected: &str,
     known: impl FnOnce() -> Vec<String>,
+    remedy: &str,
 ) {
     if faults.is_full() {
         return faults.count(1);
@@ -404,8 +431,8 @@ pub(super) fn unknown(
         .map(|name| format!("{name:.60}"))
         .collect();
     let hint = match names.is_empty() {
-        true => "Correct the number.".to_owned(),
-        false => format!("Known names: {}.", names.join(", ")),
+        true => remedy.to_owned(),
+        false => format!("Known names: {}. {remedy}", names.join(", ")),
     };
     faults.add(on_line(
         line,
@@ -415,6 +442,7 @@ pub(super) fn unknown(
         &hint,
     ));
 }
+
 #[cfg(test)]
 mod tests {
     use super::super::read;

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use super::contact_parts::{Analytical, Held, RigidBody};
 use super::element::Mechanics;
+use super::supported::UnknownKeyword;
 use super::written::{Force, Incomplete, Name, Prescribed, Pressure, Section, Set, Surface};
 use crate::source::Labels;
 use solver::element::Element;
@@ -68,6 +69,8 @@ pub(super) struct Part {
     pub(super) held: Vec<Held>,
     /// What of it is not all known, since a line could not be read.
     pub(super) incomplete: Incomplete,
+    /// Keywords in it of which nothing is known.
+    pub(super) unknown_keywords: Vec<UnknownKeyword>,
     /// Violations of its mesh.
     pub(super) faults: Found,
     /// What a problem cannot have.

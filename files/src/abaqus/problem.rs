@@ -6,10 +6,13 @@ use super::build::{Built, Row, key, sides_of_two};
 use super::contact;
 use super::element::{Mechanics, Theory};
 use super::read::read;
+use super::rigid::Body;
 use super::supports::supports;
-use super::written::{Elastic, MOST_CONSTANTS, Name, Orientation, Section, on_line};
+use super::written::{Elastic, MOST_CONSTANTS, Name, Orientation, Section, numbered, on_line};
 use crate::source::ReadError;
+use solver::element::Element;
 use solver::error::{Findings, Reason, Violation};
+use solver::mesh::RawMesh;
 use solver::problem::{
     Analysis, BoundaryValue, Elasticity, Load, Material, MeshInput, MeshSource, Orthotropic,
     Problem, SolverControls,
@@ -49,11 +52,12 @@ pub fn problem_with_warnings(text: &str) -> Result<(Problem, Vec<Warning>), Vec<
     let materials = materials(&mut built);
     let supports = supports(&built);
     for (line, name) in supports.of_no_element {
+        let (what, ..) = built.not_meshed(&name);
         built.doubt(
             line,
-            format!("a displacement of `{name:.60}`"),
+            format!("a displacement of `{name:.60}`, {what}"),
             "nodes of plane elements, or the reference node of a *RIGID BODY",
-            "Move a rigid tool by its reference node, or by the `indentation` of a contact in a problem of Signorini.",
+            "Name nodes of the mesh. A rigid tool is moved by its reference node (REF NODE of *RIGID BODY), or by the `indentation` of a contact in a problem as JSON.",
         );
     }
     let loads = loads(&mut built, thickness);
@@ -122,6 +126,43 @@ impl Built {
             0 => Violation::new("", reason, got.into(), expected, hint),
             _ => on_line(line, reason, got.into(), expected, hint),
         });
+    }
+
+    /// Why a set of nodes cannot be loaded: what it is, what is expected, and what to do.
+    fn not_meshed(&self, set: &str) -> (String, &'static str, &'static str) {
+        const MESHED: &str = "nodes of plane elements";
+        let nodes = self.raw.node_sets.get(set).map_or(&[][..], |nodes| nodes);
+        let Some(first) = nodes.first() else {
+            let hint = "Name nodes in the set: the keyword that defines it has no data lines, or only sets without nodes.";
+            return ("a set without nodes".to_owned(), MESHED, hint);
+        };
+        let of = |body: &&Body| {
+            nodes
+                .iter()
+                .any(|node| [body.reference, body.rotation].contains(&Some(*node)))
+        };
+        if let Some(body) = self.tools.bodies.iter().find(of) {
+            return (
+                format!(
+                    "the reference node of the *RIGID BODY on line {}",
+                    body.line
+                ),
+                "a rigid body that *BOUNDARY moves",
+                "A rigid body is moved here by a given displacement, not by a force. Prescribe the displacement, read `normal_force` of the result, and repeat with another displacement until that is the force.",
+            );
+        }
+        let label = self.raw.node_labels[*first as usize];
+        let what = match nodes.len() {
+            1 => format!("where node {label} belongs to no plane element"),
+            count => {
+                format!("whose {count} nodes (the first is {label}) belong to no plane element")
+            }
+        };
+        (
+            what,
+            MESHED,
+            "Name nodes of the mesh. A reference node acts through a *RIGID BODY with a *CONTACT PAIR only: *COUPLING, *MPC and *EQUATION are not read.",
+        )
     }
 
     /// The factors of loads and supports at the end of each step, of steps that are understood.
@@ -223,12 +264,27 @@ fn materials(built: &mut Built) -> Vec<Material> {
         let Some((definition, elastic)) = definition.and_then(|m| Some((m, m.elastic.as_ref()?)))
         else {
             if !built.incomplete.names && told.insert(&row.material) {
-                let got = format!("the material `{:.60}`", row.material);
+                let got = match known.contains_key(&row.material) {
+                    true => format!("the material `{:.60}` without *ELASTIC", row.material),
+                    false => format!("the unknown material `{:.60}`", row.material),
+                };
+                let names = known.keys().take(20);
+                let names: Vec<String> = names.map(|name| format!("{name:.60}")).collect();
+                let hint = match names.is_empty() {
+                    true => {
+                        "The deck has no *MATERIAL: define it by *MATERIAL, NAME=… with *ELASTIC."
+                            .to_owned()
+                    }
+                    false => format!(
+                        "Known materials: {}. Correct MATERIAL=…, or give it *ELASTIC.",
+                        names.join(", ")
+                    ),
+                };
                 built.doubt(
                     row.line,
                     got,
-                    "a *MATERIAL with *ELASTIC",
-                    "Define the material.",
+                    "a *MATERIAL of that name with *ELASTIC",
+                    &hint,
                 );
             }
             continue;
@@ -273,7 +329,12 @@ fn materials(built: &mut Built) -> Vec<Material> {
             None if elastic.unreadable || !told.insert(&row.material) => {}
             None => {
                 let (got, expected) = constants(elastic);
-                built.doubt(elastic.line, got, expected, "Correct the constants.");
+                built.doubt(
+                    elastic.line,
+                    got,
+                    expected,
+                    "Write the constants of one temperature in that order; other forms of elasticity have to be converted.",
+                );
             }
         }
     }
@@ -375,6 +436,20 @@ fn constants(elastic: &Elastic) -> (String, &'static str) {
     )
 }
 
+/// The elements on both sides of those of some sides that lie inside the body, by their numbers.
+fn elements_at(raw: &RawMesh, sides: &[[u32; 2]], inner: &[(u32, u32)]) -> String {
+    let inside = sides.iter().map(|ends| key(*ends));
+    let inside: BTreeSet<(u32, u32)> = inside
+        .filter(|side| inner.binary_search(side).is_ok())
+        .collect();
+    let has_one = |element: &Element| {
+        let corners = element.family().corners();
+        (0..corners).any(|k| inside.contains(&key([element[k], element[(k + 1) % corners]])))
+    };
+    let places = (0..raw.elements.len()).filter(|place| has_one(&raw.elements[*place]));
+    numbered("element", places.map(|place| raw.element_labels[place]))
+}
+
 /// `thickness`: of a body in plane strain, whose forces are per unit of thickness here. On a body of revolution a force
 /// acts on the whole ring, in Abaqus and CalculiX as here.
 fn loads(built: &mut Built, thickness: f64) -> Vec<Load> {
@@ -389,10 +464,8 @@ fn loads(built: &mut Built, thickness: f64) -> Vec<Load> {
     for Row { row, name } in pressures {
         let count = || {
             let sides = built.raw.lines.get(&name).map_or(&[][..], |sides| sides);
-            let inside = sides
-                .iter()
-                .filter(|ends| inner.binary_search(&key(**ends)).is_ok());
-            (sides.len(), inside.count())
+            let is_inside = |ends: &&[u32; 2]| inner.binary_search(&key(**ends)).is_ok();
+            (sides.len(), sides.iter().filter(is_inside).count())
         };
         match *counted.entry(name.clone()).or_insert_with(count) {
             (0, _) => built.doubt(
@@ -404,7 +477,10 @@ fn loads(built: &mut Built, thickness: f64) -> Vec<Load> {
             (_, 0) => loads.push(Load::Pressure(name, BoundaryValue::Constant(row.value))),
             (all, inside) => built.doubt(
                 row.line,
-                format!("a pressure on `{name:.60}`: {inside} of its {all} sides lie inside the body"),
+                format!(
+                    "a pressure on `{name:.60}`: {inside} of its {all} sides lie inside the body, those of {}",
+                    elements_at(&built.raw, &built.raw.lines[&name], &inner)
+                ),
                 "sides on the surface of the body",
                 "Load only the elements at the surface, or give forces at the nodes inside by *CLOAD.",
             ),
@@ -418,11 +494,12 @@ fn loads(built: &mut Built, thickness: f64) -> Vec<Load> {
             nodes.any(|node| built.used[*node as usize])
         };
         if !*used.entry(name.clone()).or_insert_with(count) {
+            let (what, expected, hint) = built.not_meshed(&name);
             built.doubt(
                 row.line,
-                format!("a force on `{name:.60}`, which has no node of an element"),
-                "nodes of plane elements",
-                "Press by a rigid tool through a contact, in a problem of Signorini.",
+                format!("a force on `{name:.60}`, {what}"),
+                expected,
+                hint,
             );
             continue;
         }

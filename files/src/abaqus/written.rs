@@ -180,6 +180,19 @@ pub(super) fn on_line(
     Violation::new("", reason, format!("line {line}: {got}"), expected, hint)
 }
 
+/// `element 3`, or `elements 3, 7, 12, 14, 20 and 31 others`.
+pub(super) fn numbered(what: &str, numbers: impl Iterator<Item = u64>) -> String {
+    const MOST: usize = 5;
+    let mut numbers = numbers.fuse();
+    let first: Vec<String> = numbers.by_ref().take(MOST).map(|n| n.to_string()).collect();
+    match (first.len(), numbers.count()) {
+        (1, _) => format!("{what} {}", first[0]),
+        (_, 0) => format!("{what}s {}", first.join(", ")),
+        (_, 1) => format!("{what}s {} and 1 other", first.join(", ")),
+        (_, more) => format!("{what}s {} and {more} others", first.join(", ")),
+    }
+}
+
 /// The values of a line, between commas and without blanks around them; one in quotation marks may contain commas.
 /// Those that are left out at the end are not listed.
 pub(super) fn fields(text: &str) -> Vec<&str> {
@@ -208,6 +221,15 @@ pub(super) fn number(word: &str) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn up_to_five_numbers_are_named() {
+        let named = |count: u64| numbered("element", (1..=count).map(|k| 3 * k));
+        assert_eq!(named(1), "element 3");
+        assert_eq!(named(5), "elements 3, 6, 9, 12, 15");
+        assert_eq!(named(6), "elements 3, 6, 9, 12, 15 and 1 other");
+        assert_eq!(named(36), "elements 3, 6, 9, 12, 15 and 31 others");
+    }
 
     #[test]
     fn a_line_is_split_at_commas_outside_of_quotation_marks() {
