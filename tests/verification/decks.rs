@@ -643,6 +643,23 @@ fn messages_say_what_to_do() {
         list[0].hint.contains("*RIGID BODY, *CONTACT PAIR") && !list[1].hint.contains("*RIGID"),
         "{list:#?}"
     );
+    // types of two theories, of two rules: at the second, with the first
+    for (of, got) in [
+        (
+            "CPS8",
+            "elements of type `CPS8` beside those of type `CPE8` on line 15",
+        ),
+        (
+            "CPE8R",
+            "elements of type `CPE8R` beside those of type `CPE8` on line 15",
+        ),
+    ] {
+        let deck = block(HELD, "").replace(
+            "\n2, 3, 5",
+            &format!("\n*ELEMENT, TYPE={of}, ELSET=E\n2, 3, 5"),
+        );
+        assert_eq!(refused(&deck), [format!("line 17: {got}")]);
+    }
     // up to five elements of those that are meant
     let list = all("", "*DLOAD\nE, P2, 5.\n");
     assert!(

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::contact_parts::{Analytical, Held, RigidBody};
 use super::deck::Deck;
-use super::element::Mechanics;
+use super::element::Typed;
 use super::keyword::REMOVE_ELEMENTS;
 use super::names::{Key, Meant, Names, Room, unknown};
 use super::part::{Numbered, Part, RigidLines};
@@ -38,7 +38,7 @@ pub(super) struct Built {
     /// What a problem cannot have.
     pub(super) doubts: Findings,
     pub(super) incomplete: Incomplete,
-    pub(super) types: Vec<Mechanics>,
+    pub(super) types: Vec<Typed>,
     pub(super) sections: Vec<Row<Section>>,
     pub(super) prescribed: Vec<Row<Prescribed>>,
     pub(super) pressures: Vec<Row<Pressure>>,
@@ -124,7 +124,7 @@ struct Merged {
     heights: Vec<f64>,
     lines: Vec<[u32; 3]>,
     numbered: Vec<Numbered>,
-    types: Vec<Mechanics>,
+    types: Vec<Typed>,
     unused_type: Option<(u64, String)>,
     unknown_keywords: Vec<UnknownKeyword>,
     rigid_lines: Vec<RigidLines>,
@@ -226,7 +226,11 @@ impl Merged {
             }));
         self.raw.without_centre += part.with_centre;
         for kind in part.types {
-            if !self.types.contains(&kind) {
+            if !self
+                .types
+                .iter()
+                .any(|known| known.mechanics == kind.mechanics)
+            {
                 self.types.push(kind);
             }
         }
@@ -719,8 +723,8 @@ impl Building<'_> {
                     Sides::None | Sides::OfLine { .. } => return None,
                     Sides::Number(side) if side > corners => {
                         let label = merged.raw.element_labels[place as usize];
-                        merged.faults.add(Violation::new(
-                            "",
+                        merged.faults.add(on_line(
+                            line,
                             Reason::UnknownEdge,
                             format!("side {side} of the triangle {label} in `{name:.60}`"),
                             "sides 1 … 3 of a triangle",
@@ -781,12 +785,12 @@ fn exported(
         }
         let full = names.full(scope, &name);
         if exported.contains_key(&full) {
-            faults.add(Violation::new(
-                "",
+            faults.add(on_line(
+                names.line_in_assembly(&full),
                 Reason::DuplicateName,
-                format!("`{full:.120}` of the assembly and of an instance"),
-                "different names",
-                "Rename the set of the assembly.",
+                format!("the set `{full:.120}` of the assembly, and of an instance one that the assembly names so"),
+                "sets of the assembly that are not named INSTANCE.SET like those of instances",
+                "Rename the set of the assembly, also in the keywords that name it.",
             ));
         }
         exported.insert(full, set);

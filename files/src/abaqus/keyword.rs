@@ -2,7 +2,7 @@
 
 use super::block::{Block, Rows};
 use super::deck::{Deck, Inside};
-use super::element::{ElementType, Shape};
+use super::element::{ElementType, Shape, Typed};
 use super::part::{Part, RigidLines};
 use super::replaced::{Replacement, Replaces};
 use super::supported::{IDLE, MOST_UNKNOWN, NOT_ELASTIC, NOT_WRITTEN_OUT, READ, UnknownKeyword};
@@ -450,8 +450,13 @@ impl Deck {
         let got = format!("elements of type `{name:.20}`");
         match kind.mechanics {
             Some(mechanics) => {
-                if !self.here.types.contains(&mechanics) {
-                    self.here.types.push(mechanics);
+                let mut known = self.here.types.iter();
+                if !known.any(|known| known.mechanics == mechanics) {
+                    self.here.types.push(Typed {
+                        mechanics,
+                        line,
+                        name: name.clone(),
+                    });
                 }
             }
             None if kind.idle => {}

@@ -143,6 +143,14 @@ impl Names<'_> {
         self.scopes.iter().position(named)
     }
 
+    /// The line where the assembly defines a set.
+    pub(super) fn line_in_assembly(&self, name: &str) -> u64 {
+        let scope = &self.scopes[0];
+        let sets = [&scope.node_sets, &scope.element_sets, &scope.node_surfaces];
+        let mut found = sets.iter().filter_map(|sets| sets.get(name));
+        found.next().map_or(1, |set| set.line)
+    }
+
     /// What to do about a target that is nothing.
     pub(super) fn remedy(&self, kind: Kind, scope: usize, target: &Target) -> String {
         match target {
@@ -465,7 +473,7 @@ mod tests {
             let Err(ReadError::Invalid(list)) = read(text) else {
                 panic!("{text} was read");
             };
-            let got = format!("side 4 of the triangle 20 in `{name}`");
+            let got = format!("line 11: side 4 of the triangle 20 in `{name}`");
             assert_eq!((list[0].reason, &list[0].got), (Reason::UnknownEdge, &got));
         }
     }

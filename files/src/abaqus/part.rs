@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::contact_parts::{Analytical, Held, RigidBody};
-use super::element::Mechanics;
+use super::element::Typed;
 use super::supported::UnknownKeyword;
 use super::written::{Force, Incomplete, Name, Prescribed, Pressure, Section, Set, Surface};
 use crate::source::Labels;
@@ -53,7 +53,7 @@ pub(super) struct Part {
     pub(super) unused_type: Option<(u64, String)>,
     /// Rigid lines, block by block.
     pub(super) rigid_lines: Vec<RigidLines>,
-    pub(super) types: Vec<Mechanics>,
+    pub(super) types: Vec<Typed>,
     pub(super) node_sets: BTreeMap<Name, Set>,
     pub(super) element_sets: BTreeMap<Name, Set>,
     /// Surfaces of nodes.

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::build::{Built, Row, key, sides_of_two};
 use super::contact;
-use super::element::{Mechanics, Theory};
+use super::element::{Theory, Typed};
 use super::read::read;
 use super::rigid::Body;
 use super::supports::supports;
@@ -190,17 +190,26 @@ impl Built {
     }
 }
 
+fn beside(other: &Typed, first: &Typed) -> String {
+    format!(
+        "elements of type `{:.20}` beside those of type `{:.20}` on line {}",
+        other.name, first.name, first.line
+    )
+}
+
 fn analysis(built: &mut Built) -> Analysis {
-    let theory = built
-        .types
-        .first()
-        .map_or(Theory::PlaneStrain, |kind| kind.theory);
-    if built.types.iter().any(|kind| kind.theory != theory) {
+    let first = built.types.first().cloned();
+    let theory = first
+        .as_ref()
+        .map_or(Theory::PlaneStrain, |kind| kind.mechanics.theory);
+    let mut others = built.types.iter();
+    let other = others.find(|kind| kind.mechanics.theory != theory).cloned();
+    if let (Some(first), Some(other)) = (first, other) {
         built.doubt(
-            0,
-            "elements of different theories",
-            "one of CPE, CPS, CAX throughout",
-            "Use one theory for all elements.",
+            other.line,
+            beside(&other, &first),
+            "one of CPE (plane strain), CPS (plane stress) and CAX (revolution) for all elements",
+            "Change the types of either, or leave out the elements that do not belong to the body.",
         );
     }
     let thicknesses: Vec<(u64, Option<f64>)> = built
@@ -233,20 +242,21 @@ fn analysis(built: &mut Built) -> Analysis {
 /// integrate with three points. In a mixed mesh triangles get the larger rule, which is at least as accurate but
 /// not the same.
 fn quadrature(built: &mut Built) -> u32 {
-    if built.types.iter().all(Mechanics::is_triangle) {
+    let is_quad = |kind: &&Typed| !kind.mechanics.is_triangle();
+    let quads: Vec<Typed> = built.types.iter().filter(is_quad).cloned().collect();
+    let Some(first) = quads.first() else {
         return 2;
-    }
-    built.types.retain(|kind| !kind.is_triangle());
-    let reduced = built.types.iter().filter(|kind| kind.reduced).count();
-    if reduced != 0 && reduced != built.types.len() {
+    };
+    let reduced = first.mechanics.reduced;
+    if let Some(other) = quads.iter().find(|kind| kind.mechanics.reduced != reduced) {
         built.doubt(
-            0,
-            "elements of full and of reduced integration",
-            "one kind of integration",
-            "Remove the R from the element types.",
+            other.line,
+            beside(other, first),
+            "full integration of all elements, or reduced integration (R) of all",
+            "Add or remove the R in the element types of either.",
         );
     }
-    if reduced > 0 { 2 } else { 3 }
+    if reduced { 2 } else { 3 }
 }
 
 fn materials(built: &mut Built) -> Vec<Material> {
