@@ -315,23 +315,26 @@ impl<R: BufRead> File<R> {
     }
 
     fn int(&mut self, what: &str) -> Result<i64, ReadError> {
-        match self.binary {
-            true => Ok(i64::from(i32::from_le_bytes(self.source.bytes(what)?))),
-            false => self.source.number(what),
+        if self.binary {
+            Ok(i64::from(i32::from_le_bytes(self.source.bytes(what)?)))
+        } else {
+            self.source.number(what)
         }
     }
 
     fn size(&mut self, what: &str) -> Result<u64, ReadError> {
-        match self.binary {
-            true => Ok(u64::from_le_bytes(self.source.bytes(what)?)),
-            false => self.source.number(what),
+        if self.binary {
+            Ok(u64::from_le_bytes(self.source.bytes(what)?))
+        } else {
+            self.source.number(what)
         }
     }
 
     fn float(&mut self, what: &str) -> Result<f64, ReadError> {
-        let value = match self.binary {
-            true => f64::from_le_bytes(self.source.bytes(what)?),
-            false => self.source.number(what)?,
+        let value = if self.binary {
+            f64::from_le_bytes(self.source.bytes(what)?)
+        } else {
+            self.source.number(what)?
         };
         if value.is_finite() {
             return Ok(value);

@@ -497,9 +497,10 @@ impl Deck {
                 .unwrap_or(NO_NODE);
         }
         let whole = nodes[..count].iter().all(|node| *node != NO_NODE);
-        let place = match whole {
-            true => Numbered::Line(self.here.lines.len() as u32),
-            false => Numbered::Other,
+        let place = if whole {
+            Numbered::Line(self.here.lines.len() as u32)
+        } else {
+            Numbered::Other
         };
         if self.number(label, place, set, line) && whole {
             self.here.lines.push(nodes);

@@ -140,15 +140,14 @@ impl Source<'_> {
             let others = edges.iter().filter_map(|edge| owners.get(edge).copied());
             let others: Vec<(u64, &str)> = others.collect();
             if let Some((other, of)) = others.first() {
-                let got = match of == name {
-                    true => format!(
-                        "`{name:.60}` in a second contact pair: the first is on line {other}"
-                    ),
-                    false => format!(
+                let got = if of == name {
+                    format!("`{name:.60}` in a second contact pair: the first is on line {other}")
+                } else {
+                    format!(
                         "`{name:.60}`, of which {} of {} sides belong to `{of:.60}` too, in the contact pair on line {other}",
                         others.len(),
                         edges.len()
-                    ),
+                    )
                 };
                 refused.doubt(
                     *line,

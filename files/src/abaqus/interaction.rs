@@ -301,9 +301,10 @@ impl Deck {
             Some(interaction) => interaction.behavior = behavior,
             None => return Block::Skip,
         }
-        match hard {
-            true => Block::Skip,
-            false => Block::Contact(ContactBlock::Behavior),
+        if hard {
+            Block::Skip
+        } else {
+            Block::Contact(ContactBlock::Behavior)
         }
     }
 

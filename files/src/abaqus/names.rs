@@ -438,9 +438,10 @@ pub(super) fn unknown(
         .take(MOST_LISTED)
         .map(|name| format!("{name:.60}"))
         .collect();
-    let hint = match names.is_empty() {
-        true => remedy.to_owned(),
-        false => format!("Known names: {}. {remedy}", names.join(", ")),
+    let hint = if names.is_empty() {
+        remedy.to_owned()
+    } else {
+        format!("Known names: {}. {remedy}", names.join(", "))
     };
     faults.add(on_line(
         line,
@@ -466,14 +467,14 @@ mod tests {
         let read = |text: &str| read(format!("{MIXED}{text}").as_bytes());
         let (mesh, _) = read("*DLOAD\nALL, P1, 5.\n").unwrap();
         assert_eq!(mesh.boundaries["ALL P1"].len(), 2);
-        for (text, name) in [
-            ("*DLOAD\nALL, P4, 5.\n", "ALL P4"),
-            ("*SURFACE, NAME=LEFT\nALL, S4\n", "LEFT"),
+        for (text, name, line) in [
+            ("*DLOAD\nALL, P4, 5.\n", "ALL P4", 12),
+            ("*SURFACE, NAME=LEFT\nALL, S4\n", "LEFT", 11),
         ] {
             let Err(ReadError::Invalid(list)) = read(text) else {
                 panic!("{text} was read");
             };
-            let got = format!("line 11: side 4 of the triangle 20 in `{name}`");
+            let got = format!("line {line}: side 4 of the triangle 20 in `{name}`");
             assert_eq!((list[0].reason, &list[0].got), (Reason::UnknownEdge, &got));
         }
     }

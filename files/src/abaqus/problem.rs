@@ -274,21 +274,21 @@ fn materials(built: &mut Built) -> Vec<Material> {
         let Some((definition, elastic)) = definition.and_then(|m| Some((m, m.elastic.as_ref()?)))
         else {
             if !built.incomplete.names && told.insert(&row.material) {
-                let got = match known.contains_key(&row.material) {
-                    true => format!("the material `{:.60}` without *ELASTIC", row.material),
-                    false => format!("the unknown material `{:.60}`", row.material),
+                let got = if known.contains_key(&row.material) {
+                    format!("the material `{:.60}` without *ELASTIC", row.material)
+                } else {
+                    format!("the unknown material `{:.60}`", row.material)
                 };
                 let names = known.keys().take(20);
                 let names: Vec<String> = names.map(|name| format!("{name:.60}")).collect();
-                let hint = match names.is_empty() {
-                    true => {
-                        "The deck has no *MATERIAL: define it by *MATERIAL, NAME=… with *ELASTIC."
-                            .to_owned()
-                    }
-                    false => format!(
+                let hint = if names.is_empty() {
+                    "The deck has no *MATERIAL: define it by *MATERIAL, NAME=… with *ELASTIC."
+                        .to_owned()
+                } else {
+                    format!(
                         "Known materials: {}. Correct MATERIAL=…, or give it *ELASTIC.",
                         names.join(", ")
-                    ),
+                    )
                 };
                 built.doubt(
                     row.line,
@@ -465,9 +465,10 @@ fn elements_at(raw: &RawMesh, sides: &[[u32; 2]], inner: &[(u32, u32)]) -> Strin
 fn loads(built: &mut Built, thickness: f64) -> Vec<Load> {
     let mut loads = Vec::new();
     let pressures = std::mem::take(&mut built.pressures);
-    let inner = match pressures.is_empty() {
-        true => Vec::new(),
-        false => sides_of_two(&built.raw),
+    let inner = if pressures.is_empty() {
+        Vec::new()
+    } else {
+        sides_of_two(&built.raw)
     };
     // a deck may load the same sides many times
     let mut counted: BTreeMap<String, (usize, usize)> = BTreeMap::new();

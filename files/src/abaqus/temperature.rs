@@ -26,9 +26,10 @@ impl Temperatures {
         let mut all = self.initial.iter();
         let same = all.clone().all(|(_, initial)| *initial == value);
         // what is given no temperature begins at 0
-        let named = match self.initial.is_empty() {
-            true => value == 0.0,
-            false => all.any(|(of, _)| of == target),
+        let named = if self.initial.is_empty() {
+            value == 0.0
+        } else {
+            all.any(|(of, _)| of == target)
         };
         same && named && !self.others
     }
