@@ -297,8 +297,8 @@ impl<R: BufRead> File<R> {
                 return Err(self.source.fault(
                     Reason::Malformed,
                     &format!("`{text:.40}`"),
-                    "a name in quotes",
-                    "Correct that line.",
+                    "a physical name in quotes",
+                    "Write dimension, tag and name, as in `1 3 \"top\"`.",
                 ));
             };
             // it is compared and copied for every element that has it
@@ -343,7 +343,7 @@ impl<R: BufRead> File<R> {
             Reason::NotFinite,
             &format!("{value}"),
             "a finite number",
-            "Correct the mesh.",
+            "Coordinates and parameters are numbers: mesh the geometry again, and look for degenerate curves or elements there.",
         ))
     }
 

@@ -176,7 +176,7 @@ impl<R: BufRead> Source<R> {
             Ok(number) => Ok(number),
             Err(_) => {
                 let got = format!("`{word:.40}`");
-                Err(self.fault(Reason::Malformed, &got, what, "Correct that line."))
+                Err(self.fault(Reason::Malformed, &got, what, "Correct that word. If nobody has edited the file, the lines before may have more or fewer words than their section says: save the mesh again."))
             }
         }
     }
