@@ -4,11 +4,9 @@ use std::collections::{BTreeMap, HashMap};
 
 use super::contact_parts::DeckContact;
 use super::part::Part;
-use super::replaced::Replacement;
-use super::temperature::Temperatures;
 use super::written::{
-    Amplitude, LONGEST_NAME, MOST_NAMES, MaterialDefinition, Name, Orientation, Set, Sides,
-    Surface, Target, on_line,
+    Amplitude, LONGEST_NAME, MOST_NAMES, MaterialDefinition, Name, Orientation, Replacement, Set,
+    Sides, Surface, Target, Temperatures, on_line,
 };
 use solver::error::Reason;
 

@@ -4,10 +4,10 @@ use super::block::{Block, Rows};
 use super::deck::{Deck, Inside};
 use super::element::{ElementType, Shape, Typed};
 use super::part::{Part, RigidLines};
-use super::replaced::{Replacement, Replaces};
 use super::supported::{IDLE, MOST_UNKNOWN, NOT_ELASTIC, NOT_WRITTEN_OUT, READ, UnknownKeyword};
 use super::written::{
-    Amplitude, Elastic, Incomplete, MOST_NAMES, Name, Orientation, Section, fields,
+    Amplitude, Elastic, Incomplete, MOST_NAMES, Name, Orientation, Replacement, Replaces, Section,
+    fields,
 };
 use solver::error::Reason;
 

@@ -5,23 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::build::Built;
 use super::contact_parts::WRITTEN_INSTEAD;
-
-/// What `OP=NEW` replaces. `*DLOAD` and `*DSLOAD` replace each other's pressures in CalculiX, and only their own in Abaqus:
-/// here both have to be stated again.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Replaces {
-    Supports,
-    Forces,
-    Pressures,
-}
-
-/// A keyword with `OP=NEW` in a step after the first.
-pub(super) struct Replacement {
-    pub(super) line: u64,
-    /// The name of the keyword.
-    pub(super) keyword: String,
-    pub(super) what: Replaces,
-}
+use super::written::{Replacement, Replaces};
 
 /// A component of the displacement, or of the force, and what it is prescribed for.
 pub(super) type Key = (u64, String);

@@ -4,36 +4,10 @@
 use super::block::Block;
 use super::deck::Deck;
 use super::keyword::Keyword;
-use super::written::{Target, fields, number};
+use super::written::{fields, number};
 
 /// Rows of `*INITIAL CONDITIONS` that are kept, to be compared with those of `*TEMPERATURE`.
 const MOST_ROWS: usize = 1 << 16;
-
-/// The temperatures of a deck.
-#[derive(Default)]
-pub(super) struct Temperatures {
-    /// What has a temperature at the beginning, and which.
-    initial: Vec<(Target, f64)>,
-    /// Some of the initial temperatures are not known.
-    others: bool,
-    /// The first line that changes a temperature, and what it says.
-    pub(super) changed: Option<(u64, String)>,
-}
-
-impl Temperatures {
-    /// Whether a row leaves a temperature as it is; if that is not certain it counts as changed.
-    fn is_initial(&self, target: &Target, value: f64) -> bool {
-        let mut all = self.initial.iter();
-        let same = all.clone().all(|(_, initial)| *initial == value);
-        // what is given no temperature begins at 0
-        let named = if self.initial.is_empty() {
-            value == 0.0
-        } else {
-            all.any(|(of, _)| of == target)
-        };
-        same && named && !self.others
-    }
-}
 
 impl Deck {
     /// `*INITIAL CONDITIONS`: some have no effect on a static step, others do.

@@ -106,6 +106,49 @@ pub(super) struct Force {
     pub(super) amplitude: Option<Name>,
 }
 
+/// The temperatures of a deck.
+#[derive(Default)]
+pub(super) struct Temperatures {
+    /// What has a temperature at the beginning, and which.
+    pub(super) initial: Vec<(Target, f64)>,
+    /// Some of the initial temperatures are not known.
+    pub(super) others: bool,
+    /// The first line that changes a temperature, and what it says.
+    pub(super) changed: Option<(u64, String)>,
+}
+
+impl Temperatures {
+    /// Whether a row leaves a temperature as it is; if that is not certain it counts as changed.
+    pub(super) fn is_initial(&self, target: &Target, value: f64) -> bool {
+        let mut all = self.initial.iter();
+        let same = all.clone().all(|(_, initial)| *initial == value);
+        // what is given no temperature begins at 0
+        let named = if self.initial.is_empty() {
+            value == 0.0
+        } else {
+            all.any(|(of, _)| of == target)
+        };
+        same && named && !self.others
+    }
+}
+
+/// What `OP=NEW` replaces. `*DLOAD` and `*DSLOAD` replace each other's pressures in CalculiX, and only their own in Abaqus:
+/// here both have to be stated again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Replaces {
+    Supports,
+    Forces,
+    Pressures,
+}
+
+/// A keyword with `OP=NEW` in a step after the first.
+pub(super) struct Replacement {
+    pub(super) line: u64,
+    /// The name of the keyword.
+    pub(super) keyword: String,
+    pub(super) what: Replaces,
+}
+
 /// A set as it is written.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Set {
