@@ -660,6 +660,10 @@ fn messages_say_what_to_do() {
         );
         assert_eq!(refused(&deck), [format!("line 17: {got}")]);
     }
+    // a mesh is one: what a problem could not have of it is not told
+    let mesh =
+        format!("{NODES}*ELEMENT, TYPE=CPE8\n{ELEMENTS}*ELEMENT, TYPE=T3D2\n7, 1, 3\n*FOO\n");
+    assert_eq!(refused(&mesh), ["a deck without *STEP"]);
     // up to five elements of those that are meant
     let list = all("", "*DLOAD\nE, P2, 5.\n");
     assert!(

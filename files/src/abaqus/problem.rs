@@ -38,6 +38,9 @@ pub fn problem(text: &str) -> Result<Problem, Vec<Violation>> {
 pub fn problem_with_warnings(text: &str) -> Result<(Problem, Vec<Warning>), Vec<Violation>> {
     let deck = read(text.as_bytes()).map_err(ReadError::into_violations)?;
     let mut built = deck.build();
+    if built.deck.steps == 0 {
+        return Err(without_step(built.faults));
+    }
     let analysis = analysis(&mut built);
     let axisymmetric = matches!(analysis, Analysis::Axisymmetric {});
     let quadrature = quadrature(&mut built);
@@ -119,13 +122,23 @@ pub fn problem_with_warnings(text: &str) -> Result<(Problem, Vec<Warning>), Vec<
     Ok((problem, warnings))
 }
 
+/// A deck without a step is a mesh: what a problem could not have of it is of no interest.
+fn without_step(mut faults: Findings) -> Vec<Violation> {
+    faults.add(Violation::new(
+        "",
+        Reason::NotUnderstood,
+        "a deck without *STEP",
+        "one *STEP",
+        "A deck without a step is a mesh: upload it, or quote it in a problem as JSON, \"mesh\": {\"abaqus\": \"…\"}.",
+    ));
+    faults.into_violations()
+}
+
 impl Built {
     pub(super) fn doubt(&mut self, line: u64, got: impl Into<String>, expected: &str, hint: &str) {
         let reason = Reason::NotUnderstood;
-        self.doubts.add(match line {
-            0 => Violation::new("", reason, got.into(), expected, hint),
-            _ => on_line(line, reason, got.into(), expected, hint),
-        });
+        self.doubts
+            .add(on_line(line, reason, got.into(), expected, hint));
     }
 
     /// Why a set of nodes cannot be loaded: what it is, what is expected, and what to do.
@@ -172,21 +185,15 @@ impl Built {
             self.check_replaced();
             return self.factors();
         }
-        match self.deck.contact.steps.get(1).map(|step| step.0) {
-            Some(second) => self.doubt(
+        if let Some((second, _)) = self.deck.contact.steps.get(1).copied() {
+            self.doubt(
                 second,
                 format!("the second of {steps} steps"),
                 "one *STEP",
                 "Several steps are read where they move a rigid body (*CONTACT PAIR). Delete the others, or write a problem as JSON for each, with this deck as its mesh.",
-            ),
-            None => self.doubt(
-                0,
-                "a deck without *STEP",
-                "one *STEP",
-                "A deck without a step is a mesh: upload it, or quote it in a problem as JSON, \"mesh\": {\"abaqus\": \"…\"}.",
-            ),
+            );
         }
-        vec![[1.0; 2]; steps.max(1)]
+        vec![[1.0; 2]; steps]
     }
 }
 
