@@ -163,9 +163,12 @@ pub fn memory(fields: &Fields) -> usize {
 pub(crate) fn check(fields: &Fields) -> Result<(), String> {
     let f = fields;
     let nodes = f.x.len();
-    let same = |what: &str, found: usize, expected: usize| match found == expected {
-        true => Ok(()),
-        false => Err(format!("{what}: {found} values, where {expected} belong")),
+    let same = |what: &str, found: usize, expected: usize| {
+        if found == expected {
+            Ok(())
+        } else {
+            Err(format!("{what}: {found} values, where {expected} belong"))
+        }
     };
     let nodal = [
         &f.y,

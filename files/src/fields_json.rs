@@ -51,9 +51,10 @@ type Values<'a> = (usize, bool, Box<WriteList<'a>>);
 type WriteList<'a> = dyn FnOnce(&mut Vec<u8>) -> serde_json::Result<()> + 'a;
 
 fn part<T: Serialize>(column: &[T], from: usize) -> Values<'_> {
-    let most = match size_of::<T>() > size_of::<f64>() {
-        true => ELEMENTS,
-        false => NUMBERS,
+    let most = if size_of::<T>() > size_of::<f64>() {
+        ELEMENTS
+    } else {
+        NUMBERS
     };
     let values = &column[from.min(column.len())..column.len().min(from + most)];
     let write = move |out: &mut Vec<u8>| serde_json::to_writer(out, values);
@@ -100,10 +101,11 @@ impl<F: Deref<Target = Fields>> FieldsJson<F> {
         if last {
             (self.column, self.value) = (self.column + 1, 0);
         }
-        match out.is_empty() {
+        if out.is_empty() {
             // a column that ended with the piece before
-            true => self.piece(),
-            false => Ok(Some(out)),
+            self.piece()
+        } else {
+            Ok(Some(out))
         }
     }
 }

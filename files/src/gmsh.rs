@@ -297,8 +297,8 @@ impl<R: BufRead> File<R> {
                 return Err(self.source.fault(
                     Reason::Malformed,
                     &format!("`{text:.40}`"),
-                    "a name in quotes",
-                    "Correct that line.",
+                    "a physical name in quotes",
+                    "Write dimension, tag and name, as in `1 3 \"top\"`.",
                 ));
             };
             // it is compared and copied for every element that has it
@@ -315,23 +315,26 @@ impl<R: BufRead> File<R> {
     }
 
     fn int(&mut self, what: &str) -> Result<i64, ReadError> {
-        match self.binary {
-            true => Ok(i64::from(i32::from_le_bytes(self.source.bytes(what)?))),
-            false => self.source.number(what),
+        if self.binary {
+            Ok(i64::from(i32::from_le_bytes(self.source.bytes(what)?)))
+        } else {
+            self.source.number(what)
         }
     }
 
     fn size(&mut self, what: &str) -> Result<u64, ReadError> {
-        match self.binary {
-            true => Ok(u64::from_le_bytes(self.source.bytes(what)?)),
-            false => self.source.number(what),
+        if self.binary {
+            Ok(u64::from_le_bytes(self.source.bytes(what)?))
+        } else {
+            self.source.number(what)
         }
     }
 
     fn float(&mut self, what: &str) -> Result<f64, ReadError> {
-        let value = match self.binary {
-            true => f64::from_le_bytes(self.source.bytes(what)?),
-            false => self.source.number(what)?,
+        let value = if self.binary {
+            f64::from_le_bytes(self.source.bytes(what)?)
+        } else {
+            self.source.number(what)?
         };
         if value.is_finite() {
             return Ok(value);
@@ -340,7 +343,7 @@ impl<R: BufRead> File<R> {
             Reason::NotFinite,
             &format!("{value}"),
             "a finite number",
-            "Correct the mesh.",
+            "Coordinates and parameters are numbers: mesh the geometry again, and look for degenerate curves or elements there.",
         ))
     }
 

@@ -576,9 +576,10 @@ fn digits(text: &[u8], at: &mut usize) -> Result<usize, Not> {
     while let Some(b'0'..=b'9') = text.get(*at) {
         *at += 1;
     }
-    match *at < text.len() {
-        true => Ok(*at - start),
-        false => Err(Not::Complete),
+    if *at < text.len() {
+        Ok(*at - start)
+    } else {
+        Err(Not::Complete)
     }
 }
 

@@ -25,9 +25,10 @@ pub const MOST_NESTED: usize = 64;
 /// the problem.
 pub fn parse(text: &str) -> Result<Problem, Vec<Violation>> {
     let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text);
-    match text.contains("\"inline\"") {
-        true => read(text.as_bytes()).map_err(ReadError::into_violations),
-        false => check(text, &Places::default()),
+    if text.contains("\"inline\"") {
+        read(text.as_bytes()).map_err(ReadError::into_violations)
+    } else {
+        check(text, &Places::default())
     }
 }
 

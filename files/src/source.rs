@@ -176,7 +176,7 @@ impl<R: BufRead> Source<R> {
             Ok(number) => Ok(number),
             Err(_) => {
                 let got = format!("`{word:.40}`");
-                Err(self.fault(Reason::Malformed, &got, what, "Correct that line."))
+                Err(self.fault(Reason::Malformed, &got, what, "Correct that word. If nobody has edited the file, the lines before may have more or fewer words than their section says: save the mesh again."))
             }
         }
     }
@@ -215,6 +215,8 @@ pub(crate) struct Labels {
     dense: Vec<u32>,
     sparse: std::collections::BTreeMap<u64, u32>,
     count: u32,
+    /// The smallest and the largest.
+    ends: Option<(u64, u64)>,
 }
 
 impl Labels {
@@ -236,7 +238,14 @@ impl Labels {
             }
         }
         self.count += 1;
+        let (first, last) = self.ends.unwrap_or((label, label));
+        self.ends = Some((first.min(label), last.max(label)));
         true
+    }
+
+    /// The smallest and the largest number.
+    pub(crate) fn ends(&self) -> Option<(u64, u64)> {
+        self.ends
     }
 
     /// The places of all numbers first, first + step, … up to last, and how many numbers were looked at, at most

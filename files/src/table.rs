@@ -187,9 +187,10 @@ fn cell(text: &str) -> Cow<'_, str> {
     if text.starts_with(FORMULAS) && !text.parse::<f64>().is_ok_and(f64::is_finite) {
         text = Cow::Owned(format!("'{text}"));
     }
-    match text.contains([',', ';', '"', '\t', '\r', '\n']) {
-        true => Cow::Owned(format!("\"{}\"", text.replace('"', "\"\""))),
-        false => text,
+    if text.contains([',', ';', '"', '\t', '\r', '\n']) {
+        Cow::Owned(format!("\"{}\"", text.replace('"', "\"\"")))
+    } else {
+        text
     }
 }
 

@@ -221,7 +221,7 @@ fn blanks_mean_what_they_mean_in_both_programs() {
     }
     for (from, to, got) in [
         ("1000., .3", "1000.,", "1 elastic constants"),
-        ("1000., .3", ", .3", "a blank constant"),
+        ("1000., .3", ", .3", "constant 1 is blank"),
         ("MATERIAL=M\n", "MATERIAL=M\nthick\n", "`thick`"),
     ] {
         let found = refused(&block(HELD, "").replacen(from, to, 1));
@@ -458,12 +458,12 @@ fn what_a_row_names_must_exist_and_have_something() {
         (
             "*NSET, NSET=N\n",
             "*CLOAD\nN, 1, 2.\n",
-            "no node of an element",
+            "a force on `N`, a set without nodes",
         ),
         (
             "*NODE, NSET=REF\n99, 7, 7, 3\n",
             "*CLOAD\nREF, 1, 2.\n",
-            "no node of an element",
+            "a force on `REF`, where node 99 belongs to no plane element",
         ),
         (
             "*NODE, NSET=REF\n99, 7, 7, 3\n",
@@ -487,6 +487,191 @@ fn what_a_row_names_must_exist_and_have_something() {
         "*CLOAD\nR, 1, 2.\n",
     );
     near(corner(&held), [0.01315672, -0.002800575]);
+}
+
+/// Each message says what was found where, and what to do: numbers and names that there are, fields that are blank.
+#[test]
+fn messages_say_what_to_do() {
+    let all = |model: &str, step: &str| {
+        abaqus::problem(&block(&format!("{HELD}{model}"), step)).expect_err(step)
+    };
+    let known = "The nodes have numbers from 1 to 13, not necessarily all of them. Correct the number, or define it by *NODE.";
+    for (model, step, got, hint) in [
+        ("", "*CLOAD\n99, 1, 2.\n", "`99`", known),
+        (
+            "",
+            "*CLOAD\nX, 1, 2.\n",
+            "`X`",
+            "Known names: B, L, NALL, R. Correct the name",
+        ),
+        ("*NSET, NSET=N\n99\n", "", "node 99 in the set `N`", known),
+        (
+            "*NSET, NSET=N, GENERATE\n20, 30\n",
+            "",
+            "nodes 20 to 30 in",
+            known,
+        ),
+        (
+            "*NSET, NSET=N, INSTANCE=P\n1\n",
+            "",
+            "the instance `P`",
+            "leave it out",
+        ),
+        (
+            "*ELSET, ELSET=N\nX\n",
+            "",
+            "`X` in the set `N`",
+            "by *ELSET",
+        ),
+        (
+            "",
+            "*DLOAD\n9, P1, 2.\n",
+            "`9`",
+            "elements have numbers from 1 to 2",
+        ),
+        (
+            "",
+            "*DSLOAD\nS, P, 2.\n",
+            "`S`",
+            "define the surface by *SURFACE",
+        ),
+        (
+            "",
+            "*BOUNDARY\nR,, 1, 2.\n",
+            "the first component is blank",
+            "A blank last component",
+        ),
+        (
+            "",
+            "*BOUNDARY\n, 1, 1, 2.\n",
+            "the node or set is blank",
+            "a blank value 0",
+        ),
+        (
+            "",
+            "*BOUNDARY\nR, 1, 1, .1, 2.\n",
+            ": 5 fields",
+            "Components are 1 (x)",
+        ),
+        (
+            "",
+            "*BOUNDARY\nR, 1, 1, x\n",
+            "the value `x`",
+            "Components are",
+        ),
+        (
+            "",
+            "*BOUNDARY\nR, 3, 3, .1\n",
+            "a component that a plane body does not have",
+            "Components are",
+        ),
+        (
+            "",
+            "*BOUNDARY\nR, 2, 3, .1\n",
+            "for components up to 3",
+            "Components are",
+        ),
+        (
+            "",
+            "*BOUNDARY\nR, 2, 1, .1\n",
+            "components 2 to 1",
+            "Components are",
+        ),
+        (
+            "",
+            "*BOUNDARY\nR, XSIM\n",
+            "`XSIM` in place of a component",
+            "Components are",
+        ),
+        (
+            "",
+            "*CLOAD\nR,, 2.\n",
+            "the component is blank, which",
+            "A blank value is 0",
+        ),
+        (
+            "",
+            "*CLOAD\n, 1, 2.\n",
+            "what it acts on is blank",
+            "A blank value is 0",
+        ),
+        ("", "*CLOAD\nR, 6, 2.\n", "the component `6`", "Moments"),
+        (
+            "",
+            "*DLOAD\nE, , 2.\n",
+            "the kind of load is blank",
+            "A blank value is 0",
+        ),
+        (
+            "",
+            "*DLOAD\nE, GRAV, 9.81, 0., -1.\n",
+            "5 fields, with the kind of load `GRAV`",
+            "`body_force`",
+        ),
+        (
+            "",
+            "*DLOAD\nE, P1, x\n",
+            "the value `x` is no number",
+            "A blank value is 0",
+        ),
+        (
+            "*MATERIAL, NAME=M2\n*ELASTIC\n, .3\n",
+            "",
+            "constant 1 is blank",
+            "no default",
+        ),
+    ] {
+        let list = all(model, step);
+        assert_eq!(list.len(), 1, "{model}{step}: {list:#?}");
+        assert!(
+            list[0].got.contains(got) && list[0].hint.contains(hint),
+            "{model}{step}: {list:#?}"
+        );
+        assert!(list[0].line().is_some(), "{list:#?}");
+    }
+    // each unknown keyword once, and what is known once
+    let list = all("*FOO\n*BAR\n*FOO, A=1\n*foo\n", "*BAR\n");
+    let got: Vec<&str> = list
+        .iter()
+        .map(|v| v.got.split_once(": ").unwrap().1)
+        .collect();
+    assert_eq!(
+        got,
+        ["*FOO, here and 2 times more", "*BAR, here and 1 times more"]
+    );
+    assert!(
+        list[0].hint.contains("*RIGID BODY, *CONTACT PAIR") && !list[1].hint.contains("*RIGID"),
+        "{list:#?}"
+    );
+    // types of two theories, of two rules: at the second, with the first
+    for (of, got) in [
+        (
+            "CPS8",
+            "elements of type `CPS8` beside those of type `CPE8` on line 15",
+        ),
+        (
+            "CPE8R",
+            "elements of type `CPE8R` beside those of type `CPE8` on line 15",
+        ),
+    ] {
+        let deck = block(HELD, "").replace(
+            "\n2, 3, 5",
+            &format!("\n*ELEMENT, TYPE={of}, ELSET=E\n2, 3, 5"),
+        );
+        assert_eq!(refused(&deck), [format!("line 17: {got}")]);
+    }
+    // a mesh is one: what a problem could not have of it is not told
+    let mesh =
+        format!("{NODES}*ELEMENT, TYPE=CPE8\n{ELEMENTS}*ELEMENT, TYPE=T3D2\n7, 1, 3\n*FOO\n");
+    assert_eq!(refused(&mesh), ["a deck without *STEP"]);
+    // up to five elements of those that are meant
+    let list = all("", "*DLOAD\nE, P2, 5.\n");
+    assert!(
+        list[0]
+            .got
+            .ends_with("1 of its 2 sides lie inside the body, those of elements 1, 2"),
+        "{list:#?}"
+    );
 }
 
 /// As a mesh a deck may contain anything; lines name boundaries.
@@ -620,13 +805,6 @@ fn keywords_without_effect_are_passed_over_and_others_refused_by_name() {
     );
     let plastic = MATERIAL.to_owned() + "*PLASTIC\n5., 0.\n";
     for (deck, got) in [
-        (
-            block(
-                &format!("*MATERIAL, NAME=M2\n*EXPANSION\n1E-5\n{warm}{HELD}"),
-                "*TEMPERATURE\nNALL, 90.\n",
-            ),
-            "temperatures",
-        ),
         (block(HELD, load).replace(MATERIAL, &plastic), "*PLASTIC"),
         (
             block(&format!("*EQUATION\n2\n1, 1, 1., 5, 1, 1.\n{HELD}"), load),
@@ -664,8 +842,102 @@ fn keywords_without_effect_are_passed_over_and_others_refused_by_name() {
             "{got}: {found:?}"
         );
     }
+    for (change, hint) in [
+        ("TYPE=ELEMENT, REMOVE\nE2\n", "Leave them out of the deck"),
+        ("TYPE=ELEMENT, ADD\nE2\n", "Delete this keyword"),
+        (
+            "TYPE=CONTACT PAIR, REMOVE\nA, B\n",
+            "Delete this keyword if the pair still acts",
+        ),
+        (
+            "TYPE=CONTACT PAIR, ADD\nA, B\n",
+            "a pair acts from the first step",
+        ),
+    ] {
+        let list = abaqus::problem(&block(HELD, &format!("*MODEL CHANGE, {change}{load}")));
+        let list = list.expect_err(change);
+        let what = change.split('\n').next().unwrap();
+        assert_eq!(list.len(), 1, "{list:?}");
+        assert!(
+            list[0].got.ends_with(what) && list[0].hint.contains(hint),
+            "{list:?}"
+        );
+    }
     let linear = block(HELD, load).replace("*STEP", "*STEP, NLGEOM=NO, NAME=Pull, PERTURBATION");
     assert!(abaqus::problem(&linear).is_ok());
+}
+
+/// Only a change of temperature strains a material that expands, as in CalculiX: 20 degrees from the beginning to the end
+/// change nothing.
+#[test]
+fn temperatures_count_where_they_change_and_the_body_expands() {
+    let load = "*CLOAD\nR, 1, 2.\n";
+    let warm = "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nNALL, 20.\n";
+    let expanding = |model: &str, step: &str| {
+        let deck = block(&format!("{model}{HELD}"), &format!("{step}{load}"));
+        deck.replace(
+            MATERIAL,
+            &format!("{MATERIAL}*EXPANSION, ZERO=100.\n1E-3\n"),
+        )
+    };
+    let other = "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nL, 20.\nR, 30.\n";
+    for deck in [
+        expanding("", ""),
+        expanding(warm, ""),
+        expanding(other, ""),
+        expanding(warm, "*TEMPERATURE\nnall, 20.\n"),
+        expanding("", "*TEMPERATURE\nNALL,\n"),
+        expanding("*INITIAL CONDITIONS, TYPE=VELOCITY\nNALL, 1, 5.\n", ""),
+        // nothing expands that the body is made of
+        block(
+            &format!("*MATERIAL, NAME=M2\n*EXPANSION\n1E-3\n{warm}{HELD}"),
+            &format!("*TEMPERATURE\nNALL, 90.\n{load}"),
+        ),
+    ] {
+        near(corner(&deck), [0.01315672, -0.002800575]);
+    }
+    for (model, step, got) in [
+        (
+            warm,
+            "*TEMPERATURE\nNALL, 20.\nR, 90.\n",
+            "a temperature of 90 for `R`",
+        ),
+        (
+            "",
+            "*TEMPERATURE\nNALL, 20.\n",
+            "a temperature of 20 for `NALL`",
+        ),
+        (
+            other,
+            "*TEMPERATURE\nL, 20.\n",
+            "a temperature of 20 for `L`",
+        ),
+        (
+            warm,
+            "*TEMPERATURE, AMPLITUDE=A\nNALL, 20.\n",
+            "*TEMPERATURE with AMPLITUDE",
+        ),
+        (warm, "*TEMPERATURE\nNALL, warm\n", "`warm`"),
+    ] {
+        let found = refused(&expanding(model, step));
+        assert!(
+            found.len() == 1 && found[0].contains(got),
+            "{got}: {found:?}"
+        );
+    }
+    let found = refused(&expanding(warm, "*TEMPERATURE\nNALL, 90.\n"));
+    assert!(
+        found[0].ends_with("and the material `M` of the body has *EXPANSION (line 29)"),
+        "{found:?}"
+    );
+    let found = refused(&expanding(
+        "*INITIAL CONDITIONS, TYPE=STRESS\nE, 5., 5., 0., 0.\n",
+        "",
+    ));
+    assert!(
+        found.len() == 1 && found[0].ends_with("TYPE=STRESS"),
+        "{found:?}"
+    );
 }
 
 /// A material turned by an orientation; displacements by CalculiX.

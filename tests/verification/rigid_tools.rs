@@ -264,6 +264,102 @@ fn steps_press_and_drag() {
     );
 }
 
+/// `OP=NEW` in a later step is as none where everything is stated again; what it ends is refused by name, once.
+#[test]
+fn op_new_in_a_later_step_states_everything_again() {
+    let first = "*STEP\n*STATIC\n*BOUNDARY\n9000, 1, 1\n9000, 2, 2, -0.05\n*CLOAD\nBODYHIGH, 1, .25\n8, 1, .5\n8, 1, .5\n\
+                 *DLOAD\n7, P1, 2.\n*END STEP\n";
+    let high = "*NSET, NSET=BODYHIGH\n3, 5\n*NSET, NSET=HALF\nBODYLOW\n";
+    let deck = |second: &str| {
+        let model = block(0.0) + high + &touching(ROLLER, "*FRICTION, ELASTIC SLIP=1e-4\n0.3,\n");
+        model + first + "*STEP\n*STATIC\n" + second + "*END STEP\n"
+    };
+    let kept = "*BOUNDARY\n9000, 1, 1, 0.01\n";
+    let plain = read(&deck(kept));
+    let again =
+        "*BOUNDARY, OP=NEW\nBODYLOW, 1, 2\n9000, 6, 6\n9000, 1, 1, 0.01\n9000, 2, 2, -0.05\n";
+    let loads = "*CLOAD, OP=NEW\n8, 1, 1.\nBODYHIGH, 1, .25\n*DLOAD, OP=NEW\n7, P1, 2.\n";
+    let others = again.replace("BODYLOW, 1, 2\n", "HALF, 1\nHALF, 2\n");
+    for second in [
+        again.to_owned(),
+        loads.to_owned() + kept,
+        format!("{again}{loads}"),
+        others,
+    ] {
+        let problem = read(&deck(&second));
+        assert_eq!(problem.contacts, plain.contacts, "{second}");
+        assert_eq!(problem.steps, plain.steps, "{second}");
+    }
+    for (from, to, told) in [
+        ("BODYLOW, 1, 2\n", "", "displacement 1 of `BODYLOW` (line "),
+        (
+            "BODYLOW, 1, 2\n",
+            "BODYLOW, 1\n",
+            "displacement 2 of `BODYLOW` (line ",
+        ),
+        (
+            "BODYLOW, 1, 2\n",
+            "1, 1, 2\n",
+            "displacement 1 of `BODYLOW` (line ",
+        ),
+        (
+            "9000, 6, 6\n",
+            "",
+            "displacement 6 of `the reference node of the *RIGID BODY on line ",
+        ),
+        (
+            "9000, 2, 2, -0.05\n",
+            "",
+            "displacement 2 of `the reference node",
+        ),
+        ("8, 1, 1.\n", "", "force 1 on `8`"),
+        ("BODYHIGH, 1, .25\n", "", "force 1 on `BODYHIGH`"),
+        ("7, P1, 2.\n", "8, P1, 2.\n", "the pressure on `7 P1`"),
+    ] {
+        let second = format!("{again}{loads}");
+        assert!(second.contains(from), "{from}");
+        let list = abaqus::problem(&deck(&second.replacen(from, to, 1))).expect_err(from);
+        let ends: Vec<_> = list
+            .iter()
+            .filter(|v| v.got.contains("OP=NEW, which ends"))
+            .collect();
+        assert!(
+            ends.len() == 1 && ends[0].got.contains(told),
+            "{from}: {list:#?}"
+        );
+        assert!(ends[0].got.starts_with("line "), "{list:#?}");
+        // another row may be told of as well: what it adds is of that row
+        let same = |v: &&solver::error::Violation| v.got.contains("OP=NEW");
+        assert_eq!(list.iter().filter(same).count(), 1, "{list:#?}");
+        assert!(list.len() == 1 || to == "8, P1, 2.\n", "{list:#?}");
+    }
+    // forces of one step add: the second is half of the first
+    let list = abaqus::problem(&deck(&format!("*CLOAD\n8, 1, .5\n{kept}"))).expect_err("half");
+    assert!(
+        list.len() == 1
+            && list[0]
+                .got
+                .contains("whose loads are in another proportion"),
+        "{list:#?}"
+    );
+    // a support of the model that the first step ends
+    let model = block(0.0) + &touching(ROLLER, "");
+    let ended =
+        model + &pressed([0.0, -0.05]).replace("*BOUNDARY\n", "*BOUNDARY, OP=NEW\nBODYLOW, 1, 2\n");
+    assert!(
+        doubts(&ended)[0].contains("free in 6"),
+        "{:?}",
+        doubts(&ended)
+    );
+    // without a rigid body there is one cause, which is that there are several steps
+    let two = "*STEP\n*STATIC\n*CLOAD\n8, 1, 1.\n*END STEP\n*STEP\n*STATIC\n*CLOAD, OP=NEW\n3, 1, 1.\n*BOUNDARY, OP=NEW\n8, 1\n*END STEP\n";
+    let found = abaqus::problem(&(block(0.0) + two)).expect_err("two steps");
+    assert!(
+        found.len() == 1 && found[0].got.ends_with("the second of 2 steps"),
+        "{found:#?}"
+    );
+}
+
 /// A rigid plate under a disc: that the plate moves up or the disc down is the same, with friction too. Along a curved
 /// boundary only a motion in one direction is one of a rigid body.
 #[test]
@@ -410,6 +506,16 @@ fn what_is_no_contact_with_a_rigid_obstacle_is_refused() {
         ("FACE, TOOL", "TOOL, TOOL", "two rigid surfaces"),
         ("FACE, TOOL", "FAC, TOOL", "`FAC` in a contact pair"),
         (
+            "FACE, TOOL\n",
+            "FACE, TOOL\nFACE, TOOL2\n*SURFACE, TYPE=SEGMENTS, NAME=TOOL2\nSTART, 9., 4.\nLINE, 5., 4.\n*RIGID BODY, ANALYTICAL SURFACE=TOOL2, REF NODE=9000\n",
+            "`FACE` in a second contact pair: the first is on line",
+        ),
+        (
+            "FACE, TOOL\n",
+            "FACE, TOOL\nPART, TOOL2\n*SURFACE, NAME=PART\n49, S3\n*SURFACE, TYPE=SEGMENTS, NAME=TOOL2\nSTART, 9., 4.\nLINE, 5., 4.\n*RIGID BODY, ANALYTICAL SURFACE=TOOL2, REF NODE=9000\n",
+            "of which 1 of 1 sides belong to `FACE` too",
+        ),
+        (
             "START, 4., 4.\nCIRCL, 0., 0., 0., 4.\nCIRCL, -4.",
             "START, -4., 4.\nCIRCL, 0., 0., 0., 4.\nCIRCL, 4.",
             "whose outer side does not face",
@@ -431,7 +537,7 @@ fn what_is_no_contact_with_a_rigid_obstacle_is_refused() {
         (
             "*END STEP",
             "*CLOAD\n9000, 2, -5.\n*END STEP",
-            "which has no node of an element",
+            "a force on `9000`, the reference node of the *RIGID BODY on line",
         ),
         ("*FRICTION, ELASTIC SLIP=1e-4", "*FRICTION, ROUGH", "ROUGH"),
         (

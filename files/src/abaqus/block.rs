@@ -52,6 +52,8 @@ pub(super) enum Block {
     Orientation(Name),
     Amplitude(Name),
     Thickness,
+    InitialTemperatures,
+    Temperatures,
     Period,
     Contact(ContactBlock),
     /// Rows of `*BOUNDARY`, and the name of their amplitude.
@@ -137,16 +139,21 @@ impl Deck {
                 let words = fields(text);
                 // one more than any form has: the violation reports the excess
                 let room = MOST_CONSTANTS + 1 - elastic.values.len().min(MOST_CONSTANTS);
-                for word in words.into_iter().take(room) {
+                for (k, word) in words.into_iter().take(room).enumerate() {
                     match number(word) {
                         Some(value) => elastic.values.push(value),
                         None => {
                             elastic.unreadable = true;
                             let got = match word {
-                                "" => "a blank constant".to_owned(),
-                                _ => format!("`{word:.40}`"),
+                                "" => format!("`{text:.60}`: constant {} is blank", k + 1),
+                                _ => format!("`{word:.40}` for constant {}", k + 1),
                             };
-                            self.doubt(line, got, "a number", "Correct that line.");
+                            self.doubt(
+                                line,
+                                got,
+                                "a number for each elastic constant",
+                                "Constants have no default: write every one of them, 0 too, as in `210000., 0.3`.",
+                            );
                         }
                     }
                 }
@@ -174,8 +181,8 @@ impl Deck {
                         self.doubt(
                             line,
                             format!("`{word:.40}`"),
-                            "a thickness",
-                            "Correct that line.",
+                            "the thickness, a number",
+                            "Write it alone on the line after *SOLID SECTION, as in `2.5`, or a comma alone for a thickness of 1.",
                         );
                     }
                     if let Some(section) = self.here.sections.last_mut() {
@@ -184,6 +191,8 @@ impl Deck {
                 }
                 *block = Block::Skip;
             }
+            Block::InitialTemperatures => self.temperature(true, line, text),
+            Block::Temperatures => self.temperature(false, line, text),
             Block::Period => {
                 // a period of 0 stands for that of 1 that a step has by itself
                 let words = fields(text);
@@ -232,7 +241,7 @@ impl Deck {
                     Reason::Truncated,
                     got,
                     &expected,
-                    "The last element before this line is not complete.",
+                    "The last element before this line is not complete: write its other nodes, or correct TYPE= of *ELEMENT.",
                 );
             }
             Block::Elastic(elastic) => {
@@ -311,9 +320,9 @@ impl Deck {
                         self.fault(
                             line,
                             Reason::Malformed,
-                            format!("`{word:.40}`"),
+                            format!("`{word:.40}` in `{text:.60}`"),
                             "a number",
-                            "Correct that line.",
+                            "Write a number like `1.5` or `1.5E-3` there; a blank is 0.",
                         );
                     }
                 }
@@ -348,8 +357,8 @@ impl Deck {
                 line,
                 Reason::Malformed,
                 format!("`{text:.60}`"),
-                "a node: number, x, y",
-                "Correct that line.",
+                "a node: its number, a whole number > 0, and x, y",
+                "Write it like `7, 0.5, 1.25`; a blank coordinate is 0, a blank number has no default.",
             );
             return;
         };
@@ -364,8 +373,8 @@ impl Deck {
                     line,
                     Reason::RepeatedNode,
                     format!("node {label} a second time"),
-                    "each node once",
-                    "Renumber it.",
+                    "each node once, or the same coordinates again",
+                    "Give one of both another number, in the elements and sets that name it too.",
                 );
                 return;
             }
@@ -395,9 +404,9 @@ impl Deck {
                     self.fault(
                         line,
                         Reason::Malformed,
-                        format!("`{word:.40}`"),
-                        "a number of a node or element",
-                        "Correct that line.",
+                        format!("`{word:.40}` in `{text:.60}`"),
+                        "an element: its number, and the numbers of its nodes",
+                        "Write whole numbers, as in `4, 1, 2, 12, 11`.",
                     );
                     // its next line begins another element, or continues this one: both are unknown
                     pending.clear();
@@ -421,12 +430,20 @@ impl Deck {
                 if self.here.incomplete.nodes {
                     return; // it may be the node that could not be read
                 }
+                let hint = match self.here.node_places.ends() {
+                    Some((first, last)) => format!(
+                        "The nodes above have numbers from {first} to {last}, not necessarily all of them. Correct the number, or define the node by *NODE before the element."
+                    ),
+                    None => {
+                        "No *NODE stands above. Define the nodes before the elements.".to_owned()
+                    }
+                };
                 self.fault(
                     line,
                     Reason::UnknownNode,
                     format!("node {number} in element {label}"),
-                    "a node of an earlier *NODE",
-                    "Correct the number.",
+                    "the number of a node that an earlier *NODE defines",
+                    &hint,
                 );
                 return;
             };
@@ -439,7 +456,7 @@ impl Deck {
                 Reason::RepeatedElement,
                 format!("element {label} a second time"),
                 "each element once",
-                "Renumber it.",
+                "Give one of both another number, in the sets that name it too.",
             );
             return;
         }
@@ -480,9 +497,10 @@ impl Deck {
                 .unwrap_or(NO_NODE);
         }
         let whole = nodes[..count].iter().all(|node| *node != NO_NODE);
-        let place = match whole {
-            true => Numbered::Line(self.here.lines.len() as u32),
-            false => Numbered::Other,
+        let place = if whole {
+            Numbered::Line(self.here.lines.len() as u32)
+        } else {
+            Numbered::Other
         };
         if self.number(label, place, set, line) && whole {
             self.here.lines.push(nodes);
@@ -538,8 +556,8 @@ impl Deck {
                 line,
                 Reason::Malformed,
                 format!("`{text:.40}`"),
-                "an element or a set of them, and S1 … S4",
-                "Name the sides of the surface.",
+                "an element or a set of elements, and a side S1 … S4",
+                "Write it like `TOP, S3`; without a side all sides of those elements on the surface of the body are meant. The element or set has no default.",
             ),
         }
     }
@@ -561,8 +579,8 @@ impl Deck {
                 line,
                 Reason::Malformed,
                 format!("`{text:.40}`"),
-                "first, last, step",
-                "Correct that line.",
+                "first number, last number, and a step > 0 if it is not 1",
+                "With GENERATE a line is a range of numbers, as in `1, 21, 2`: names and blanks have no meaning there.",
             );
         }
         range.map(|range| vec![Target::Range(range.into())])
@@ -601,12 +619,38 @@ impl Deck {
                     amplitude: amplitude.clone(),
                 });
             }
-            _ => self.doubt(
-                line,
-                format!("`{text:.60}`"),
-                "node or set, first and last component (1: x, 2: y), value",
-                "Only displacements can be prescribed.",
-            ),
+            _ => {
+                let why = match (components, value) {
+                    _ if word(0).is_empty() => "the node or set is blank".to_owned(),
+                    _ if words.len() > 4 => format!("{} fields", words.len()),
+                    _ if words.len() == 1 || word(1).is_empty() => {
+                        "the first component is blank, which has no default".to_owned()
+                    }
+                    (_, None) => format!("the value `{:.40}` is no number", word(3)),
+                    (Some((3.., _)), Some(value)) if known(&components.unwrap_or_default()) => {
+                        format!(
+                            "a value of {value} for a component that a plane body does not have"
+                        )
+                    }
+                    (Some(found), Some(value)) if known(&found) => {
+                        format!("a value of {value} for components up to {}", found.1)
+                    }
+                    (Some((first, last)), _) => format!("components {first} to {last}"),
+                    (None, _) if first.is_some() => {
+                        format!("the last component `{:.40}` is no number", word(2))
+                    }
+                    (None, _) if named_components(&word(1).to_uppercase()).is_some() => {
+                        format!("fields after the name `{:.40}`", word(1))
+                    }
+                    (None, _) => format!("`{:.40}` in place of a component", word(1)),
+                };
+                self.doubt(
+                    line,
+                    format!("`{text:.60}`: {why}"),
+                    "node or set, first component, last component, value; or node or set, a name like XSYMM or ENCASTRE",
+                    "Components are 1 (x) and 2 (y). A blank last component means the first one alone, a blank value 0. Temperatures and other unknowns cannot be prescribed.",
+                );
+            }
         }
     }
 
@@ -638,9 +682,9 @@ impl Deck {
             }
             (Rows::Nodes, ..) => self.doubt(
                 line,
-                format!("`{text:.60}`"),
-                "a force: node or set, 1 or 2, value",
-                "Forces act along x (1) and y (2).",
+                format!("`{text:.60}`: {}", unlike_load(&words, "component")),
+                "a force: node or set, 1 (x) or 2 (y), value",
+                "A blank value is 0; the node and the component have no default. Moments and forces out of the plane have no meaning here.",
             ),
             (_, Some(value), Some(side), _) => {
                 let target = self.target(word(0));
@@ -652,13 +696,38 @@ impl Deck {
                     amplitude,
                 });
             }
-            _ => self.doubt(
-                line,
-                format!("`{text:.60}`"),
-                "a pressure: element or set, P1 … P4, value (*DSLOAD: surface, P, value)",
-                "Give other loads in a problem of Signorini.",
-            ),
+            _ => {
+                let (expected, hint) = match rows {
+                    Rows::Surfaces => ("a pressure: surface, P, value", "A blank value is 0; the surface and P have no default. Give shear as `tangential` of a load in a problem as JSON, with this deck as its mesh."),
+                    _ => ("a pressure: element or set, P1 … P4, value", "A blank value is 0; the element and P1 … P4 have no default. Gravity is `body_force` (density times acceleration) of a problem as JSON, with this deck as its mesh; other loads are not computed."),
+                };
+                self.doubt(
+                    line,
+                    format!("`{text:.60}`: {}", unlike_load(&words, "kind of load")),
+                    expected,
+                    hint,
+                );
+            }
         }
+    }
+}
+
+/// Why a row of loads is none; `second`: what its second field is.
+fn unlike_load(words: &[&str], second: &str) -> String {
+    match words {
+        [] | ["", ..] => "what it acts on is blank".to_owned(),
+        [_] | [_, "", ..] => format!("the {second} is blank, which has no default"),
+        [_, _, value, rest @ ..]
+            if !value.is_empty() && number(value).is_none() && rest.is_empty() =>
+        {
+            format!("the value `{value:.40}` is no number")
+        }
+        [_, kind, ..] if words.len() <= 3 => format!("the {second} `{kind:.40}`"),
+        _ => format!(
+            "{} fields, with the {second} `{:.40}`",
+            words.len(),
+            words[1]
+        ),
     }
 }
 

@@ -4,14 +4,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::contact_parts::{Analytical, Held, RigidBody};
 use super::deck::Deck;
-use super::element::Mechanics;
+use super::element::Typed;
 use super::keyword::REMOVE_ELEMENTS;
 use super::names::{Key, Meant, Names, Room, unknown};
 use super::part::{Numbered, Part, RigidLines};
 use super::rigid::{Search, Tools};
 use super::scope::{Kind, Scope};
+use super::supported::{UnknownKeyword, report_unknown};
 use super::written::{
-    Force, Incomplete, Name, Prescribed, Pressure, Section, Sides, Target, on_line,
+    Force, Incomplete, Name, Prescribed, Pressure, Section, Sides, Target, numbered, on_line,
 };
 use crate::source::Plane;
 use solver::error::{Findings, Reason, Violation};
@@ -37,7 +38,7 @@ pub(super) struct Built {
     /// What a problem cannot have.
     pub(super) doubts: Findings,
     pub(super) incomplete: Incomplete,
-    pub(super) types: Vec<Mechanics>,
+    pub(super) types: Vec<Typed>,
     pub(super) sections: Vec<Row<Section>>,
     pub(super) prescribed: Vec<Row<Prescribed>>,
     pub(super) pressures: Vec<Row<Pressure>>,
@@ -123,8 +124,9 @@ struct Merged {
     heights: Vec<f64>,
     lines: Vec<[u32; 3]>,
     numbered: Vec<Numbered>,
-    types: Vec<Mechanics>,
+    types: Vec<Typed>,
     unused_type: Option<(u64, String)>,
+    unknown_keywords: Vec<UnknownKeyword>,
     rigid_lines: Vec<RigidLines>,
     rows: Rows,
     incomplete: Incomplete,
@@ -172,6 +174,7 @@ impl Merged {
             .enumerate()
             .map(|(place, (name, part))| self.add(place, name, part))
             .collect();
+        report_unknown(std::mem::take(&mut self.unknown_keywords), &mut self.doubts);
         if self.raw.nodes.is_empty() && !self.incomplete.nodes {
             self.faults.add(Violation::new(
                 "",
@@ -223,7 +226,11 @@ impl Merged {
             }));
         self.raw.without_centre += part.with_centre;
         for kind in part.types {
-            if !self.types.contains(&kind) {
+            if !self
+                .types
+                .iter()
+                .any(|known| known.mechanics == kind.mechanics)
+            {
                 self.types.push(kind);
             }
         }
@@ -250,6 +257,7 @@ impl Merged {
         rows.analytical
             .extend(analytical.map(|(name, surface)| (place, name, surface)));
         self.incomplete.add(part.incomplete);
+        self.unknown_keywords.extend(part.unknown_keywords);
         part.faults.add_to(&mut self.faults);
         part.doubts.add_to(&mut self.doubts);
         Scope {
@@ -276,7 +284,7 @@ impl Merged {
             elements: &sets.elements,
         };
         let held = std::mem::take(&mut self.rows.held);
-        let tools = search.tools(&self.rows.rigid_bodies, &self.rows.analytical, held);
+        let mut tools = search.tools(&self.rows.rigid_bodies, &self.rows.analytical, held);
         for lines in &self.rigid_lines {
             let known = |place: u32| tools.members.contains(&place);
             if !(lines.places.clone().all(known) || self.incomplete.names) {
@@ -307,6 +315,11 @@ impl Merged {
             }
         }
         let raw = &mut self.raw;
+        let left_out = tools
+            .elements
+            .iter()
+            .map(|&k| raw.element_labels[k as usize]);
+        tools.left_out = numbered("element", left_out);
         raw.elements = kept.iter().map(|&k| raw.elements[k as usize]).collect();
         raw.element_labels = kept
             .iter()
@@ -472,13 +485,14 @@ impl Merged {
                     row,
                 }),
                 None if self.incomplete.names => {}
-                None => self.doubts.add(on_line(
+                None => unknown(
+                    &mut self.doubts,
                     row.line,
-                    Reason::UnknownName,
-                    format!("the element set `{:.60}`", row.elements),
+                    &format!("the element set `{:.60}` of *SOLID SECTION", row.elements),
                     "a set of elements (*ELSET)",
-                    "Define the set.",
-                )),
+                    || names.all_sets(Kind::Elements),
+                    Kind::Elements.remedy(),
+                ),
             }
         }
         found
@@ -499,9 +513,14 @@ impl Merged {
             let Some(meant) = names.meant(Kind::Nodes, scope, to) else {
                 let label = matches!(to, Target::Label(_));
                 if !(self.incomplete.names || label && self.incomplete.nodes) {
-                    self.unknown_target(line, &word(to), "a node or a set of nodes", || {
-                        names.all_sets(Kind::Nodes)
-                    });
+                    let hint = names.remedy(Kind::Nodes, scope, to);
+                    self.unknown_target(
+                        line,
+                        &word(to),
+                        "a node or a set of nodes",
+                        || names.known(Kind::Nodes, to),
+                        &hint,
+                    );
                 }
                 continue;
             };
@@ -524,6 +543,7 @@ impl Merged {
         got: &str,
         expected: &str,
         known: impl FnOnce() -> Vec<String>,
+        remedy: &str,
     ) {
         unknown(
             &mut self.doubts,
@@ -531,6 +551,7 @@ impl Merged {
             &format!("`{got:.60}`"),
             expected,
             known,
+            remedy,
         );
     }
 
@@ -578,6 +599,7 @@ impl Merged {
                         &word(&row.target),
                         "a surface (*SURFACE)",
                         Vec::new,
+                        "*DSLOAD acts on surfaces: define one by *SURFACE, or load sides of elements by *DLOAD.",
                     );
                     continue;
                 };
@@ -590,28 +612,36 @@ impl Merged {
                             found.push(Row { row, name });
                         } else {
                             let known = "a surface of sides of plane elements";
-                            self.unknown_target(row.line, &name, known, Vec::new);
+                            let remedy = "A pressure acts on sides: name elements and S1 … S4 in that surface, or its elements alone for all sides of the body's surface.";
+                            self.unknown_target(row.line, &name, known, Vec::new, remedy);
                         }
                     }
                     None if self.incomplete.names => {}
-                    None => self.unknown_target(row.line, name, "a surface (*SURFACE)", || {
-                        known
-                            .iter()
-                            .take(20)
-                            .map(|(scope, name)| names.full(*scope, name))
-                            .collect()
-                    }),
+                    None => self.unknown_target(
+                        row.line,
+                        name,
+                        "a surface (*SURFACE)",
+                        || {
+                            let known = known.iter().take(20);
+                            known
+                                .map(|(scope, name)| names.full(*scope, name))
+                                .collect()
+                        },
+                        "Correct the name, or define the surface by *SURFACE.",
+                    ),
                 }
                 continue;
             };
             let Some(meant) = names.meant(Kind::Elements, scope, &row.target) else {
                 let label = matches!(row.target, Target::Label(_));
                 if !(self.incomplete.names || label && self.incomplete.elements) {
+                    let hint = names.remedy(Kind::Elements, scope, &row.target);
                     self.unknown_target(
                         row.line,
                         &word(&row.target),
                         "an element or a set of elements",
-                        || names.all_sets(Kind::Elements),
+                        || names.known(Kind::Elements, &row.target),
+                        &hint,
                     );
                 }
                 continue;
@@ -668,7 +698,8 @@ impl Building<'_> {
                             line,
                             &got,
                             "an element or a set of elements",
-                            || self.names.all_sets(Kind::Elements),
+                            || self.names.known(Kind::Elements, target),
+                            &self.names.remedy(Kind::Elements, scope, target),
                         );
                     }
                     continue;
@@ -692,8 +723,8 @@ impl Building<'_> {
                     Sides::None | Sides::OfLine { .. } => return None,
                     Sides::Number(side) if side > corners => {
                         let label = merged.raw.element_labels[place as usize];
-                        merged.faults.add(Violation::new(
-                            "",
+                        merged.faults.add(on_line(
+                            line,
                             Reason::UnknownEdge,
                             format!("side {side} of the triangle {label} in `{name:.60}`"),
                             "sides 1 … 3 of a triangle",
@@ -754,12 +785,12 @@ fn exported(
         }
         let full = names.full(scope, &name);
         if exported.contains_key(&full) {
-            faults.add(Violation::new(
-                "",
+            faults.add(on_line(
+                names.line_in_assembly(&full),
                 Reason::DuplicateName,
-                format!("`{full:.120}` of the assembly and of an instance"),
-                "different names",
-                "Rename the set of the assembly.",
+                format!("the set `{full:.120}` of the assembly, and of an instance one that the assembly names so"),
+                "sets of the assembly that are not named INSTANCE.SET like those of instances",
+                "Rename the set of the assembly, also in the keywords that name it.",
             ));
         }
         exported.insert(full, set);

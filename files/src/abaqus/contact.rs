@@ -1,4 +1,6 @@
-//! Contact between a surface of the body and a rigid surface of a refused, as contacts with obstacles.
+//! Contact between a surface of the body and a rigid surface of a deck, as contacts with obstacles.
+
+use std::collections::BTreeMap;
 
 use super::contact_parts::{Adjust, Behavior, DeckContact, DeckFriction, Pair, WRITTEN_INSTEAD};
 use super::rigid::{MOST_POINTS, Tools};
@@ -25,7 +27,7 @@ const CLOSED: f64 = 1e-6;
 /// Nodes of a boundary that are looked at.
 const MOST_LOOKS: usize = 1000;
 
-/// The contacts of a refused, its steps, and what is done differently here.
+/// The contacts of a deck, its steps, and what is done differently here.
 pub(super) struct Translated {
     pub(super) contacts: Vec<Contact>,
     pub(super) steps: Vec<Step>,
@@ -73,6 +75,9 @@ impl Source<'_> {
             steps: Vec::new(),
             warnings: Vec::new(),
         };
+        if self.report_shared_sides(refused) {
+            return found;
+        }
         let mut all = Vec::new();
         for (pair, surfaces) in self.said.pairs.iter().zip(self.pairs) {
             all.extend(self.contact((pair, surfaces), others, refused, &mut found.warnings));
@@ -116,6 +121,46 @@ impl Source<'_> {
             }
         }
         found
+    }
+
+    /// Reports pairs with sides of the body that an earlier pair has too; whether there are any.
+    fn report_shared_sides(&self, refused: &mut Refused) -> bool {
+        let mut owners: BTreeMap<Edge, (u64, &str)> = BTreeMap::new();
+        let before = refused.violations.len();
+        for (Pair { line, .. }, surfaces) in self.said.pairs.iter().zip(self.pairs) {
+            let mut bodies = surfaces.iter();
+            let Some(name) = bodies.find(|name| !self.tools.by_surface.contains_key(*name)) else {
+                continue;
+            };
+            let edges = self
+                .mesh
+                .boundaries
+                .get(name)
+                .map_or(&[][..], |edges| edges);
+            let others = edges.iter().filter_map(|edge| owners.get(edge).copied());
+            let others: Vec<(u64, &str)> = others.collect();
+            if let Some((other, of)) = others.first() {
+                let got = if of == name {
+                    format!("`{name:.60}` in a second contact pair: the first is on line {other}")
+                } else {
+                    format!(
+                        "`{name:.60}`, of which {} of {} sides belong to `{of:.60}` too, in the contact pair on line {other}",
+                        others.len(),
+                        edges.len()
+                    )
+                };
+                refused.doubt(
+                    *line,
+                    got,
+                    "each side of the body in one contact pair",
+                    "Divide the surface by *SURFACE into parts, and pair each part with the rigid surface that it can touch. Two rigid surfaces that move together may be one: write their lines into one *SURFACE, TYPE=SEGMENTS. In a problem as JSON, `contacts` name parts of the boundary, too.",
+                );
+            }
+            for edge in edges {
+                owners.entry(*edge).or_insert((*line, name));
+            }
+        }
+        refused.violations.len() > before
     }
 
     fn contact(
@@ -217,11 +262,13 @@ impl Source<'_> {
         let interaction = pair.interaction.as_ref();
         let unknown = interaction.filter(|name| !self.said.interactions.contains_key(*name));
         if let Some(unknown) = unknown {
+            let known = self.said.interactions.keys().take(20);
+            let known: Vec<String> = known.map(|name| format!("{name:.60}")).collect();
             refused.doubt(
                 line,
                 format!("the interaction `{unknown:.60}`"),
                 "a *SURFACE INTERACTION of that name",
-                "Define it.",
+                &format!("Known interactions: {}. Correct INTERACTION=…, or define it by *SURFACE INTERACTION, NAME=….", known.join(", ")),
             );
         }
         let interaction = interaction.and_then(|name| self.said.interactions.get(name));

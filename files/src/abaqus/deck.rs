@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, HashMap};
 use super::contact_parts::DeckContact;
 use super::part::Part;
 use super::written::{
-    Amplitude, LONGEST_NAME, MOST_NAMES, MaterialDefinition, Name, Orientation, Set, Sides,
-    Surface, Target, on_line,
+    Amplitude, LONGEST_NAME, MOST_NAMES, MaterialDefinition, Name, Orientation, Replacement, Set,
+    Sides, Surface, Target, Temperatures, on_line,
 };
 use solver::error::Reason;
 
@@ -46,8 +46,7 @@ pub(super) struct Deck {
     pub(super) materials: BTreeMap<Name, MaterialDefinition>,
     pub(super) orientations: BTreeMap<Name, Orientation>,
     pub(super) amplitudes: BTreeMap<Name, Amplitude>,
-    /// The first line that gives temperatures.
-    pub(super) temperatures: Option<u64>,
+    pub(super) temperatures: Temperatures,
     pub(super) steps: usize,
     /// Where the instance that lines belong to is.
     pub(super) placement: Option<Placement>,
@@ -55,6 +54,8 @@ pub(super) struct Deck {
     pub(super) period: Option<f64>,
     /// The step has had a `*BOUNDARY`.
     pub(super) supported_in_step: bool,
+    /// Keywords with `OP=NEW` in steps after the first.
+    pub(super) replacements: Vec<Replacement>,
     pub(super) title: Option<String>,
     pub(super) contact: DeckContact,
 }

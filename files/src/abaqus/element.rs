@@ -19,6 +19,15 @@ pub(super) struct Mechanics {
     pub(super) reduced: bool,
 }
 
+/// The mechanics of the elements of a keyword, the first with them.
+#[derive(Clone, Debug)]
+pub(super) struct Typed {
+    pub(super) mechanics: Mechanics,
+    /// The line of the keyword, and the type that it names.
+    pub(super) line: u64,
+    pub(super) name: String,
+}
+
 impl Mechanics {
     pub(super) fn is_triangle(&self) -> bool {
         self.family == Family::Triangle

@@ -22,18 +22,6 @@ impl Deck {
                 self.contact.steps.push((line, None));
                 return None;
             }
-            // what a later step takes away is not followed
-            "BOUNDARY" | "CLOAD" | "DLOAD" | "DSLOAD"
-                if self.steps > 1 && keyword.is("OP", "NEW") =>
-            {
-                self.doubt(
-                    line,
-                    format!("*{} with OP=NEW in a later step", keyword.name),
-                    "steps that change values of the first",
-                    WRITTEN_INSTEAD,
-                );
-                return None;
-            }
             "SURFACE" if value("TYPE").is_some_and(|t| t.eq_ignore_ascii_case("SEGMENTS")) => {
                 let Some(name) = value("NAME").map(|name| self.spelled(&name)) else {
                     return Some(self.nameless(line, "*SURFACE", "NAME"));
@@ -73,6 +61,10 @@ impl Deck {
             }
             "FRICTION" => return Some(self.friction_block(keyword, line)),
             "SURFACE BEHAVIOR" => return Some(self.behavior_block(keyword, line)),
+            "MODEL CHANGE" => {
+                self.model_change(keyword, line);
+                return Some(Block::Skip);
+            }
             "CLEARANCE"
             | "CONTACT INTERFERENCE"
             | "CHANGE FRICTION"
@@ -82,7 +74,6 @@ impl Deck {
             | "CONTACT PROPERTY ASSIGNMENT"
             | "CONTACT INITIALIZATION DATA"
             | "CONTACT CLEARANCE"
-            | "MODEL CHANGE"
             | "TIE"
             | "GAP"
             | "CONTACT DAMPING"
@@ -99,6 +90,36 @@ impl Deck {
             _ => return None,
         };
         Some(Block::Contact(block))
+    }
+
+    /// `*MODEL CHANGE`, which takes elements or contact pairs out of the body between steps, or adds them.
+    fn model_change(&mut self, keyword: &Keyword, line: u64) {
+        let is_pair = keyword.is("TYPE", "CONTACT PAIR");
+        let what = if is_pair { "CONTACT PAIR" } else { "ELEMENT" };
+        let action = ["REMOVE", "ADD"].into_iter().find(|a| keyword.has(a));
+        let got = match action {
+            Some(action) => format!("*MODEL CHANGE, TYPE={what}, {action}"),
+            None => format!("*MODEL CHANGE, TYPE={what}"),
+        };
+        let (expected, hint) = match (is_pair, action) {
+            (true, Some("REMOVE")) => (
+                "contact pairs that may touch in every step",
+                "Delete this keyword if the pair still acts in the last step, and the pair itself if it does not.",
+            ),
+            (true, _) => (
+                "contact pairs that may touch in every step",
+                "Delete this keyword: a pair acts from the first step on, wherever its surfaces touch.",
+            ),
+            (false, Some("REMOVE")) => (
+                "the same elements in every step",
+                "Elements cannot be removed between steps. Leave them out of the deck if the body is without them from the beginning; what they carried before the step is not computed here.",
+            ),
+            (false, _) => (
+                "the same elements in every step",
+                "Elements cannot be added between steps. Delete this keyword if they belong to the body from the beginning.",
+            ),
+        };
+        self.doubt(line, got, expected, hint);
     }
 
     fn rigid_body(&mut self, keyword: &Keyword, line: u64) {
@@ -233,7 +254,7 @@ impl Deck {
                 line,
                 format!("{name}={written:.40}"),
                 "a number > 0",
-                "Correct it.",
+                &format!("Write it like {name}=0.005, or leave it out."),
             );
         }
         value
@@ -280,9 +301,10 @@ impl Deck {
             Some(interaction) => interaction.behavior = behavior,
             None => return Block::Skip,
         }
-        match hard {
-            true => Block::Skip,
-            false => Block::Contact(ContactBlock::Behavior),
+        if hard {
+            Block::Skip
+        } else {
+            Block::Contact(ContactBlock::Behavior)
         }
     }
 
@@ -412,7 +434,7 @@ impl Deck {
                 line,
                 format!("`{text:.60}`"),
                 "START, x, y; LINE, x, y of its end; CIRCL, x, y of its end, x, y of its centre (less than half a circle, both ends equally far from it); PARAB, x, y of its middle, x, y of its end",
-                "Correct that line of the rigid surface.",
+                "Begin by START; each line goes on where the one before ends, and no number may be blank.",
             ),
         }
     }

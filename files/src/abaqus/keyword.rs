@@ -2,10 +2,12 @@
 
 use super::block::{Block, Rows};
 use super::deck::{Deck, Inside};
-use super::element::{ElementType, Shape};
+use super::element::{ElementType, Shape, Typed};
 use super::part::{Part, RigidLines};
+use super::supported::{IDLE, MOST_UNKNOWN, NOT_ELASTIC, NOT_WRITTEN_OUT, READ, UnknownKeyword};
 use super::written::{
-    Amplitude, Elastic, Incomplete, MOST_NAMES, Name, Orientation, Section, fields,
+    Amplitude, Elastic, Incomplete, MOST_NAMES, Name, Orientation, Replacement, Replaces, Section,
+    fields,
 };
 use solver::error::Reason;
 
@@ -15,90 +17,6 @@ const MOST_PARTS: usize = 1 << 8;
 /// How often instances may repeat what the parts contain.
 const MOST_TIMES: u64 = 8;
 
-/// Keywords without effect on a linear static step: requests for output, options of its solution, and what only other
-/// kinds of steps use.
-const IDLE: &[&str] = &[
-    "END STEP",
-    "DENSITY",
-    "DAMPING",
-    "CONDUCTIVITY",
-    "SPECIFIC HEAT",
-    "LATENT HEAT",
-    "PHYSICAL CONSTANTS",
-    "USER OUTPUT VARIABLES",
-    "MASS",
-    "ROTARY INERTIA",
-    "NODE PRINT",
-    "EL PRINT",
-    "NODE FILE",
-    "EL FILE",
-    "NODE OUTPUT",
-    "ELEMENT OUTPUT",
-    "EL OUTPUT",
-    "OUTPUT",
-    "FILE OUTPUT",
-    "CONTACT FILE",
-    "CONTACT PRINT",
-    "CONTACT OUTPUT",
-    "SECTION PRINT",
-    "SECTION FILE",
-    "SECTION OUTPUT",
-    "ENERGY PRINT",
-    "ENERGY FILE",
-    "ENERGY OUTPUT",
-    "INTEGRATED OUTPUT",
-    "INTEGRATED OUTPUT SECTION",
-    "INCREMENTATION OUTPUT",
-    "TIME POINTS",
-    "FILTER",
-    "PREPRINT",
-    "PRINT",
-    "RESTART",
-    "MONITOR",
-    "FILE FORMAT",
-    "NODE RESPONSE",
-    "DIAGNOSTICS",
-    "CONTROLS",
-    "CONTACT CONTROLS",
-    "SOLVER CONTROLS",
-    "SECTION CONTROLS",
-    "HOURGLASS STIFFNESS",
-    "WAVEFRONT MINIMIZATION",
-    "DISTRIBUTION",
-    "DISTRIBUTION TABLE",
-    "POST OUTPUT",
-];
-
-/// Properties of a material that a linear elastic one does not have. A material that nothing is made of may have them.
-const NOT_ELASTIC: &[&str] = &[
-    "PLASTIC",
-    "CYCLIC HARDENING",
-    "RATE DEPENDENT",
-    "DEFORMATION PLASTICITY",
-    "HYPERELASTIC",
-    "HYPERFOAM",
-    "MULLINS EFFECT",
-    "VISCOELASTIC",
-    "VISCOUS",
-    "CREEP",
-    "SWELLING",
-    "POROUS ELASTIC",
-    "POROUS METAL PLASTICITY",
-    "POTENTIAL",
-    "CAP PLASTICITY",
-    "CLAY PLASTICITY",
-    "DRUCKER PRAGER",
-    "DRUCKER PRAGER HARDENING",
-    "MOHR COULOMB",
-    "CONCRETE",
-    "CONCRETE DAMAGED PLASTICITY",
-    "DAMAGE INITIATION",
-    "USER MATERIAL",
-    "NO TENSION",
-    "NO COMPRESSION",
-    "FAIL STRESS",
-];
-
 /// A keyword line in parts.
 pub(super) struct Keyword {
     pub(super) name: String,
@@ -107,15 +25,7 @@ pub(super) struct Keyword {
 
 /// CalculiX reads keywords without their blanks, too.
 fn spaced(name: String) -> String {
-    const OF_WORDS: [&str; 6] = [
-        "SOLID SECTION",
-        "RIGID BODY",
-        "CONTACT PAIR",
-        "SURFACE INTERACTION",
-        "SURFACE BEHAVIOR",
-        "INITIAL CONDITIONS",
-    ];
-    let mut known = OF_WORDS.iter().chain(IDLE);
+    let mut known = READ.iter().chain(IDLE);
     let known = known.find(|known| known.replace(' ', "") == name);
     known.map_or(name, |known| (*known).to_owned())
 }
@@ -199,6 +109,13 @@ impl Deck {
         if let Some(block) = self.begin_contact(keyword, line) {
             return block;
         }
+        let name = &keyword.name[..];
+        if ![READ, NOT_WRITTEN_OUT, NOT_ELASTIC, IDLE]
+            .iter()
+            .any(|names| names.contains(&name))
+        {
+            return self.unknown_keyword(name, line);
+        }
         match &keyword.name[..] {
             "HEADING" => Block::Title,
             "NODE" => {
@@ -259,8 +176,8 @@ impl Deck {
                 }
                 Block::Skip
             }
-            "TEMPERATURE" => self.temperature(line),
-            "INITIAL CONDITIONS" if keyword.is("TYPE", "TEMPERATURE") => self.temperature(line),
+            "TEMPERATURE" => self.temperature_block(keyword, line),
+            "INITIAL CONDITIONS" => self.initial_conditions(keyword, line),
             "ORIENTATION" => self.orientation_block(keyword),
             "AMPLITUDE" => self.amplitude_block(keyword, line),
             "SOLID SECTION" => {
@@ -292,22 +209,33 @@ impl Deck {
                 }
             }
             "BOUNDARY" => {
-                // the first in a step decides whether those of the model remain
-                if self.steps > 0
-                    && !std::mem::replace(&mut self.supported_in_step, true)
-                    && keyword.is("OP", "NEW")
-                {
-                    self.here.prescribed.clear();
-                    for (_, part) in &mut self.instances {
+                // the first in the first step decides whether those of the model remain
+                let is_first = !std::mem::replace(&mut self.supported_in_step, true);
+                if self.steps == 1 && is_first && keyword.is("OP", "NEW") {
+                    let instances = self.instances.iter_mut().map(|(_, part)| part);
+                    for part in instances.chain(self.parts.values_mut()) {
                         part.prescribed.clear();
+                        part.held.clear();
                     }
+                    self.here.prescribed.clear();
+                    self.here.held.clear();
                 }
+                self.note_replacement(keyword, Replaces::Supports, line);
                 Block::Boundary(self.amplitude(keyword, line))
             }
-            // they only add to one another, and nothing comes before the first step
-            "DLOAD" => Block::Load(Rows::Sides, self.amplitude(keyword, line)),
-            "DSLOAD" => Block::Load(Rows::Surfaces, self.amplitude(keyword, line)),
-            "CLOAD" => Block::Load(Rows::Nodes, self.amplitude(keyword, line)),
+            // those of one step only add to one another
+            "DLOAD" => {
+                self.note_replacement(keyword, Replaces::Pressures, line);
+                Block::Load(Rows::Sides, self.amplitude(keyword, line))
+            }
+            "DSLOAD" => {
+                self.note_replacement(keyword, Replaces::Pressures, line);
+                Block::Load(Rows::Surfaces, self.amplitude(keyword, line))
+            }
+            "CLOAD" => {
+                self.note_replacement(keyword, Replaces::Forces, line);
+                Block::Load(Rows::Nodes, self.amplitude(keyword, line))
+            }
             "STEP" => {
                 self.steps += 1;
                 self.supported_in_step = false;
@@ -337,7 +265,7 @@ impl Deck {
             "PART" | "END PART" | "ASSEMBLY" | "END ASSEMBLY" | "INSTANCE" | "END INSTANCE" => {
                 self.part_block(keyword, line)
             }
-            "INCLUDE" | "NGEN" | "NFILL" | "NCOPY" | "NMAP" | "ELGEN" | "ELCOPY" | "SYSTEM" => {
+            name if NOT_WRITTEN_OUT.contains(&name) => {
                 self.here.incomplete = Incomplete::ALL;
                 self.fault(
                     line,
@@ -356,20 +284,38 @@ impl Deck {
                 }
                 Block::Skip
             }
-            name => {
-                self.doubt(line, format!("*{name:.60}"), "a supported keyword", "*NODE, *ELEMENT, *NSET, *ELSET, *SURFACE, *PART, *INSTANCE, *MATERIAL, *ELASTIC, *ORIENTATION, *SOLID SECTION, *BOUNDARY, *DLOAD, *DSLOAD, *CLOAD, *AMPLITUDE, *STEP, *STATIC and requests for output are supported.");
-                Block::Skip
-            }
+            name => self.unknown_keyword(name, line),
+        }
+    }
+
+    /// A keyword of which nothing is known, or that is not where it belongs: told in the end, each once.
+    fn unknown_keyword(&mut self, name: &str, line: u64) -> Block {
+        let known = &mut self.here.unknown_keywords;
+        match known.iter().position(|known| known.name == name) {
+            Some(place) => known[place].more += 1,
+            None if known.len() < MOST_UNKNOWN => known.push(UnknownKeyword {
+                name: name.to_owned(),
+                line,
+                more: 0,
+            }),
+            None => {}
+        }
+        Block::Skip
+    }
+
+    /// Keeps a keyword that replaces what earlier steps prescribe.
+    fn note_replacement(&mut self, keyword: &Keyword, what: Replaces, line: u64) {
+        if self.steps > 1 && keyword.is("OP", "NEW") {
+            self.replacements.push(Replacement {
+                line,
+                keyword: keyword.name.clone(),
+                what,
+            });
         }
     }
 
     pub(super) fn named(&mut self, keyword: &Keyword, parameter: &str) -> Option<Name> {
         keyword.get(parameter).map(|name| self.spelled(name))
-    }
-
-    fn temperature(&mut self, line: u64) -> Block {
-        self.temperatures.get_or_insert(line);
-        Block::Skip
     }
 
     pub(super) fn nameless(&mut self, line: u64, keyword: &str, parameter: &str) -> Block {
@@ -504,8 +450,13 @@ impl Deck {
         let got = format!("elements of type `{name:.20}`");
         match kind.mechanics {
             Some(mechanics) => {
-                if !self.here.types.contains(&mechanics) {
-                    self.here.types.push(mechanics);
+                let mut known = self.here.types.iter();
+                if !known.any(|known| known.mechanics == mechanics) {
+                    self.here.types.push(Typed {
+                        mechanics,
+                        line,
+                        name: name.clone(),
+                    });
                 }
             }
             None if kind.idle => {}
@@ -573,7 +524,7 @@ impl Deck {
                         Reason::DuplicateName,
                         got,
                         "each instance once",
-                        "Rename one.",
+                        "Rename one of both, also where INSTANCE.NAME names its sets.",
                     );
                 }
                 self.instances.push((name, part));

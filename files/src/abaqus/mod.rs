@@ -20,10 +20,13 @@ mod names;
 mod part;
 mod problem;
 mod read;
+mod replaced;
 mod rigid;
 mod scope;
 mod steps;
+mod supported;
 mod supports;
+mod temperature;
 mod tool;
 mod written;
 

@@ -143,6 +143,35 @@ impl Names<'_> {
         self.scopes.iter().position(named)
     }
 
+    /// The line where the assembly defines a set.
+    pub(super) fn line_in_assembly(&self, name: &str) -> u64 {
+        let scope = &self.scopes[0];
+        let sets = [&scope.node_sets, &scope.element_sets, &scope.node_surfaces];
+        let mut found = sets.iter().filter_map(|sets| sets.get(name));
+        found.next().map_or(1, |set| set.line)
+    }
+
+    /// What to do about a target that is nothing.
+    pub(super) fn remedy(&self, kind: Kind, scope: usize, target: &Target) -> String {
+        match target {
+            Target::Label(_) => self.scopes[scope].hint_of_numbers(kind),
+            _ => kind.remedy().to_owned(),
+        }
+    }
+
+    /// The names that a target might be instead: a number is no name.
+    pub(super) fn known(&self, kind: Kind, target: &Target) -> Vec<String> {
+        match target {
+            Target::Label(_) => Vec::new(),
+            _ => self.all_sets(kind),
+        }
+    }
+
+    fn instances(&self) -> Vec<String> {
+        let names = self.scopes.iter().filter_map(|scope| scope.name.as_deref());
+        names.take(MOST_LISTED).map(str::to_owned).collect()
+    }
+
     pub(super) fn all_sets(&self, kind: Kind) -> Vec<String> {
         let names = (0..self.scopes.len()).flat_map(|scope| {
             let sets = self.scopes[scope].sets(kind).keys();
@@ -242,6 +271,7 @@ impl<'a> Members<'a> {
                     &got,
                     "a set of elements (*ELSET)",
                     || self.names.all_sets(Kind::Elements),
+                    Kind::Elements.remedy(),
                 );
             }
         }
@@ -259,7 +289,8 @@ impl<'a> Members<'a> {
                         self.line,
                         &got,
                         "the name of an *INSTANCE",
-                        Vec::new,
+                        || self.names.instances(),
+                        "Correct INSTANCE=…, or leave it out where the deck has no *INSTANCE.",
                     );
                 }
             }
@@ -296,8 +327,9 @@ impl<'a> Members<'a> {
                         faults,
                         self.line,
                         &got,
-                        &format!("numbers that {what}s have"),
+                        &format!("a range that contains numbers of {what}s"),
                         Vec::new,
+                        &place.hint_of_numbers(kind),
                     );
                 }
                 self.found.extend(inside);
@@ -321,8 +353,9 @@ impl<'a> Members<'a> {
                     faults,
                     self.line,
                     &format!("`{other:.60}` in the set `{:.60}`", self.name),
-                    &format!("a {what} or a set (*{})", kind.keyword()),
+                    &format!("{} or a set (*{})", kind.one(), kind.keyword()),
                     || names.all_sets(kind),
+                    kind.remedy(),
                 ),
                 (Target::Label(label), None) if !numbers => {
                     let got = format!("{what} {label} in the set `{:.60}`", self.name);
@@ -330,8 +363,9 @@ impl<'a> Members<'a> {
                         faults,
                         self.line,
                         &got,
-                        &format!("a number that a {what} has"),
+                        &format!("the number of {}", kind.one()),
                         Vec::new,
+                        &place.hint_of_numbers(kind),
                     );
                 }
                 _ => {}
@@ -387,13 +421,14 @@ impl Room {
 /// Names that a hint lists.
 const MOST_LISTED: usize = 20;
 
-/// Reports a name or number that nothing has; `known`: the names that there are.
+/// Reports a name or number that nothing has; `known`: the names that there are; `remedy`: what to do.
 pub(super) fn unknown(
     faults: &mut Findings,
     line: u64,
     got: &str,
     expected: &str,
     known: impl FnOnce() -> Vec<String>,
+    remedy: &str,
 ) {
     if faults.is_full() {
         return faults.count(1);
@@ -403,9 +438,10 @@ pub(super) fn unknown(
         .take(MOST_LISTED)
         .map(|name| format!("{name:.60}"))
         .collect();
-    let hint = match names.is_empty() {
-        true => "Correct the number.".to_owned(),
-        false => format!("Known names: {}.", names.join(", ")),
+    let hint = if names.is_empty() {
+        remedy.to_owned()
+    } else {
+        format!("Known names: {}. {remedy}", names.join(", "))
     };
     faults.add(on_line(
         line,
@@ -415,6 +451,7 @@ pub(super) fn unknown(
         &hint,
     ));
 }
+
 #[cfg(test)]
 mod tests {
     use super::super::read;
@@ -430,14 +467,14 @@ mod tests {
         let read = |text: &str| read(format!("{MIXED}{text}").as_bytes());
         let (mesh, _) = read("*DLOAD\nALL, P1, 5.\n").unwrap();
         assert_eq!(mesh.boundaries["ALL P1"].len(), 2);
-        for (text, name) in [
-            ("*DLOAD\nALL, P4, 5.\n", "ALL P4"),
-            ("*SURFACE, NAME=LEFT\nALL, S4\n", "LEFT"),
+        for (text, name, line) in [
+            ("*DLOAD\nALL, P4, 5.\n", "ALL P4", 12),
+            ("*SURFACE, NAME=LEFT\nALL, S4\n", "LEFT", 11),
         ] {
             let Err(ReadError::Invalid(list)) = read(text) else {
                 panic!("{text} was read");
             };
-            let got = format!("side 4 of the triangle 20 in `{name}`");
+            let got = format!("line {line}: side 4 of the triangle 20 in `{name}`");
             assert_eq!((list[0].reason, &list[0].got), (Reason::UnknownEdge, &got));
         }
     }

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::contact_parts::{Analytical, Held, RigidBody};
-use super::element::Mechanics;
+use super::element::Typed;
+use super::supported::UnknownKeyword;
 use super::written::{Force, Incomplete, Name, Prescribed, Pressure, Section, Set, Surface};
 use crate::source::Labels;
 use solver::element::Element;
@@ -52,7 +53,7 @@ pub(super) struct Part {
     pub(super) unused_type: Option<(u64, String)>,
     /// Rigid lines, block by block.
     pub(super) rigid_lines: Vec<RigidLines>,
-    pub(super) types: Vec<Mechanics>,
+    pub(super) types: Vec<Typed>,
     pub(super) node_sets: BTreeMap<Name, Set>,
     pub(super) element_sets: BTreeMap<Name, Set>,
     /// Surfaces of nodes.
@@ -68,6 +69,8 @@ pub(super) struct Part {
     pub(super) held: Vec<Held>,
     /// What of it is not all known, since a line could not be read.
     pub(super) incomplete: Incomplete,
+    /// Keywords in it of which nothing is known.
+    pub(super) unknown_keywords: Vec<UnknownKeyword>,
     /// Violations of its mesh.
     pub(super) faults: Found,
     /// What a problem cannot have.

@@ -4,14 +4,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::build::{Built, Row, key, sides_of_two};
 use super::contact;
-use super::element::{Mechanics, Theory};
+use super::element::{Theory, Typed};
 use super::read::read;
+use super::rigid::Body;
 use super::supports::supports;
-use super::written::{
-    Elastic, MOST_CONSTANTS, MaterialDefinition, Name, Orientation, Section, on_line,
-};
+use super::written::{Elastic, MOST_CONSTANTS, Name, Orientation, Section, numbered, on_line};
 use crate::source::ReadError;
+use solver::element::Element;
 use solver::error::{Findings, Reason, Violation};
+use solver::mesh::RawMesh;
 use solver::problem::{
     Analysis, BoundaryValue, Elasticity, Load, Material, MeshInput, MeshSource, Orthotropic,
     Problem, SolverControls,
@@ -37,11 +38,14 @@ pub fn problem(text: &str) -> Result<Problem, Vec<Violation>> {
 pub fn problem_with_warnings(text: &str) -> Result<(Problem, Vec<Warning>), Vec<Violation>> {
     let deck = read(text.as_bytes()).map_err(ReadError::into_violations)?;
     let mut built = deck.build();
+    if built.deck.steps == 0 {
+        return Err(without_step(built.faults));
+    }
     let analysis = analysis(&mut built);
     let axisymmetric = matches!(analysis, Analysis::Axisymmetric {});
     let quadrature = quadrature(&mut built);
     let motions = built.take_motions(axisymmetric);
-    let factors = built.factors();
+    let factors = built.factors_of_steps();
     built.keep_last_loads();
     let thickness = match analysis {
         Analysis::PlaneStrain {} => built.sections.first().and_then(|s| s.row.thickness),
@@ -49,14 +53,14 @@ pub fn problem_with_warnings(text: &str) -> Result<(Problem, Vec<Warning>), Vec<
     };
     let thickness = thickness.unwrap_or(1.0);
     let materials = materials(&mut built);
-    built.check_steps();
     let supports = supports(&built);
     for (line, name) in supports.of_no_element {
+        let (what, ..) = built.not_meshed(&name);
         built.doubt(
             line,
-            format!("a displacement of `{name:.60}`"),
+            format!("a displacement of `{name:.60}`, {what}"),
             "nodes of plane elements, or the reference node of a *RIGID BODY",
-            "Move a rigid tool by its reference node, or by the `indentation` of a contact in a problem of Signorini.",
+            "Name nodes of the mesh. A rigid tool is moved by its reference node (REF NODE of *RIGID BODY), or by the `indentation` of a contact in a problem as JSON.",
         );
     }
     let loads = loads(&mut built, thickness);
@@ -118,55 +122,101 @@ pub fn problem_with_warnings(text: &str) -> Result<(Problem, Vec<Warning>), Vec<
     Ok((problem, warnings))
 }
 
+/// A deck without a step is a mesh: what a problem could not have of it is of no interest.
+fn without_step(mut faults: Findings) -> Vec<Violation> {
+    faults.add(Violation::new(
+        "",
+        Reason::NotUnderstood,
+        "a deck without *STEP",
+        "one *STEP",
+        "A deck without a step is a mesh: upload it, or quote it in a problem as JSON, \"mesh\": {\"abaqus\": \"…\"}.",
+    ));
+    faults.into_violations()
+}
+
 impl Built {
     pub(super) fn doubt(&mut self, line: u64, got: impl Into<String>, expected: &str, hint: &str) {
         let reason = Reason::NotUnderstood;
-        self.doubts.add(match line {
-            0 => Violation::new("", reason, got.into(), expected, hint),
-            _ => on_line(line, reason, got.into(), expected, hint),
-        });
+        self.doubts
+            .add(on_line(line, reason, got.into(), expected, hint));
     }
 
-    fn check_steps(&mut self) {
+    /// Why a set of nodes cannot be loaded: what it is, what is expected, and what to do.
+    fn not_meshed(&self, set: &str) -> (String, &'static str, &'static str) {
+        const MESHED: &str = "nodes of plane elements";
+        let nodes = self.raw.node_sets.get(set).map_or(&[][..], |nodes| nodes);
+        let Some(first) = nodes.first() else {
+            let hint = "Name nodes in the set: the keyword that defines it has no data lines, or only sets without nodes.";
+            return ("a set without nodes".to_owned(), MESHED, hint);
+        };
+        let of = |body: &&Body| {
+            nodes
+                .iter()
+                .any(|node| [body.reference, body.rotation].contains(&Some(*node)))
+        };
+        if let Some(body) = self.tools.bodies.iter().find(of) {
+            return (
+                format!(
+                    "the reference node of the *RIGID BODY on line {}",
+                    body.line
+                ),
+                "a rigid body that *BOUNDARY moves",
+                "A rigid body is moved here by a given displacement, not by a force. Prescribe the displacement, read `normal_force` of the result, and repeat with another displacement until that is the force.",
+            );
+        }
+        let label = self.raw.node_labels[*first as usize];
+        let what = match nodes.len() {
+            1 => format!("where node {label} belongs to no plane element"),
+            count => {
+                format!("whose {count} nodes (the first is {label}) belong to no plane element")
+            }
+        };
+        (
+            what,
+            MESHED,
+            "Name nodes of the mesh. A reference node acts through a *RIGID BODY with a *CONTACT PAIR only: *COUPLING, *MPC and *EQUATION are not read.",
+        )
+    }
+
+    /// The factors of loads and supports at the end of each step, of steps that are understood.
+    fn factors_of_steps(&mut self) -> Vec<[f64; 2]> {
         let steps = self.deck.steps;
-        if steps == 0 || steps != 1 && self.pairs.is_empty() {
+        if steps == 1 || steps > 1 && !self.pairs.is_empty() {
+            self.check_replaced();
+            return self.factors();
+        }
+        if let Some((second, _)) = self.deck.contact.steps.get(1).copied() {
             self.doubt(
-                0,
-                format!("{steps} steps"),
+                second,
+                format!("the second of {steps} steps"),
                 "one *STEP",
-                match steps {
-                    0 => "A deck without a step is a mesh: upload it, or quote it in a problem as JSON, \"mesh\": {\"abaqus\": \"…\"}.",
-                    _ => "Several steps are read where they move a rigid body (*CONTACT PAIR). Give others in a problem as JSON, with this deck as its mesh.",
-                },
+                "Several steps are read where they move a rigid body (*CONTACT PAIR). Delete the others, or write a problem as JSON for each, with this deck as its mesh.",
             );
         }
-        // without one of the two there are no thermal strains
-        let expansion = |material: &MaterialDefinition| material.expansion;
-        if let (Some(line), Some(_)) = (
-            self.deck.temperatures,
-            self.deck.materials.values().find_map(expansion),
-        ) {
-            self.doubt(
-                line,
-                "temperatures of a material with *EXPANSION",
-                "no thermal strains",
-                "Remove the temperatures, or the expansion.",
-            );
-        }
+        vec![[1.0; 2]; steps]
     }
 }
 
+fn beside(other: &Typed, first: &Typed) -> String {
+    format!(
+        "elements of type `{:.20}` beside those of type `{:.20}` on line {}",
+        other.name, first.name, first.line
+    )
+}
+
 fn analysis(built: &mut Built) -> Analysis {
-    let theory = built
-        .types
-        .first()
-        .map_or(Theory::PlaneStrain, |kind| kind.theory);
-    if built.types.iter().any(|kind| kind.theory != theory) {
+    let first = built.types.first().cloned();
+    let theory = first
+        .as_ref()
+        .map_or(Theory::PlaneStrain, |kind| kind.mechanics.theory);
+    let mut others = built.types.iter();
+    let other = others.find(|kind| kind.mechanics.theory != theory).cloned();
+    if let (Some(first), Some(other)) = (first, other) {
         built.doubt(
-            0,
-            "elements of different theories",
-            "one of CPE, CPS, CAX throughout",
-            "Use one theory for all elements.",
+            other.line,
+            beside(&other, &first),
+            "one of CPE (plane strain), CPS (plane stress) and CAX (revolution) for all elements",
+            "Change the types of either, or leave out the elements that do not belong to the body.",
         );
     }
     let thicknesses: Vec<(u64, Option<f64>)> = built
@@ -199,20 +249,21 @@ fn analysis(built: &mut Built) -> Analysis {
 /// integrate with three points. In a mixed mesh triangles get the larger rule, which is at least as accurate but
 /// not the same.
 fn quadrature(built: &mut Built) -> u32 {
-    if built.types.iter().all(Mechanics::is_triangle) {
+    let is_quad = |kind: &&Typed| !kind.mechanics.is_triangle();
+    let quads: Vec<Typed> = built.types.iter().filter(is_quad).cloned().collect();
+    let Some(first) = quads.first() else {
         return 2;
-    }
-    built.types.retain(|kind| !kind.is_triangle());
-    let reduced = built.types.iter().filter(|kind| kind.reduced).count();
-    if reduced != 0 && reduced != built.types.len() {
+    };
+    let reduced = first.mechanics.reduced;
+    if let Some(other) = quads.iter().find(|kind| kind.mechanics.reduced != reduced) {
         built.doubt(
-            0,
-            "elements of full and of reduced integration",
-            "one kind of integration",
-            "Remove the R from the element types.",
+            other.line,
+            beside(other, first),
+            "full integration of all elements, or reduced integration (R) of all",
+            "Add or remove the R in the element types of either.",
         );
     }
-    if reduced > 0 { 2 } else { 3 }
+    if reduced { 2 } else { 3 }
 }
 
 fn materials(built: &mut Built) -> Vec<Material> {
@@ -230,18 +281,47 @@ fn materials(built: &mut Built) -> Vec<Material> {
         let Some((definition, elastic)) = definition.and_then(|m| Some((m, m.elastic.as_ref()?)))
         else {
             if !built.incomplete.names && told.insert(&row.material) {
-                let got = format!("the material `{:.60}`", row.material);
+                let got = if known.contains_key(&row.material) {
+                    format!("the material `{:.60}` without *ELASTIC", row.material)
+                } else {
+                    format!("the unknown material `{:.60}`", row.material)
+                };
+                let names = known.keys().take(20);
+                let names: Vec<String> = names.map(|name| format!("{name:.60}")).collect();
+                let hint = if names.is_empty() {
+                    "The deck has no *MATERIAL: define it by *MATERIAL, NAME=… with *ELASTIC."
+                        .to_owned()
+                } else {
+                    format!(
+                        "Known materials: {}. Correct MATERIAL=…, or give it *ELASTIC.",
+                        names.join(", ")
+                    )
+                };
                 built.doubt(
                     row.line,
                     got,
-                    "a *MATERIAL with *ELASTIC",
-                    "Define the material.",
+                    "a *MATERIAL of that name with *ELASTIC",
+                    &hint,
                 );
             }
             continue;
         };
         if told.contains(&row.material) {
             continue;
+        }
+        if let Some(expansion) = definition.expansion
+            && let Some((line, got)) = built.deck.temperatures.changed.take()
+        {
+            let got = format!(
+                "{got}, and the material `{:.60}` of the body has *EXPANSION (line {expansion})",
+                row.material
+            );
+            built.doubt(
+                line,
+                got,
+                "temperatures that stay as *INITIAL CONDITIONS give them, 0 where they give none, or a material without *EXPANSION",
+                "Thermal strains are not computed. Remove the change of temperature or *EXPANSION if they may be neglected.",
+            );
         }
         for (line, got) in &definition.other {
             told.insert(&row.material);
@@ -266,7 +346,12 @@ fn materials(built: &mut Built) -> Vec<Material> {
             None if elastic.unreadable || !told.insert(&row.material) => {}
             None => {
                 let (got, expected) = constants(elastic);
-                built.doubt(elastic.line, got, expected, "Correct the constants.");
+                built.doubt(
+                    elastic.line,
+                    got,
+                    expected,
+                    "Write the constants of one temperature in that order; other forms of elasticity have to be converted.",
+                );
             }
         }
     }
@@ -368,24 +453,37 @@ fn constants(elastic: &Elastic) -> (String, &'static str) {
     )
 }
 
+/// The elements on both sides of those of some sides that lie inside the body, by their numbers.
+fn elements_at(raw: &RawMesh, sides: &[[u32; 2]], inner: &[(u32, u32)]) -> String {
+    let inside = sides.iter().map(|ends| key(*ends));
+    let inside: BTreeSet<(u32, u32)> = inside
+        .filter(|side| inner.binary_search(side).is_ok())
+        .collect();
+    let has_one = |element: &Element| {
+        let corners = element.family().corners();
+        (0..corners).any(|k| inside.contains(&key([element[k], element[(k + 1) % corners]])))
+    };
+    let places = (0..raw.elements.len()).filter(|place| has_one(&raw.elements[*place]));
+    numbered("element", places.map(|place| raw.element_labels[place]))
+}
+
 /// `thickness`: of a body in plane strain, whose forces are per unit of thickness here. On a body of revolution a force
 /// acts on the whole ring, in Abaqus and CalculiX as here.
 fn loads(built: &mut Built, thickness: f64) -> Vec<Load> {
     let mut loads = Vec::new();
     let pressures = std::mem::take(&mut built.pressures);
-    let inner = match pressures.is_empty() {
-        true => Vec::new(),
-        false => sides_of_two(&built.raw),
+    let inner = if pressures.is_empty() {
+        Vec::new()
+    } else {
+        sides_of_two(&built.raw)
     };
     // a deck may load the same sides many times
     let mut counted: BTreeMap<String, (usize, usize)> = BTreeMap::new();
     for Row { row, name } in pressures {
         let count = || {
             let sides = built.raw.lines.get(&name).map_or(&[][..], |sides| sides);
-            let inside = sides
-                .iter()
-                .filter(|ends| inner.binary_search(&key(**ends)).is_ok());
-            (sides.len(), inside.count())
+            let is_inside = |ends: &&[u32; 2]| inner.binary_search(&key(**ends)).is_ok();
+            (sides.len(), sides.iter().filter(is_inside).count())
         };
         match *counted.entry(name.clone()).or_insert_with(count) {
             (0, _) => built.doubt(
@@ -397,7 +495,10 @@ fn loads(built: &mut Built, thickness: f64) -> Vec<Load> {
             (_, 0) => loads.push(Load::Pressure(name, BoundaryValue::Constant(row.value))),
             (all, inside) => built.doubt(
                 row.line,
-                format!("a pressure on `{name:.60}`: {inside} of its {all} sides lie inside the body"),
+                format!(
+                    "a pressure on `{name:.60}`: {inside} of its {all} sides lie inside the body, those of {}",
+                    elements_at(&built.raw, &built.raw.lines[&name], &inner)
+                ),
                 "sides on the surface of the body",
                 "Load only the elements at the surface, or give forces at the nodes inside by *CLOAD.",
             ),
@@ -411,11 +512,12 @@ fn loads(built: &mut Built, thickness: f64) -> Vec<Load> {
             nodes.any(|node| built.used[*node as usize])
         };
         if !*used.entry(name.clone()).or_insert_with(count) {
+            let (what, expected, hint) = built.not_meshed(&name);
             built.doubt(
                 row.line,
-                format!("a force on `{name:.60}`, which has no node of an element"),
-                "nodes of plane elements",
-                "Press by a rigid tool through a contact, in a problem of Signorini.",
+                format!("a force on `{name:.60}`, {what}"),
+                expected,
+                hint,
             );
             continue;
         }

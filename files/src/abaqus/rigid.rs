@@ -20,6 +20,8 @@ pub(super) struct Tools {
     pub(super) by_surface: BTreeMap<String, (usize, Vec<Piece>)>,
     /// Places of plane elements of rigid bodies: they are no part of the elastic body.
     pub(super) elements: BTreeSet<u32>,
+    /// Their numbers, as a warning says them.
+    pub(super) left_out: String,
     /// Places of all elements of rigid bodies among all elements.
     pub(super) members: BTreeSet<u32>,
     /// Rows of `*BOUNDARY` for reference nodes, in the order of the deck.
@@ -56,7 +58,8 @@ impl Tools {
             code: WarningCode::RigidElementsLeftOut,
             pointer: String::new(),
             message: format!(
-                "{count} elements of a *RIGID BODY are no part of the elastic body and are left out."
+                "{count} elements of a *RIGID BODY are no part of the elastic body and are left out: {}.",
+                self.left_out
             ),
         })
     }

@@ -22,6 +22,23 @@ impl Kind {
         }
     }
 
+    pub(super) fn one(self) -> &'static str {
+        match self {
+            Kind::Elements => "an element",
+            _ => "a node",
+        }
+    }
+
+    /// What to do about a name or number of this kind that nothing has.
+    pub(super) fn remedy(self) -> &'static str {
+        match self {
+            Kind::Elements => {
+                "Correct the name, or define the set by *ELSET or by ELSET=… of *ELEMENT."
+            }
+            _ => "Correct the name, or define the set by *NSET or by NSET=… of *NODE.",
+        }
+    }
+
     /// The kind of sets that are named in one: surfaces of nodes name sets of nodes.
     pub(super) fn named(self) -> Kind {
         match self {
@@ -94,6 +111,27 @@ impl Scope {
         let (mut places, visited) = labels.range(first, last, step, most);
         places.iter_mut().for_each(|place| *place += from);
         (places, visited)
+    }
+
+    /// What to do about a number that nothing has: says which numbers there are.
+    pub(super) fn hint_of_numbers(&self, kind: Kind) -> String {
+        let (labels, _) = self.labels(kind);
+        let (what, keyword) = match kind {
+            Kind::Elements => ("elements", "*ELEMENT"),
+            _ => ("nodes", "*NODE"),
+        };
+        let of = match &self.name {
+            Some(instance) => format!(" of the instance `{instance:.60}`"),
+            None => String::new(),
+        };
+        match labels.ends() {
+            Some((first, last)) => format!(
+                "The {what}{of} have numbers from {first} to {last}, not necessarily all of them. Correct the number, or define it by {keyword}."
+            ),
+            None => format!(
+                "There are no {what}{of} here. Define them by {keyword}, or name those of an instance as INSTANCE.NUMBER."
+            ),
+        }
     }
 
     /// A missing number may be on a line that could not be read.

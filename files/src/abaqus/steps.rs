@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::build::{Built, Row};
 use super::contact_parts::WRITTEN_INSTEAD;
+use super::replaced::Key;
 use super::rigid::{Body, Moving};
 use super::tool::Point;
 use super::written::{Force, Pressure};
@@ -55,6 +56,7 @@ impl Built {
             .map(|(body, held)| self.motion(body, held, axisymmetric))
             .collect();
         self.tools.bodies = bodies;
+        self.tools.rows = rows;
         motions
     }
 
@@ -107,40 +109,68 @@ impl Built {
     pub(super) fn factors(&mut self) -> Vec<[f64; 2]> {
         let steps = &self.deck.contact;
         let count = steps.steps.len().max(1);
-        let mut loads: BTreeMap<String, Vec<(usize, f64)>> = BTreeMap::new();
+        let mut loads = ByName::new();
         for Row { row, name } in &self.pressures {
-            let rows = loads.entry(format!("p {name}")).or_default();
-            rows.push((steps.step_of(row.line), row.value));
+            let rows = loads.entry((0, name.clone())).or_default();
+            add(rows, steps.step_of(row.line), row.value);
         }
         for Row { row, name } in &self.forces {
-            let rows = loads
-                .entry(format!("f{} {name}", row.component))
-                .or_default();
-            rows.push((steps.step_of(row.line), row.value));
+            let rows = loads.entry((row.component, name.clone())).or_default();
+            add(rows, steps.step_of(row.line), row.value);
         }
-        let mut supports: BTreeMap<String, Vec<(usize, f64)>> = BTreeMap::new();
+        let mut supports = ByName::new();
+        // the first row that a later step adds for nodes that were free
+        let mut late: Vec<(u64, u64, &str)> = Vec::new();
         for Row { row, name } in &self.prescribed {
             for component in row.components.0..=row.components.1 {
-                let rows = supports.entry(format!("{component} {name}")).or_default();
+                let rows = supports.entry((component, name.clone())).or_default();
+                if rows.is_empty() && steps.step_of(row.line) > 0 {
+                    late.push((row.line, component, name));
+                }
                 rows.push((steps.step_of(row.line), row.value));
             }
         }
-        // a support that a later step adds would hold the body from the beginning
-        let late = supports
-            .values()
-            .any(|rows| rows.iter().all(|(step, _)| *step > 0));
-        let found = [proportion(&loads, count), proportion(&supports, count)];
-        match (found, late) {
-            ([Some(loads), Some(supports)], false) => loads
-                .into_iter()
-                .zip(supports)
-                .map(|(l, s)| [l, s])
-                .collect(),
-            _ => {
-                self.doubt(0, "steps that change loads or supports in different proportions, or add supports", "supports of the first step, and one factor on all loads and one on all prescribed displacements in each step", WRITTEN_INSTEAD);
-                vec![[1.0; 2]; count]
-            }
+        if !late.is_empty() {
+            let first =
+                |(_, rows): &(&Key, &Vec<(usize, f64)>)| rows.iter().any(|(step, _)| *step == 0);
+            let held = self.nodes_held(supports.iter().filter(first).map(|(key, _)| key));
+            late.retain(|(_, component, name)| !self.is_held(*component, name, &held));
         }
+        let late = late.first().map(|(line, component, name)| {
+            (
+                *line,
+                format!(
+                    "a support that a later step adds: displacement {component} of `{name:.60}`"
+                ),
+            )
+        });
+        if let Some((line, got)) = late {
+            self.doubt(
+                line,
+                got,
+                "supports that hold from the first step on",
+                &format!("It would hold the body from the beginning. State it in the first step if that is meant. {WRITTEN_INSTEAD}"),
+            );
+        }
+        let whats = ["loads", "prescribed displacements"];
+        let found = [(loads, whats[0]), (supports, whats[1])].map(|(rows, what)| {
+            proportion(&rows, count).unwrap_or_else(|step| {
+                let line = self.deck.contact.steps.get(step).map_or(0, |step| step.0);
+                self.doubt(
+                    line,
+                    format!("a step whose {what} are in another proportion to each other than in the last step"),
+                    &format!("in each step one factor on all {what}"),
+                    WRITTEN_INSTEAD,
+                );
+                vec![1.0; count]
+            })
+        });
+        let [loads, supports] = found;
+        loads
+            .into_iter()
+            .zip(supports)
+            .map(|(l, s)| [l, s])
+            .collect()
     }
 
     /// Leaves of each load only its row of the last step that has one.
@@ -162,8 +192,20 @@ impl Built {
     }
 }
 
-/// The factor of all values at the end of each step; 0 where there are none. `None`: they are not in proportion.
-fn proportion(rows: &BTreeMap<String, Vec<(usize, f64)>>, count: usize) -> Option<Vec<f64>> {
+/// Values with their steps, in the order of the deck.
+type ByName = BTreeMap<Key, Vec<(usize, f64)>>;
+
+/// Adds a load: those of one step for the same set add.
+fn add(rows: &mut Vec<(usize, f64)>, step: usize, value: f64) {
+    match rows.last_mut() {
+        Some((last, sum)) if *last == step => *sum += value,
+        _ => rows.push((step, value)),
+    }
+}
+
+/// The factor of all values at the end of each step; 0 where there are none. An error is the first step whose values are
+/// not in proportion to the last ones.
+fn proportion(rows: &ByName, count: usize) -> Result<Vec<f64>, usize> {
     let at = |rows: &[(usize, f64)], step: usize| {
         let mut latest = rows.iter().rev();
         latest
@@ -185,7 +227,7 @@ fn proportion(rows: &BTreeMap<String, Vec<(usize, f64)>>, count: usize) -> Optio
             .iter()
             .zip(&ends)
             .all(|(now, end)| (now - factor * end).abs() <= SAME * size.max(now.abs()));
-        fits.then_some(factor)
+        fits.then_some(factor).ok_or(step)
     };
     (0..count).map(factor).collect()
 }

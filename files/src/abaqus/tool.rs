@@ -97,9 +97,10 @@ impl Piece {
     /// The side of an element of second order: a line if its midside lies in the middle.
     pub(super) fn side([a, m, b]: [Point; 3]) -> Self {
         let off = length(minus(m, [0, 1].map(|i| 0.5 * (a[i] + b[i]))));
-        match off <= 1e-9 * length(minus(b, a)) {
-            true => Piece::Line([a, b]),
-            false => Piece::Parabola([a, m, b]),
+        if off <= 1e-9 * length(minus(b, a)) {
+            Piece::Line([a, b])
+        } else {
+            Piece::Parabola([a, m, b])
         }
     }
 

@@ -106,6 +106,49 @@ pub(super) struct Force {
     pub(super) amplitude: Option<Name>,
 }
 
+/// The temperatures of a deck.
+#[derive(Default)]
+pub(super) struct Temperatures {
+    /// What has a temperature at the beginning, and which.
+    pub(super) initial: Vec<(Target, f64)>,
+    /// Some of the initial temperatures are not known.
+    pub(super) others: bool,
+    /// The first line that changes a temperature, and what it says.
+    pub(super) changed: Option<(u64, String)>,
+}
+
+impl Temperatures {
+    /// Whether a row leaves a temperature as it is; if that is not certain it counts as changed.
+    pub(super) fn is_initial(&self, target: &Target, value: f64) -> bool {
+        let mut all = self.initial.iter();
+        let same = all.clone().all(|(_, initial)| *initial == value);
+        // what is given no temperature begins at 0
+        let named = if self.initial.is_empty() {
+            value == 0.0
+        } else {
+            all.any(|(of, _)| of == target)
+        };
+        same && named && !self.others
+    }
+}
+
+/// What `OP=NEW` replaces. `*DLOAD` and `*DSLOAD` replace each other's pressures in CalculiX, and only their own in Abaqus:
+/// here both have to be stated again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Replaces {
+    Supports,
+    Forces,
+    Pressures,
+}
+
+/// A keyword with `OP=NEW` in a step after the first.
+pub(super) struct Replacement {
+    pub(super) line: u64,
+    /// The name of the keyword.
+    pub(super) keyword: String,
+    pub(super) what: Replaces,
+}
+
 /// A set as it is written.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Set {
@@ -180,6 +223,19 @@ pub(super) fn on_line(
     Violation::new("", reason, format!("line {line}: {got}"), expected, hint)
 }
 
+/// `element 3`, or `elements 3, 7, 12, 14, 20 and 31 others`.
+pub(super) fn numbered(what: &str, numbers: impl Iterator<Item = u64>) -> String {
+    const MOST: usize = 5;
+    let mut numbers = numbers.fuse();
+    let first: Vec<String> = numbers.by_ref().take(MOST).map(|n| n.to_string()).collect();
+    match (first.len(), numbers.count()) {
+        (1, _) => format!("{what} {}", first[0]),
+        (_, 0) => format!("{what}s {}", first.join(", ")),
+        (_, 1) => format!("{what}s {} and 1 other", first.join(", ")),
+        (_, more) => format!("{what}s {} and {more} others", first.join(", ")),
+    }
+}
+
 /// The values of a line, between commas and without blanks around them; one in quotation marks may contain commas.
 /// Those that are left out at the end are not listed.
 pub(super) fn fields(text: &str) -> Vec<&str> {
@@ -208,6 +264,15 @@ pub(super) fn number(word: &str) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn up_to_five_numbers_are_named() {
+        let named = |count: u64| numbered("element", (1..=count).map(|k| 3 * k));
+        assert_eq!(named(1), "element 3");
+        assert_eq!(named(5), "elements 3, 6, 9, 12, 15");
+        assert_eq!(named(6), "elements 3, 6, 9, 12, 15 and 1 other");
+        assert_eq!(named(36), "elements 3, 6, 9, 12, 15 and 31 others");
+    }
 
     #[test]
     fn a_line_is_split_at_commas_outside_of_quotation_marks() {

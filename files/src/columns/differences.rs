@@ -85,9 +85,10 @@ impl Writer {
             let bits = |difference: &u64| u64::from(64 - difference.leading_zeros());
             differences.iter().map(bits).sum()
         };
-        let (kind, nearer) = match bits(&own) <= bits(&in_sequence) {
-            true => (AS_PREDICTED, own),
-            false => (AS_BEFORE, in_sequence),
+        let (kind, nearer) = if bits(&own) <= bits(&in_sequence) {
+            (AS_PREDICTED, own)
+        } else {
+            (AS_BEFORE, in_sequence)
         };
         self.stream.push(kind);
         self.planes(&nearer);
@@ -128,9 +129,10 @@ impl Writer {
         let mut out = Vec::new();
         head.write(&mut out);
         out.extend(&self.random);
-        let level = match self.stream.len() > LARGE {
-            true => Compression::fast(),
-            false => Compression::best(),
+        let level = if self.stream.len() > LARGE {
+            Compression::fast()
+        } else {
+            Compression::best()
         };
         let mut deflate = DeflateEncoder::new(out, level);
         // writing to memory does not fail
@@ -252,9 +254,10 @@ impl Reader<'_> {
 
     /// An error unless all was read.
     pub(super) fn finish(self) -> Result<(), String> {
-        match (self.at, self.at_random) == (self.stream.len(), self.random.len()) {
-            true => Ok(()),
-            false => Err(damaged("there is more than fields")),
+        if (self.at, self.at_random) == (self.stream.len(), self.random.len()) {
+            Ok(())
+        } else {
+            Err(damaged("there is more than fields"))
         }
     }
 }

@@ -82,9 +82,10 @@ impl Head {
         if self.sum(LEAST_JSON) > json_bytes || content > most {
             return Err(damaged("larger than its content"));
         }
-        match (3 * self.elements..=9 * self.elements).contains(&self.points) {
-            true => Ok(()),
-            false => Err(damaged("integration points")),
+        if (3 * self.elements..=9 * self.elements).contains(&self.points) {
+            Ok(())
+        } else {
+            Err(damaged("integration points"))
         }
     }
 

@@ -105,9 +105,10 @@ impl Strains {
         Strains {
             dx: mapped.gradient.map(|[x, _]| x),
             dy: mapped.gradient.map(|[_, y]| y),
-            hoop: match axisymmetric {
-                true => mapped.shape.map(|h| h / mapped.x),
-                false => [0.0; 8],
+            hoop: if axisymmetric {
+                mapped.shape.map(|h| h / mapped.x)
+            } else {
+                [0.0; 8]
             },
         }
     }

@@ -177,9 +177,10 @@ fn read_elements(
         let own = own
             .get(..usize::from(*length))
             .ok_or_else(|| damaged("elements"))?;
-        match own.iter().all(|node| (*node as usize) < nodes) {
-            true => Element::try_from(own),
-            false => Err(damaged("nodes of elements")),
+        if own.iter().all(|node| (*node as usize) < nodes) {
+            Element::try_from(own)
+        } else {
+            Err(damaged("nodes of elements"))
         }
     };
     let mut elements = Vec::with_capacity(count);

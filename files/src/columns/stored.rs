@@ -147,14 +147,15 @@ fn lattice(cells: u32, split: &[bool], order: u32, curved: f64) -> Fields {
         let sides = [node(0, 0), node(2, 0), node(2, 2), node(0, 2)];
         let [bottom, right, top, left] = [node(1, 0), node(2, 1), node(1, 2), node(0, 1)];
         let [a, b, c, d] = sides;
-        match split {
-            true => fields.elements.extend([
+        if *split {
+            fields.elements.extend([
                 Element::Triangle([a, b, c, bottom, right, node(1, 1)]),
                 Element::Triangle([a, c, d, node(1, 1), top, left]),
-            ]),
-            false => fields
+            ])
+        } else {
+            fields
                 .elements
-                .push(Element::Quad([a, b, c, d, bottom, right, top, left])),
+                .push(Element::Quad([a, b, c, d, bottom, right, top, left]))
         }
     }
     fields.element_error = (0..fields.elements.len())

@@ -40,9 +40,10 @@ pub(super) fn limits(curves: &[&[(f64, f64)]], cut: f64) -> Range<f64> {
     } else {
         0.0
     };
-    match below + above > 0.0 {
-        true => -1.08 * below - 0.02 * above..1.08 * above + 0.02 * below,
-        false => -1.0..1.0,
+    if below + above > 0.0 {
+        -1.08 * below - 0.02 * above..1.08 * above + 0.02 * below
+    } else {
+        -1.0..1.0
     }
 }
 
@@ -121,9 +122,12 @@ pub(super) fn named_peak(
     of_peak: &str,
 ) -> Option<(f64, f64, bool)> {
     let beyond = curves.iter().flat_map(|points| peaks(points, up));
-    let largest = beyond.reduce(|most, peak| match peak.1.abs() > most.1.abs() {
-        true => peak,
-        false => most,
+    let largest = beyond.reduce(|most, peak| {
+        if peak.1.abs() > most.1.abs() {
+            peak
+        } else {
+            most
+        }
     });
     if largest.is_some() || of_peak.is_empty() {
         return largest;
@@ -148,9 +152,10 @@ pub(super) fn interpolated(
 /// Where on the first axis the second has a value.
 pub(super) fn place_of(places: &[(f64, f64)], value: f64) -> Option<f64> {
     let turned = places.iter().map(|&(s, c)| (c, s));
-    match places.first()?.1 <= places.last()?.1 {
-        true => interpolated(turned, value),
-        false => interpolated(turned.rev(), value),
+    if places.first()?.1 <= places.last()?.1 {
+        interpolated(turned, value)
+    } else {
+        interpolated(turned.rev(), value)
     }
 }
 

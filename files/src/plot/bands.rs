@@ -63,9 +63,10 @@ impl Bands {
             most
         };
         let span = highest - lowest;
-        let step = match span > 1e-9 * most.abs().max(least.abs()) && span.is_normal() {
-            true => round_up(span / BANDS, &[1.0, 2.0, 2.5, 5.0]),
-            false => most.abs().max(1.0), // one colour
+        let step = if span > 1e-9 * most.abs().max(least.abs()) && span.is_normal() {
+            round_up(span / BANDS, &[1.0, 2.0, 2.5, 5.0])
+        } else {
+            most.abs().max(1.0) // one colour
         };
         let first = (lowest / step + 1e-9).floor();
         let count = ((highest / step - 1e-9).ceil() - first).max(1.0);
@@ -77,9 +78,10 @@ impl Bands {
             (lowest > least).then_some(least).filter(|v| *v < edges[0]),
             (highest < most).then_some(most).filter(|v| *v > end),
         ];
-        let colours = match edges[0] < 0.0 && end > 0.0 {
-            true => ColourMap::Signed,
-            false => ColourMap::Rising,
+        let colours = if edges[0] < 0.0 && end > 0.0 {
+            ColourMap::Signed
+        } else {
+            ColourMap::Rising
         };
         Bands {
             edges,

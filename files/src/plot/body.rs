@@ -149,9 +149,10 @@ pub(super) fn layout(style: Style, windows: &[Window]) -> (Vec<Frame>, i32) {
             top += CAPTION + size[1] / page::FINE + BELOW + GAP;
         }
     }
-    let height = match beside {
-        true => CAPTION + highest / page::FINE + BELOW + GAP,
-        false => top,
+    let height = if beside {
+        CAPTION + highest / page::FINE + BELOW + GAP
+    } else {
+        top
     };
     (frames, height)
 }
@@ -257,9 +258,10 @@ impl Path {
             let c = [0, 1].map(|k| round(2.0 * mid[k] - 0.5 * (start[k] + end[k])) - a[k]);
             let off = (0..2).any(|k| (2 * m[k] - a[k] - b[k]).abs() > 2);
             let to = [b[0] - a[0], b[1] - a[1]];
-            let _ = match off {
-                true => write!(self.0, "q{} {} {} {}", c[0], c[1], to[0], to[1]),
-                false => write!(self.0, "l{} {}", to[0], to[1]),
+            let _ = if off {
+                write!(self.0, "q{} {} {} {}", c[0], c[1], to[0], to[1])
+            } else {
+                write!(self.0, "l{} {}", to[0], to[1])
             };
             here = Some(b);
         }
@@ -270,9 +272,10 @@ impl Path {
 
     /// An element of SVG with these attributes; nothing if the path is empty.
     pub(super) fn drawn(&self, attributes: &str) -> String {
-        match self.0.is_empty() {
-            true => String::new(),
-            false => format!("<path {attributes} d=\"{}\"/>\n", self.0),
+        if self.0.is_empty() {
+            String::new()
+        } else {
+            format!("<path {attributes} d=\"{}\"/>\n", self.0)
         }
     }
 }

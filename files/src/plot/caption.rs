@@ -47,9 +47,10 @@ impl Caption {
         let several = problem.contacts.len() > 1;
         let parameters = problem.contacts.iter().map(|contact| {
             let law = law(contact, length(problem));
-            match several {
-                true => format!("{}: {law}", solver::error::shortened(&contact.boundary, 20)),
-                false => law,
+            if several {
+                format!("{}: {law}", solver::error::shortened(&contact.boundary, 20))
+            } else {
+                law
             }
         });
         Caption {

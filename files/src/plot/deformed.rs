@@ -198,12 +198,13 @@ impl Surface<'_> {
 /// The states that have a colour of their own; without friction contact is contact.
 fn looks(style: Style, rough: bool) -> Vec<(&'static [NodeState], RGBColor)> {
     let palette = style.palette();
-    match rough {
-        true => vec![
+    if rough {
+        vec![
             (&[NodeState::Stick], palette.stick),
             (&[NodeState::Slip], palette.slip),
-        ],
-        false => vec![(&[NodeState::Stick, NodeState::Slip], palette.curves[0])],
+        ]
+    } else {
+        vec![(&[NodeState::Stick, NodeState::Slip], palette.curves[0])]
     }
 }
 
@@ -279,11 +280,12 @@ impl Body<'_> {
         let nodes = f.x.len();
         let columns = [&f.y, &f.ux, &f.uy];
         let known = |n: &u32| (*n as usize) < nodes;
-        match columns.iter().all(|column| column.len() == nodes)
+        if columns.iter().all(|column| column.len() == nodes)
             && f.elements.iter().all(|e| e.iter().all(known))
         {
-            true => Ok(()),
-            false => Err("some nodes have no field values".to_owned()),
+            Ok(())
+        } else {
+            Err("some nodes have no field values".to_owned())
         }
     }
 

@@ -190,10 +190,11 @@ fn draw_panel(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
     let curves: Vec<Vec<(f64, f64)>> = panel.curves.iter().map(shown).collect();
     let whole = matches!(panel.scale, Scale::Count | Scale::Log);
     let places = curves.iter().flatten().map(|p| p.0);
-    let across = match whole {
+    let across = if whole {
         // the first and the last whole number stand clear of the ends
-        true => extent(places.flat_map(|x| [x - 0.5, x + 0.5])),
-        false => extent(places),
+        extent(places.flat_map(|x| [x - 0.5, x + 0.5]))
+    } else {
+        extent(places)
     };
     let (head, body) = area.split_vertically(px(LEGEND * rows(style, panel)));
     let name = if panel.x.is_empty() { 0 } else { NAME };
@@ -210,9 +211,12 @@ fn draw_panel(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
         round if (value - round).abs() < 1e-6 => number(round),
         _ => String::new(),
     };
-    let x_label = |value: &f64| match whole {
-        true => whole_number(*value),
-        false => tick(*value, across.end - across.start),
+    let x_label = |value: &f64| {
+        if whole {
+            whole_number(*value)
+        } else {
+            tick(*value, across.end - across.start)
+        }
     };
     let y_label = |value: &f64| match panel.scale {
         Scale::Log => power_of_ten(*value),
@@ -417,13 +421,15 @@ fn draw_cuts(
     };
     let words = format!("peak {}{}", rounded(peak), panel.of_peak);
     let x_at = frame.x(x);
-    let (side, gap) = match x_at > (frame.left + frame.right) / 2 {
-        true => (HPos::Right, -px(12)),
-        false => (HPos::Left, px(12)),
+    let (side, gap) = if x_at > (frame.left + frame.right) / 2 {
+        (HPos::Right, -px(12))
+    } else {
+        (HPos::Left, px(12))
     };
-    let (vertical, lift) = match over {
-        true => (VPos::Top, px(6)),
-        false => (VPos::Bottom, -px(6)),
+    let (vertical, lift) = if over {
+        (VPos::Top, px(6))
+    } else {
+        (VPos::Bottom, -px(6))
     };
     let place = (
         x_at + gap,

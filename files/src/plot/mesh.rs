@@ -62,9 +62,10 @@ pub fn mesh_svg(
         .zip(&fields.y)
         .map(|(&x, &y)| [x, y])
         .collect();
-    let (elements, nodes) = match fields.elements.is_empty() {
-        true => (&mesh.elements, &mesh.nodes),
-        false => (&fields.elements, &refined),
+    let (elements, nodes) = if fields.elements.is_empty() {
+        (&mesh.elements, &mesh.nodes)
+    } else {
+        (&fields.elements, &refined)
     };
     if elements
         .iter()
@@ -260,9 +261,10 @@ fn label(problem: &Problem, name: &str) -> String {
         .map(|(_, role)| role)
         .collect();
     let name = shortened(name, 24);
-    match roles.is_empty() {
-        true => name,
-        false => format!("{name} ({})", roles.join(", ")),
+    if roles.is_empty() {
+        name
+    } else {
+        format!("{name} ({})", roles.join(", "))
     }
 }
 

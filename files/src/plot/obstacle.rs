@@ -31,9 +31,12 @@ impl Face {
         for (i, position) in nodes.iter().enumerate() {
             // edge k has the nodes 2k, 2k + 1 in its middle, and 2k + 2
             let (edge, middle) = (i / 2, i % 2 == 1);
-            let before = |place: &&&solver::contact::obstacle::Place| match middle {
-                true => place.edge < edge || (place.edge == edge && place.xi < 0.0),
-                false => place.edge < edge,
+            let before = |place: &&&solver::contact::obstacle::Place| {
+                if middle {
+                    place.edge < edge || (place.edge == edge && place.xi < 0.0)
+                } else {
+                    place.edge < edge
+                }
             };
             while let Some(place) = places.next_if(|place| before(&place)) {
                 let first = 2 * place.edge;

@@ -50,9 +50,10 @@ pub(super) fn page(
     let above = above(style, caption);
     let head = TITLE + LINE * above.len() as i32;
     let foot = foot(style, caption);
-    let below = match foot.is_empty() {
-        true => 0,
-        false => FOOT * foot.len() as i32 + MARGIN,
+    let below = if foot.is_empty() {
+        0
+    } else {
+        FOOT * foot.len() as i32 + MARGIN
     };
     let size = (width, head + height + below);
     let mut svg = String::new();
@@ -250,10 +251,11 @@ fn with_subscripts(svg: &str) -> String {
         ));
         let stop = tail[..close].find("σ_").unwrap_or(close);
         let (following, tail) = tail.split_at(stop);
-        match following.trim().is_empty() && stop == close {
-            true => out.push_str(following),
+        if following.trim().is_empty() && stop == close {
+            out.push_str(following);
+        } else {
             // back to the line
-            false => out.push_str(&format!(r#"<tspan dy="-{down}">{following}</tspan>"#)),
+            out.push_str(&format!(r#"<tspan dy="-{down}">{following}</tspan>"#));
         }
         rest = tail;
     }

@@ -52,9 +52,10 @@ fn panels(
     let stress = |name: &str| with_unit(name, page::stress(&problem.units));
     let rough = |contact: &Contact| contact.boundary == name && contact.friction.is_some();
     let rough = problem.contacts.iter().any(rough);
-    let shades = match rough {
-        true => shades(profile, shown.clone()),
-        false => vec![],
+    let shades = if rough {
+        shades(profile, shown.clone())
+    } else {
+        vec![]
     };
     let normal = Panel {
         x: if rough { String::new() } else { along.clone() },
@@ -105,9 +106,10 @@ fn of_peak(name: &str, summary: Option<&Summary>) -> &'static str {
                 && q.method == ErrorMethod::NoLimit
         })
     });
-    match no_limit {
-        true => ", which grows on finer meshes",
-        false => "",
+    if no_limit {
+        ", which grows on finer meshes"
+    } else {
+        ""
     }
 }
 
@@ -132,19 +134,19 @@ impl ProfileView {
         let normal = curve(&profile.normal_stress);
         let tangential = curve(&profile.tangential_stress);
         let of_normal = limits(&[&normal], CUT);
-        let stresses = match tangential.iter().any(|(_, stress)| *stress != 0.0) {
-            true => {
-                let of_tangential = limits(&[&tangential], f64::INFINITY);
-                of_normal.start.min(of_tangential.start)..of_normal.end.max(of_tangential.end)
-            }
-            false => of_normal,
+        let stresses = if tangential.iter().any(|(_, stress)| *stress != 0.0) {
+            let of_tangential = limits(&[&tangential], f64::INFINITY);
+            of_normal.start.min(of_tangential.start)..of_normal.end.max(of_tangential.end)
+        } else {
+            of_normal
         };
         let of_peak = of_peak(name, summary);
         let peak = named_peak(&[&normal], &stresses, of_peak).map(|(s, peak, _)| {
             let place = format!("σ_n: peak {} at s = {}", rounded(peak), number(s));
-            match stresses.contains(&peak) {
-                true => format!("{place}{of_peak}"),
-                false => format!("{place}{of_peak}; the axis ends before it"),
+            if stresses.contains(&peak) {
+                format!("{place}{of_peak}")
+            } else {
+                format!("{place}{of_peak}; the axis ends before it")
             }
         });
         ProfileView {

@@ -174,9 +174,10 @@ mod tests {
     fn linear(RGBColor(r, g, b): RGBColor) -> [f64; 3] {
         [r, g, b].map(|c| {
             let c = f64::from(c) / 255.0;
-            match c <= 0.04045 {
-                true => c / 12.92,
-                false => ((c + 0.055) / 1.055).powf(2.4),
+            if c <= 0.04045 {
+                c / 12.92
+            } else {
+                ((c + 0.055) / 1.055).powf(2.4)
             }
         })
     }
@@ -193,9 +194,12 @@ mod tests {
             [0.0193, 0.1192, 0.9505],
         ];
         let xyz = times(&TO_XYZ, rgb.map(|c| c.clamp(0.0, 1.0)));
-        let [x, y, z] = [xyz[0] / 0.9505, xyz[1], xyz[2] / 1.089].map(|t| match t > 0.008856 {
-            true => t.cbrt(),
-            false => 7.787 * t + 16.0 / 116.0,
+        let [x, y, z] = [xyz[0] / 0.9505, xyz[1], xyz[2] / 1.089].map(|t| {
+            if t > 0.008856 {
+                t.cbrt()
+            } else {
+                7.787 * t + 16.0 / 116.0
+            }
         });
         [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
     }

@@ -114,9 +114,10 @@ impl Shape {
     }
 
     pub(super) fn branches(&self) -> &[Shape] {
-        match self.any_of.is_empty() {
-            true => &self.one_of,
-            false => &self.any_of,
+        if self.any_of.is_empty() {
+            &self.one_of
+        } else {
+            &self.any_of
         }
     }
 

@@ -103,9 +103,10 @@ impl<'a> Walk<'a> {
             }
         };
         self.stopped |= full;
-        match full {
-            true => Err(E::custom("enough violations")),
-            false => Ok(()),
+        if full {
+            Err(E::custom("enough violations"))
+        } else {
+            Ok(())
         }
     }
 
@@ -135,9 +136,10 @@ impl<'a> Walk<'a> {
             return Ok(());
         }
         if let Some(condition) = &shape.condition {
-            let chosen = match Walk::fits(condition, value)? {
-                true => &shape.then,
-                false => &shape.otherwise,
+            let chosen = if Walk::fits(condition, value)? {
+                &shape.then
+            } else {
+                &shape.otherwise
             };
             if let Some(chosen) = chosen {
                 self.check(chosen, value.get())?;
@@ -344,9 +346,10 @@ impl<'de> Visitor<'de> for Value<'_, '_> {
             let (reason, hint) = (Reason::WrongLength, "Correct the list.");
             return walk.report(|at| Violation::new(at, reason, got, expected, hint));
         }
-        match items.is_some() && count > most {
-            true => walk.too_many(count, most, "entries"),
-            false => Ok(()),
+        if items.is_some() && count > most {
+            walk.too_many(count, most, "entries")
+        } else {
+            Ok(())
         }
     }
 
@@ -411,9 +414,10 @@ impl<'de> Visitor<'de> for Value<'_, '_> {
                 })?;
             }
         }
-        match count > MOST_OBJECTS {
-            true => walk.too_many(count, MOST_OBJECTS, "names"),
-            false => Ok(()),
+        if count > MOST_OBJECTS {
+            walk.too_many(count, MOST_OBJECTS, "names")
+        } else {
+            Ok(())
         }
     }
 }

@@ -30,9 +30,10 @@ pub fn groups(sweep: &Sweep) -> Result<Vec<Group>, Vec<Violation>> {
     for number in 0..plan.count() {
         let read = problems.read(number).and_then(|read| {
             let violations = violations(read.problem);
-            match violations.is_empty() {
-                true => Ok(read),
-                false => Err(violations),
+            if violations.is_empty() {
+                Ok(read)
+            } else {
+                Err(violations)
             }
         });
         match read {
@@ -98,9 +99,10 @@ pub fn has_own_meshes(problem: &Problem, refine: &Refine) -> bool {
 
 /// The same of a member.
 fn is_alone(problem: &Problem, sweep: &Sweep) -> bool {
-    let refine = match sweep.plan.changes_mesh() {
-        true => &problem.mesh.refine,
-        false => &sweep.base.mesh.refine,
+    let refine = if sweep.plan.changes_mesh() {
+        &problem.mesh.refine
+    } else {
+        &sweep.base.mesh.refine
     };
     has_own_meshes(problem, refine)
 }

@@ -64,17 +64,19 @@ pub(super) fn are_apart(paths: &[Path], found: &mut Findings) -> bool {
     let mut apart = true;
     for (k, path) in paths.iter().enumerate() {
         for other in &paths[..k] {
-            let (longer, shorter) = match path.tokens.len() >= other.tokens.len() {
-                true => (path, other),
-                false => (other, path),
+            let (longer, shorter) = if path.tokens.len() >= other.tokens.len() {
+                (path, other)
+            } else {
+                (other, path)
             };
             if !longer.tokens.starts_with(&shorter.tokens) {
                 continue;
             }
             apart = false;
-            let (reason, expected) = match longer.tokens.len() == shorter.tokens.len() {
-                true => (Reason::DuplicateName, "each pointer once"),
-                false => (Reason::Conflict, "pointers of which none is inside another"),
+            let (reason, expected) = if longer.tokens.len() == shorter.tokens.len() {
+                (Reason::DuplicateName, "each pointer once")
+            } else {
+                (Reason::Conflict, "pointers of which none is inside another")
             };
             found.add(Violation::new(
                 path.at.clone(),

@@ -85,9 +85,10 @@ pub fn read(fields: &Fields<'_>) -> Result<Sweep, Vec<Violation>> {
             Reason::TooMany,
             got,
             format!("at most {MOST_MEMBERS} members"),
-            match list {
-                true => "Submit several sweeps.",
-                false => "Give fewer values, or submit several sweeps.",
+            if list {
+                "Submit several sweeps."
+            } else {
+                "Give fewer values, or submit several sweeps."
             },
         ));
     } else if plan.value_bytes() > MOST_VALUE_BYTES {
@@ -107,10 +108,7 @@ pub fn read(fields: &Fields<'_>) -> Result<Sweep, Vec<Violation>> {
             Reason::TooLarge,
             format!("{count} members of {} bytes together", bytes),
             format!("at most {MOST_BYTES} bytes as JSON"),
-            match with_mesh {
-                true => "Upload the mesh and name it as `stored`, or sweep its refinement in several sweeps.",
-                false => "Shorten what the base has beside its mesh, or give fewer values.",
-            },
+            if with_mesh { "Upload the mesh and name it as `stored`, or sweep its refinement in several sweeps." } else { "Shorten what the base has beside its mesh, or give fewer values." },
         ));
     }
     found.into_result(Sweep { base, plan })
@@ -169,9 +167,12 @@ pub(super) fn leads_nowhere(path: &Path, nowhere: &Nowhere) -> Violation {
         "" => "the problem",
         parent => parent,
     };
-    let hint = meant(token, names).unwrap_or_else(|| match names.is_empty() {
-        true => "Check the pointer (RFC 6901).".to_owned(),
-        false => format!("It has: {}.", names.join(", ")),
+    let hint = meant(token, names).unwrap_or_else(|| {
+        if names.is_empty() {
+            "Check the pointer (RFC 6901).".to_owned()
+        } else {
+            format!("It has: {}.", names.join(", "))
+        }
     });
     Violation::new(
         path.at.clone(),

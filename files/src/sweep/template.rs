@@ -48,9 +48,10 @@ impl Template {
                     let name = serde_json::Value::String(name);
                     Gap {
                         place: inside..inside,
-                        before: match empty && !first {
-                            true => format!(",{name}:"),
-                            false => format!("{name}:"),
+                        before: if empty && !first {
+                            format!(",{name}:")
+                        } else {
+                            format!("{name}:")
                         },
                         after: (if empty { "" } else { "," }).to_owned(),
                     }

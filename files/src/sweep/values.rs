@@ -207,9 +207,10 @@ fn axis(at: &str, members: Named<'_>, found: &mut Findings) -> (Option<Path>, Op
         [(name, raw)] => spaced(&format!("{at}/{name}"), name == "logspace", raw, found),
         _ => {
             let named: Vec<&str> = given.iter().map(|(name, _)| *name).collect();
-            let got = match named.is_empty() {
-                true => "none of them".to_owned(),
-                false => named.join(" and "),
+            let got = if named.is_empty() {
+                "none of them".to_owned()
+            } else {
+                named.join(" and ")
             };
             found.add(Violation::new(
                 at,
@@ -317,9 +318,10 @@ fn rounded(value: f64) -> f64 {
 /// A finite number as JSON: a whole one without a fraction, so that it may be a count.
 pub(super) fn number(value: f64) -> String {
     const EXACT: f64 = 9_007_199_254_740_992.0;
-    match value.fract() == 0.0 && value.abs() < EXACT {
-        true => format!("{}", value as i64),
-        false => format!("{value:?}"),
+    if value.fract() == 0.0 && value.abs() < EXACT {
+        format!("{}", value as i64)
+    } else {
+        format!("{value:?}")
     }
 }
 

@@ -363,7 +363,10 @@ pub(super) fn invalid(file: &Path, violations: &[Violation]) -> Exit {
     };
     eprintln!("{}: {} {many}", file.display(), violations.len());
     for violation in violations {
-        eprintln!("  {violation}");
+        match violation.line() {
+            Some(_) => eprintln!("{}", violation.in_file(file.display())),
+            None => eprintln!("  {violation}"),
+        }
     }
     Exit::Invalid
 }

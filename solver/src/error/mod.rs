@@ -50,6 +50,31 @@ impl Violation {
     }
 }
 
+impl Violation {
+    /// The line of the file that it is about, and what was found there: readers of files begin `got` by `line 61: `.
+    fn on_line(&self) -> Option<(u64, &str)> {
+        let rest = self.got.strip_prefix("line ")?;
+        let (line, got) = rest.split_once(": ").filter(|_| self.pointer.is_empty())?;
+        Some((line.parse().ok()?, got))
+    }
+
+    /// The line of the file that it is about, counted from 1; none: it is not about one line of a deck or mesh file.
+    pub fn line(&self) -> Option<u64> {
+        self.on_line().map(|(line, _)| line)
+    }
+
+    /// As one line of text about a file: `deck.inp:61: expected …, got …. …`
+    pub fn in_file(&self, file: impl fmt::Display) -> String {
+        match self.on_line() {
+            Some((line, got)) => format!(
+                "{file}:{line}: expected {}, got {got}. {}",
+                self.expected, self.hint
+            ),
+            None => format!("{file}: {self}"),
+        }
+    }
+}
+
 /// Lists which of several alternatives were given, where exactly one is required.
 pub fn either(given: &[(&str, bool)]) -> String {
     let given = given.iter().filter(|(_, given)| *given);
@@ -67,16 +92,13 @@ pub fn escape(name: &str) -> String {
 
 impl fmt::Display for Violation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let pointer = if self.pointer.is_empty() {
-            "(the whole problem)"
-        } else {
-            &self.pointer
-        };
-        write!(
-            f,
-            "{pointer}: expected {}, got {}. {}",
-            self.expected, self.got, self.hint
-        )
+        match self.on_line() {
+            Some((line, _)) => write!(f, "line {line}")?,
+            None if self.pointer.is_empty() => f.write_str("(the whole problem)")?,
+            None => f.write_str(&self.pointer)?,
+        }
+        let got = self.on_line().map_or(&self.got[..], |(_, got)| got);
+        write!(f, ": expected {}, got {got}. {}", self.expected, self.hint)
     }
 }
 
@@ -157,3 +179,39 @@ impl fmt::Display for SolveError {
 }
 
 impl std::error::Error for SolveError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_violation_of_a_file_is_placed_at_its_line() {
+        let new = |pointer: &str, got: &str| {
+            Violation::new(pointer, Reason::Malformed, got, "a number", "Write one.")
+        };
+        let of_deck = new("", "line 61: `x`");
+        assert_eq!(of_deck.line(), Some(61));
+        assert_eq!(
+            of_deck.to_string(),
+            "line 61: expected a number, got `x`. Write one."
+        );
+        assert_eq!(
+            of_deck.in_file("a.inp"),
+            "a.inp:61: expected a number, got `x`. Write one."
+        );
+        let whole = new("", "a deck without *STEP");
+        assert_eq!(whole.line(), None);
+        assert!(
+            whole
+                .to_string()
+                .starts_with("(the whole problem): expected")
+        );
+        // a deck inside of a problem has lines of its own, which are not those of the file
+        let inside = new("/mesh/abaqus", "line 2: `x`");
+        assert_eq!(inside.line(), None);
+        assert_eq!(
+            inside.in_file("a.json"),
+            "a.json: /mesh/abaqus: expected a number, got line 2: `x`. Write one."
+        );
+    }
+}

@@ -62,20 +62,28 @@ impl Submitted {
             .is_some_and(|ending| ending.eq_ignore_ascii_case("inp"));
         if deck {
             let text = files::text(bytes);
-            let path = path.to_path_buf();
-            let (problem, warnings) =
-                files::abaqus::problem_with_warnings(&text).map_err(ApiError::InvalidProblem)?;
+            let mut submitted = Submitted {
+                path: path.to_path_buf(),
+                text,
+                kind: Kind::Job,
+                fields: BTreeMap::new(),
+                envelope: "/problem",
+            };
+            let read = files::abaqus::problem_with_warnings(&submitted.text);
+            let (problem, warnings) = match read {
+                Ok(read) => read,
+                Err(violations) => {
+                    submitted.tell(&violations);
+                    // all of them are told already, with their lines
+                    bail!(ApiError::InvalidProblem(Vec::new()));
+                }
+            };
             for warning in warnings {
                 eprintln!("{}: {}", path.display(), warning.message);
             }
-            let fields = [("problem".to_owned(), to_raw_value(&problem)?)].into();
-            return Ok(Submitted {
-                path,
-                text,
-                kind: Kind::Job,
-                fields,
-                envelope: "/problem",
-            });
+            let problem = to_raw_value(&problem)?;
+            submitted.fields.insert("problem".to_owned(), problem);
+            return Ok(submitted);
         }
         let mut text = String::from_utf8(bytes).with_context(unread)?;
         if text.starts_with(files::BYTE_ORDER_MARK) {
@@ -143,15 +151,18 @@ impl Submitted {
                 pointer: pointer.to_owned(),
                 ..violation.clone()
             };
-            match files::pointer::line_of(&self.text, pointer) {
-                Some(line) => {
-                    eprintln!("{}:{line}: {shown}", self.path.display());
-                    let text = self.text.lines().nth(line - 1).unwrap_or_default();
-                    let text: String = text.chars().take(100).collect();
-                    eprintln!("{line:>6} | {text}");
-                }
+            let path = self.path.display();
+            let in_deck = shown.line().and_then(|line| usize::try_from(line).ok());
+            let line = in_deck.or_else(|| files::pointer::line_of(&self.text, pointer));
+            match line {
+                Some(line) if in_deck.is_none() => eprintln!("{path}:{line}: {shown}"),
                 // a deck has other places than the problem made of it
-                None => eprintln!("{}: {shown}", self.path.display()),
+                _ => eprintln!("{}", shown.in_file(path)),
+            }
+            if let Some(line) = line {
+                let text = self.text.lines().nth(line.saturating_sub(1));
+                let text: String = text.unwrap_or_default().chars().take(100).collect();
+                eprintln!("{line:>6} | {text}");
             }
         }
         if let more @ 1.. = violations.len().saturating_sub(MOST_TOLD) {

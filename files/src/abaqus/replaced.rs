@@ -1,0 +1,193 @@
+//! `OP=NEW` in a step after the first: it ends all supports, forces or pressures of the steps before that its own step does
+//! not state again. Where all of them are stated again it changes nothing; what ends is refused by name.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::build::Built;
+use super::contact_parts::WRITTEN_INSTEAD;
+use super::written::{Replacement, Replaces};
+
+/// A component of the displacement, or of the force, and what it is prescribed for.
+pub(super) type Key = (u64, String);
+
+/// A row of a step: its step, key, line and value.
+type Stated = (usize, Key, u64, f64);
+
+/// Rows that hold at a time, with their lines and values.
+type InForce = BTreeMap<Key, (u64, f64)>;
+
+/// Names that a violation lists.
+const MOST_NAMED: usize = 5;
+
+impl Built {
+    /// Reports what steps end; each keyword once.
+    pub(super) fn check_replaced(&mut self) {
+        for what in [Replaces::Supports, Replaces::Forces, Replaces::Pressures] {
+            let replacements = self.deck.replacements.iter();
+            let mut by_step: BTreeMap<usize, &Replacement> = BTreeMap::new();
+            for replacement in replacements.filter(|replacement| replacement.what == what) {
+                let step = self.deck.contact.step_of(replacement.line);
+                by_step.entry(step).or_insert(replacement);
+            }
+            if by_step.is_empty() {
+                continue;
+            }
+            let found = self.first_end(&self.stated(what), &by_step, what);
+            if let Some((line, got)) = found {
+                self.doubt(
+                    line,
+                    got,
+                    "a step that states again what OP=NEW replaces, or one without OP=NEW, which keeps it",
+                    &format!("State those again in this step: what ends between steps is not followed here. {WRITTEN_INSTEAD}"),
+                );
+            }
+        }
+    }
+
+    /// The rows of one kind, in the order of the deck.
+    fn stated(&self, what: Replaces) -> Vec<Stated> {
+        let step = |line: u64| self.deck.contact.step_of(line);
+        match what {
+            Replaces::Supports => {
+                let of_nodes = self.prescribed.iter().flat_map(|row| {
+                    let (first, last) = row.row.components;
+                    let key = move |component| (component, row.name.clone());
+                    let line = row.row.line;
+                    (first..=last).map(move |component| (key(component), line, row.row.value))
+                });
+                let of_bodies = self.tools.rows.iter().flat_map(|moving| {
+                    let row = &moving.row;
+                    let body = |(number, rotates): &(usize, bool)| {
+                        let node = if *rotates { "rotation" } else { "reference" };
+                        let line = self.tools.bodies[*number].line;
+                        format!("the {node} node of the *RIGID BODY on line {line}")
+                    };
+                    let keys = moving.on.iter().flat_map(move |on| {
+                        let all = row.components.iter();
+                        let moves = all
+                            .filter(move |c| matches!((c, on.1), (1 | 2 | 6, false) | (3, true)));
+                        moves.map(move |component| (*component, body(on)))
+                    });
+                    keys.map(|key| (key, row.line, row.value))
+                });
+                let mut all: Vec<Stated> = of_nodes
+                    .chain(of_bodies)
+                    .map(|(key, line, value)| (step(line), key, line, value))
+                    .collect();
+                all.sort_by_key(|(_, _, line, _)| *line);
+                all
+            }
+            Replaces::Forces => {
+                let rows = self.forces.iter();
+                rows.map(|row| {
+                    let key = (row.row.component, row.name.clone());
+                    (step(row.row.line), key, row.row.line, row.row.value)
+                })
+                .collect()
+            }
+            Replaces::Pressures => {
+                let rows = self.pressures.iter();
+                rows.map(|row| {
+                    (
+                        step(row.row.line),
+                        (0, row.name.clone()),
+                        row.row.line,
+                        row.row.value,
+                    )
+                })
+                .collect()
+            }
+        }
+    }
+
+    /// The first keyword that ends something: its line, and what it ends.
+    fn first_end(
+        &self,
+        rows: &[Stated],
+        by_step: &BTreeMap<usize, &Replacement>,
+        what: Replaces,
+    ) -> Option<(u64, String)> {
+        let mut in_force = InForce::new();
+        let mut rows = rows.iter().peekable();
+        for step in 0..self.deck.steps {
+            let mut now = InForce::new();
+            while let Some((_, key, line, value)) = rows.next_if(|row| row.0 == step) {
+                let entry = now.entry(key.clone()).or_insert((*line, 0.0));
+                // the last displacement holds; forces add
+                let before = if what == Replaces::Supports {
+                    0.0
+                } else {
+                    entry.1
+                };
+                *entry = (*line, before + value);
+            }
+            if let Some(replacement) = by_step.get(&step) {
+                let ended = self.ended(&in_force, &now, what);
+                if !ended.is_empty() {
+                    let got = format!(
+                        "*{}, OP=NEW, which ends {}",
+                        replacement.keyword,
+                        listed(&ended, what)
+                    );
+                    return Some((replacement.line, got));
+                }
+                in_force.clear();
+            }
+            in_force.extend(now);
+        }
+        None
+    }
+
+    /// What holds before a step and not in it. A force of 0 is none; a node may be held by a row for another set.
+    fn ended<'a>(&self, before: &'a InForce, now: &InForce, what: Replaces) -> Vec<(&'a Key, u64)> {
+        let supports = what == Replaces::Supports;
+        let mut ended: Vec<(&Key, u64)> = before
+            .iter()
+            .filter(|(key, (_, value))| !now.contains_key(*key) && (supports || *value != 0.0))
+            .map(|(key, (line, _))| (key, *line))
+            .collect();
+        if supports && !ended.is_empty() {
+            let held = self.nodes_held(now.keys());
+            ended.retain(|((component, name), _)| !self.is_held(*component, name, &held));
+        }
+        ended.sort_by_key(|(_, line)| *line);
+        ended
+    }
+
+    /// The nodes that rows hold, each with the component.
+    pub(super) fn nodes_held<'a>(
+        &self,
+        keys: impl Iterator<Item = &'a Key>,
+    ) -> BTreeSet<(u64, u32)> {
+        keys.flat_map(|(component, name)| {
+            let nodes = self.raw.node_sets.get(name).into_iter().flatten();
+            nodes.map(|node| (*component, *node))
+        })
+        .collect()
+    }
+
+    /// Whether all nodes of a set are held.
+    pub(super) fn is_held(&self, component: u64, set: &str, held: &BTreeSet<(u64, u32)>) -> bool {
+        let nodes = self.raw.node_sets.get(set);
+        nodes.is_some_and(|nodes| nodes.iter().all(|node| held.contains(&(component, *node))))
+    }
+}
+
+/// `displacement 1 of L (line 3) and 2 others`.
+fn listed(ended: &[(&Key, u64)], what: Replaces) -> String {
+    let names: Vec<String> = ended
+        .iter()
+        .take(MOST_NAMED)
+        .map(|((component, name), line)| match what {
+            Replaces::Supports => {
+                format!("displacement {component} of `{name:.120}` (line {line})")
+            }
+            Replaces::Forces => format!("force {component} on `{name:.60}` (line {line})"),
+            Replaces::Pressures => format!("the pressure on `{name:.60}` (line {line})"),
+        })
+        .collect();
+    match ended.len() - names.len() {
+        0 => names.join(", "),
+        more => format!("{} and {more} others", names.join(", ")),
+    }
+}

@@ -1,0 +1,167 @@
+//! The keywords that a deck may have here, and what is said of others.
+
+use super::written::on_line;
+use solver::error::{Findings, Reason};
+
+/// Keywords that are read: the message about an unknown one lists them.
+pub(super) const READ: &[&str] = &[
+    "HEADING",
+    "NODE",
+    "ELEMENT",
+    "NSET",
+    "ELSET",
+    "SURFACE",
+    "PART",
+    "END PART",
+    "ASSEMBLY",
+    "END ASSEMBLY",
+    "INSTANCE",
+    "END INSTANCE",
+    "MATERIAL",
+    "ELASTIC",
+    "EXPANSION",
+    "ORIENTATION",
+    "SOLID SECTION",
+    "AMPLITUDE",
+    "INITIAL CONDITIONS",
+    "RIGID BODY",
+    "CONTACT PAIR",
+    "SURFACE INTERACTION",
+    "SURFACE BEHAVIOR",
+    "FRICTION",
+    "STEP",
+    "STATIC",
+    "BOUNDARY",
+    "CLOAD",
+    "DLOAD",
+    "DSLOAD",
+    "TEMPERATURE",
+];
+
+/// Keywords that stand for nodes or elements that are not in the deck, or not where they are written.
+pub(super) const NOT_WRITTEN_OUT: &[&str] = &[
+    "INCLUDE", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM",
+];
+
+/// Keywords without effect on a linear static step: requests for output, options of its solution, and what only other
+/// kinds of steps use.
+pub(super) const IDLE: &[&str] = &[
+    "END STEP",
+    "DENSITY",
+    "DAMPING",
+    "CONDUCTIVITY",
+    "SPECIFIC HEAT",
+    "LATENT HEAT",
+    "PHYSICAL CONSTANTS",
+    "USER OUTPUT VARIABLES",
+    "MASS",
+    "ROTARY INERTIA",
+    "NODE PRINT",
+    "EL PRINT",
+    "NODE FILE",
+    "EL FILE",
+    "NODE OUTPUT",
+    "ELEMENT OUTPUT",
+    "EL OUTPUT",
+    "OUTPUT",
+    "FILE OUTPUT",
+    "CONTACT FILE",
+    "CONTACT PRINT",
+    "CONTACT OUTPUT",
+    "SECTION PRINT",
+    "SECTION FILE",
+    "SECTION OUTPUT",
+    "ENERGY PRINT",
+    "ENERGY FILE",
+    "ENERGY OUTPUT",
+    "INTEGRATED OUTPUT",
+    "INTEGRATED OUTPUT SECTION",
+    "INCREMENTATION OUTPUT",
+    "TIME POINTS",
+    "FILTER",
+    "PREPRINT",
+    "PRINT",
+    "RESTART",
+    "MONITOR",
+    "FILE FORMAT",
+    "NODE RESPONSE",
+    "DIAGNOSTICS",
+    "CONTROLS",
+    "CONTACT CONTROLS",
+    "SOLVER CONTROLS",
+    "SECTION CONTROLS",
+    "HOURGLASS STIFFNESS",
+    "WAVEFRONT MINIMIZATION",
+    "DISTRIBUTION",
+    "DISTRIBUTION TABLE",
+    "POST OUTPUT",
+];
+
+/// Properties of a material that a linear elastic one does not have. A material that nothing is made of may have them.
+pub(super) const NOT_ELASTIC: &[&str] = &[
+    "PLASTIC",
+    "CYCLIC HARDENING",
+    "RATE DEPENDENT",
+    "DEFORMATION PLASTICITY",
+    "HYPERELASTIC",
+    "HYPERFOAM",
+    "MULLINS EFFECT",
+    "VISCOELASTIC",
+    "VISCOUS",
+    "CREEP",
+    "SWELLING",
+    "POROUS ELASTIC",
+    "POROUS METAL PLASTICITY",
+    "POTENTIAL",
+    "CAP PLASTICITY",
+    "CLAY PLASTICITY",
+    "DRUCKER PRAGER",
+    "DRUCKER PRAGER HARDENING",
+    "MOHR COULOMB",
+    "CONCRETE",
+    "CONCRETE DAMAGED PLASTICITY",
+    "DAMAGE INITIATION",
+    "USER MATERIAL",
+    "NO TENSION",
+    "NO COMPRESSION",
+    "FAIL STRESS",
+];
+
+/// Unknown keywords that are kept of one part.
+pub(super) const MOST_UNKNOWN: usize = 50;
+
+/// A keyword of which nothing is known.
+#[derive(Clone)]
+pub(super) struct UnknownKeyword {
+    pub(super) name: String,
+    /// The line where it is first.
+    pub(super) line: u64,
+    /// How often it follows.
+    pub(super) more: usize,
+}
+
+/// Reports each unknown keyword once; the first with a list of those that are read.
+pub(super) fn report_unknown(mut unknown: Vec<UnknownKeyword>, doubts: &mut Findings) {
+    unknown.sort_by(|a, b| (&a.name, a.line).cmp(&(&b.name, b.line)));
+    unknown.dedup_by(|later, first| {
+        let same = later.name == first.name;
+        if same {
+            first.more += 1 + later.more;
+        }
+        same
+    });
+    unknown.sort_by_key(|keyword| keyword.line);
+    let mut hint = format!(
+        "Remove it if the solution does not depend on it. These are read: *{}. Requests for output are passed over.",
+        READ.join(", *")
+    );
+    for UnknownKeyword { name, line, more } in unknown {
+        let got = match more {
+            0 => format!("*{name:.60}"),
+            more => format!("*{name:.60}, here and {more} times more"),
+        };
+        let expected = "a keyword that is known here";
+        doubts.add(on_line(line, Reason::NotUnderstood, got, expected, &hint));
+        hint = "Remove it if the solution does not depend on it. The message on the first unknown keyword lists those that are read.".to_owned();
+    }
+}
