@@ -146,7 +146,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
     }
     rows.sort_unstable_by_key(|row: &MemberRow| row.number);
     for row in &mut rows {
-        row.with_values(&plan);
+        row.with_values(plan);
     }
     let written =
         |format| formats::members(plan.paths(), &rows, format).map_err(anyhow::Error::msg);
