@@ -37,6 +37,7 @@ pub fn run(
     }
     let solved = with_corners(
         (model, body),
+        |solution: &Solution| solution.summary.converged,
         observe,
         &mut |load_history, body, observe| {
             if let Some(origins) = origins.as_deref_mut() {
@@ -72,9 +73,11 @@ fn has_uncertain_ends(model: &Model) -> bool {
 
 /// Solves with the common ends of contacts as the model has them, and again while the solution shows that they are of other
 /// contacts: each is tried as one contact's or the other's, and in the end as that of both. Where the node on the axis is
-/// open and the midside node presses, once more with that node left open; if it touches then, the solution before stands.
+/// open and the midside node presses, once more with that node left open; if it touches then, or that does not converge, the
+/// solution before stands.
 fn with_corners<T>(
     (model, body): (&Model, &ElasticBody),
+    converged: impl Fn(&T) -> bool,
     observe: &mut Observer<'_>,
     solve: &mut SolveOn<'_, T>,
 ) -> Result<T, SolveError> {
@@ -89,7 +92,14 @@ fn with_corners<T>(
         };
         let (solved, next, open) = {
             let load_history = LoadHistory::new(model, System::new(model, body, observe)?);
-            let (solved, mut load_history) = solve(load_history, body, observe)?;
+            let solved = solve(load_history, body, observe);
+            let fails = solved
+                .as_ref()
+                .map_or(true, |(solved, _)| !converged(solved));
+            if fails && let Some(closed) = closed.take() {
+                return Ok(closed);
+            }
+            let (solved, mut load_history) = solved?;
             let wrong = !load_history.of_both.is_empty();
             both.append(&mut load_history.of_both);
             let end = load_history.last.as_ref().map(|last| &last.state);
@@ -105,7 +115,8 @@ fn with_corners<T>(
                 return Ok(closed);
             }
             let open = end.map(|end| algorithm::open_on_axis(system, end));
-            let open = open.filter(|open| closed.is_none() && !open.is_empty());
+            let open =
+                open.filter(|open| closed.is_none() && !open.is_empty() && model.hollow_at_axis());
             (solved, next, open)
         };
         let next = match (next, open) {
@@ -282,6 +293,7 @@ pub fn run_to_numbers(
     if has_uncertain_ends(model) {
         let numbers = with_corners(
             (model, body),
+            |numbers: &Numbers| numbers.finished.outcome == Outcome::Converged,
             observe,
             &mut |mut load_history, _, observe| Ok((load_history.numbers(observe)?, load_history)),
         )?;
@@ -385,6 +397,7 @@ pub fn run_to_compare(
 ) -> Result<Reported, SolveError> {
     with_corners(
         (model, body),
+        |reported: &Reported| reported.summary.converged,
         observe,
         &mut |mut load_history, body, observe| {
             let model = load_history.model;

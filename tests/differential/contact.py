@@ -142,6 +142,7 @@ class Reference:
         self.contacts = [Contact(body, given, self.held) for given in problem.get("contacts", [])]
         self.supports()
         self.condense()
+        self.open = set()
         self.constraints()
         self.both = set()
         self.alone = self.nearest()
@@ -206,11 +207,7 @@ class Reference:
             contact.index = {}
             if contact.condition == "none":
                 continue
-            axis = {}
-            if self.body.axisymmetric:
-                for end, beside in ((0, 1), (len(contact.nodes) - 1, len(contact.nodes) - 2)):
-                    if contact.positions[end][0] == 0:
-                        axis[beside] = end
+            axis = {beside: end for end, beside in self.axis_ends(contact) if contact.nodes[end] not in self.open}
             for i, node in enumerate(contact.nodes):
                 if contact.condition == "bonded":
                     for way, which in ((contact.normals[i], 0), (contact.tangents[i], 1)):
@@ -230,6 +227,18 @@ class Reference:
                 self.unilateral.append((number, i, beside))
         self.rows = np.array(rows).reshape(len(rows), len(self.on))
         self.bond_rows = np.array(bonds).reshape(len(bonds), len(self.on))
+
+    def axis_ends(self, contact):
+        """Ends on the axis, each with the midside node beside it."""
+        last = len(contact.nodes) - 1
+        return [pair for pair in ((0, 1), (last, last - 1)) if self.body.axisymmetric and contact.positions[pair[0]][0] == 0]
+
+    def hollow(self):
+        """Whether an obstacle is further from a node on the axis than from the midside node beside it (3.5)."""
+        return any(
+            contact.gap(WHOLE)[end] - contact.gap(WHOLE)[beside] > 1e-10 * (contact.s[-1] - contact.s[0])
+            for contact in self.contacts if contact.condition == "unilateral" for end, beside in self.axis_ends(contact)
+        )  # fmt: skip
 
     def limits(self, level):
         """The right sides of the constraints."""
@@ -388,10 +397,9 @@ class Reference:
 
     def beside_axis(self, contact, forces):
         """The midside node beside one on the axis, where it is in contact: it carries what that node has, R₀ + R₁ (3.5)."""
-        last = len(contact.nodes) - 1
-        for end, beside in ((0, 1), (last, last - 1)):
-            on_axis = self.body.axisymmetric and contact.positions[end][0] == 0
-            if on_axis and end in contact.index and beside in contact.index and forces[contact.index[beside]] > 0:
+        for end, beside in self.axis_ends(contact):
+            closed = contact.nodes[end] not in self.open
+            if closed and end in contact.index and beside in contact.index and forces[contact.index[beside]] > 0:
                 yield beside, end
 
     def pressure_rows(self, patch, forces):
@@ -541,16 +549,44 @@ class Reference:
     def solve(self, known=None):
         """The result of every load step; `known`: profiles at the end of each, near which a solution is sought.
 
-        Again where an end of two contacts was taken to be of the wrong one.
+        Again where an end of two contacts was taken to be of the wrong one, and once more with plain bounds where an obstacle is
+        hollow at the axis (3.5), unless the node there touches then.
         """
-        for _ in range(6):
+        self.open = set()
+        self.constraints()
+        closed = None
+        for _ in range(8):
             results, states = self.follow(known)
             alone = self.touching(states)
-            if alone == self.alone:
+            if alone != self.alone:
+                self.alone = alone
+                self.friction_points()
+                continue
+            if closed is not None:
+                return closed if self.on_axis_touch(states[-1]) else results
+            self.open = self.open_on_axis(states[-1]) if self.hollow() else set()
+            if not self.open:
                 return results
-            self.alone = alone
+            closed = results
+            self.constraints()
             self.friction_points()
         raise Unsolved("a common end of two contacts changes between them")
+
+    def open_on_axis(self, forces):
+        """Nodes on the axis that are open beside a midside node that presses."""
+        least = 1e-9 * np.abs(forces).max(initial=0.0)
+
+        def pressed(contact, i):
+            return i in contact.index and forces[contact.index[i]] > least
+
+        ends = ((contact, *pair) for contact in self.contacts for pair in self.axis_ends(contact))
+        return {c.nodes[end] for c, end, beside in ends if end in c.index and pressed(c, beside) and not pressed(c, end)}
+
+    def on_axis_touch(self, forces):
+        """Whether a node that was left open touches."""
+        least = 1e-9 * np.abs(forces).max(initial=0.0)
+        indices = (c.index.get(i) for c in self.contacts for i, node in enumerate(c.nodes) if node in self.open)
+        return any(k is not None and forces[k] > least for k in indices)
 
     def follow(self, known):
         """The results of all steps, and the forces of the constraints at the end of each."""
