@@ -264,6 +264,29 @@ fn steps_press_and_drag() {
     );
 }
 
+/// Several sets may hold a node: what a later step prescribes for it replaces what an earlier one did, whatever the sets.
+#[test]
+fn what_a_later_step_prescribes_counts_for_the_nodes() {
+    let first = "*STEP\n*STATIC\n*BOUNDARY\n9000, 1, 1\n9000, 2, 2, -0.05\nBODYHIGH, 1, 1, 0.01\n*END STEP\n";
+    let high = "*NSET, NSET=BODYHIGH\n3, 5\n*NSET, NSET=TWIN\n3, 5\n";
+    let deck = |second: &str| {
+        let model = block(0.0) + high + &touching(ROLLER, "*FRICTION, ELASTIC SLIP=1e-4\n0.3,\n");
+        model + first + "*STEP\n*STATIC\n*BOUNDARY\n9000, 1, 1, 0.01\n" + second + "*END STEP\n"
+    };
+    let plain = read(&deck(""));
+    for same in ["TWIN, 1, 1, 0.01\n", "3, 1, 1, 0.01\n"] {
+        assert_eq!(read(&deck(same)).steps, plain.steps, "{same}");
+    }
+    for other in ["TWIN, 1, 1\n", "3, 1, 1, 0.\n", "5, 1, 1, 0.02\n"] {
+        let list = abaqus::problem(&deck(other)).expect_err(other);
+        let words = "a step whose prescribed displacements are in another proportion";
+        assert!(
+            list.iter().any(|v| v.got.contains(words)),
+            "{other}: {list:#?}"
+        );
+    }
+}
+
 /// `OP=NEW` in a later step is as none where everything is stated again; what it ends is refused by name, once.
 #[test]
 fn op_new_in_a_later_step_states_everything_again() {

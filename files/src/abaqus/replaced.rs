@@ -155,10 +155,7 @@ impl Built {
     }
 
     /// The nodes that rows hold, each with the component.
-    pub(super) fn nodes_held<'a>(
-        &self,
-        keys: impl Iterator<Item = &'a Key>,
-    ) -> BTreeSet<(u64, u32)> {
+    fn nodes_held<'a>(&self, keys: impl Iterator<Item = &'a Key>) -> BTreeSet<(u64, u32)> {
         keys.flat_map(|(component, name)| {
             let nodes = self.raw.node_sets.get(name).into_iter().flatten();
             nodes.map(|node| (*component, *node))
@@ -167,7 +164,7 @@ impl Built {
     }
 
     /// Whether all nodes of a set are held.
-    pub(super) fn is_held(&self, component: u64, set: &str, held: &BTreeSet<(u64, u32)>) -> bool {
+    fn is_held(&self, component: u64, set: &str, held: &BTreeSet<(u64, u32)>) -> bool {
         let nodes = self.raw.node_sets.get(set);
         nodes.is_some_and(|nodes| nodes.iter().all(|node| held.contains(&(component, *node))))
     }

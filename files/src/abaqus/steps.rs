@@ -118,32 +118,27 @@ impl Built {
             let rows = loads.entry((row.component, name.clone())).or_default();
             add(rows, steps.step_of(row.line), row.value);
         }
-        let mut supports = ByName::new();
-        // the first row that a later step adds for nodes that were free
-        let mut late: Vec<(u64, u64, &str)> = Vec::new();
+        // by node, since the rows of several sets may hold it
+        let mut supports: BTreeMap<(u64, u32), Vec<(usize, f64)>> = BTreeMap::new();
+        // the first row that a later step adds for a node that was free
+        let mut late: Option<(u64, String)> = None;
         for Row { row, name } in &self.prescribed {
+            let step = steps.step_of(row.line);
+            let nodes = self.raw.node_sets.get(name).into_iter().flatten();
+            let nodes = nodes.filter(|node| self.used[**node as usize]);
             for component in row.components.0..=row.components.1 {
-                let rows = supports.entry((component, name.clone())).or_default();
-                if rows.is_empty() && steps.step_of(row.line) > 0 {
-                    late.push((row.line, component, name));
+                for node in nodes.clone() {
+                    let rows = supports.entry((component, *node)).or_default();
+                    if rows.is_empty() && step > 0 && late.is_none() {
+                        let got = format!(
+                            "a support that a later step adds: displacement {component} of `{name:.60}`"
+                        );
+                        late = Some((row.line, got));
+                    }
+                    rows.push((step, row.value));
                 }
-                rows.push((steps.step_of(row.line), row.value));
             }
         }
-        if !late.is_empty() {
-            let first =
-                |(_, rows): &(&Key, &Vec<(usize, f64)>)| rows.iter().any(|(step, _)| *step == 0);
-            let held = self.nodes_held(supports.iter().filter(first).map(|(key, _)| key));
-            late.retain(|(_, component, name)| !self.is_held(*component, name, &held));
-        }
-        let late = late.first().map(|(line, component, name)| {
-            (
-                *line,
-                format!(
-                    "a support that a later step adds: displacement {component} of `{name:.60}`"
-                ),
-            )
-        });
         if let Some((line, got)) = late {
             self.doubt(
                 line,
@@ -152,9 +147,12 @@ impl Built {
                 &format!("It would hold the body from the beginning. State it in the first step if that is meant. {WRITTEN_INSTEAD}"),
             );
         }
-        let whats = ["loads", "prescribed displacements"];
-        let found = [(loads, whats[0]), (supports, whats[1])].map(|(rows, what)| {
-            proportion(&rows, count).unwrap_or_else(|step| {
+        let found = [
+            ("loads", proportion(&loads, count)),
+            ("prescribed displacements", proportion(&supports, count)),
+        ];
+        let found = found.map(|(what, found)| {
+            found.unwrap_or_else(|step| {
                 let line = self.deck.contact.steps.get(step).map_or(0, |step| step.0);
                 self.doubt(
                     line,
@@ -205,7 +203,7 @@ fn add(rows: &mut Vec<(usize, f64)>, step: usize, value: f64) {
 
 /// The factor of all values at the end of each step; 0 where there are none. An error is the first step whose values are
 /// not in proportion to the last ones.
-fn proportion(rows: &ByName, count: usize) -> Result<Vec<f64>, usize> {
+fn proportion<K>(rows: &BTreeMap<K, Vec<(usize, f64)>>, count: usize) -> Result<Vec<f64>, usize> {
     let at = |rows: &[(usize, f64)], step: usize| {
         let mut latest = rows.iter().rev();
         latest
