@@ -117,10 +117,13 @@ impl Store {
         Ok(())
     }
 
-    /// The store has seen this moment.
+    /// The store has seen this moment. On a full disk it is not noted: the space that is reserved there is for what users ask.
     pub(super) async fn note_alive(&self) {
+        if self.reserve.was_disk_full() {
+            return;
+        }
         let now = self.now().micros().to_string();
-        if let Err(cause) = self.control(|| self.write_sealed(SEEN, &now)).await {
+        if let Err(cause) = self.writing(self.write_sealed(SEEN, &now)).await {
             tracing::debug!(%cause, "the time could not be noted: {cause}");
         }
     }

@@ -8,7 +8,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use serde::{Deserialize, Serialize};
 
-/// Pauses that are kept: beyond that the oldest ones become one, which also covers what is between them.
+/// Pauses that are kept: beyond that the shortest ones are forgotten. Of a year with twenty restarts a day those are a small part
+/// of each age that matters.
 const MOST: usize = 200;
 /// A pause of so small a part of an age counts: a wrong clock makes that little difference, and machines are off at night.
 const SMALL_PART: i64 = 30;
@@ -16,6 +17,12 @@ const SMALL_PART: i64 = 30;
 /// A pause, by the times of the store (µs).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Pause(pub(super) i64, pub(super) i64);
+
+impl Pause {
+    fn length(self) -> i64 {
+        self.1.saturating_sub(self.0)
+    }
+}
 
 /// All pauses, the oldest first.
 #[derive(Debug, Default)]
@@ -29,8 +36,8 @@ impl Pauses {
             .map(|Pause(from, to)| Pause(from, to.min(now)));
         let mut kept: Vec<Pause> = until_now.filter(|Pause(from, to)| from < to).collect();
         while kept.len() > MOST {
-            let oldest = kept.remove(0);
-            kept[0].0 = oldest.0;
+            let shortest = (0..kept.len()).min_by_key(|&at| kept[at].length());
+            kept.remove(shortest.unwrap_or_default());
         }
         *self.all() = kept.clone();
         kept
@@ -50,11 +57,11 @@ impl Pauses {
 /// Back from `now` by an age, without the pauses that are more than a small part of it (µs).
 fn cutoff(pauses: &[Pause], now: i64, age: i64) -> i64 {
     let (mut at, mut left) = (now, age.max(0));
-    for Pause(from, to) in pauses.iter().rev() {
+    for pause @ Pause(from, to) in pauses.iter().rev() {
         if at.saturating_sub(left) >= *to {
             break;
         }
-        if to.saturating_sub(*from) > age / SMALL_PART {
+        if pause.length() > age / SMALL_PART {
             left -= at.saturating_sub(*to).max(0);
             at = at.min(*from);
         }
@@ -81,5 +88,23 @@ mod tests {
         let two = [Pause(100, 400), Pause(500, 900)];
         assert_eq!(cutoff(&two, 1000, 250), 50);
         assert_eq!(cutoff(&[Pause(i64::MIN, 900)], 1000, 5000), i64::MIN);
+    }
+
+    #[test]
+    fn frequent_restarts_do_not_end_retention() {
+        const DAY: i64 = 86_400 * 1_000_000;
+        for a_day in [1, 3, 20] {
+            let every = DAY / a_day;
+            let (kept, mut now) = (Pauses::default(), 0);
+            let mut pauses = vec![];
+            for _ in 0..365 * a_day {
+                now += every;
+                pauses.push(Pause(now - 5_000_000, now));
+                pauses = kept.set(pauses, now);
+            }
+            assert!(pauses.len() <= MOST);
+            let age = now - kept.cutoff(now, 90 * DAY);
+            assert!((90 * DAY..91 * DAY).contains(&age), "{a_day} a day: {age}");
+        }
     }
 }

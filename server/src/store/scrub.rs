@@ -21,6 +21,9 @@ use super::{
 
 /// How long after one reading the next begins.
 const PAUSE: Duration = Duration::from_secs(86_400);
+/// A table that cannot be read, for lack of memory or of files, is read once more, so often and after such a time.
+const TRIES: u32 = 5;
+const BEFORE_ANOTHER: Duration = Duration::from_secs(1);
 /// Jobs that are read at a time, and the pause after them: others need the processors, too.
 const JOBS_AT_ONCE: i64 = 500;
 const BETWEEN: Duration = Duration::from_millis(20);
@@ -78,14 +81,24 @@ pub(super) async fn read_once(store: &Weak<Store>) {
         return;
     };
     for (table, name, check) in TABLES {
-        let read = read_table(store, &options, (table, name, check)).await;
+        let mut read = read_table(store, &options, (table, name, check)).await;
+        for _ in 1..TRIES {
+            if matches!(read, Ok(()) | Err(StoreError::Damaged(_))) || store.strong_count() == 0 {
+                break;
+            }
+            tokio::time::sleep(BEFORE_ANOTHER).await;
+            read = read_table(store, &options, (table, name, check)).await;
+        }
         let Some(store) = store.upgrade() else { return };
         match read {
             Err(StoreError::Damaged(damage)) if damage.record.name != BY_JOB => {
                 store.damages.note_table(table, &damage.cause).await;
             }
             Err(StoreError::Damaged(damage)) => drop(store.damages.note(*damage).await),
-            Err(cause) => tracing::debug!(%cause, "the table {name} could not be read: {cause}"),
+            Err(cause) => tracing::warn!(
+                %cause,
+                "the table {name} could not be read, {TRIES} times: {cause}; what a disk has changed in it is noticed tomorrow"
+            ),
             Ok(()) => {}
         }
         if table == Table::Keys {
