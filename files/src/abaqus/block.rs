@@ -397,14 +397,18 @@ impl Deck {
         line: u64,
         text: &str,
     ) {
-        for word in fields(text).into_iter().filter(|word| !word.is_empty()) {
+        for (place, word) in fields(text).into_iter().enumerate() {
             match word.parse() {
                 Ok(number) => pending.push(number),
                 Err(_) => {
+                    let got = match word {
+                        "" => format!("`{text:.60}`: field {} is blank", place + 1),
+                        _ => format!("`{word:.40}` in `{text:.60}`"),
+                    };
                     self.fault(
                         line,
                         Reason::Malformed,
-                        format!("`{word:.40}` in `{text:.60}`"),
+                        got,
                         "an element: its number, and the numbers of its nodes",
                         "Write whole numbers, as in `4, 1, 2, 12, 11`.",
                     );

@@ -109,6 +109,12 @@ impl Source<'_> {
         if friction || others.len() > 1 {
             for (k, (factor, other)) in factors.iter().zip(others).enumerate() {
                 let written = self.said.steps.get(k).and_then(|step| step.1);
+                if let Some(more) = written.filter(|n| friction && *n > MOST_INCREMENTS) {
+                    found.warnings.push(differs(format!(
+                        "Step {} begins with {more:.0} increments, and is solved in {MOST_INCREMENTS:.0}. Divide it into several steps if more are needed.",
+                        k + 1
+                    )));
+                }
                 found.steps.push(Step {
                     name: Some(format!("Step-{}", k + 1)),
                     indentation: factor[0],
@@ -429,11 +435,14 @@ impl Source<'_> {
     }
 }
 
-/// The increments of a step with friction, which depends on the path: as many as the deck begins with.
+/// The increments of a step with friction, which depends on the path: as many as the deck begins with, and no fewer than these.
+const FEWEST_INCREMENTS: f64 = 10.0;
+/// And no more than these.
+const MOST_INCREMENTS: f64 = 1000.0;
+
 fn increments(written: Option<f64>) -> u32 {
-    const FEWEST: f64 = 10.0;
-    const MOST: f64 = 100.0;
-    written.unwrap_or(FEWEST).ceil().clamp(FEWEST, MOST) as u32
+    let written = written.unwrap_or(FEWEST_INCREMENTS).ceil();
+    written.clamp(FEWEST_INCREMENTS, MOST_INCREMENTS) as u32
 }
 
 /// The largest motion of each kind, with its sign; the last of equal ones.

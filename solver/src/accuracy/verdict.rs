@@ -181,7 +181,7 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
                 (
                     relative / good,
                     format!(
-                        "`{name}` of contact `{contact}`, {:.5e}, may be off by {}{}, that is {error:.1e}, most of it because the load grows in too few increments: give `steps` more `increments` (without `steps` there is one).",
+                        "`{name}` of contact `{contact}`, {:.5e}, may be off by {}{}, that is {error:.1e}, most of it because the load grows in too few increments: give `steps` more `increments` (without `steps` there is one), or a deck a smaller first number in the row of *STATIC.",
                         q.value,
                         percent(relative),
                         if end { " of the length of the contact" } else { "" },
