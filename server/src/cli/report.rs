@@ -68,6 +68,24 @@ pub(super) fn document(title: Option<&str>, document: &Document) -> String {
     result(title, &document.summary, steps)
 }
 
+/// How far a result can be trusted, for who reads it from files: its verdict, and its warnings.
+pub(super) fn trust(document: &Document) -> String {
+    let solution = &document.summary.solution;
+    let verdict = solution.accuracy.iter().map(|accuracy| {
+        let reason = accuracy.reasons.first().map(|reason| format!(": {reason}"));
+        let verdict = accuracy.verdict.in_words();
+        (
+            "accuracy",
+            format!("{verdict}{}", reason.unwrap_or_default()),
+        )
+    });
+    let warnings = solution.warnings.iter().map(|warning| {
+        let text = format!("{}: {}", warning.pointer, warning.message);
+        ("warning", text)
+    });
+    lines(verdict.chain(warnings))
+}
+
 /// A summary, and those of its load steps by their names.
 pub(super) fn result<'a>(
     title: Option<&str>,

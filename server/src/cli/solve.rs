@@ -196,6 +196,9 @@ pub(super) fn run(
     }
     if outputs.is_empty() {
         output::print(&report::document(title, &document))?;
+    } else {
+        // what the files are read for must not hide how far they can be trusted
+        eprint!("{}", report::trust(&document));
     }
     Ok(if document.summary.solution.converged {
         Exit::Ok
