@@ -210,7 +210,8 @@ def as_mesh(program, path):
 
 def words(lines):
     """The first violation in short, without its hint."""
-    text = next((line.strip() for line in lines if line.startswith("  ")), lines[0] if lines else "nothing is said")
+    # the first line counts them
+    text = next((line.strip() for line in lines if ": expected " in line), lines[0] if lines else "nothing is said")
     found = re.search(r"got (.*)", text)
     text = re.sub(r"^line \d+: ", "", found[1] if found else text)
     return re.split(r"\. [A-Z*]", text)[0][:90].rstrip(".").replace("|", "\\|")
