@@ -13,16 +13,30 @@ import select
 import struct
 import subprocess
 import sys
+import threading
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 
-from outside import Server, check, cpu_s, equal, example, memory, note, percentile
+from outside import Server, check, children, cpu_s, equal, example, memory, note, percentile
 
 SOAK = "--soak" in sys.argv
 MIB = 1 << 20
 # the promise; the small form runs beside other tests and leaves a margin
 MOST_P99_S = 0.1 if SOAK else 0.25
+
+
+class Watch(threading.Thread):
+    """The highest resident memory of a process and its worker processes together."""
+
+    def __init__(self, pid):
+        super().__init__(daemon=True)
+        self.pid, self.highest, self.ended = pid, 0, False
+
+    def run(self):
+        while not self.ended:
+            self.highest = max(self.highest, sum(map(memory, (self.pid, *children(self.pid)))))
+            time.sleep(0.01)
 
 
 class Attacked(Server):

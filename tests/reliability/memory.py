@@ -8,28 +8,12 @@ whose estimates run from 1 MiB to beyond 10 GiB: each is refused with figures, w
 them, and the large ones to their ends.
 """
 
-import threading
-import time
-
-from attack import MIB, SOAK, Attacked, Bystander, check, equal, example
-from outside import children, long_contact, memory
+from attack import MIB, SOAK, Attacked, Bystander, Watch, check, equal, example
+from outside import long_contact
 
 BUDGET = 512 * MIB
 MOST = BUDGET + 256 * MIB
 STEPS = 1_000 if SOAK else 200
-
-
-class Watch(threading.Thread):
-    """The highest resident memory of a process and its worker processes together."""
-
-    def __init__(self, pid):
-        super().__init__(daemon=True)
-        self.pid, self.highest, self.ended = pid, 0, False
-
-    def run(self):
-        while not self.ended:
-            self.highest = max(self.highest, sum(map(memory, (self.pid, *children(self.pid)))))
-            time.sleep(0.01)
 
 
 def told(server, problem):

@@ -15,26 +15,12 @@ import time
 
 import grpc
 
-from attack import MIB, SOAK, Attacked, Bystander, check, equal, example
-from outside import children, memory
+from attack import MIB, SOAK, Attacked, Bystander, Watch, check, equal, example
 
 BUDGET = 256 * MIB
 MOST = BUDGET + 256 * MIB
 # `page_size` of a list over gRPC: 1000
 PAGE = b"\x10\xe8\x07"
-
-
-class Watch(threading.Thread):
-    """The highest resident memory of a process, and of the largest of its worker processes."""
-
-    def __init__(self, pid):
-        super().__init__(daemon=True)
-        self.pid, self.highest, self.ended = pid, 0, False
-
-    def run(self):
-        while not self.ended:
-            self.highest = max(self.highest, max(map(memory, (self.pid, *children(self.pid)))))
-            time.sleep(0.01)
 
 
 def row_of_contacts(count, steps=0, friction=False):

@@ -596,6 +596,13 @@ fn fields_are_stored_as_columns_and_everything_else_deflated() {
 
 const DAY_S: f64 = 86_400.0;
 
+fn a_month() -> Retention {
+    Retention {
+        age_s: Some(30.0 * DAY_S),
+        ..Retention::default()
+    }
+}
+
 /// A machine without a battery begins with an old time, and hears of the right one later.
 #[tokio::test]
 async fn what_ended_under_a_wrong_clock_is_kept_as_long_as_anything_else() {
@@ -657,10 +664,7 @@ async fn a_start_with_a_clock_that_is_ahead_removes_nothing_and_leaves_no_trace(
     solved(&store, "ada", "1", 10).await;
     store.close().await;
     drop(store);
-    let month = Retention {
-        age_s: Some(30.0 * DAY_S),
-        ..Retention::default()
-    };
+    let month = a_month();
     let ahead = right.after_s(400.0 * DAY_S);
     ahead.simulate();
     let store = Store::open(folder.path()).await.unwrap();
@@ -685,10 +689,7 @@ async fn nights_count_and_a_damaged_record_of_pauses_removes_nothing_early() {
     solved(&store, "ada", "1", 10).await;
     store.close().await;
     drop(store);
-    let month = Retention {
-        age_s: Some(30.0 * DAY_S),
-        ..Retention::default()
-    };
+    let month = a_month();
     let night = start.after_s(0.5 * DAY_S);
     night.simulate();
     let store = Store::open(folder.path()).await.unwrap();
@@ -738,10 +739,7 @@ async fn a_changed_time_in_a_row_or_an_index_removes_nothing() {
         store.close().await;
         drop(store);
         let store = Store::open(folder.path()).await.unwrap();
-        let month = Retention {
-            age_s: Some(30.0 * DAY_S),
-            ..Retention::default()
-        };
+        let month = a_month();
         let retired = store.retire(&month, right).await.unwrap();
         assert_eq!(retired.jobs, 0, "{harm}");
         if !harm.contains("null") {
