@@ -48,16 +48,20 @@ pub struct MeshInfo {
     pub created_at: Time,
 }
 
-/// Writes the stored form of a mesh: the mesh, and after it which of its midsides were added.
+/// Writes the stored form of a mesh: the mesh, and after it which of its midsides were added, and how many nodes its sets lost.
 pub fn write_stored<W: std::io::Write>(mesh: &Mesh, to: W) -> postcard::Result<W> {
-    postcard::to_io(&(mesh, mesh.added_midsides), to)
+    postcard::to_io(&(mesh, mesh.added_midsides, &mesh.nodes_left_out), to)
 }
 
-/// A mesh from its stored form; that of earlier versions ends with the mesh.
+/// A mesh from its stored form; those of earlier versions end with the mesh, or with its midsides.
 pub fn read_stored(bytes: &[u8]) -> postcard::Result<Mesh> {
     let (mut mesh, rest): (Mesh, &[u8]) = postcard::take_from_bytes(bytes)?;
     if !rest.is_empty() {
-        mesh.added_midsides = postcard::from_bytes(rest)?;
+        let (added, rest): (_, &[u8]) = postcard::take_from_bytes(rest)?;
+        mesh.added_midsides = added;
+        if !rest.is_empty() {
+            mesh.nodes_left_out = postcard::from_bytes(rest)?;
+        }
     }
     Ok(mesh)
 }
@@ -152,10 +156,17 @@ mod tests {
             nodes: vec![[0.0, 1.0]; 9],
             node_sets: BTreeMap::from([("top".to_owned(), vec![2, 3])]),
             added_midsides: Some(4),
+            nodes_left_out: BTreeMap::from([("top".to_owned(), 1)]),
             ..Mesh::default()
         };
         let stored = write_stored(&mesh, Vec::new()).unwrap();
         assert_eq!(read_stored(&stored).unwrap(), mesh);
+        let with_midsides = postcard::to_io(&(&mesh, mesh.added_midsides), Vec::new()).unwrap();
+        let read = read_stored(&with_midsides).unwrap();
+        assert_eq!(
+            (read.added_midsides, read.nodes_left_out.len()),
+            (Some(4), 0)
+        );
         let earlier = postcard::to_io(&mesh, Vec::new()).unwrap();
         let read = read_stored(&earlier).unwrap();
         assert_eq!(read.added_midsides, None);

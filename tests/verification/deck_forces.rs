@@ -1,9 +1,12 @@
 //! Forces of decks: per unit of thickness in plane strain, on the whole ring of a body of revolution.
 
 use files::abaqus;
+use serde_json::json;
+use solver::error::Reason;
+use solver::problem::Problem;
 use solver::solution::WarningCode;
 
-use crate::support::{close, solve};
+use crate::support::{close, problem, solve};
 
 /// A square of one element, held below at y, pulled at its upper side by 3 in all, 1 : 4 : 1 as a constant stress does.
 fn square(kind: &str, section: &str) -> String {
@@ -55,4 +58,46 @@ fn blanks_in_keywords_may_be_left_out() {
         .replace("SOLID SECTION", "SOLIDSECTION")
         .replace("END STEP", "ENDSTEP");
     assert_eq!(rise(&deck), rise(&without));
+}
+
+/// A node that belongs to no element moves no body: a force on it, or on a set with it, is refused, in decks and where a mesh comes
+/// from one; a support of it holds nothing.
+#[test]
+fn a_force_on_nodes_without_elements_is_refused() {
+    let square =
+        square("CPS8", "").replace("*ELEMENT", "99, 7, 7\n*NSET, NSET=FIRST\n1,\n*ELEMENT");
+    let with = |from: &str, to: &str| {
+        assert!(square.contains(from));
+        square.replace(from, to)
+    };
+    for deck in [
+        with("NSET=ENDS\n3, 4\n", "NSET=ENDS\n99\n"),
+        with("ENDS, 2, 0.5\n", "ENDS, 2, 0.5\n99, 2, 1.\n"),
+    ] {
+        let found = format!("{:?}", abaqus::problem(&deck).unwrap_err());
+        assert!(
+            found.contains("node 99 belongs to no plane element"),
+            "{found}"
+        );
+    }
+    let set = with("NSET=ENDS\n3, 4\n", "NSET=ENDS\n3, 4, 99\n");
+    let refused = |problem: &Problem| {
+        let found = solver::check(problem, files::external_mesh(problem, None)).unwrap_err();
+        let found: Vec<_> = found.iter().map(|v| (&*v.pointer, v.reason)).collect();
+        assert_eq!(found, [("/loads/0/nodes", Reason::UnusedNode)]);
+    };
+    refused(&abaqus::problem(&set).unwrap());
+    for refine in [0, 1] {
+        let on_mesh_of_deck = json!({
+            "analysis": {"kind": "plane_stress", "thickness": 1},
+            "mesh": {"abaqus": set, "refine": refine},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0}],
+            "supports": [{"nodes": "LOW", "uy": 0}, {"nodes": "FIRST", "ux": 0}],
+            "loads": [{"nodes": "ENDS", "force": [0, 0.5]}],
+        });
+        refused(&problem(&on_mesh_of_deck.to_string()));
+    }
+    let held = with("NSET=LOW\n1, 2, 5\n", "NSET=LOW\n1, 2, 5, 99\n");
+    close(rise(&square), 3e-3, 1e-12);
+    close(rise(&held), 3e-3, 1e-12);
 }

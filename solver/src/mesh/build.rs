@@ -86,7 +86,7 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
             ),
         );
     }
-    let of_file = drop_unused(&mut raw, of_file);
+    let (of_file, nodes_left_out) = drop_unused(&mut raw, of_file);
     let owners = Owners::new(&raw, found)?;
     let surface = surface(&raw.elements, &owners.count);
     let by_corners = by_corners(&surface, &owners, &raw, found)?;
@@ -160,6 +160,7 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
         groups: raw.groups,
         node_sets: raw.node_sets,
         added_midsides: (raised > 0).then_some(of_file),
+        nodes_left_out,
         ..Mesh::default()
     };
     let mut all = AllChecks::default();
@@ -286,8 +287,8 @@ fn second_order(raw: &mut RawMesh) -> usize {
 }
 
 /// Removes the nodes that belong to no element: points of the geometry, centres of 9-node elements. Returns how many of
-/// the first `of_file` nodes remain.
-fn drop_unused(raw: &mut RawMesh, of_file: usize) -> u32 {
+/// the first `of_file` nodes remain, and how many nodes each set lost.
+fn drop_unused(raw: &mut RawMesh, of_file: usize) -> (u32, BTreeMap<String, u32>) {
     let mut number = vec![NO_NODE; raw.nodes.len()];
     for &node in raw.elements.iter().flat_map(|e| e.iter()) {
         number[node as usize] = 0;
@@ -311,14 +312,19 @@ fn drop_unused(raw: &mut RawMesh, of_file: usize) -> u32 {
     for line in raw.lines.values_mut().flatten() {
         *line = line.map(|n| number[n as usize]);
     }
-    for set in raw.node_sets.values_mut() {
-        set.iter_mut().for_each(|n| *n = number[*n as usize]);
-        set.retain(|n| *n != NO_NODE);
+    let mut left_out = BTreeMap::new();
+    for (name, set) in &mut raw.node_sets {
         set.sort_unstable();
         set.dedup();
+        let before = set.len();
+        set.iter_mut().for_each(|n| *n = number[*n as usize]);
+        set.retain(|n| *n != NO_NODE);
+        if set.len() < before {
+            left_out.insert(name.clone(), (before - set.len()) as u32);
+        }
     }
     raw.node_sets.retain(|_, set| !set.is_empty());
-    remaining as u32
+    (remaining as u32, left_out)
 }
 
 /// The elements on each side, known by its midside node.

@@ -39,6 +39,7 @@ pub struct GradedMesh {
     groups: BTreeMap<String, Vec<u32>>,
     set_names: Vec<String>,
     added_midsides: Option<u32>,
+    nodes_left_out: BTreeMap<String, u32>,
 }
 
 /// A part of an element of the first mesh.
@@ -68,6 +69,7 @@ impl GradedMesh {
             groups: mesh.groups.clone(),
             set_names: mesh.node_sets.keys().cloned().collect(),
             added_midsides: mesh.added_midsides,
+            nodes_left_out: mesh.nodes_left_out.clone(),
         }
     }
 
@@ -143,6 +145,7 @@ impl GradedMesh {
                 .collect(),
             node_sets: finer.sets.into_named(self.set_names.iter()),
             added_midsides: self.added_midsides,
+            nodes_left_out: self.nodes_left_out.clone(),
             lineage: finer.lineage,
         };
         (mesh, parts)

@@ -52,6 +52,9 @@ pub struct Mesh {
     /// nodes of the first mesh. A stored mesh has it after the rest.
     #[serde(skip)]
     pub added_midsides: Option<u32>,
+    /// How many nodes of a set were left out since they belong to no element. A stored mesh has it after the rest.
+    #[serde(skip)]
+    pub nodes_left_out: BTreeMap<String, u32>,
     /// How it was made from the first mesh, which is the one that is stored.
     #[serde(skip)]
     pub lineage: Lineage,

@@ -39,6 +39,7 @@ pub fn refine(mesh: &Mesh) -> Mesh {
         groups,
         node_sets: finer.sets.into_named(mesh.node_sets.keys()),
         added_midsides: mesh.added_midsides,
+        nodes_left_out: mesh.nodes_left_out.clone(),
         lineage: finer.lineage,
     }
 }

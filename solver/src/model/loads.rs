@@ -55,7 +55,17 @@ impl Checks {
                 return Ok(());
             }
             Load::Force(nodes, force) => {
-                let set = self.node_set(mesh, nodes, format!("{pointer}/nodes"))?;
+                let pointer = format!("{pointer}/nodes");
+                if let Some(count) = mesh.nodes_left_out.get(nodes) {
+                    return Err(self.report(
+                        pointer,
+                        Reason::UnusedNode,
+                        format!("{count} nodes of `{nodes}` that belong to no element"),
+                        "nodes of elements only",
+                        "The body would not feel the force on them: leave these nodes out of the set, or give them an element.",
+                    ));
+                }
+                let set = self.node_set(mesh, nodes, pointer)?;
                 let force = force.map(|f| f / ring);
                 let given = mesh.given_nodes(set).into_iter();
                 at_nodes.push(given.map(|node| (node, force)).collect());
