@@ -7,7 +7,7 @@ use solver::solution::{ErrorMethod, QuantityName, Solution, Verdict, WarningCode
 use crate::support::{Lattice, problem, solve};
 
 /// A block 4 wide and 3 high, clamped at its foot, or a sector of a ring between two radii about the origin, clamped inside or
-/// outside, so that the other side is the contact `face`; frictionless.
+/// outside, so that the other side is the contact `face`.
 fn body(kind: &str, contact: &Value) -> Problem {
     // midsides in the middle
     let depth = |j: usize| {
@@ -82,7 +82,8 @@ fn compared(what: &str, linear: &Problem, twin: &Problem) -> (f64, bool) {
             .map(|q| (q.value - own.value).abs())
             .fold(f64::INFINITY, f64::min);
         let error = match own.quantity {
-            NormalForce | PeakNormalStress => own.error,
+            NormalForce | TangentialForce | FrictionForce | PeakNormalStress
+            | PeakTangentialStress => own.error,
             ContactStart | ContactEnd => own.error.map(|error| error + 0.04),
             _ => continue,
         };
@@ -140,6 +141,61 @@ fn an_obstacle_before_a_straight_side_is_as_if_it_were_drawn_there() {
         }
     }
     assert!(large > 8, "{large} of {count}");
+}
+
+/// What a push across the body drags along, with friction: as a tangential displacement does that of an obstacle drawn where the
+/// push leaves it.
+#[test]
+fn a_push_across_the_body_drags_it() {
+    for kind in ["circle", "parabola"] {
+        for (radius, depth) in [(1.0, 0.05), (4.0, 0.1)] {
+            for [x, y] in DIRECTIONS {
+                for (coefficient, nonlocal_radius) in [(0.2, 0.0), (0.5, 0.3)] {
+                    let by = [depth * x, depth * y];
+                    let friction = json!({"coefficient": coefficient, "elastic_slip": 0.01 * depth,
+                        "nonlocal_radius": nonlocal_radius});
+                    let at =
+                        |center: f64| json!({"kind": kind, "radius": radius, "center": center});
+                    let linear = json!({"obstacle": at(0.0), "direction": [x, y],
+                        "indentation": depth * x.hypot(y), "friction": friction});
+                    let twin = json!({"obstacle": at(by[0]), "indentation": -by[1],
+                        "tangential_displacement": by[0], "friction": friction});
+                    let what = format!("{kind} {radius} {by:?} {coefficient}");
+                    let [linear, twin] = [linear, twin].map(|c| body("block", &c));
+                    let (off, told) = compared(&what, &linear, &twin);
+                    assert!(off < 0.01 || told, "{what}: {off}");
+                }
+            }
+        }
+    }
+}
+
+/// At a circle's flank its side is vertical: a node there is below no point of it, however the body moves.
+#[test]
+fn a_node_at_the_flank_of_a_circle_does_not_touch_it() {
+    for push in [
+        json!({}),
+        json!({"direction": [0.5, -1.0]}),
+        json!({"direction": [-0.5, -1.0]}),
+    ] {
+        for center in [0.0, 0.04, 0.24] {
+            // nodes lie at every .04
+            let mut contact = json!({"obstacle": {"kind": "circle", "radius": 1.0, "center": center},
+                "normal": "obstacle", "indentation": 0.05});
+            contact
+                .as_object_mut()
+                .unwrap()
+                .extend(push.as_object().unwrap().clone());
+            let solution = solve(&body("block", &contact));
+            let [start, end] = solution.summary.contacts["face"].contact[0];
+            assert_eq!(
+                solution.summary.contacts["face"].contact.len(),
+                1,
+                "{contact}"
+            );
+            assert!(end - start < 1.2, "{contact}: {start} {end}");
+        }
+    }
 }
 
 /// A pin in a hole and a saddle on a shaft, pushed and drawn back.

@@ -1,9 +1,11 @@
 //! The shape of an obstacle: its distance as a function of the coordinate c, or a curve in space.
 
-use super::ROUNDING;
 use super::curve::Curve;
 use crate::problem::{Interpolation, Obstacle};
 use crate::spline::{Spline, smoothed};
+
+/// A circle ends where its side is so near to vertical: this part of its radius below its centre.
+const FLANK: f64 = 1e-3;
 
 /// A place where an obstacle may be nearer to the body than beside it, or has a kink.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -145,7 +147,11 @@ fn formula(obstacle: &Obstacle, c: f64, rounding: f64) -> Option<(f64, f64)> {
     // a circle of radius R that leaves the surface at x = 0
     let round = |radius: f64, x: f64| {
         let root = (radius * radius - x * x).max(0.0).sqrt();
-        let slope = x / root.max(ROUNDING * radius);
+        // at its flank, where its side is vertical, no point is below it: there it faces the body as if it were level
+        let slope = match root <= FLANK * radius {
+            true => 0.0,
+            false => x / root,
+        };
         (x.abs() <= radius + rounding).then_some((radius - root, slope))
     };
     // 0 at 0: the mean of both sides. A node lies at a kink only up to rounding.
