@@ -431,8 +431,8 @@ struct Again {
     rounding: Option<Rounding>,
 }
 
-/// The same path in these steps, without reporting to the observer. The first history is then as it was, but for the common
-/// ends that the second has found to be of both contacts.
+/// The same path in these steps, without reporting to the observer. The first history is then as it was: what a finer path
+/// finds at the common ends of contacts changes no result, which is the same whether its errors are asked for or not.
 fn again_in<'a>(
     first: LoadHistory<'a>,
     steps: &[Step],
@@ -456,9 +456,7 @@ fn again_in<'a>(
     again.rounding = second.rounding;
     system = second.system;
     system.resume(path);
-    let mut first = LoadHistory { system, ..first };
-    first.of_both.append(&mut second.of_both);
-    (first, again)
+    (LoadHistory { system, ..first }, again)
 }
 
 /// Notes how much twice the increments change the forces. The history is then as it was.

@@ -589,7 +589,7 @@ class Reference:
         return any(k is not None and forces[k] > least for k in indices)
 
     def follow(self, known):
-        """The results of all steps, and the forces of the constraints at the end of each."""
+        """The results of all steps, and the forces of the constraints at the end of each increment."""
         steps = self.problem.get("steps") or [None]
         for patch in self.patches:
             patch["anchor"] = np.zeros(len(patch["s"]))
@@ -601,18 +601,19 @@ class Reference:
             if step is not None:
                 end = {key: step.get(key, 0.0 if key == "tangential_displacement" else 1.0) for key in WHOLE}
                 increments = step.get("increments", 1)
-            incremental = any(p["law"].get("history") == "incremental" for p in self.patches)
+            # an increment matters to a law that depends on the path, and to which contact a common end is of
+            whole_path = self.common() or any(p["law"].get("history") == "incremental" for p in self.patches)
             for k in range(1, increments + 1):
-                if not incremental and k < increments:
+                if not whole_path and k < increments:
                     continue
                 part = k / increments
                 level = {key: before[key] + part * (end[key] - before[key]) for key in WHOLE}
                 state = self.near(level, known[number]) if known and k == increments else self.level(level)
                 result = self.result(level, *state)
                 self.anchor(level, *state)
+                states.append(state[1])
             before = end
             results.append(result)
-            states.append(state[1])
         return results, states
 
     def anchor(self, level, v, forces, ties):
