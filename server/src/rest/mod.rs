@@ -17,13 +17,13 @@ mod object;
 mod origin;
 
 // Answers.
-mod asked;
 mod compressed;
 mod data;
 mod observe;
 mod refused;
 mod reply;
-mod while_valid;
+mod request_target;
+mod revocation;
 
 // Handlers, by subject.
 mod docs;

@@ -22,7 +22,6 @@ mod uploads;
 pub mod bulk;
 pub mod jobs;
 pub mod lists;
-mod loaded;
 pub mod retry;
 pub mod submit;
 pub mod watch;
@@ -32,6 +31,7 @@ pub mod sweeps;
 
 // Results.
 pub mod fields;
+mod fields_in_memory;
 pub mod history;
 pub mod plots;
 pub mod profiles;
