@@ -1,5 +1,30 @@
 //! Problems and meshes from texts and files, results and figures as files: all input and output
 //! of `solver`. Bytes in, bytes out, never a path.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | a problem from JSON | `json.rs` |
+//! | the JSON Schema of a problem, and all violations of it | `schema` |
+//! | large inline meshes | `inline.rs` |
+//! | a mesh file of any format | `file.rs` |
+//! | Gmsh | `gmsh.rs` |
+//! | decks of Abaqus and CalculiX | `abaqus` |
+//! | reading by lines with their numbers | `source.rs` |
+//! | the mesh that a problem names or contains as text | `external.rs` |
+//! | sweeps | `sweep` |
+//! | problems of which some numbers are given later | `sweep/parametrised.rs` |
+//! | the place in a text that a JSON Pointer names | `pointer` |
+//! | columns of profiles and histories, as CSV and JSON Lines | `table.rs` |
+//! | Arrow | `arrow.rs` |
+//! | NumPy | `npz.rs` |
+//! | fields as arrays | `fields.rs` |
+//! | fields as JSON | `fields_json.rs` |
+//! | fields as VTU | `vtu.rs` |
+//! | principal stresses | `stress.rs` |
+//! | fields as the service stores them | `columns` |
+//! | figures | `plot` |
 
 // In: problems as JSON, and sweeps of them; meshes as Gmsh files and as decks of Abaqus or CalculiX.
 pub mod abaqus;

@@ -6,6 +6,39 @@
 //! factored on two threads if the observer lets it ([`solution::Progress::SecondThread`]), with the same bits as on one.
 //! Reading and writing of any format is left to the crate `files`. The modules are
 //! listed from the ground up; each uses only those above it.
+//!
+//! # Where to look
+//!
+//! The map by sections of the thesis, and of what goes beyond it. A room with many files has a map of its own in its `mod.rs`;
+//! docs/theory.md leads from each equation to its function.
+//!
+//! | subject | where |
+//! |---|---|
+//! | 1.2 the friction law | `friction` |
+//! | 1.3 Hooke's law | `elasticity` |
+//! | supports and loads | `model` |
+//! | the contact boundary Γ_C, its gap and the obstacles | `contact` |
+//! | 1.4 the energy (1.21) and its minimum | `algorithm/convex` |
+//! | 2.1, 2.3 master elements and Gauss integration | `element` |
+//! | 2.2 stiffness, loads and stresses | `elasticity` |
+//! | the factorisation | `linear` |
+//! | 3.1 the iteration exactly as printed, with 3.3, 3.4.1 and 3.4.2 | `algorithm/thesis` |
+//! | the iterations that replace it (formulation 4) | `algorithm` |
+//! | 3.3 normals and tangents | `contact` |
+//! | 3.5 the criterion R_F and the history of an iteration | `algorithm/track.rs` |
+//! | 4 the examples | `examples` |
+//! | the examples on meshes of the thesis's size | `tests/data/thesis`, `tests/verification/examples.rs` |
+//! | 5 a law that depends on the load path | `friction`, `steps.rs` |
+//! | codes of violations | `error/reason.rs` |
+//! | codes of warnings | `solution` |
+//! | summary, profiles and fields of a result: their fields | `solution` |
+//! | summary, profiles and fields of a result: how they are computed | `algorithm/report.rs`, `algorithm/profile` |
+//! | stated errors by estimation, and the verdict | `accuracy` |
+//! | errors by a second solution on the mesh split in two | `verify.rs` |
+//! | adaptive refinement | `adapt`, `origins.rs` |
+//! | names of the first mesh on a refined one | `mesh/lineage.rs`, `mesh/first.rs`, `model/nodes.rs` |
+//! | many problems on one body, each solved from a neighbour | `family.rs`, `model/variable.rs`, `algorithm/settle.rs` |
+//! | memory and time that a problem needs | `model/estimate.rs` |
 
 // The phases of a solution.
 pub mod phase;

@@ -7,6 +7,27 @@
 //!
 //! As a mesh a deck needs elements of a plane and nothing else: other elements are left out or, if they are lines, name
 //! boundaries; what only its analysis needs is not looked at. As a problem everything counts that changes the solution.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | lines, keywords and data | `read`, `keyword`, `block` |
+//! | which keywords are supported | `supported` |
+//! | rows, sets, sections and materials that were read | `written` |
+//! | what was read about contact | `contact_parts` |
+//! | everything that was read | `deck` |
+//! | types of elements | `element` |
+//! | parts, instances and the assembly | `part`, `scope` |
+//! | what names and numbers mean | `names` |
+//! | one mesh from all parts | `build` |
+//! | a deck as a problem | `problem` |
+//! | supports of a deck | `supports` |
+//! | temperatures of a deck | `temperature` |
+//! | contact: what the deck says | `interaction` |
+//! | contact: rigid bodies, their shapes, their motion | `rigid`, `tool`, `steps` |
+//! | contact: the contacts made of them | `contact` |
+//! | OP=NEW in later steps | `replaced` |
 
 mod block;
 mod build;

@@ -2,6 +2,30 @@
 //!
 //! `Model::new` checks everything and reports all violations at once; the [`Model`] that it returns is
 //! numbered, and every room above relies on it.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | names of boundaries and groups | `boundaries` |
+//! | curves of boundaries | `curves` |
+//! | supports | `supports` |
+//! | loads | `loads` |
+//! | forces at nodes of the first mesh | `nodes` |
+//! | materials | `materials` |
+//! | contacts and the obstacles that they face | `contacts` |
+//! | checks of obstacles and friction laws | `laws` |
+//! | a checked contact | `contact_model` |
+//! | common ends of two contacts | `corners` |
+//! | obstacles that slide along the body | `sliding` |
+//! | rigid motions that nothing prevents | `freedom` |
+//! | nodes that were not merged | `unmerged` |
+//! | the axis of a body of revolution | `axis` |
+//! | load levels | `level` |
+//! | problems that differ in numbers only | `variable` |
+//! | collecting violations and warnings | `checks` |
+//! | checks of single numbers | `numbers` |
+//! | memory and time | `estimate` |
 
 mod axis;
 mod boundaries;
