@@ -1,5 +1,5 @@
 //! The code holds to ARCHITECTURE.md: its floors, its invariants that can be read from what a file names, and no
-//! circles in any folder. Its paths, those of CONTRIBUTING.md and those of the maps of the rooms exist.
+//! circles in any folder. Files that it, CONTRIBUTING.md, SECURITY.md and the maps of the rooms name exist.
 //!
 //! What stands under `#[cfg(test)]` is free. A `mod.rs` that declares its children and shows what is theirs
 //! (`pub use child::Thing`) does not use them; whoever imports `super::Thing` then uses the child. A `mod.rs` with code
@@ -62,7 +62,7 @@ fn maps_and_pages_name_files_that_exist() {
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .collect();
     names.remove("target"); // what a build has made need not be there
-    for page in ["ARCHITECTURE.md", "CONTRIBUTING.md"] {
+    for page in ["ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md"] {
         let text = fs::read_to_string(top.join(page)).unwrap();
         wrong.extend(maps::dead_paths(page, &text, &names, &exists));
     }
