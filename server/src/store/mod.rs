@@ -55,6 +55,8 @@
 //! | restoring a backup | `restore` |
 //! | doctor and salvage | `inspect`, `salvage` |
 //! | random sequences of everything, by seed | `tests/simulation` |
+//!
+//! [`Owners`]: crate::caller::Owners
 
 // Input and output types, and errors.
 mod checksum;
