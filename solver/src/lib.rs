@@ -7,6 +7,30 @@
 //! Reading and writing of any format is left to the crate `files`. The modules are
 //! listed from the ground up; each uses only those above it.
 //!
+//! ```
+//! use std::ops::ControlFlow;
+//!
+//! // a block that is pressed by a rigid punch, as JSON: `files::parse` reads it with all violations at once
+//! let problem = serde_json::from_str(r#"{
+//!     "analysis": {"kind": "plane_strain"},
+//!     "mesh": {"grid": {"x": [0, 0.5, 1, 2], "y": [-2, -1, 0]}},
+//!     "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+//!     "supports": [{"boundary": "left", "ux": 0}, {"boundary": "bottom", "ux": 0, "uy": 0}],
+//!     "contacts": [{
+//!         "boundary": "top",
+//!         "obstacle": {"kind": "flat", "from": 0, "to": 1},
+//!         "indentation": 0.01,
+//!         "friction": {"coefficient": 0.3, "nonlocal_radius": 0.1, "elastic_slip": 1e-4}
+//!     }]
+//! }"#)?;
+//! let solution = solver::solve(&problem, &mut |_progress| ControlFlow::Continue(()))?;
+//! println!("normal force {}", solution.summary.normal_force);
+//! assert!(solution.summary.converged && solution.summary.normal_force > 0.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! [`family`] solves many problems on one body; `examples/friction.rs` shows it.
+//!
 //! # Where to look
 //!
 //! The map by sections of the thesis, and of what goes beyond it. A room with many files has a map of its own in its `mod.rs`;
@@ -104,13 +128,25 @@ use verify::Verification;
 /// Solves a problem: the whole flow on one screen.
 ///
 /// `observe` is called with every phase and iteration, and again and again in long work, and may stop the solution: the
-/// result is then the last state as `Outcome::Canceled`, or `SolveError::Stopped` if there is none yet or its stresses and
-/// profiles are much work.
+/// result is then the last state as `Outcome::Canceled`. A method that does not converge is an
+/// [`Outcome`](solution::Outcome) too, with its history.
+///
+/// # Errors
+///
+/// [`SolveError::Invalid`] with all violations, if the problem is wrong or names a mesh that only its caller can read
+/// (see [`solve_on`]). The other kinds of [`SolveError`] mean that no state could be computed: the body is not held,
+/// memory does not suffice, a number is not finite, or the observer stopped before there was a state, or while its
+/// stresses and profiles were much work.
 pub fn solve(problem: &Problem, observe: &mut Observer<'_>) -> Result<Solution, SolveError> {
     solve_on(problem, None, observe)
 }
 
-/// Solves a problem that may only name or quote its mesh: `external` is that mesh.
+/// Solves a problem like [`solve`]; if the problem only names or quotes its mesh, `external` is that mesh
+/// (`files::external_mesh` reads it).
+///
+/// # Errors
+///
+/// As for [`solve`]; violations of the external mesh are among those of the problem.
 pub fn solve_on(
     problem: &Problem,
     external: Option<External>,
@@ -119,7 +155,11 @@ pub fn solve_on(
     solve_with_mesh(problem, external, observe).map(|(solution, _)| solution)
 }
 
-/// The same, and the mesh that the solution is on: the refined one.
+/// Solves a problem like [`solve_on`], and returns the mesh that the solution is on: the refined one.
+///
+/// # Errors
+///
+/// As for [`solve`].
 pub fn solve_with_mesh(
     problem: &Problem,
     external: Option<External>,
@@ -158,7 +198,11 @@ pub struct Checked {
     pub estimate: Estimate,
 }
 
-/// Checks a problem without solving it: its warnings and its cost, or all its violations.
+/// Checks a problem without solving it: its warnings and its cost.
+///
+/// # Errors
+///
+/// All violations of the problem, each with its place, what was found, what was expected and what to do.
 pub fn check(problem: &Problem, external: Option<External>) -> Result<Checked, Vec<Violation>> {
     let model = Model::new(problem, external)?;
     Ok(Checked {

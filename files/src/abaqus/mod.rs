@@ -59,9 +59,13 @@ use crate::source::ReadError;
 use solver::mesh::{self, Mesh};
 use solver::solution::{Warning, WarningCode};
 
-/// Reads the mesh of a deck, with warnings of what was changed. The analysis of the deck is not used, except that
-/// the sets and faces that it loads get names: `SET P3` for a pressure on the third
-/// sides of the elements of SET, `7` for the node 7.
+/// Reads the mesh of a deck, with warnings of what was changed. The analysis of the deck is not used, except that the
+/// sets and faces that it loads get names: `SET P3` for a pressure on the third sides of the elements of SET, `7` for
+/// the node 7.
+///
+/// # Errors
+///
+/// [`ReadError::Io`] if the reader fails; [`ReadError::Invalid`] with all violations of the deck, which name its lines.
 pub fn read(reader: impl BufRead) -> Result<(Mesh, Vec<Warning>), ReadError> {
     read_for(reader, |_| false)
 }

@@ -89,7 +89,11 @@ pub struct Parts<'a> {
     pub stored: Option<&'a Mesh>,
 }
 
-/// Draws one figure. `Err`: the reason why it could not be drawn.
+/// Draws one figure of a problem and its solution, as SVG.
+///
+/// # Errors
+///
+/// The reason in words, if the figure cannot be drawn.
 pub fn draw(
     plot: Plot,
     style: impl Into<Style>,

@@ -105,15 +105,23 @@ pub struct Model {
 }
 
 impl Model {
-    /// Checks and numbers a problem; `external`: its mesh, if the problem only names or quotes one.
+    /// Checks and numbers a problem; `external` is its mesh, if the problem only names or quotes one.
+    ///
+    /// # Errors
+    ///
+    /// All violations of the problem at once, those of the external mesh among them; at most a hundred are listed.
     pub fn new(problem: &Problem, external: Option<External>) -> Result<Model, Vec<Violation>> {
         let mut checks = Checks::default();
         let model = checks.model(problem, Source::Given(external));
         checks.found.conclude(model)
     }
 
-    /// The same problem on a refined mesh, which has all names of the first one: adaptive refinement makes one after the
-    /// other, and verification splits the last in two.
+    /// Checks and numbers a problem on a refined mesh, which has all names of the first one: adaptive refinement makes
+    /// one after the other, and verification splits the last in two.
+    ///
+    /// # Errors
+    ///
+    /// All violations of the problem on that mesh.
     pub fn on_mesh(problem: &Problem, given: ExternalMesh) -> Result<Model, Vec<Violation>> {
         let mut checks = Checks {
             warnings: given.warnings,
