@@ -1,15 +1,25 @@
 //! Solves a problem for several coefficients of friction on one factored body, and prints the forces:
 //!
-//!     cargo run --release --example friction tests/data/thesis/rectangular_punch.json
+//!     cargo run --release --example friction -- tests/data/thesis/rectangular_punch.json
 
-use std::{env, error::Error, fs, ops::ControlFlow};
+use std::{env, error::Error, fs, ops::ControlFlow, process::ExitCode};
 
 use solver::{
     family::{Family, Start},
     problem::Refine,
 };
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> ExitCode {
+    match study() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn study() -> Result<(), Box<dyn Error>> {
     let path = env::args().nth(1).ok_or("usage: friction PROBLEM.json")?;
     let text = fs::read_to_string(path)?;
     let mut problem = files::parse(&text).map_err(|violations| {
