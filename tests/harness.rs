@@ -96,10 +96,11 @@ impl Server {
 
     /// SIGTERM; gives what became of it.
     pub async fn terminate(&mut self) -> ExitStatus {
-        let pid = self.child.id().expect("it is running").to_string();
+        let pid = self.child.id().expect("it is running");
+        // of the shell: the program of that name is a package of its own
         assert!(
-            Command::new("kill")
-                .args(["-TERM", &pid])
+            Command::new("sh")
+                .args(["-c", &format!("kill -TERM {pid}")])
                 .status()
                 .await
                 .unwrap()

@@ -8,7 +8,11 @@ use arrow_schema::{ArrowError, DataType, Field, Schema};
 
 use crate::table::{Table, Values};
 
-/// The bytes of the file. A missing number is null.
+/// Writes a table as an Arrow IPC file. A missing number is null.
+///
+/// # Errors
+///
+/// The reason in words, if the columns have different lengths.
 pub fn file(table: &Table) -> Result<Vec<u8>, String> {
     written(table).map_err(|error| error.to_string())
 }

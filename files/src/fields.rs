@@ -73,8 +73,11 @@ fn stresses(fields: &Fields) -> impl Iterator<Item = Stress> {
 /// Adds the fields to an archive, their names after `prefix`.
 ///
 /// Elements are in two arrays, `quads` and `triangles`, each with an array of their numbers in the mesh;
-/// `element_error` has one entry per element of the mesh, `gauss_element` the element of each
-/// integration point.
+/// `element_error` has one entry per element of the mesh, `gauss_element` the element of each integration point.
+///
+/// # Errors
+///
+/// The reason in words, if the columns of the fields do not fit together.
 pub fn add(npz: &mut Npz, prefix: &str, fields: &Fields) -> Result<(), String> {
     check(fields)?;
     let name = |name: &str| format!("{prefix}{name}");
@@ -122,7 +125,11 @@ pub fn add(npz: &mut Npz, prefix: &str, fields: &Fields) -> Result<(), String> {
     npz.array(&name("gauss_stress"), &stress, 6)
 }
 
-/// The fields alone as an archive.
+/// Writes the fields alone as an NPZ archive.
+///
+/// # Errors
+///
+/// As for [`add`].
 pub fn npz(fields: &Fields) -> Result<Vec<u8>, String> {
     let mut npz = Npz::new();
     add(&mut npz, "", fields)?;

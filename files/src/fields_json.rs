@@ -72,7 +72,11 @@ impl<F: Deref<Target = Fields>> FieldsJson<F> {
         }
     }
 
-    /// The next piece, never empty; `None` after the last. `Err`: a number that is not finite has no JSON.
+    /// Returns the next piece, never empty, and `None` after the last.
+    ///
+    /// # Errors
+    ///
+    /// A number that is not finite, which JSON cannot write.
     pub fn piece(&mut self) -> serde_json::Result<Option<Vec<u8>>> {
         let Some((before, values)) = COLUMNS.get(self.column) else {
             let last = self.column == COLUMNS.len();

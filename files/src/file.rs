@@ -26,7 +26,12 @@ pub enum MeshFormat {
 /// What some editors write before a text.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Reads a mesh file, with warnings of what was changed.
+/// Reads a mesh file of any format, with warnings of what was changed. The format is recognised by its first
+/// characters.
+///
+/// # Errors
+///
+/// [`ReadError::Io`] if the reader fails; [`ReadError::Invalid`] with all violations of the file, which name its lines.
 pub fn read_mesh(mut reader: impl BufRead) -> Result<(MeshFormat, Mesh, Vec<Warning>), ReadError> {
     if reader
         .fill_buf()

@@ -45,7 +45,12 @@ enum Kind {
     Quad,
 }
 
-/// Reads a mesh, with warnings of what was changed.
+/// Reads a Gmsh file, MSH 2.2 or 4.1, ASCII or binary, with warnings of what was changed.
+///
+/// # Errors
+///
+/// [`ReadError::Io`] if the reader fails; [`ReadError::Invalid`] with the violations of the file: another version,
+/// sections that end too early, elements that no plane body has, and so on, each with its line.
 pub fn read(reader: impl BufRead) -> Result<(Mesh, Vec<Warning>), ReadError> {
     let mut file = File::new(reader);
     file.sections()?;

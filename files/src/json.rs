@@ -21,8 +21,13 @@ const INLINE: &[&str] = &["mesh", "inline"];
 /// Most brackets that may be open at once. A problem has ten.
 pub const MOST_NESTED: usize = 64;
 
-/// Reads a problem, or returns all faults of its structure. Pointers are relative to
-/// the problem.
+/// Reads a problem from JSON.
+///
+/// # Errors
+///
+/// All violations of its structure (at most a hundred), with pointers relative to the problem: unknown and missing
+/// fields, wrong types, alternatives that are none or more than one. What the fields mean together is checked by the
+/// solver.
 pub fn parse(text: &str) -> Result<Problem, Vec<Violation>> {
     let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text);
     if text.contains("\"inline\"") {
@@ -32,8 +37,13 @@ pub fn parse(text: &str) -> Result<Problem, Vec<Violation>> {
     }
 }
 
-/// The same, from a reader, in pieces: of an inline mesh only the columns are held, and never its text, unless it is
-/// faulty. A text that is not UTF-8 is an error of reading.
+/// Reads a problem from a reader, in pieces: of an inline mesh only the columns are held, and never its text, unless it
+/// is faulty.
+///
+/// # Errors
+///
+/// [`ReadError::Io`] if the reader fails or the text is not UTF-8; [`ReadError::Invalid`] with the violations of
+/// [`parse`].
 pub fn read(reader: impl Read) -> Result<Problem, ReadError> {
     let mut extract = Extract::new(reader, INLINE);
     let mut text = String::new();

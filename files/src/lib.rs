@@ -1,5 +1,54 @@
 //! Problems and meshes from texts and files, results and figures as files: all input and output
 //! of `solver`. Bytes in, bytes out, never a path.
+//!
+//! ```
+//! use std::ops::ControlFlow;
+//!
+//! let text = r#"{
+//!     "analysis": {"kind": "plane_strain"},
+//!     "mesh": {"grid": {"x": [0, 0.5, 1, 2], "y": [-2, -1, 0]}},
+//!     "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+//!     "supports": [{"boundary": "left", "ux": 0}, {"boundary": "bottom", "ux": 0, "uy": 0}],
+//!     "contacts": [{"boundary": "top", "obstacle": {"kind": "flat", "from": 0, "to": 1}, "indentation": 0.01}]
+//! }"#;
+//! let problem = files::parse(text).expect("a valid problem");
+//! let solution = solver::solve(&problem, &mut |_progress| ControlFlow::Continue(()))?;
+//! println!("normal force {}", solution.summary.normal_force);
+//!
+//! // the stresses along the contact as CSV, a line for each point
+//! let csv = files::table::Table::of_profile(&solution.profiles["top"]).csv()?;
+//! assert!(csv.starts_with("s,x,y,"));
+//!
+//! // what is wrong with a problem is told with its place and with what to do
+//! let violations = files::parse(&text.replace("indentation", "identation")).unwrap_err();
+//! assert_eq!(violations[0].pointer, "/contacts/0/identation");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | a problem from JSON | `json.rs` |
+//! | the JSON Schema of a problem, and all violations of it | `schema` |
+//! | large inline meshes | `inline.rs` |
+//! | a mesh file of any format | `file.rs` |
+//! | Gmsh | `gmsh.rs` |
+//! | decks of Abaqus and CalculiX | `abaqus` |
+//! | reading by lines with their numbers | `source.rs` |
+//! | the mesh that a problem names or contains as text | `external.rs` |
+//! | sweeps | `sweep` |
+//! | problems of which some numbers are given later | `sweep/parametrised.rs` |
+//! | the place in a text that a JSON Pointer names | `pointer` |
+//! | columns of profiles and histories, as CSV and JSON Lines | `table.rs` |
+//! | Arrow | `arrow.rs` |
+//! | NumPy | `npz.rs` |
+//! | fields as arrays | `fields.rs` |
+//! | fields as JSON | `fields_json.rs` |
+//! | fields as VTU | `vtu.rs` |
+//! | principal stresses | `stress.rs` |
+//! | fields as the service stores them | `columns` |
+//! | figures | `plot` |
 
 // In: problems as JSON, and sweeps of them; meshes as Gmsh files and as decks of Abaqus or CalculiX.
 pub mod abaqus;

@@ -32,8 +32,13 @@ impl Npz {
         }
     }
 
-    /// Adds `rows` × `width` numbers, row by row; a vector when `width` is 1. The number of rows
-    /// follows from that of the numbers.
+    /// Adds `rows` × `width` numbers, row by row; a vector when `width` is 1. The number of rows follows from that of
+    /// the numbers.
+    ///
+    /// # Errors
+    ///
+    /// The reason in words, if the numbers cannot be split into rows of that width, or the archive becomes too large
+    /// for its format.
     pub fn array<T: Number>(
         &mut self,
         name: &str,
@@ -61,6 +66,10 @@ impl Npz {
     }
 
     /// Adds a vector of words, each as wide as the longest: NumPy's own `<U`, which needs no pickle.
+    ///
+    /// # Errors
+    ///
+    /// The reason in words, if the archive becomes too large for its format.
     pub fn words<S: AsRef<str>>(&mut self, name: &str, words: &[S]) -> Result<(), String> {
         let width = words.iter().map(|word| word.as_ref().chars().count()).max();
         let width = width.unwrap_or(0).max(1);
@@ -85,6 +94,10 @@ impl Npz {
     }
 
     /// Adds the columns of a table, each under its name after `prefix`; a missing number is NaN.
+    ///
+    /// # Errors
+    ///
+    /// The reason in words, if the columns have different lengths, or the archive becomes too large for its format.
     pub fn table(&mut self, prefix: &str, table: &Table) -> Result<(), String> {
         table.rows()?;
         for column in &table.columns {
@@ -98,7 +111,11 @@ impl Npz {
         Ok(())
     }
 
-    /// The bytes of the archive.
+    /// Returns the bytes of the archive.
+    ///
+    /// # Errors
+    ///
+    /// The reason in words, if the archive became too large for its format.
     pub fn finish(self) -> Result<Vec<u8>, String> {
         Ok(self.zip.finish().map_err(failed)?.into_inner())
     }
@@ -126,7 +143,11 @@ impl Npz {
     }
 }
 
-/// A table as an archive of its columns.
+/// Writes a table as an archive of its columns.
+///
+/// # Errors
+///
+/// As for [`Npz::table`].
 pub fn file(table: &Table) -> Result<Vec<u8>, String> {
     let mut npz = Npz::new();
     npz.table("", table)?;

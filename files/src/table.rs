@@ -101,7 +101,11 @@ impl Table {
         ] }
     }
 
-    /// The number of rows; `Err`: a column with another number.
+    /// Returns the number of rows.
+    ///
+    /// # Errors
+    ///
+    /// The reason in words, if a column has another number of entries.
     pub fn rows(&self) -> Result<usize, String> {
         let rows = self.columns.first().map_or(0, |first| first.values.len());
         match self.columns.iter().find(|c| c.values.len() != rows) {
@@ -126,8 +130,12 @@ impl Table {
         self.columns.iter().map(of_column).sum()
     }
 
-    /// RFC 4180: a line of names, then a line per row. A number is the shortest text that reads back
-    /// as the same; a missing one is empty.
+    /// Writes the table as RFC 4180: a line of names, then a line per row. A number is the shortest text that reads
+    /// back as the same; a missing one is empty.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Table::rows`].
     pub fn csv(&self) -> Result<String, String> {
         let mut text = self.header();
         for row in 0..self.rows()? {
@@ -155,7 +163,11 @@ impl Table {
         format!("{}\r\n", names.join(","))
     }
 
-    /// A JSON object per row; a missing number is null.
+    /// Writes the table as JSON Lines: an object per row; a missing number is null.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Table::rows`].
     pub fn jsonl(&self) -> Result<String, String> {
         let mut text = String::new();
         let names: Vec<String> = self.columns.iter().map(|c| quoted(&c.name)).collect();

@@ -22,7 +22,11 @@ const QUADRATIC_QUAD: u8 = 23;
 /// Bytes compressed at a time; a multiple of every number's size.
 const BLOCK: usize = 1 << 18;
 
-/// The bytes of the file: nodes before deformation at z = 0, cells, values at both.
+/// Writes the fields as VTU: nodes before deformation at z = 0, cells, values at both.
+///
+/// # Errors
+///
+/// The reason in words, if the columns of the fields do not fit together.
 pub fn file(fields: &Fields) -> Result<Vec<u8>, String> {
     check(fields)?;
     written(fields).map_err(|error| error.to_string())

@@ -1,5 +1,9 @@
 //! Condensed bodies that are kept for later jobs on the same body: within a limit, and the least recently used is dropped
 //! first. Only data: `memory` decides when jobs need the room.
+//!
+//! A body is found by a hash of all that it is made from, and a solution on it has the same bits as one on a new body. Jobs on
+//! meshes of their own (adaptive refinement, `verify`) and worker processes keep none; two jobs that begin at the same time
+//! each make theirs.
 
 use std::{collections::HashMap, sync::Arc};
 

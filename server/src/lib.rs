@@ -1,5 +1,48 @@
 //! The service: contact problems as jobs, over REST and gRPC. A room uses only rooms of its own
 //! group and of the groups above it; ARCHITECTURE.md has the finer order.
+//!
+//! # Where to look
+//!
+//! The map of the service by subject. `rest`, `verbs`, `store`, `queue`, `listener` and `cli` have a map of their own in their `mod.rs`. The
+//! same file name in several rooms is the same subject: `sweeps` is the routes in `rest`, the operations in `verbs`, the tables in
+//! `store`.
+//!
+//! | subject | where |
+//! |---|---|
+//! | routes, bodies and headers of requests | `rest` |
+//! | operations, whatever the protocol | `verbs` |
+//! | everything stored, and all SQL | `store` |
+//! | how jobs start, are recorded and end | `queue` |
+//! | one solution with its times | `run` |
+//! | sweeps: operations | `verbs/sweeps.rs` |
+//! | sweeps: tables | `store/sweeps.rs` |
+//! | sweeps: members solved one after the other | `run/members.rs` |
+//! | conversions between messages of gRPC and our types: which mirror each other | `server/build/mirrors.rs` |
+//! | conversions between messages of gRPC and our types: the generator | `server/build/conversions.rs` |
+//! | conversions between messages of gRPC and our types: those written by hand | `convert` |
+//! | kinds of errors, with status, gRPC code and explanation | `catalog.rs` |
+//! | an error of one request, with its details | `error.rs` |
+//! | a parameter of requests, for both protocols | `parameters`, and beside its verb in `verbs` |
+//! | callers, owners and scopes | `caller.rs` |
+//! | tokens | `token.rs`, `verbs/tokens.rs`, `store/tokens.rs`, `cli/token.rs` |
+//! | connections and TLS | `listener` |
+//! | bytes of requests and answers in memory | `transfer.rs` |
+//! | how fast clients have to send and read | `pace.rs` |
+//! | size of gRPC messages | `codec.rs` |
+//! | the memory budget | `memory.rs` |
+//! | the estimate of a problem | `solver/src/model/estimate.rs` |
+//! | bodies kept for later jobs | `bodies.rs` |
+//! | settings: the struct | `config.rs` |
+//! | settings: their sources | `cli/settings.rs` |
+//! | the log | `cli/log.rs`, `cli/log_line.rs` |
+//! | metrics | `metrics`, `verbs/metrics.rs` |
+//! | spans | `spans.rs` |
+//! | the trace of a request | `trace.rs` |
+//! | systemd and `signorini health` | `cli/notify.rs`, `cli/health.rs`, `contrib/systemd` |
+//! | start and stop | `app.rs` |
+//! | formats of a result, by name and media type | `formats.rs` |
+//! | fingerprints of problem, result and body | `digest` |
+//! | points where tests make a job fail | `failpoint.rs` |
 
 // Basic types, for every module: the address of the service, kept bodies, callers and their tokens, kinds of errors, points in time, jobs and their changes of status, sweeps, parametrised problems, events.
 pub mod address;

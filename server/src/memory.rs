@@ -1,5 +1,7 @@
 //! The memory budget: what running jobs are estimated to need is reserved in it, and a job that takes far more than
 //! that is ended. What they leave of it is for bodies that are kept for later jobs: those give way to any job.
+//!
+//! The next job in order is claimed when its estimate fits, and no later job before it.
 
 use std::{
     cell::Cell,

@@ -86,7 +86,13 @@ impl<'a> Source<'a> {
 pub const AXIS_SHARE: f64 = 0.125;
 
 impl ElasticBody {
-    /// Assembles, factors and condenses, and reports each phase to the observer.
+    /// Assembles, factors and condenses the body of a model, and reports each phase to the observer.
+    ///
+    /// # Errors
+    ///
+    /// [`SolveError::SingularSystem`] with the node and direction that nothing holds; [`SolveError::ResourceExhausted`]
+    /// and [`SolveError::NonFinite`] if a matrix does not fit into memory or is not finite; [`SolveError::Stopped`] if
+    /// the observer says so.
     pub fn new(model: &Model, observe: &mut Observer<'_>) -> Result<Self, SolveError> {
         notify(observe, Progress::Phase(Phase::Assemble))?;
         let nodal_loads =

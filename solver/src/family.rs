@@ -54,8 +54,14 @@ pub struct Member {
 }
 
 impl Family {
-    /// Checks the first problem, factors and condenses its body. Errors are estimated, not verified, and meshes not
-    /// refined adaptively: a problem that asks for that shares no body, and is solved by [`solve_on`](crate::solve_on).
+    /// Checks the first problem, factors and condenses its body.
+    ///
+    /// Errors of numbers are estimated, not verified, and meshes are not refined adaptively: a problem that asks for
+    /// that shares no body, and is solved by [`solve_on`](crate::solve_on).
+    ///
+    /// # Errors
+    ///
+    /// As for [`prepare`].
     pub fn new(
         problem: &Problem,
         external: Option<External>,
@@ -77,15 +83,20 @@ impl Family {
         }
     }
 
-    /// Solves a problem on this body (`problem.mesh` is not read: it is the family's); also its end, from which others may
-    /// begin. `Err(Invalid)` with its violations if it is wrong; `Err(OtherBody)` if its body differs.
+    /// Solves a problem on this body (`problem.mesh` is not read: it is the family's), and returns its end, too, from
+    /// which others may begin.
     ///
-    /// Its numbers are those of its own solution within the tolerance. Their last bits depend on its start, and on nothing
-    /// else that was solved before.
+    /// The numbers are those of the problem's own solution within its tolerance. Their last bits depend on `start`, and
+    /// on nothing else that was solved before.
     ///
-    /// Its displacements away from the contacts are not computed: the balance of forces (`residuals.equilibrium`) is 0, and
-    /// warnings that need it, or strains, are missing. A body that only contact holds, and comparisons of solutions, take
-    /// the whole solution.
+    /// Displacements away from the contacts are not computed: the balance of forces (`residuals.equilibrium`) is 0, and
+    /// warnings that need it, or strains, are missing. A body that only contact holds, and comparisons of solutions,
+    /// take the whole solution.
+    ///
+    /// # Errors
+    ///
+    /// [`SolveError::Invalid`] with the violations of the problem; [`SolveError::OtherBody`] if its body differs;
+    /// otherwise as for [`Prepared::solve`].
     pub fn member(
         &mut self,
         problem: &Problem,
@@ -120,8 +131,13 @@ impl Family {
         Ok((Member::of_numbers(&numbers), end))
     }
 
-    /// Solves a problem on this body with all its displacements, whose balance of forces tells whether the body is sound:
-    /// the first of those that share it. Its numbers are those of its own solution, bit for bit.
+    /// Solves a problem on this body with all its displacements, whose balance of forces tells whether the body is
+    /// sound: this is for the first of the problems that share it. The numbers are those of the problem's own solution,
+    /// bit for bit.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Family::member`].
     pub fn whole_member(
         &self,
         problem: &Problem,
@@ -138,7 +154,11 @@ impl Family {
         Ok(Member::of(&reported.summary))
     }
 
-    /// The whole solution of a problem on this body, as [`solve`](crate::solve) gives it, bit for bit.
+    /// Returns the whole solution of a problem on this body, bit for bit as [`solve`](crate::solve) gives it.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Family::member`].
     pub fn solution(
         &self,
         problem: &Problem,

@@ -6,6 +6,63 @@
 //! factored on two threads if the observer lets it ([`solution::Progress::SecondThread`]), with the same bits as on one.
 //! Reading and writing of any format is left to the crate `files`. The modules are
 //! listed from the ground up; each uses only those above it.
+//!
+//! ```
+//! use std::ops::ControlFlow;
+//!
+//! // a block that is pressed by a rigid punch, as JSON: `files::parse` reads it with all violations at once
+//! let problem = serde_json::from_str(r#"{
+//!     "analysis": {"kind": "plane_strain"},
+//!     "mesh": {"grid": {"x": [0, 0.5, 1, 2], "y": [-2, -1, 0]}},
+//!     "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+//!     "supports": [{"boundary": "left", "ux": 0}, {"boundary": "bottom", "ux": 0, "uy": 0}],
+//!     "contacts": [{
+//!         "boundary": "top",
+//!         "obstacle": {"kind": "flat", "from": 0, "to": 1},
+//!         "indentation": 0.01,
+//!         "friction": {"coefficient": 0.3, "nonlocal_radius": 0.1, "elastic_slip": 1e-4}
+//!     }]
+//! }"#)?;
+//! let solution = solver::solve(&problem, &mut |_progress| ControlFlow::Continue(()))?;
+//! println!("normal force {}", solution.summary.normal_force);
+//! assert!(solution.summary.converged && solution.summary.normal_force > 0.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! [`family`] solves many problems on one body; `examples/friction.rs` shows it.
+//!
+//! # Where to look
+//!
+//! The map by sections of the thesis, and of what goes beyond it. A room with many files has a map of its own in its `mod.rs`;
+//! docs/theory.md leads from each equation to its function.
+//!
+//! | subject | where |
+//! |---|---|
+//! | 1.2 the friction law | `friction` |
+//! | 1.3 Hooke's law | `elasticity` |
+//! | supports and loads | `model` |
+//! | the contact boundary Γ_C, its gap and the obstacles | `contact` |
+//! | 1.4 the energy (1.21) and its minimum | `algorithm/convex` |
+//! | 2.1, 2.3 master elements and Gauss integration | `element` |
+//! | 2.2 stiffness, loads and stresses | `elasticity` |
+//! | the factorisation | `linear` |
+//! | 3.1 the iteration exactly as printed, with 3.3, 3.4.1 and 3.4.2 | `algorithm/thesis` |
+//! | the iterations that replace it (formulation 4) | `algorithm` |
+//! | 3.3 normals and tangents | `contact` |
+//! | 3.5 the criterion R_F and the history of an iteration | `algorithm/track.rs` |
+//! | 4 the examples | `examples` |
+//! | the examples on meshes of the thesis's size | `tests/data/thesis`, `tests/verification/examples.rs` |
+//! | 5 a law that depends on the load path | `friction`, `steps.rs` |
+//! | codes of violations | `error/reason.rs` |
+//! | codes of warnings | `solution` |
+//! | summary, profiles and fields of a result: their fields | `solution` |
+//! | summary, profiles and fields of a result: how they are computed | `algorithm/report.rs`, `algorithm/profile` |
+//! | stated errors by estimation, and the verdict | `accuracy` |
+//! | errors by a second solution on the mesh split in two | `verify.rs` |
+//! | adaptive refinement | `adapt`, `origins.rs` |
+//! | names of the first mesh on a refined one | `mesh/lineage.rs`, `mesh/first.rs`, `model/nodes.rs` |
+//! | many problems on one body, each solved from a neighbour | `family.rs`, `model/variable.rs`, `algorithm/settle.rs` |
+//! | memory and time that a problem needs | `model/estimate.rs` |
 
 // The phases of a solution.
 pub mod phase;
@@ -71,13 +128,25 @@ use verify::Verification;
 /// Solves a problem: the whole flow on one screen.
 ///
 /// `observe` is called with every phase and iteration, and again and again in long work, and may stop the solution: the
-/// result is then the last state as `Outcome::Canceled`, or `SolveError::Stopped` if there is none yet or its stresses and
-/// profiles are much work.
+/// result is then the last state as `Outcome::Canceled`. A method that does not converge is an
+/// [`Outcome`](solution::Outcome) too, with its history.
+///
+/// # Errors
+///
+/// [`SolveError::Invalid`] with all violations, if the problem is wrong or names a mesh that only its caller can read
+/// (see [`solve_on`]). The other kinds of [`SolveError`] mean that no state could be computed: the body is not held,
+/// memory does not suffice, a number is not finite, or the observer stopped before there was a state, or while its
+/// stresses and profiles were much work.
 pub fn solve(problem: &Problem, observe: &mut Observer<'_>) -> Result<Solution, SolveError> {
     solve_on(problem, None, observe)
 }
 
-/// Solves a problem that may only name or quote its mesh: `external` is that mesh.
+/// Solves a problem like [`solve`]; if the problem only names or quotes its mesh, `external` is that mesh
+/// (`files::external_mesh` reads it).
+///
+/// # Errors
+///
+/// As for [`solve`]; violations of the external mesh are among those of the problem.
 pub fn solve_on(
     problem: &Problem,
     external: Option<External>,
@@ -86,7 +155,11 @@ pub fn solve_on(
     solve_with_mesh(problem, external, observe).map(|(solution, _)| solution)
 }
 
-/// The same, and the mesh that the solution is on: the refined one.
+/// Solves a problem like [`solve_on`], and returns the mesh that the solution is on: the refined one.
+///
+/// # Errors
+///
+/// As for [`solve`].
 pub fn solve_with_mesh(
     problem: &Problem,
     external: Option<External>,
@@ -125,7 +198,11 @@ pub struct Checked {
     pub estimate: Estimate,
 }
 
-/// Checks a problem without solving it: its warnings and its cost, or all its violations.
+/// Checks a problem without solving it: its warnings and its cost.
+///
+/// # Errors
+///
+/// All violations of the problem, each with its place, what was found, what was expected and what to do.
 pub fn check(problem: &Problem, external: Option<External>) -> Result<Checked, Vec<Violation>> {
     let model = Model::new(problem, external)?;
     Ok(Checked {

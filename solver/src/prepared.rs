@@ -23,7 +23,13 @@ pub struct Prepared {
     pub body: Arc<ElasticBody>,
 }
 
-/// Prepares a problem on its own mesh; adaptive refinement prepares it on each of several.
+/// Checks a problem on its own mesh, and factors and condenses its body; `external` is the mesh that it only names or
+/// quotes.
+///
+/// # Errors
+///
+/// [`SolveError::Invalid`] with all violations of the problem; [`SolveError::SingularSystem`], `ResourceExhausted` or
+/// `NonFinite` if the body cannot be factored; [`SolveError::Stopped`] if the observer says so.
 pub fn prepare(
     problem: &Problem,
     external: Option<External>,
@@ -32,7 +38,11 @@ pub fn prepare(
     Prepared::new(checked(problem, external, observe)?, observe)
 }
 
-/// Checks a problem and tells its warnings: what comes before its body.
+/// Checks a problem, and passes its warnings to the observer: the part of [`prepare`] before the body.
+///
+/// # Errors
+///
+/// [`SolveError::Invalid`] with all violations of the problem; [`SolveError::Stopped`] if the observer says so.
 pub fn checked(
     problem: &Problem,
     external: Option<External>,
@@ -44,7 +54,12 @@ pub fn checked(
     Ok(model)
 }
 
-/// Prepares a problem on another mesh of its body, with all boundaries, groups and node sets of its own.
+/// Prepares a problem like [`prepare`], on another mesh of its body, which has all boundaries, groups and node sets
+/// itself.
+///
+/// # Errors
+///
+/// As for [`prepare`].
 pub fn prepare_on_mesh(
     problem: &Problem,
     mesh: Mesh,
@@ -63,17 +78,31 @@ pub(crate) fn tell_warnings(model: &Model, observe: &mut Observer<'_>) -> Result
 
 impl Prepared {
     /// Factors and condenses the body of a model.
+    ///
+    /// # Errors
+    ///
+    /// [`SolveError::SingularSystem`], `ResourceExhausted` or `NonFinite` if the body cannot be factored;
+    /// [`SolveError::Stopped`] if the observer says so.
     pub fn new(model: Model, observe: &mut Observer<'_>) -> Result<Prepared, SolveError> {
         let body = Arc::new(ElasticBody::new(&model, observe)?);
         Ok(Prepared { model, body })
     }
 
-    /// Contact and friction, load step by load step.
+    /// Solves contact and friction on the prepared body, load step by load step.
+    ///
+    /// # Errors
+    ///
+    /// [`SolveError::Unheld`] if nothing holds the body in its final state; `ResourceExhausted` or `NonFinite` if a
+    /// state cannot be computed; [`SolveError::Stopped`] if the observer says so before there is a state.
     pub fn solve(&self, observe: &mut Observer<'_>) -> Result<Solution, SolveError> {
         steps::run(&self.model, &self.body, None, observe)
     }
 
-    /// Solves another problem on this body; `None`: its body is not the same.
+    /// Solves another problem on this body, or returns `None` if its body is not the same.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Prepared::solve`].
     pub fn solve_other(
         &self,
         model: &Model,

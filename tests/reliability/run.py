@@ -1,11 +1,12 @@
 """Runs the commands of `table.py`, and keeps what they found.
 
-    run.py [--soak] [--record] [ROW ...]
+    run.py [--soak] [--record] [--without-tools] [ROW ...]
     run.py --page
 
 Each command ends with a line `figure: …`. With --record the figures and the date are written to figures.json, and
 docs/reliability.md is written anew; tests/soak does that. Without it the page is only compared with what the table and
-the recorded figures say. With --page it is written anew from them, and nothing is run.
+the recorded figures say. With --page it is written anew from them, and nothing is run. With --without-tools rows
+that need other programs than a C compiler and Python are named, and not run.
 """
 
 import datetime
@@ -65,24 +66,25 @@ def measured(before):
 
 def page(figures):
     """The page: a row for each promise."""
-    missing = ("passes in `tests/run`", "**not run at this size yet**")
     lines = [
         "# Reliability",
         "",
         "What the service promises under faults and attacks, and the command that shows it. `tests/run` runs the small",
-        "form of each; `tests/soak` the large one, by hand. Both are listed in `tests/reliability/table.py`, from which",
-        "`tests/reliability/run.py` writes this page. Scripts lie in `tests/reliability`. *Before* is what an attack on an",
-        "earlier version found.",
+        "form of each (`tests/run --all` where it needs other programs); `tests/soak` the large one, by hand. Both are listed in",
+        "`tests/reliability/table.py`, from which `tests/reliability/run.py` writes this page. Scripts lie in",
+        "`tests/reliability`. *Before* is what an attack on an earlier version found.",
         "",
     ]
     for row in ROWS:
+        small = "passes in `tests/run%s`" % (" --all" if row.needs else "")
         lines += ["## %s. %s" % (row.name, row.promise), ""]
         if row.before:
             lines += ["- Before: " + row.before]
         for command in dict.fromkeys([row.small, row.soak]):
             if command:
                 found = figures.get(command)
-                figure = "%s (%s)" % (found["figure"], found["date"]) if found else missing[command != row.small]
+                unrecorded = small if command == row.small else "**not run at this size yet**"
+                figure = "%s (%s)" % (found["figure"], found["date"]) if found else unrecorded
                 lines += ["- `%s`: %s" % (command, figure)]
         if row.missing:
             lines += ["- **Not shown:** " + row.missing]
@@ -94,6 +96,11 @@ def main():
     options = [word for word in sys.argv[1:] if word.startswith("--")]
     wanted = [word for word in sys.argv[1:] if not word.startswith("--")]
     rows = [row for row in ROWS if not wanted or row.name in wanted]
+    if "--without-tools" in options:
+        for row in rows:
+            if row.needs:
+                print("-- left to tests/run --all: %s, which needs %s" % (row.name, ", ".join(row.needs)), flush=True)
+        rows = [row for row in rows if not row.needs]
     commands = dict.fromkeys(row.soak if "--soak" in options else row.small for row in rows)
     figures = json.loads(FIGURES.read_text(encoding="utf-8")) if FIGURES.exists() else {}
     failed = []

@@ -9,7 +9,7 @@ from typing import NamedTuple
 class Row(NamedTuple):
     name: str
     promise: str
-    # Run by tests/run, in at most a minute; a Python script lies in this folder.
+    # Run by tests/run (with --all if there are `needs`), in at most a minute; a Python script lies in this folder.
     small: str = ""
     # Run by tests/soak, for as long as it takes.
     soak: str = ""
@@ -17,6 +17,8 @@ class Row(NamedTuple):
     missing: str = ""
     # What an attack on an earlier version found, which did not keep the promise.
     before: str = ""
+    # Programs that the small form needs beyond a C compiler and Python: `tests/run` alone leaves such rows to `tests/run --all`.
+    needs: tuple[str, ...] = ()
 
 
 ROWS = [
@@ -24,13 +26,14 @@ ROWS = [
         "kills.py", "kills.py 1000"),
     Row("R2", "Power loss: a submit is answered only after its job is on the disk, and survives whatever else the disk lost",
         "power.py", "power.py --soak"),
-    Row("R2a", "The order of system calls behind a submit: read, logged, synced, answered", "durable.py", "durable.py"),
+    Row("R2a", "The order of system calls behind a submit: read, logged, synced, answered", "durable.py", "durable.py", needs=("strace",)),
     Row("R3", "The n-th write, sync, opening or reading of a file fails, for every n: a clean error or success, and the next job runs",
         "io_errors.py", "io_errors.py --soak"),
     Row("R4", "A panic or an error at every boundary of a job's stages costs that job only", "unit.py failpoints", "unit.py failpoints"),
     Row("R5", "A full disk: 507 within a second, reads and control verbs work, and all is as before when there is space",
         "full.py", "full.py --soak",
-        before="a store that had filled its disk stayed full when all of it was deleted, and meshes could not be deleted at all; a cancel was answered with `cancel_requested` and the job succeeded later; delete, pause and the cancel of a job in the queue were refused with 507"),
+        before="a store that had filled its disk stayed full when all of it was deleted, and meshes could not be deleted at all; a cancel was answered with `cancel_requested` and the job succeeded later; delete, pause and the cancel of a job in the queue were refused with 507",
+        needs=("unshare", "nsenter")),
     Row("R6", "A damaged database: nothing wrong is served, and intact jobs are saved", "corrupt.py", "corrupt.py --soak",
         before="138 of 200 corruptions served something changed, such as a force of 97.65 for 96.65 with status 200; with a deleted log or an emptied database it started with jobs missing"),
     Row("R6a", "A changed bit in any table or index: nothing that is there is said to be absent, nothing is removed, and no submit makes a second job",
@@ -38,9 +41,11 @@ ROWS = [
         before="lists by a label were empty, a mesh was not found, a repeated submit made a second job, and a changed time in an index set the clock, by which all jobs were removed as too old"),
     Row("R7", "The clock jumps: no negative time, nothing ends early or late, lists stay in order",
         "clock.py", "clock.py --soak",
-        before="an hour ahead expired jobs in the queue and told `run_s` 3607; an hour back listed the newest job last"),
+        before="an hour ahead expired jobs in the queue and told `run_s` 3607; an hour back listed the newest job last",
+        needs=("faketime",)),
     Row("R8", "Clients that vanish in the middle of anything leave no files or memory behind, and cancel nothing",
-        "connections.py", "connections.py --soak"),
+        "connections.py", "connections.py --soak",
+        needs=("prlimit", "openssl")),
     Row("R9", "Hundreds of watchers: beside slow ones a solve takes no longer, beside as many quick ones at most a quarter longer; thousands who wait are soon answered",
         "watchers.py", "watchers.py --soak",
         before="200 slow watchers made a solve 4 times as long; 10,000 watchers of one end wrote 6,800 warnings"),
@@ -57,12 +62,15 @@ ROWS = [
         before="0.88 MiB of sets of nodes took 3.8 GiB and 58 CPU s; 76 KB of sets that name each other 7 CPU s"),
     Row("R14", "Requests that stop half-way are closed in time, and disturb nobody",
         "connections.py", "connections.py --soak",
-        before="after 75 s none of 4,000 connections was closed"),
+        before="after 75 s none of 4,000 connections was closed",
+        needs=("prlimit", "openssl")),
     Row("R14a", "Behind nginx and Caddy as documented: events at once, streams resume, 512 MiB and long waits pass, links lead back",
-        "proxy.py", "proxy.py --soak"),
+        "proxy.py", "proxy.py --soak",
+        needs=("nginx", "caddy", "openssl")),
     Row("R15", "More connections than files: bystanders are answered, and it is over when they go",
         "connections.py", "connections.py --soak",
-        before="1,000 idle connections kept everybody else out"),
+        before="1,000 idle connections kept everybody else out",
+        needs=("prlimit", "openssl")),
     Row("R16", "Floods of HTTP/2 frames end their connection", "floods.py", "floods.py --soak",
         before="none of the floods ended its connection"),
     Row("R17", "Jobs that need more memory than there is are refused, or fail alone", "memory.py", "memory.py --soak",
@@ -77,7 +85,8 @@ ROWS = [
     Row("R18c", "systemd is told when the service is ready and stops, and that it is alive only while its store answers",
         "systemd.py", "systemd.py --soak"),
     Row("R18a", "A log that nobody reads, and signals that would end a process: work goes on", "logs.py", "logs.py --soak",
-        before="after 97 submits with an unread log nobody was answered; SIGHUP and SIGXFSZ ended the process"),
+        before="after 97 submits with an unread log nobody was answered; SIGHUP and SIGXFSZ ended the process",
+        needs=("prlimit",)),
     Row("R18b", "One cancel or deletion of very many jobs is done in seconds, while others are answered", "bulk.py", "bulk.py --soak",
         before="97,704 cancels took 411 s, 20,000 deletions 66 s"),
     Row("R19", "Canceled at any time: one end, soon", "cancels.py", "cancels.py"),

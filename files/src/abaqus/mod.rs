@@ -7,6 +7,27 @@
 //!
 //! As a mesh a deck needs elements of a plane and nothing else: other elements are left out or, if they are lines, name
 //! boundaries; what only its analysis needs is not looked at. As a problem everything counts that changes the solution.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | lines, keywords and data | `read`, `keyword`, `block` |
+//! | which keywords are supported | `supported` |
+//! | rows, sets, sections and materials that were read | `written` |
+//! | what was read about contact | `contact_parts` |
+//! | everything that was read | `deck` |
+//! | types of elements | `element` |
+//! | parts, instances and the assembly | `part`, `scope` |
+//! | what names and numbers mean | `names` |
+//! | one mesh from all parts | `build` |
+//! | a deck as a problem | `problem` |
+//! | supports of a deck | `supports` |
+//! | temperatures of a deck | `temperature` |
+//! | contact: what the deck says | `interaction` |
+//! | contact: rigid bodies, their shapes, their motion | `rigid`, `tool`, `steps` |
+//! | contact: the contacts made of them | `contact` |
+//! | OP=NEW in later steps | `replaced` |
 
 mod block;
 mod build;
@@ -38,9 +59,13 @@ use crate::source::ReadError;
 use solver::mesh::{self, Mesh};
 use solver::solution::{Warning, WarningCode};
 
-/// Reads the mesh of a deck, with warnings of what was changed. The analysis of the deck is not used, except that
-/// the sets and faces that it loads get names: `SET P3` for a pressure on the third
-/// sides of the elements of SET, `7` for the node 7.
+/// Reads the mesh of a deck, with warnings of what was changed. The analysis of the deck is not used, except that the
+/// sets and faces that it loads get names: `SET P3` for a pressure on the third sides of the elements of SET, `7` for
+/// the node 7.
+///
+/// # Errors
+///
+/// [`ReadError::Io`] if the reader fails; [`ReadError::Invalid`] with all violations of the deck, which name its lines.
 pub fn read(reader: impl BufRead) -> Result<(Mesh, Vec<Warning>), ReadError> {
     read_for(reader, |_| false)
 }

@@ -28,13 +28,23 @@ pub fn has_step(text: &str) -> bool {
     text.split(['\n', '\r']).any(keyword)
 }
 
-/// The problem that a deck states: one linear static step; or several, which move rigid bodies against it. The text
-/// itself becomes the problem's mesh.
+/// Reads the problem that a deck states: one linear static step, or several that move rigid bodies against the body.
+/// The text itself becomes the problem's mesh.
+///
+/// # Errors
+///
+/// All violations of the deck, each with its line: what would change the solution and is not understood is refused,
+/// never left out.
 pub fn problem(text: &str) -> Result<Problem, Vec<Violation>> {
     problem_with_warnings(text).map(|(problem, _)| problem)
 }
 
-/// The same, with what is done differently here than the deck says.
+/// Reads the problem that a deck states like [`problem`], with a warning for each thing that is done differently than
+/// the deck says.
+///
+/// # Errors
+///
+/// As for [`problem`].
 pub fn problem_with_warnings(text: &str) -> Result<(Problem, Vec<Warning>), Vec<Violation>> {
     let deck = read(text.as_bytes()).map_err(ReadError::into_violations)?;
     let mut built = deck.build();

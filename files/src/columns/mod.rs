@@ -26,7 +26,11 @@ use self::{
     order::NodeOrder,
 };
 
-/// Fields as bytes. `Err`: columns of different lengths, elements with nodes that do not exist, or too many materials.
+/// Encodes fields as bytes.
+///
+/// # Errors
+///
+/// The reason in words: columns of different lengths, elements with nodes that do not exist, or too many materials.
 pub fn encode(fields: &Fields, law: &Law) -> Result<Vec<u8>, String> {
     crate::fields::check(fields)?;
     if law.moduli.len() > MOST_MATERIALS {
@@ -69,13 +73,21 @@ pub fn encode(fields: &Fields, law: &Law) -> Result<Vec<u8>, String> {
     Ok(out.finish([nodes, fields.elements.len(), points]))
 }
 
-/// The memory that decoding takes at most, the fields among it, as the head of the bytes says; the rest of them may be missing.
+/// Returns the memory (bytes) that decoding takes at most, the fields among it, as the head of the bytes says; the rest
+/// of them may be missing.
+///
+/// # Errors
+///
+/// The reason in words, if the head is not that of encoded fields.
 pub fn memory_to_decode(bytes: &[u8]) -> Result<usize, String> {
     Ok(Head::read(bytes)?.0.memory())
 }
 
-/// Fields as they were encoded. `json_bytes`: the size of their JSON, which limits the memory; `Err`: these bytes are not those of
-/// such fields.
+/// Decodes fields, bit for bit as they were encoded. `json_bytes`, the size of their JSON, limits the memory.
+///
+/// # Errors
+///
+/// The reason in words, if the bytes are not those of such fields.
 pub fn decode(bytes: &[u8], json_bytes: usize) -> Result<Fields, String> {
     let (head, rest) = Head::read(bytes)?;
     head.check(json_bytes)?;

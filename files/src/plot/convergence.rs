@@ -7,8 +7,12 @@ use solver::error::shortened;
 use solver::problem::Problem;
 use solver::solution::Iteration;
 
-/// Every residual on a logarithmic axis with the tolerance above, the contact set below, against the
-/// number of the iteration; vertical lines where load steps begin. `Err`: the reason why it could not be drawn.
+/// Draws every residual on a logarithmic axis with the tolerance above, the contact set below, against the number of
+/// the iteration; vertical lines are where load steps begin.
+///
+/// # Errors
+///
+/// The reason in words, if the figure cannot be drawn.
 pub fn convergence_svg(
     style: Style,
     caption: &Caption,

@@ -54,9 +54,13 @@ impl Stress {
     }
 }
 
-/// The deformed body with contours of a stress and its undeformed outline, the obstacle on it, and the contact in the
-/// colours of stick and slip; a second panel shows the contact where it is small. Displacements are scaled so that they are visible, and each panel shows
-/// the factor. `Err`: the reason why it could not be drawn.
+/// Draws the deformed body with contours of a stress and its undeformed outline, the obstacle on it, and the contact in
+/// the colours of stick and slip; a second panel shows the contact where it is small. Displacements are scaled so that
+/// they are visible, and each panel shows the factor.
+///
+/// # Errors
+///
+/// The reason in words, if the figure cannot be drawn.
 pub fn deformed_svg(
     style: Style,
     caption: &Caption,

@@ -152,7 +152,11 @@ impl Panel {
     }
 }
 
-/// Panels below one another, with a caption. `Err`: the reason why the figure could not be drawn.
+/// Draws panels below one another, with a caption.
+///
+/// # Errors
+///
+/// The reason in words, if the figure cannot be drawn.
 pub fn figure(
     style: impl Into<Style>,
     caption: &Caption,

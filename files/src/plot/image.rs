@@ -38,7 +38,11 @@ const HIGHEST: f32 = 14_400.0;
 /// Largest SVG that is converted (bytes): what is made of it while it is drawn takes some ten times as much.
 const LARGEST: usize = 4 << 20;
 
-/// A drawn figure as a file. `Err`: the reason why there is none.
+/// Writes a drawn figure as a file of the given kind.
+///
+/// # Errors
+///
+/// The reason in words, if the SVG cannot be read or drawn.
 pub fn write(svg: String, size: Size, image: Image) -> Result<Vec<u8>, String> {
     match image {
         Image::Svg => Ok(svg.into_bytes()),

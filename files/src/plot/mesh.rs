@@ -38,9 +38,13 @@ const NEAR: f64 = 0.12;
 const SMALL: f64 = 0.2;
 const CLOSE: f64 = 0.1;
 
-/// Elements between equal axes, each named boundary in a colour of its own, and the obstacles before they are pushed; a
-/// small contact has a panel of its own. The elements are those of `fields`, which adaptive refinement makes, or without them
-/// those of the problem. `Err`: the reason why it could not be drawn.
+/// Draws the elements between equal axes, each named boundary in a colour of its own, and the obstacles before they are
+/// pushed; a small contact has a panel of its own. The elements are those of `fields`, which adaptive refinement makes,
+/// or without them those of the problem.
+///
+/// # Errors
+///
+/// The reason in words, if the figure cannot be drawn.
 pub fn mesh_svg(
     style: Style,
     caption: &Caption,

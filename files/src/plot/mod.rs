@@ -3,6 +3,15 @@
 //!
 //! Axes, text and curves are drawn by plotters; bodies (`body`) are paths written here, since plotters
 //! neither clips nor joins shapes.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | the figures | `mesh`, `deformed`, `profile`, `convergence` |
+//! | pieces: panels with curves, a body, a field in colours, an obstacle, an axis | `figure`, `body`, `bands`, `obstacle`, `axis` |
+//! | the page, its texts, sizes, colours, numbers | `page`, `caption`, `style`, `theme`, `numbers` |
+//! | PNG and PDF | `image` |
 
 mod axis;
 mod bands;
@@ -80,7 +89,11 @@ pub struct Parts<'a> {
     pub stored: Option<&'a Mesh>,
 }
 
-/// Draws one figure. `Err`: the reason why it could not be drawn.
+/// Draws one figure of a problem and its solution, as SVG.
+///
+/// # Errors
+///
+/// The reason in words, if the figure cannot be drawn.
 pub fn draw(
     plot: Plot,
     style: impl Into<Style>,

@@ -14,9 +14,12 @@ use solver::error::shortened;
 use solver::problem::{Contact, Problem};
 use solver::solution::{ContactProfile, ErrorMethod, NodeState, QuantityName, Summary};
 
-/// For each contact boundary: σ_n above, and where there is friction σ_t with its bound ±τ below, against arc
-/// length and position, with stick and slip behind them. Stresses are negative in compression. `Err`: the reason why a figure
-/// could not be drawn.
+/// Draws for each contact boundary σ_n above, and where there is friction σ_t with its bound ±τ below, against arc
+/// length and position, with stick and slip behind them. Stresses are negative in compression.
+///
+/// # Errors
+///
+/// The reason in words, if the figure cannot be drawn.
 pub fn profile_svg(
     style: Style,
     caption: &Caption,

@@ -16,8 +16,12 @@ pub const MOST_TOLD: usize = 50;
 /// Members on one body, by their numbers in order.
 pub type Group = Vec<usize>;
 
-/// The members of a sweep in groups that share a body, or what is wrong with some of them, at most [`MOST_TOLD`] places.
-/// Structure and numbers are checked; what shows only on the mesh does not refuse a member here.
+/// Puts the members of a sweep into groups that share a body. Structure and numbers of each member are checked; what
+/// shows only on the mesh does not refuse a member here.
+///
+/// # Errors
+///
+/// What is wrong with some of the members, at most [`MOST_TOLD`] places.
 pub fn groups(sweep: &Sweep) -> Result<Vec<Group>, Vec<Violation>> {
     let plan = &sweep.plan;
     let mut found = Findings::default();

@@ -3,6 +3,19 @@
 //! A sweep is kept as text: that of the base problem with gaps where values go, and the values. A member is that text
 //! with its values filled in, which is then read as any other problem. The mesh of the base is left out of the text
 //! unless the sweep changes it, so that a large one is read once and not once for each member.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | reading a definition, with all its violations | `read` |
+//! | values of axes and points | `values` |
+//! | pointers | `path` |
+//! | the list of all members | `plan` |
+//! | a member's text | `template` |
+//! | checking the members and grouping those that share a body | `check` |
+//! | members that differ in numbers only | `numbers` |
+//! | the member that a member starts from | `neighbours` |
 
 mod check;
 mod neighbours;

@@ -39,7 +39,11 @@ impl<'a> Problems<'a> {
         Problems { plan, last: None }
     }
 
-    /// The problem of a member, or its violations, as [`Plan::problem`] gives them.
+    /// Returns the problem of a member.
+    ///
+    /// # Errors
+    ///
+    /// Its violations, as [`Plan::problem`] gives them.
     pub fn read(&mut self, number: usize) -> Result<Read<'_>, Vec<Violation>> {
         let texts = self.plan.values(number);
         let paths = || self.plan.paths().iter().zip(&texts);

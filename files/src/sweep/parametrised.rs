@@ -23,8 +23,12 @@ pub struct Parametrised {
 }
 
 impl Parametrised {
-    /// `text`: a problem that was read and written again. `pointers`: each with its place in the request, and where it
-    /// leads in the problem, which must be to a number.
+    /// Makes a problem whose numbers at `pointers` are given later. `text` is a problem that was read and written
+    /// again; each pointer comes with its place in the request.
+    ///
+    /// # Errors
+    ///
+    /// A violation for each pointer that does not lead to a number of the problem.
     pub fn new<'a>(
         text: &str,
         pointers: impl IntoIterator<Item = (String, &'a str)>,
@@ -71,7 +75,11 @@ impl Parametrised {
         &self.own
     }
 
-    /// The problem with these numbers, in the order of the pointers, or its violations.
+    /// Returns the problem with these numbers, in the order of the pointers.
+    ///
+    /// # Errors
+    ///
+    /// The violations of the problem with these numbers.
     pub fn problem(&self, numbers: &[f64]) -> Result<Problem, Vec<Violation>> {
         let texts: Vec<String> = numbers.iter().map(|value| number(*value)).collect();
         let texts: Vec<Option<&str>> = texts.iter().map(|text| Some(text.as_str())).collect();

@@ -123,13 +123,20 @@ impl Plan {
             .sum()
     }
 
-    /// The problem of a member, or its violations: pointers are relative to it. Without a mesh of its own it has an
-    /// empty one in place of the base's.
+    /// Returns the problem of a member. Unless the sweep changes the mesh, it has an empty one in place of the base's.
+    ///
+    /// # Errors
+    ///
+    /// The violations of the member, with pointers relative to its problem.
     pub fn problem(&self, number: usize) -> Result<Problem, Vec<Violation>> {
         parse(&self.template.filled(&self.values(number)))
     }
 
-    /// The problem of a member on its mesh, which is the base's unless the sweep changes it.
+    /// Returns the problem of a member on its mesh, which is the base's unless the sweep changes it.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Plan::problem`].
     pub fn whole_problem(
         &self,
         number: usize,

@@ -31,7 +31,11 @@ pub struct Sweep {
 /// In place of a mesh that all members share: a file that is not read.
 const NO_MESH: &str = r#"{"gmsh":""}"#;
 
-/// Reads a definition; pointers are relative to it. Its members are not checked yet, see [`groups`](super::groups).
+/// Reads the definition of a sweep. Its members are not checked yet, see [`groups`](super::groups).
+///
+/// # Errors
+///
+/// All violations of the definition, with pointers relative to it.
 pub fn read(fields: &Fields<'_>) -> Result<Sweep, Vec<Violation>> {
     let mut found = Findings::default();
     let base = base(fields.base, &mut found);

@@ -1,4 +1,21 @@
 //! The commands, one file each.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | commands of the service | `serve`, `token`, `backup`, `restore`, `doctor`, `health`, `config` |
+//! | settings of `serve` and their sources | `settings` |
+//! | commands without a service | `solve`, `sweep`, `demo`, `explain` |
+//! | commands for a running service | `jobs` |
+//! | calls of the service and its refusals | `service`, `client` |
+//! | certificates that client commands trust | `pinned` |
+//! | exit codes | `exit` |
+//! | completions and manual pages | `pages` |
+//! | `-o` by a file's name, written atomically | `output` |
+//! | what is printed: progress, results, tables | `progress`, `report`, `table` |
+//! | the log | `log`, `log_line` |
+//! | what systemd is told | `notify` |
 
 mod backup;
 mod client;

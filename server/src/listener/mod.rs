@@ -2,6 +2,18 @@
 //!
 //! axum's own loop has none of them: a connection on which nothing arrives, or nothing is read, would stay open for
 //! ever, and with the last file descriptor the service would be unreachable.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | how many connections there may be, and which gives way | `places`, `files` |
+//! | serving one connection | `connection` |
+//! | how long a connection may be idle | `activity` |
+//! | the stream of a connection, watched for floods and errors | `guarded` |
+//! | floods of HTTP/2 frames | `control_frames` |
+//! | errors that hyper answers by itself | `bare` |
+//! | TLS | `tls` |
 
 mod activity;
 mod bare;

@@ -14,7 +14,7 @@ use base64::{Engine, prelude::BASE64_STANDARD};
 use super::{
     operations,
     reply::{is_grpc, refusal},
-    while_valid::while_valid,
+    revocation::end_when_revoked,
 };
 use crate::{
     caller::{Access, Caller, Peer, RequestId, Scope},
@@ -49,7 +49,7 @@ pub(super) async fn authenticate(
         Some(error) => Err(error),
         None => {
             request.extensions_mut().insert(caller.clone());
-            while_valid(next.run(request), service.store.clone(), by).await
+            end_when_revoked(next.run(request), service.store.clone(), by).await
         }
     };
     let mut answer = answer.unwrap_or_else(|error| refusal(grpc, &path, error));

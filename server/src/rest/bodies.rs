@@ -1,5 +1,8 @@
 //! Bodies of requests in JSON: their schemas, and reading them with all errors reported together. A problem inside is
 //! read by the parser of `files`.
+//!
+//! A body is kept whole until it is read (16 MiB by default), since the problem may stand before what is said about it, and
+//! violations quote their places. Larger meshes are uploaded.
 
 use std::collections::{BTreeMap, BTreeSet};
 

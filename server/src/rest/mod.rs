@@ -1,4 +1,30 @@
 //! REST. The whole API is one list, `operations`. Handlers only translate; see `verbs`.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | every operation: route, access, input, handler, rpc, answers, errors; which tests cover it | `operations` |
+//! | made from that list: routes | `router` |
+//! | made from that list: `/openapi.json` | `openapi` |
+//! | made from that list: docs/api.md | `reference` |
+//! | the input of a request: the order in which it is read and checked | `call` |
+//! | the input of a request: path, query and headers | `input`, `headers` |
+//! | the input of a request: filters | `filters` |
+//! | the input of a request: formats | `accept` |
+//! | bodies as bytes, as JSON with all violations | `body`, `bodies`, `object` |
+//! | content codings | `coding`, `compressed` |
+//! | the caller and what they may do | `authenticate` |
+//! | a token that ends while it is used | `revocation` |
+//! | hosts and origins | `origin` |
+//! | proxies | `forwarded` |
+//! | limits that hold for every request | `limits` |
+//! | answers: errors | `reply` |
+//! | answers: entity tags, digests, ranges | `data` |
+//! | log line, metrics and span of a request | `observe`, `request_target` |
+//! | refused requests in the log | `refused` |
+//! | handlers by subject | `jobs`, `submit`, `events`, `results`, `plots`, `sweeps`, `meshes`, `models`, `tokens`, `service`, `umbridge` |
+//! | the page at /docs | `docs` |
 
 // Requests: parameters and headers, bodies, the caller.
 mod accept;
@@ -17,13 +43,13 @@ mod object;
 mod origin;
 
 // Answers.
-mod asked;
 mod compressed;
 mod data;
 mod observe;
 mod refused;
 mod reply;
-mod while_valid;
+mod request_target;
+mod revocation;
 
 // Handlers, by subject.
 mod docs;

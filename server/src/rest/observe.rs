@@ -20,7 +20,7 @@ use tonic::Code;
 use tracing::{Level, debug, enabled, info};
 
 use super::{
-    asked::{Asked, UNKNOWN, name_of},
+    request_target::{RequestTarget, UNKNOWN, name_of},
     service::is_probe,
 };
 use crate::{
@@ -84,7 +84,7 @@ impl Budget {
 /// A request, from its head to the end of its answer.
 #[derive(Debug)]
 struct Observed {
-    asked: Asked,
+    target: RequestTarget,
     probe: bool,
     trace: Trace,
     id: String,
@@ -102,7 +102,7 @@ impl Observed {
         METRICS.in_progress.inc();
         let trace = Trace::of_request(request.headers());
         Observed {
-            asked: Asked::of(request),
+            target: RequestTarget::of(request),
             probe: is_probe(request.uri().path()),
             id: given_id(request.headers()).unwrap_or_else(|| trace.id().to_string()),
             trace,
@@ -137,12 +137,12 @@ impl Observed {
         let took = self.start.elapsed();
         METRICS.sent_bytes.inc_by(self.bytes);
         let code = self.code.unwrap_or(Code::Cancelled); // the client did not wait for it
-        match &self.asked {
-            Asked::Rpc(rpc) => METRICS.answered_call(rpc, name_of(code), took),
-            Asked::Route(method, route) => {
+        match &self.target {
+            RequestTarget::Rpc(rpc) => METRICS.answered_call(rpc, name_of(code), took),
+            RequestTarget::Route(method, route) => {
                 METRICS.answered(method, route.as_str(), self.status.unwrap_or(0), took);
             }
-            Asked::NoRoute(method) => {
+            RequestTarget::NoRoute(method) => {
                 METRICS.answered(method, UNKNOWN, self.status.unwrap_or(0), took);
             }
         }
@@ -172,8 +172,8 @@ impl Observed {
                 }
             };
         }
-        let (method, route) = match &self.asked {
-            Asked::Rpc(rpc) => {
+        let (method, route) = match &self.target {
+            RequestTarget::Rpc(rpc) => {
                 let code = name_of(code);
                 tell!(
                     rpc,
@@ -187,8 +187,8 @@ impl Observed {
                 );
                 return;
             }
-            Asked::Route(method, route) => (method, route.as_str()),
-            Asked::NoRoute(method) => (method, UNKNOWN),
+            RequestTarget::Route(method, route) => (method, route.as_str()),
+            RequestTarget::NoRoute(method) => (method, UNKNOWN),
         };
         let status = self.status;
         let gone = || "no answer, the client has gone".to_owned();
@@ -215,8 +215,8 @@ impl Observed {
         if !self.owner.is_empty() {
             attributes.push(KeyValue::new("enduser.id", self.owner.clone()));
         }
-        let (name, error) = match &self.asked {
-            Asked::Rpc(rpc) => {
+        let (name, error) = match &self.target {
+            RequestTarget::Rpc(rpc) => {
                 let (service, method) = rpc.split_once('/').unwrap_or((rpc, rpc));
                 attributes.extend([
                     KeyValue::new("rpc.system", "grpc"),
@@ -230,9 +230,9 @@ impl Observed {
                 );
                 ((*rpc).into(), ours.then(|| name_of(code).to_owned()))
             }
-            Asked::Route(method, _) | Asked::NoRoute(method) => {
-                let route = match &self.asked {
-                    Asked::Route(_, route) => route.as_str(),
+            RequestTarget::Route(method, _) | RequestTarget::NoRoute(method) => {
+                let route = match &self.target {
+                    RequestTarget::Route(_, route) => route.as_str(),
                     _ => UNKNOWN,
                 };
                 attributes.push(KeyValue::new("http.request.method", *method));

@@ -1,4 +1,5 @@
 //! Solves members of a sweep that share a body, one after the other: for the worker and for `signorini sweep` alike.
+//! A later attempt does not store a row again, and solves its member again only if others begin from it.
 
 use std::ops::ControlFlow;
 

@@ -10,6 +10,52 @@
 //!
 //! The files are listed in order of use: no file uses one that uses it.
 //!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | accepting jobs, also repeated requests | `submit`, `keys` |
+//! | jobs with the same input, answered from a result or coalesced | `coalescing` |
+//! | editing a job | `edit` |
+//! | deleting a job | `delete` |
+//! | the life of a job: claimed, ended, requeued | `claim`, `end`, `requeue` |
+//! | the life of a job: every change of status | `lifecycle` |
+//! | a transaction of the writer and what follows its commit: the mirror of the queue, watchers, the log line of a job's end | `change` |
+//! | whose turn it is | `waiting` |
+//! | positions in the queue | `positions` |
+//! | lists of jobs: filters | `filter` |
+//! | lists of jobs: pages and the indexes they use | `list` |
+//! | lists of jobs: labels | `labels` |
+//! | events of a job | `events` |
+//! | results, which are written in parts, encoded and read | `results`, `parts`, `encoding`, `snapshot` |
+//! | sweeps | `sweeps` |
+//! | meshes | `meshes` |
+//! | models | `models` |
+//! | tokens | `tokens` |
+//! | what a disk has changed: checksums of rows | `checksum` |
+//! | what a disk has changed: parts of results | `intact` |
+//! | what a disk has changed: what was found so far | `damage` |
+//! | what a disk has changed: whether the database still takes a job | `trial` |
+//! | what a disk has changed: reading all keys in the background | `scrub` |
+//! | the folder and its lock | `folder` |
+//! | how far the store had come | `progress` |
+//! | space for control on a full disk | `reserve` |
+//! | tables and migrations | `migrations`, `migrations/0001_jobs.sql` and those after it |
+//! | connections to the database | `database` |
+//! | the clock of the store, and time that it has not seen pass | `clock`, `pauses` |
+//! | whether the store works (`/readyz`) | `health` |
+//! | retention | `retention` |
+//! | cancels and deletions of many jobs | `bulk` |
+//! | remembering ids of deleted jobs | `forget` |
+//! | deleting fields alone | `fields` |
+//! | bytes that jobs and owners keep | `sizes` |
+//! | giving free pages back to the file system | `pages`, `space` |
+//! | rebuilding the database | `compact` |
+//! | backups | `backup` |
+//! | restoring a backup | `restore` |
+//! | doctor and salvage | `inspect`, `salvage` |
+//! | random sequences of everything, by seed | `tests/simulation` |
+//!
 //! [`Owners`]: crate::caller::Owners
 
 // Input and output types, and errors.

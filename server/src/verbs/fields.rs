@@ -7,7 +7,7 @@ use files::fields_json::FieldsJson;
 use futures_util::Stream;
 
 use super::{
-    loaded::{Loaded, Shared},
+    fields_in_memory::{LoadedFields, Shared},
     results::{Found, no_result, with_result},
     service::{Service, detached},
 };
@@ -27,7 +27,7 @@ pub struct StoredFields {
     id: JobId,
     result_key: i64,
     /// If they had to be read to know that they are intact.
-    loaded: Option<Arc<Loaded>>,
+    loaded: Option<Arc<LoadedFields>>,
 }
 
 /// The fields at all nodes as JSON.
@@ -68,7 +68,10 @@ pub(super) async fn are_kept(service: &Service, job: &Job) -> Result<(), ApiErro
 }
 
 /// Fields in memory, once there is room for them; `None` if there are none.
-pub(super) async fn load(service: &Service, key: i64) -> Result<Option<Arc<Loaded>>, ApiError> {
+pub(super) async fn load(
+    service: &Service,
+    key: i64,
+) -> Result<Option<Arc<LoadedFields>>, ApiError> {
     if let Some(loaded) = service.fields_in_memory.find(key) {
         return Ok(Some(loaded));
     }
@@ -84,7 +87,7 @@ pub(super) async fn load(service: &Service, key: i64) -> Result<Option<Arc<Loade
     };
     // reading took several times as much
     share.shrink_to(files::fields::memory(&fields));
-    let loaded = Arc::new(Loaded {
+    let loaded = Arc::new(LoadedFields {
         info,
         fields,
         _share: share,

@@ -1,6 +1,30 @@
 //! The operations of the service, called verbs, each defined once for both protocols; `rest` and `grpc` only
 //! translate. A verb takes the service, the caller, and then the arguments of the request. The parameters of requests
 //! are defined beside the verb that they belong to.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | the service that all verbs receive: its limits and pools | `service` |
+//! | submitting jobs | `submit`, `envelope`, `key` |
+//! | retrying a job | `retry` |
+//! | admission, with shares of owners | `admission` |
+//! | checking a problem without storing it | `problems` |
+//! | one job | `jobs` |
+//! | lists, their filters and pages | `lists`, `filters`, `page` |
+//! | many jobs at once | `bulk` |
+//! | watching a job | `watch` |
+//! | sweeps | `sweeps` |
+//! | results: summary, iterations, profiles, fields, figures | `results`, `history`, `profiles`, `fields` with `fields_in_memory`, `plots` |
+//! | meshes and their uploads | `meshes`, `uploads` |
+//! | parametrised problems | `models` |
+//! | UM-Bridge | `umbridge` |
+//! | who a caller is | `identify` |
+//! | tokens | `tokens` |
+//! | the queue | `queue` |
+//! | version, limits and shares | `info` |
+//! | metrics | `metrics` |
 
 // The service, which every verb receives.
 mod service;
@@ -22,7 +46,6 @@ mod uploads;
 pub mod bulk;
 pub mod jobs;
 pub mod lists;
-mod loaded;
 pub mod retry;
 pub mod submit;
 pub mod watch;
@@ -32,6 +55,7 @@ pub mod sweeps;
 
 // Results.
 pub mod fields;
+mod fields_in_memory;
 pub mod history;
 pub mod plots;
 pub mod profiles;

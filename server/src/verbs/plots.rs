@@ -11,10 +11,9 @@ use solver::{
 
 use super::{
     fields,
+    fields_in_memory::LoadedFields,
     history::StoredHistory,
-    jobs,
-    loaded::Loaded as LoadedFields,
-    profiles,
+    jobs, profiles,
     results::{self, Found, StepResult, read},
     service::Service,
 };

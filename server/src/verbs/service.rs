@@ -5,7 +5,7 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 use tokio::{sync::Semaphore, time::timeout};
 
 use super::{
-    loaded::FieldsInMemory,
+    fields_in_memory::FieldsInMemory,
     uploads::{Upload, Uploads},
 };
 use crate::{

@@ -1,4 +1,5 @@
-//! Submitting jobs: one, one with an id chosen by the client, many at once.
+//! Submitting jobs: one, one with an id chosen by the client, many at once. Each submission works in a task of its own, so that
+//! a client that disconnects changes nothing.
 
 use std::sync::Arc;
 

@@ -2,6 +2,27 @@
 //!
 //! Algorithms are functions from a [`System`] to its final state, and show each iteration to the
 //! observer. [`run`] chooses among them.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | the condensed system at one load level, and a state of it | `system` |
+//! | methods: the thesis's own | `thesis` |
+//! | methods: sweeps over the friction bound | `fixed_point` |
+//! | methods: Newton's | `newton` |
+//! | methods: the convex problem for a given bound | `convex` |
+//! | the nodes that may touch | `near` |
+//! | factors that are used again | `factors` |
+//! | a start from a neighbour's solution | `settle` |
+//! | what every method records and returns | `track`, `finished` |
+//! | what rounding leaves of residuals | `rounding` |
+//! | a second solution: uniqueness, twice the increments | `uniqueness` |
+//! | from the final state to the result | `report` |
+//! | forces, extents, peaks and warnings of one contact | `profile` |
+//! | what a small force would change in a quantity: the adjoint, for stated errors | `adjoint` |
+//! | common ends of contacts | `corners` |
+//! | bodies that slide away, slide far, or strain much | `slides`, `large_slip`, `small_strain` |
 
 mod adjoint;
 mod convex;

@@ -1,5 +1,14 @@
 //! The geometry of Γ_C, thesis 1.3(c) and 3.3.1: a chain of edges in order of arc length, with
 //! normals, weights and the points where friction is evaluated.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | which part of a boundary faces an obstacle, distances at nodes, and what lies between nodes | `obstacle` |
+//! | the shape of each kind of obstacle: a function, or a curve in space | `shape`, `curve` |
+//! | an obstacle that is displaced along a direction | `displaced` |
+//! | where the surface is smooth and where it has a corner | `smooth` |
 
 mod curve;
 mod displaced;

@@ -1,4 +1,16 @@
 //! A standard elastic program, thesis 1.3 and 2.2; independent of contact.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | Hooke's law and its matrix | `material` |
+//! | element stiffness, loads, numbering of unknowns | `assembly` |
+//! | integrals shared by elements of one shape | `geometry`, `shapes` |
+//! | elements that do not lock | `mixed` |
+//! | stresses, nodal forces and energy | `recovery` |
+//! | the error of stresses | `stress_difference` |
+//! | how stresses grow where materials meet at the surface | `wedges` |
 
 mod assembly;
 mod geometry;

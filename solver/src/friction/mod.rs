@@ -1,4 +1,13 @@
 //! The friction law, thesis 1.2: numbers along arc length only, no mesh.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | 1.2.1 the kernel ω_ρ and the averaged pressure S_ρ | `kernel` |
+//! | integrals of ω, also over rings around the axis | `moments`, `rings` |
+//! | 1.2.2 the transition φ_ε | `transition` |
+//! | the bound τ, from the averaged pressure or prescribed | `bound` |
 
 mod bound;
 mod kernel;

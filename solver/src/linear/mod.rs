@@ -1,4 +1,22 @@
 //! Matrices and index sets only; the one room that names faer.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | the order of elimination by nested dissection | `dissection` |
+//! | shorter cuts between two halves | `halves` |
+//! | the multifrontal factor: parts that are equal | `alike` |
+//! | the multifrontal factor: its plan | `fronts` |
+//! | the multifrontal factor: the factor itself | `multifrontal` |
+//! | the multifrontal factor: one front | `front` |
+//! | the multifrontal factor: solutions with it | `substitution` |
+//! | dense matrices | `dense` |
+//! | interruptible factors | `blocked` |
+//! | a system without some unknowns | `eliminated` |
+//! | eigenvalues | `spectrum` |
+//! | two threads with the same bits as one | `parallel` |
+//! | where long work asks whether to go on | `breaks` |
 
 mod alike;
 mod blocked;

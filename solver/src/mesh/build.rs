@@ -33,8 +33,11 @@ pub struct RawMesh {
     pub sets_span_boundaries: bool,
 }
 
-/// The mesh and warnings of what was changed, or all its violations. Pointers are empty: only the caller knows
-/// the origin of the file.
+/// Builds a mesh from the nodes and elements of a file, with warnings of what was changed.
+///
+/// # Errors
+///
+/// All violations of the mesh. Their pointers are empty: only the caller knows the origin of the file.
 pub fn build(raw: RawMesh) -> Result<(Mesh, Vec<Warning>), Vec<Violation>> {
     let mut found = Findings::of_mesh("");
     let built = assemble(raw, &mut found);

@@ -50,6 +50,10 @@ pub(super) fn put_on_curve(
 
 impl Mesh {
     /// Moves the nodes of a boundary of the mesh onto its curve.
+    ///
+    /// # Errors
+    ///
+    /// [`OffCurve`] if the boundary is too far from the curve, or turns too much to lie on it.
     pub fn put_on_curve(&mut self, boundary: &str, curve: &Curve) -> Result<(), OffCurve> {
         match self.boundaries.get(boundary) {
             Some(edges) => put_on_curve(&mut self.nodes, edges, curve),

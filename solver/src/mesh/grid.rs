@@ -127,7 +127,11 @@ pub fn largest_cut(grid: &Grid) -> Option<(f64, f64)> {
     worst
 }
 
-/// Whether a grid can be meshed, or all its violations; `pointer` is that of the grid.
+/// Checks that a grid can be meshed; `pointer` is its place in the problem.
+///
+/// # Errors
+///
+/// All violations of the grid.
 pub fn check_grid(grid: &Grid, pointer: &str) -> Result<(), Vec<Violation>> {
     let mut found = Findings::of_mesh(pointer);
     let mut all = AllChecks::default();

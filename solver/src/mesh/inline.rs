@@ -6,7 +6,11 @@ use super::{Mesh, key};
 use crate::error::{AllChecks, Checked, Findings, Reason, Violation, escape};
 use crate::problem::InlineMesh;
 
-/// The mesh, or all faults of its numbering; `pointer` is that of the inline mesh.
+/// Builds the mesh that a problem has written out; `pointer` is its place in the problem.
+///
+/// # Errors
+///
+/// All violations of its numbering.
 pub fn inline_mesh(input: InlineMesh, pointer: &str) -> Result<Mesh, Vec<Violation>> {
     let mut found = Findings::of_mesh(pointer);
     let mesh = check(input, &mut found);

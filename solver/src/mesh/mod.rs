@@ -1,4 +1,20 @@
 //! The body as nodes, elements and named boundaries.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | meshes from grids and strips | `grid` |
+//! | meshes written in the problem | `inline` |
+//! | meshes from files | `build` |
+//! | uniform refinement | `refine` |
+//! | local refinement | `graded` |
+//! | long elements, halved before they are refined | `halving` |
+//! | sides and nodes of the first mesh on a refined one | `lineage`, `first` |
+//! | a side divided where an obstacle ends | `divide` |
+//! | boundaries on their curves | `curved` |
+//! | folded elements | `inverted` |
+//! | nodes that were not merged | `coincident` |
 
 mod build;
 mod coincident;

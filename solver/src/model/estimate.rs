@@ -86,9 +86,12 @@ const BYTES_PER_ELEMENT: f64 = 80.0;
 /// Most elements that can be numbered, with up to eight nodes each.
 const MOST_ELEMENTS: f64 = u32::MAX as f64 / 8.0;
 
-/// A first bound, from the number of elements alone, and not above that of [`Model::estimate`]: it refuses what would be
-/// too large to mesh. `stored`: the mesh that the problem names by its hash, if it does. Elements that cannot be
-/// numbered are a violation.
+/// Estimates memory and time by the number of elements alone: a first bound, not above [`Model::estimate`], which
+/// refuses what would be too large to mesh. `stored` is the size of the mesh that the problem names by its hash.
+///
+/// # Errors
+///
+/// One violation if the elements are too many to be numbered (2³² / 8).
 pub fn estimate(problem: &Problem, stored: Option<&MeshSize>) -> Result<Estimate, Violation> {
     let mesh = &problem.mesh;
     // nodes of an element in a large mesh: of triangles fewer

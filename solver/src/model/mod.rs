@@ -2,6 +2,30 @@
 //!
 //! `Model::new` checks everything and reports all violations at once; the [`Model`] that it returns is
 //! numbered, and every room above relies on it.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | names of boundaries and groups | `boundaries` |
+//! | curves of boundaries | `curves` |
+//! | supports | `supports` |
+//! | loads | `loads` |
+//! | forces at nodes of the first mesh | `nodes` |
+//! | materials | `materials` |
+//! | contacts and the obstacles that they face | `contacts` |
+//! | checks of obstacles and friction laws | `laws` |
+//! | a checked contact | `contact_model` |
+//! | common ends of two contacts | `corners` |
+//! | obstacles that slide along the body | `sliding` |
+//! | rigid motions that nothing prevents | `freedom` |
+//! | nodes that were not merged | `unmerged` |
+//! | the axis of a body of revolution | `axis` |
+//! | load levels | `level` |
+//! | problems that differ in numbers only | `variable` |
+//! | collecting violations and warnings | `checks` |
+//! | checks of single numbers | `numbers` |
+//! | memory and time | `estimate` |
 
 mod axis;
 mod boundaries;
@@ -81,15 +105,23 @@ pub struct Model {
 }
 
 impl Model {
-    /// Checks and numbers a problem; `external`: its mesh, if the problem only names or quotes one.
+    /// Checks and numbers a problem; `external` is its mesh, if the problem only names or quotes one.
+    ///
+    /// # Errors
+    ///
+    /// All violations of the problem at once, those of the external mesh among them; at most a hundred are listed.
     pub fn new(problem: &Problem, external: Option<External>) -> Result<Model, Vec<Violation>> {
         let mut checks = Checks::default();
         let model = checks.model(problem, Source::Given(external));
         checks.found.conclude(model)
     }
 
-    /// The same problem on a refined mesh, which has all names of the first one: adaptive refinement makes one after the
-    /// other, and verification splits the last in two.
+    /// Checks and numbers a problem on a refined mesh, which has all names of the first one: adaptive refinement makes
+    /// one after the other, and verification splits the last in two.
+    ///
+    /// # Errors
+    ///
+    /// All violations of the problem on that mesh.
     pub fn on_mesh(problem: &Problem, given: ExternalMesh) -> Result<Model, Vec<Violation>> {
         let mut checks = Checks {
             warnings: given.warnings,

@@ -34,8 +34,11 @@ impl VariableModel {
         &self.model
     }
 
-    /// Becomes the model of another problem, or refuses its violations and stays as it is. None if more than those numbers
-    /// differ. The mesh of the problem is not read.
+    /// Becomes the model of another problem whose mesh is not read. `None` if more than the variable numbers differ.
+    ///
+    /// # Errors
+    ///
+    /// All violations of the other problem; the model stays as it is.
     pub fn set(&mut self, problem: &Problem) -> Option<Result<(), Vec<Violation>>> {
         let (own, other) = (&self.problem, problem);
         let same = own.analysis == other.analysis

@@ -19,6 +19,21 @@ From the ground up:
     Sweep       one problem with many values, as one table
     figures     what can be drawn, and in which style
     errors      what can go wrong
+
+Where to look in this package, for those who change it:
+
+    problem, _parts, _shapes     types of a problem (generated); what is wrong with a value; where its parts lie
+    _calls                       each request, as data
+    _answer, _events             whether an answer is the service's, and whole; the stream of events
+    _retry                       when a request is sent again
+    _pool, _connection           connections, one for each call; address, token and certificates
+    client, job, result, sweep   the blocking client
+    aio                          the same with asyncio
+    _job, _sweep                 what both clients share
+    _data, _saved                numbers with their errors, profiles, histories, fields; a result in a file
+    figures, _style, _about      figures, their look, and the texts in them
+    _html, _progress             what notebooks show; the line of progress
+    local                        a service for as long as a script runs
 """
 
 from . import errors, examples, figures, mesh, obstacle, problem

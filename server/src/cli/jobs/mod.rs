@@ -1,4 +1,14 @@
 //! The commands for the jobs and sweeps of a running service.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | commands | `submit`, `watch`, `wait`, `get`, `ls`, `result`, `plot`, `change` (cancel, retry, rm), `validate` |
+//! | files of problems, decks and sweeps, and the lines of their violations | `file` |
+//! | following a job through restarts of the service | `follow` |
+//! | how jobs are printed | `listing` |
+//! | curves in the terminal | `chart` |
 
 mod change;
 mod chart;

@@ -1,5 +1,17 @@
 //! One contact in the final state: its columns; its forces, extents, peaks and warnings are in files of
 //! their own.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | forces, extents and peaks | `extents` |
+//! | the quantities that have a stated error | `quantities` |
+//! | what nodes do not see of an obstacle | `between` |
+//! | what the distances between nodes leave open | `resolution` |
+//! | what a push along a direction leaves open | `displaced` |
+//! | materials that meet under the contact | `junction` |
+//! | warnings about a contact | `warnings` |
 
 mod between;
 mod displaced;

@@ -1,4 +1,4 @@
-//! Answers that end with what identified their caller, a token for instance: a stream of events may stay open for days.
+//! Ends answers when the token of their caller is revoked or expires: a stream of events may stay open for days.
 
 use std::{
     pin::Pin,
@@ -20,13 +20,16 @@ use crate::{
     verbs::{identify::By, tokens::TokensChanged},
 };
 
-/// How often it is looked whether the caller is still who they were.
+/// How often the token is checked again.
 const INTERVAL: Duration = Duration::from_secs(1);
 const NO_LONGER: &str = "the token was revoked or has expired";
 
-/// The answer, which is cut when what identified its caller is no longer valid; an error if that happens before, as the
-/// handler may wait for a minute.
-pub(super) async fn while_valid(
+/// Returns the answer with a body that is cut when the token becomes invalid.
+///
+/// # Errors
+///
+/// `Unauthenticated` if the token becomes invalid before there is an answer: the handler may wait for a minute.
+pub(super) async fn end_when_revoked(
     answer: impl Future<Output = Response>,
     store: Arc<Store>,
     by: By,
@@ -43,17 +46,17 @@ pub(super) async fn while_valid(
         return Err(ApiError::Unauthenticated(NO_LONGER));
     }
     Ok(answer.map(|body| {
-        Body::new(WhileValid {
+        Body::new(UntilRevoked {
             body,
             store,
             by,
-            looked: Instant::now(),
+            checked: Instant::now(),
             ticks: None,
         })
     }))
 }
 
-/// Returns when what identified a caller has been invalid for a while: who revokes their own token is answered meanwhile.
+/// Returns when the token has been invalid for a while: a caller who revokes their own token is answered in that time.
 async fn invalid(store: &Store, by: &By) {
     loop {
         sleep(INTERVAL).await;
@@ -64,27 +67,27 @@ async fn invalid(store: &Store, by: &By) {
     }
 }
 
-struct WhileValid {
+struct UntilRevoked {
     body: Body,
     store: Arc<Store>,
     by: By,
-    /// When it was last looked.
-    looked: Instant,
-    /// Since the answer had to wait for the first time: most never do.
+    /// When the token was last checked.
+    checked: Instant,
+    /// Wakes the task for the next check; made when the body has to wait for the first time, which most never do.
     ticks: Option<Interval>,
 }
 
-impl WhileValid {
+impl UntilRevoked {
     fn is_valid(&mut self) -> bool {
-        let due = self.looked.elapsed() >= INTERVAL;
+        let due = self.checked.elapsed() >= INTERVAL;
         if due {
-            self.looked = Instant::now();
+            self.checked = Instant::now();
         }
         !due || self.by.is_valid(&self.store)
     }
 }
 
-impl HttpBody for WhileValid {
+impl HttpBody for UntilRevoked {
     type Data = Bytes;
     type Error = axum::Error;
 

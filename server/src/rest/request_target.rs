@@ -1,4 +1,5 @@
-//! What a request asks for and how it was answered, by names of which there are few: for logs, metrics and spans.
+//! The target of a request (a route or an rpc) and the name of its status, from small fixed sets: labels for logs, metrics
+//! and spans.
 
 use std::{collections::BTreeSet, sync::LazyLock};
 
@@ -10,24 +11,24 @@ use tonic::Code;
 
 use super::{operations, reply::is_grpc};
 
-/// What is no route and no rpc.
+/// The label of a target that is neither a route nor an rpc.
 pub(super) const UNKNOWN: &str = "unknown";
 
-/// What a request asks for, by a name of which there are few.
+/// The target of a request, as a label with few values.
 #[derive(Clone, Debug)]
-pub(super) enum Asked {
+pub(super) enum RequestTarget {
     /// A method and the template of a route.
     Route(&'static str, MatchedPath),
-    /// A method and a path that is none.
+    /// A method and a path that is no route.
     NoRoute(&'static str),
     /// A method of a service, with its name.
     Rpc(&'static str),
 }
 
-impl Asked {
-    /// By its path, or by the route that was found for it.
-    pub(super) fn of(request: &Request) -> Asked {
-        /// The calls that there are, by their paths.
+impl RequestTarget {
+    /// Finds the target by the path of the request, or by the route that the router has matched.
+    pub(super) fn of(request: &Request) -> RequestTarget {
+        /// All rpcs of the service, by their paths.
         static RPCS: LazyLock<BTreeSet<String>> = LazyLock::new(|| {
             let all = operations::all().into_iter();
             let ours = all.flat_map(|operation| operation.rpcs.iter());
@@ -44,15 +45,15 @@ impl Asked {
         let rpcs: &'static BTreeSet<String> = &RPCS;
         let path = request.uri().path();
         if let Some(rpc) = rpcs.get(path) {
-            return Asked::Rpc(rpc.trim_start_matches('/'));
+            return RequestTarget::Rpc(rpc.trim_start_matches('/'));
         }
         let method = method(request.method());
         match request.extensions().get::<MatchedPath>() {
             // a service of the contract, without such a method
-            Some(route) if route.as_str().contains('*') => Asked::Rpc(UNKNOWN),
-            Some(route) => Asked::Route(method, route.clone()),
-            None if is_grpc(request) => Asked::Rpc(UNKNOWN),
-            None => Asked::NoRoute(method),
+            Some(route) if route.as_str().contains('*') => RequestTarget::Rpc(UNKNOWN),
+            Some(route) => RequestTarget::Route(method, route.clone()),
+            None if is_grpc(request) => RequestTarget::Rpc(UNKNOWN),
+            None => RequestTarget::NoRoute(method),
         }
     }
 }
@@ -71,7 +72,7 @@ fn method(method: &Method) -> &'static str {
     }
 }
 
-/// The names that gRPC has for them.
+/// The name of a status code, as the gRPC specification writes it.
 pub(super) fn name_of(code: Code) -> &'static str {
     match code {
         Code::Ok => "OK",

@@ -1,4 +1,4 @@
-//! Fields in memory while they are sent.
+//! Fields that are kept in memory while they are sent, shared by all requests for the same ones.
 
 use std::{
     collections::HashMap,
@@ -10,34 +10,34 @@ use solver::solution::Fields;
 
 use crate::{store::PartInfo, transfer::Share};
 
-/// Fields in memory, with their share of the limit on answers.
+/// The fields of one result in memory, with their share of the limit on answers.
 #[derive(Debug)]
-pub(super) struct Loaded {
+pub(super) struct LoadedFields {
     /// Size and hash of their JSON.
     pub(super) info: PartInfo,
     pub(super) fields: Fields,
     pub(super) _share: Share,
 }
 
-/// The fields that are being sent, by the key of their result: who asks for the same ones shares them.
+/// The fields that are being sent, by the key of their result.
 #[derive(Debug, Default)]
-pub(super) struct FieldsInMemory(Mutex<HashMap<i64, Weak<Loaded>>>);
+pub(super) struct FieldsInMemory(Mutex<HashMap<i64, Weak<LoadedFields>>>);
 
 impl FieldsInMemory {
-    pub(super) fn find(&self, key: i64) -> Option<Arc<Loaded>> {
+    pub(super) fn find(&self, key: i64) -> Option<Arc<LoadedFields>> {
         let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         all.get(&key)?.upgrade()
     }
 
-    pub(super) fn insert(&self, key: i64, loaded: &Arc<Loaded>) {
+    pub(super) fn insert(&self, key: i64, loaded: &Arc<LoadedFields>) {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         all.retain(|_, loaded| loaded.strong_count() > 0);
         all.insert(key, Arc::downgrade(loaded));
     }
 }
 
-/// Shared fields as their JSON is written of them.
-pub(super) struct Shared(pub(super) Arc<Loaded>);
+/// Shared fields, in the form from which their JSON is written.
+pub(super) struct Shared(pub(super) Arc<LoadedFields>);
 
 impl Deref for Shared {
     type Target = Fields;
