@@ -218,7 +218,7 @@ def test_every_number_of_a_summary_has_its_path(punch: sg.Result) -> None:
 
 def test_files_and_the_command(tmp_path: pathlib.Path, client: sg.Client, capfd: Any, monkeypatch: Any) -> None:
     (tmp_path / "problem.json").write_text(json.dumps(frictionless().to_dict()))
-    (tmp_path / "model.json").write_text(json.dumps(definition(problem="problem.json", title="flat")))
+    (tmp_path / "model.json").write_text(json.dumps(definition(problem="problem.json", title="a punch")))
     (tmp_path / "list.json").write_text("[]")
     (tmp_path / "deep.json").write_text("[" * 100_000)
     monkeypatch.setenv("SIGNORINI_URL", client.url)
@@ -228,7 +228,7 @@ def test_files_and_the_command(tmp_path: pathlib.Path, client: sg.Client, capfd:
     assert umbridge.main([good, "--port", "0"]) == 0
     ((models, host, port, threads),) = served
     assert (models[0].name, host, port, threads) == ("flat", "127.0.0.1", 0, 32)
-    assert capfd.readouterr().err == "flat: inputs [1, 2], outputs [2, 5], with derivatives\n"
+    assert capfd.readouterr().err == "flat (a punch): inputs [1, 2], outputs [2, 5], with derivatives\n"
     bad = [f"m={tmp_path / name}" for name in ("list.json", "deep.json", "no.json")]
     assert umbridge.main([good, good, "flat", *bad]) == 1
     told = capfd.readouterr().err

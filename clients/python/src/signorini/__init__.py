@@ -19,6 +19,7 @@ From the ground up:
     Sweep       one problem with many values, as one table
     figures     what can be drawn, and in which style
     errors      what can go wrong
+    umbridge    a problem as a function of vectors, also for programs that speak UM-Bridge; imported by itself
 """
 
 from . import errors, examples, figures, mesh, obstacle, problem

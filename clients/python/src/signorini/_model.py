@@ -83,6 +83,10 @@ class Model:
         self._client = client
         self._of = _checked(name, definition, client)
 
+    @property
+    def title(self) -> str | None:
+        return self._of.title
+
     @classmethod
     def from_file(cls, name: str, path: str | os.PathLike[str], client: Client) -> Model:
         """A model from a JSON file; its `problem` may be the name of another file, from the folder of this one. Raises
@@ -313,10 +317,10 @@ class Model:
 def _checked(name: str, definition: Mapping[str, Any], client: Client) -> Parametrised:
     """The definition, if the service accepts its problem. Raises `InvalidProblem` with everything that is wrong."""
     found: list[Violation] = []
+    parametrised = Parametrised(definition, found)
     if not NAME.fullmatch(name):
         wanted = "1 … 64 letters, digits, _ . and -, the first a letter or digit"
         found.append(Violation("/name", "bad_name", name, wanted))
-    parametrised = Parametrised(definition, found)
     if parametrised.document:
         for violation in client.validate(parametrised.document).violations:
             place = "/problem" + violation.pointer

@@ -91,12 +91,13 @@ class Parametrised:
         self.document: dict[str, Any] = {}
         self.inputs: list[list[str]] = []
         self.outputs: list[Output] = []
+        self.title: str | None = None
         self.base: list[list[float]] = []
         if found:
             return
         self.document = read.problem.to_dict(defaults=True)
         self.inputs = [[to_pointer(pointer) for pointer in vector] for vector in read.inputs]
-        self.outputs = read.outputs
+        self.outputs, self.title = read.outputs, read.title
         _not_empty("/inputs", [len(vector) for vector in self.inputs], found)
         _not_empty("/outputs", [1 if output.scalars is None else len(output.scalars) for output in self.outputs], found)
         seen: dict[str, str] = {}

@@ -211,7 +211,8 @@ def _line(model: Model) -> str:
     derivatives = (
         "with derivatives" if model.supports_gradient() else "no derivatives, since an input is 0 in the problem"
     )
-    return f"{model.name}: inputs {model.get_input_sizes()}, outputs {model.get_output_sizes()}, {derivatives}"
+    title = f" ({model.title})" if model.title else ""
+    return f"{model.name}{title}: inputs {model.get_input_sizes()}, outputs {model.get_output_sizes()}, {derivatives}"
 
 
 if __name__ == "__main__":
