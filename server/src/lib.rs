@@ -1,7 +1,7 @@
 //! The service: contact problems as jobs, over REST and gRPC. A room uses only rooms of its own
 //! group and of the groups above it; ARCHITECTURE.md has the finer order.
 
-// Basic types, for every module: the address of the service, kept bodies, callers and their tokens, kinds of errors, points in time, jobs and their changes of status, sweeps, parametrised problems, events.
+// Basic types, for every module: the address of the service, kept bodies, callers and their tokens, kinds of errors, points in time, jobs and their changes of status, sweeps, events.
 pub mod address;
 pub mod bodies;
 pub mod caller;
@@ -11,7 +11,6 @@ pub mod job;
 pub mod memory;
 pub mod mesh;
 pub mod metrics;
-pub mod model;
 pub mod sweep;
 pub mod time;
 pub mod token;

@@ -12,7 +12,6 @@ mod forwarded;
 mod headers;
 mod input;
 mod limits;
-mod model_body;
 mod object;
 mod origin;
 
@@ -30,14 +29,12 @@ mod docs;
 mod events;
 mod jobs;
 mod meshes;
-mod models;
 mod plots;
 mod results;
 mod service;
 mod submit;
 mod sweeps;
 mod tokens;
-mod umbridge;
 
 // The list of operations, and what is made from it.
 mod openapi;

@@ -36,6 +36,7 @@ mod clock;
 mod compact;
 mod database;
 mod migrations;
+mod model_files;
 mod pages;
 mod waiting;
 
@@ -80,7 +81,6 @@ mod scrub;
 
 // What is not a job.
 mod meshes;
-mod models;
 mod settings;
 mod space;
 mod tokens;

@@ -37,10 +37,6 @@ pub mod plots;
 pub mod profiles;
 pub mod results;
 
-// Parametrised problems, and what UM-Bridge asks of them.
-pub mod models;
-pub mod umbridge;
-
 // Who makes a request; tokens.
 pub mod identify;
 pub mod tokens;
