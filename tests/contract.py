@@ -82,7 +82,7 @@ class Server:
         )
         self.url = self.process.stdout.readline().strip()
         self.log = folder / "log"
-        self.known = {"id": self.jobs(), "hash": [self.mesh()], "boundary": ["top"], "name": [self.model()]}
+        self.known = {"id": self.jobs(), "hash": [self.mesh()], "boundary": ["top"]}
 
     def ask(self, method, path, body=None, **headers):
         data = body if isinstance(body, (bytes, type(None))) else json.dumps(body).encode()
@@ -108,12 +108,6 @@ class Server:
     def mesh(self):
         mesh = (TOP / "tests/data/gmsh/sheet-tri6-msh41-binary.msh").read_bytes()
         return self.ask("POST", "/v1/meshes", mesh)["hash"]
-
-    def model(self):
-        problem = json.loads((TOP / "tests/data/thesis/rectangular_punch.json").read_text(encoding="utf-8"))
-        outputs = [{"scalars": ["normal_force"]}, {"profile": "top", "quantity": "gap", "points": 3}]
-        model = {"problem": problem, "inputs": [["/contacts/0/indentation"]], "outputs": outputs}
-        return self.ask("PUT", "/v1/models/punch", model)["name"]
 
     def end(self):
         self.process.send_signal(signal.SIGTERM)

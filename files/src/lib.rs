@@ -38,7 +38,6 @@
 //! | reading by lines with their numbers | `source.rs` |
 //! | the mesh that a problem names or contains as text | `external.rs` |
 //! | sweeps | `sweep` |
-//! | problems of which some numbers are given later | `sweep/parametrised.rs` |
 //! | the place in a text that a JSON Pointer names | `pointer` |
 //! | columns of profiles and histories, as CSV and JSON Lines | `table.rs` |
 //! | Arrow | `arrow.rs` |

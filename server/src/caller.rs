@@ -48,20 +48,17 @@ pub enum Access {
     Open,
     /// Every caller who is identified.
     Identified,
-    /// Callers with all of these scopes, and those with the scope `admin`.
-    Needs(&'static [Scope]),
+    /// Callers with this scope, and those with the scope `admin`.
+    Needs(Scope),
 }
 
 impl Access {
-    /// For people and programs: `open`, `identified`, or the scopes, as `read+submit`.
-    pub fn name(self) -> String {
+    /// For people and programs: `open`, `identified`, or the scope.
+    pub fn name(self) -> &'static str {
         match self {
-            Access::Open => "open".to_owned(),
-            Access::Identified => "identified".to_owned(),
-            Access::Needs(scopes) => {
-                let words: Vec<&str> = scopes.iter().map(|scope| (*scope).into()).collect();
-                words.join("+")
-            }
+            Access::Open => "open",
+            Access::Identified => "identified",
+            Access::Needs(scope) => scope.into(),
         }
     }
 }

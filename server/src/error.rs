@@ -266,8 +266,6 @@ pub enum QuotaOf {
     StoredBytes,
     /// Jobs submitted in a minute.
     Submissions,
-    /// Registered models.
-    Models,
 }
 
 impl Quota {
@@ -281,7 +279,6 @@ impl Quota {
             }
             QuotaOf::StoredBytes if self.asked > 0 => None, // it would be sent as a whole again
             QuotaOf::Queued | QuotaOf::StoredBytes => code.kind().retry_after_s,
-            QuotaOf::Models => None, // it does not pass by itself
         }
     }
 }
@@ -317,10 +314,6 @@ impl fmt::Display for Quota {
             QuotaOf::Submissions => write!(
                 f,
                 "{owner} may submit {limit} jobs in a minute, has submitted {used}, and this request would add {asked}{in_parts}"
-            ),
-            QuotaOf::Models => write!(
-                f,
-                "{owner} has {used} models, as many as an owner may: delete one, or replace it under its name"
             ),
         }
     }
@@ -372,7 +365,7 @@ impl ApiError {
             ApiError::ProblemTooLarge { .. } => Code::ProblemTooLarge,
             ApiError::InvalidProblem(_) => Code::InvalidProblem,
             ApiError::QuotaExceeded(quota) => match quota.of {
-                QuotaOf::Queued | QuotaOf::StoredBytes | QuotaOf::Models => Code::QuotaExceeded,
+                QuotaOf::Queued | QuotaOf::StoredBytes => Code::QuotaExceeded,
                 QuotaOf::Submissions => Code::RateLimited,
             },
             ApiError::RateLimited => Code::RateLimited,

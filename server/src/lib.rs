@@ -44,7 +44,7 @@
 //! | fingerprints of problem, result and body | `digest` |
 //! | points where tests make a job fail | `failpoint.rs` |
 
-// Basic types, for every module: the address of the service, kept bodies, callers and their tokens, kinds of errors, points in time, jobs and their changes of status, sweeps, parametrised problems, events.
+// Basic types, for every module: the address of the service, kept bodies, callers and their tokens, kinds of errors, points in time, jobs and their changes of status, sweeps, events.
 pub mod address;
 pub mod bodies;
 pub mod caller;
@@ -54,7 +54,6 @@ pub mod job;
 pub mod memory;
 pub mod mesh;
 pub mod metrics;
-pub mod model;
 pub mod sweep;
 pub mod time;
 pub mod token;

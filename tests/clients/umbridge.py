@@ -1,4 +1,5 @@
-"""UM-Bridge: its Python package drives a fresh service, and the protocol is checked point by point (R29).
+"""UM-Bridge: its Python package drives `python -m signorini.umbridge` with a fresh service behind it, and the protocol is
+checked point by point (R29).
 
     umbridge.py [CONFORMITY_FOLDER]
 
@@ -7,24 +8,32 @@ protocol, for a model that supports derivatives and one that does not, so that n
 has the suite itself (`testing/protocol_conformity_1.0` of the project's repository) pytest runs that, too.
 """
 
+import contextlib
 import json
 import math
+import os
 import pathlib
 import re
+import shlex
+import signal
 import struct
 import subprocess
 import sys
+import tempfile
+import threading
 
 HERE = pathlib.Path(__file__).resolve().parent
 # this script has the name of the package
 sys.path[:] = [path for path in sys.path if pathlib.Path(path or ".").resolve() != HERE]
-sys.path.insert(0, str(HERE.parent))
+SOURCE = HERE.parents[1] / "clients/python/src"
+sys.path[:0] = [str(HERE.parent), str(SOURCE)]
 
 import requests
 import umbridge
 
 import outside
 from outside import BINARY, TOP, Server, check, equal, example
+from signorini import LocalServer
 
 INDENTATION, MODULUS, POISSON = "/contacts/0/indentation", "/materials/0/youngs_modulus", "/materials/0/poissons_ratio"
 COEFFICIENT = "/contacts/0/friction/coefficient"
@@ -57,9 +66,39 @@ def frictionless(indentation=0.25):
     }
 
 
-def register(server, name, model, **headers):
-    answer = server.call("PUT", "/v1/models/" + name, model, **headers)
-    check(answer.status in (200, 201), "PUT of a model, %r" % answer)
+def environment(server, token=""):
+    """Of a program that uses the client for Python."""
+    return dict(os.environ, PYTHONPATH=str(SOURCE), SIGNORINI_URL=server.url, SIGNORINI_TOKEN=token, SIGNORINI_CA="")
+
+
+@contextlib.contextmanager
+def bridge(server, models, token="", options=()):
+    """The address of `python -m signorini.umbridge` with these models; it ends well when it is told to."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        for model, definition in models.items():
+            (folder / (model + ".json")).write_text(json.dumps(definition))
+        words = ["%s=%s" % (model, folder / (model + ".json")) for model in models]
+        command = [sys.executable, "-m", "signorini.umbridge", "--port", "0", *options, *words]
+        with running(command, environment(server, token)) as url:
+            yield url
+
+
+@contextlib.contextmanager
+def running(command, environment):
+    """The address that a program prints, which is told to stop at the end."""
+    # not in the folder of this script, which has the name of the package
+    process = subprocess.Popen(command, cwd=TOP, env=environment, stdout=subprocess.PIPE, text=True)
+    try:
+        url = process.stdout.readline().strip()
+        check(url.startswith("http://127.0.0.1:"), "the server of models began with %r" % url)
+        yield url
+        process.send_signal(signal.SIGTERM)
+        equal(process.wait(timeout=30), 0, "exit code after SIGTERM")
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
 
 
 def bits(values):
@@ -70,9 +109,9 @@ def close(found, expected, tolerance, what):
     check(math.isclose(found, expected, rel_tol=tolerance), "%s: found %r, expected %r" % (what, found, expected))
 
 
-def evaluate(server, model):
+def evaluate(server, url, model):
     """The package gets what a job with the same problem has, bit by bit."""
-    equal(umbridge.supported_models(server.url + "/umbridge"), ["punch", "smooth"], "the models")
+    equal(umbridge.supported_models(url), ["punch", "smooth", "hasty"], "the models")
     equal((model.get_input_sizes(), model.get_output_sizes()), ([2, 1], [3, 7]), "the sizes")
     features = [model.supports_evaluate(), model.supports_gradient(), model.supports_apply_jacobian(), model.supports_apply_hessian()]
     equal(features, [True, True, True, False], "what is supported")
@@ -122,9 +161,9 @@ def differentiate(model):
     equal(len(model.gradient(1, 1, AT, [1.0] * 7)), 1, "a gradient of the profile by Young's modulus")
 
 
-def known_derivatives(server):
+def known_derivatives(url):
     """F = c E d: its derivatives are F/d and F/E."""
-    model = umbridge.HTTPModel(server.url + "/umbridge", "smooth")
+    model = umbridge.HTTPModel(url, "smooth")
     depth, modulus = 0.3, 900.0
     (force, peak), = model([[depth, modulus]])
     check(force > 0 and peak < 0, "a force of %r and a stress of %r" % (force, peak))
@@ -145,56 +184,163 @@ def refused(work, *words):
         check(False, "was not refused: %r" % (words,))
 
 
-def be_refused(server, model):
+def be_refused(url, model):
     """What the package shows its user."""
     refused(lambda: model([[0.2], [1200.0]]), "InvalidInput", "input 0 has 1 numbers; expected 2")
     refused(lambda: model(AT, {"level": 2}), "InvalidInput", "level")
     refused(lambda: model([[0.2, -1.0], [1200.0]]), "InvalidInput", COEFFICIENT)
-    smooth = umbridge.HTTPModel(server.url + "/umbridge", "smooth")
+    smooth, hasty = umbridge.HTTPModel(url, "smooth"), umbridge.HTTPModel(url, "hasty")
     refused(lambda: smooth([[-0.1, 900.0]]), "InvalidOutput", "job_", "peak_normal_stress")
     refused(lambda: model.apply_hessian(0, 0, 0, AT, [1.0] * 3, [1.0] * 2), "not supported")
-    refused(lambda: umbridge.HTTPModel(server.url + "/umbridge", "press"), "press", "punch")
+    refused(lambda: umbridge.HTTPModel(url, "press"), "press", "punch")
+    # a job that failed, and steps to where a problem is invalid
+    refused(lambda: hasty(AT), "InvalidOutput", "job_", "not-converged")
+    refused(lambda: model.gradient(0, 0, [[0.2, 0.0], [1200.0]], [1.0, 0.0, 0.0]), "InvalidInput", COEFFICIENT + " = -0.000139")
+
+
+def wrong_requests(url):
+    """What the package does not send: each is refused in the form of the protocol, and nothing is submitted for it."""
+    good = {"name": "punch", "input": AT, "config": {}, "outWrt": 0, "inWrt": 0, "sens": [1, 0, 0], "vec": [1, 0]}
+    for endpoint, changes, words in (
+        ("Evaluate", {"name": None}, "name: expected"),
+        ("Evaluate", {"name": "press"}, "press"),
+        ("Evaluate", {"inputs": []}, "inputs"),
+        ("Evaluate", {"config": []}, "config: expected an object"),
+        ("Evaluate", {"input": [[0.2, 0.25]]}, "1 vectors; the model takes 2"),
+        ("Evaluate", {"input": [0.2, 1200]}, "a list of finite numbers"),
+        ("Evaluate", {"input": [["0.2", 0.25], [1200]]}, "a list of finite numbers"),
+        ("Evaluate", {"input": [[True, 0.25], [1200]]}, "a list of finite numbers"),
+        ("Evaluate", {"input": [[math.nan, 0.25], [1200]]}, "a list of finite numbers"),
+        ("Evaluate", {"input": [[10**400, 0.25], [1200]]}, "a list of finite numbers"),
+        ("Evaluate", {"input": [[0.2, 0.25], [-5]]}, "/materials/0/youngs_modulus"),
+        ("Gradient", {"outWrt": 2}, "outWrt is 2; expected 0 … 1"),
+        ("Gradient", {"inWrt": -1}, "inWrt is -1; expected 0 … 1"),
+        ("Gradient", {"inWrt": 0.5}, "inWrt: expected"),
+        ("Gradient", {"sens": [1]}, "sens has 1 numbers; expected 3"),
+        ("ApplyJacobian", {"vec": [1]}, "vec has 1 numbers; expected 2"),
+        ("ApplyJacobian", {"vec": [1.7e308, 0]}, "vec is too large"),
+    ):
+        answer = requests.post("%s/%s" % (url, endpoint), data=json.dumps({**good, **changes}))
+        kind = "ModelNotFound" if changes == {"name": "press"} else "InvalidInput"
+        found = answer.status_code, list(answer.json()), answer.json()["error"]["type"]
+        equal(found, (400, ["error"], kind), "%s %r, %s" % (endpoint, changes, answer.text))
+        check(words in answer.json()["error"]["message"], "%r is not in %s" % (words, answer.text))
+    for body, status, words in (
+        ("", 400, "cannot be read"),
+        ('{"name": "punch"', 400, "cannot be read"),
+        ("[" * 100_000, 400, "cannot be read"),
+        ('["punch"]', 400, "expected a JSON object"),
+        ('{"name": "punch"}', 400, "input is missing"),
+        (" " * ((1 << 20) + 1), 413, "1048576"),
+    ):
+        answer = requests.post(url + "/Evaluate", data=body)
+        equal(answer.status_code, status, "%.80r, %s" % (body, answer.text))
+        check(words in answer.json()["error"]["message"], "%r is not in %s" % (words, answer.text))
+    for answer in (
+        requests.post(url + "/Evaluate", data=json.dumps(good), headers={"Origin": "http://elsewhere.example"}),
+        requests.post(url + "/EvaluateShMem", data=json.dumps(good)),
+        requests.get(url + "/Evaluate"),
+    ):
+        check(answer.status_code in (403, 404, 405) and "error" in answer.json(), answer.text)
+
+
+def wrong_definitions(server):
+    """All that is wrong is told before anything is served, and nothing is."""
+    problem = dict(example("rectangular_punch"), materials=[{"youngs_modulus": -1, "poissons_ratio": 0.3}])
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        inputs = [["/contacts/0/identation", "/title"], []]
+        outputs = [{"scalars": ["normal_forces", "contacts/side/normal_force"]}, {"profile": "top"}]
+        definition = {"problem": problem, "inputs": inputs, "outputs": outputs}
+        (folder / "wrong.json").write_text(json.dumps(definition))
+        (folder / "none.json").write_text("{")
+        words = ["wrong=%s" % (folder / "wrong.json"), "none=%s" % (folder / "none.json"), "absent=%s" % (folder / "absent.json")]
+        done = subprocess.run([sys.executable, "-m", "signorini.umbridge", "--port", "0", *words], cwd=TOP,
+                              env=environment(server), capture_output=True, text=True, timeout=60)
+    equal((done.returncode, done.stdout), (1, ""), "the end of a server without models: %s" % done.stderr)
+    for words in ("/problem/materials/0/youngs_modulus", "/inputs/0/0", "/contacts/0/identation", "`indentation`", "/inputs/0/1",
+                  "/inputs/1", "/outputs/0/scalars/0", "/outputs/0/scalars/1", "/outputs/1", "none.json", "absent.json"):
+        check(words in done.stderr, "%r is not in %s" % (words, done.stderr))
+
+
+def without_the_service():
+    """What is asked while the service is away is asked again for a while, and then an error; it comes back by itself."""
+    server = LocalServer(binary=BINARY)
+    server.start()
+    with bridge(server, {"smooth": frictionless()}, options=("--retry-for", "1")) as url:
+        model = umbridge.HTTPModel(url, "smooth")
+        check(model([[0.3, 900.0]])[0][0] > 0, "an evaluation")
+        server.kill()
+        refused(lambda: model([[0.31, 900.0]]), "service-unreachable", server.url)
+        server.start()
+        check(model([[0.31, 900.0]])[0][0] > 0, "an evaluation when the service is back")
+    server.stop()
+
+
+def stopped():
+    """A server that is told to stop while it waits answers with an error; the job stays in the queue, and ends."""
+    with Server("--memory-budget-bytes", str(2 << 30)) as server:
+        found = []
+        with bridge(server, {"smooth": frictionless()}) as url:
+            equal(server.call("POST", "/v1/queue/pause").status, 200, "pausing")
+            asking = threading.Thread(target=lambda: found.append(
+                requests.post(url + "/Evaluate", data=json.dumps({"name": "smooth", "input": [[0.3, 900.0]]}))))
+            asking.start()
+            while not server.every_job(status="queued"):
+                pass
+        asking.join()
+        equal((found[0].status_code, found[0].json()["error"]["type"]), (503, "draining"), "the answer of one that stops")
+        equal(server.call("POST", "/v1/queue/resume").status, 200, "resuming")
+        job, = server.every_job()
+        equal(server.finished(job["id"])["status"], "succeeded", "the job")
 
 
 def as_documented(server):
     """The commands of the page, as a reader copies them."""
-    blocks = re.findall(r"<!-- run -->\n```(sh|python)\n(.*?)```", (TOP / "docs/umbridge.md").read_text(encoding="utf-8"), re.S)
-    equal([language for language, _ in blocks], ["sh", "python"], "the commands of the page")
-    for language, code in blocks:
-        command = {"sh": ["bash", "-euo", "pipefail", "-c"], "python": [sys.executable, "-c"]}[language]
-        code = code.replace("127.0.0.1:8080", server.address)
-        done = subprocess.run([*command, code], cwd=TOP, capture_output=True, text=True, timeout=300)
-        equal(done.returncode, 0, "%s\n%s%s" % (code, done.stdout, done.stderr))
-        check(done.stdout and '"error' not in done.stdout, "%s\n%s" % (code, done.stdout))
-    equal(done.stdout.splitlines()[0], "[2] [3, 50]", "the sizes that the page shows")
+    page = (TOP / "docs/umbridge.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"<!-- (run|serve) -->\n```(sh|python)\n(.*?)```", page, re.S)
+    equal([block[:2] for block in blocks], [("run", "sh"), ("serve", "sh"), ("run", "python")], "the commands of the page")
+    (*_, define), (*_, serve), (*_, call) = blocks
+    with tempfile.TemporaryDirectory() as folder:
+        model = os.path.join(folder, "model.json")
+        done = subprocess.run(["bash", "-euo", "pipefail", "-c", define.replace("model.json", model)], cwd=TOP)
+        equal(done.returncode, 0, define)
+        words = shlex.split(serve.replace("model.json", model))
+        equal(words[0], "python", serve)
+        with running([sys.executable, *words[1:], "--port", "0"], environment(server)) as url:
+            code = call.replace("http://127.0.0.1:4242", url)
+            done = subprocess.run([sys.executable, "-c", code], cwd=TOP, capture_output=True, text=True, timeout=300)
+            equal(done.returncode, 0, "%s\n%s%s" % (code, done.stdout, done.stderr))
+            equal(done.stdout.splitlines()[0], "[2] [3, 50]", "the sizes that the page shows")
 
 
-def from_other_ways(server):
+def from_other_ways(url):
     """Shared memory is offered by the package: it finds that there is none, and goes on over HTTP."""
-    model = umbridge.HTTPModel(server.url + "/umbridge", "smooth", use_shmem=True)
+    model = umbridge.HTTPModel(url, "smooth", use_shmem=True)
     equal(len(model([[0.3, 900.0]])[0]), 2, "an evaluation by a client that tried shared memory")
 
 
 def with_tokens():
-    """The one way to give the package a token: as the password in the address."""
+    """The server of models has a token; whoever reaches it evaluates with that."""
     with Server("--memory-budget-bytes", str(2 << 30)) as server:
         server.kill()
         create = [BINARY, "token", "create", "--data", server.data, "--name", "test", "--owner"]
         made = [subprocess.run([*create, owner, "--scope", scope], capture_output=True, text=True, check=True).stdout.strip()
-                for owner, scope in (("root", "admin"), ("ada", "read,submit"), ("bob", "read"), ("bob", "read,submit"))]
-        admin, ada, reads, bob = made
+                for owner, scope in (("root", "admin"), ("ada", "read,submit"), ("bob", "read"))]
+        admin, ada, reads = made
         server.start()
-        register(server, "smooth", frictionless(), authorization="Bearer " + ada)
-        address = {token: "http://anyone:%s@%s/umbridge" % (token, server.address) for token in made}
-        equal(umbridge.supported_models(address[ada]), ["smooth"], "ada's models")
-        equal(umbridge.supported_models(address[bob]), [], "bob's models")
-        model = umbridge.HTTPModel(address[ada], "smooth")
-        check(model([[0.3, 900.0]])[0][0] > 0, "an evaluation with a token")
-        register(server, "smooth", frictionless(), authorization="Bearer " + bob)
-        refused(lambda: umbridge.HTTPModel(address[reads], "smooth")([[0.3, 900.0]]), "forbidden", "submit")
-        answer = requests.get("http://%s/umbridge/Info" % server.address)
-        equal((answer.status_code, answer.json()["code"]), (401, "unauthenticated"), "without a token")
-        check("Bearer" in answer.headers["www-authenticate"], "the challenge")
+        with bridge(server, {"smooth": frictionless()}, token=ada) as url:
+            check(umbridge.HTTPModel(url, "smooth")([[0.3, 900.0]])[0][0] > 0, "an evaluation with a token")
+        job, = server.call("GET", "/v1/jobs", authorization="Bearer " + admin).json()["jobs"]
+        equal(job["owner"], "ada", "the owner of the job")
+        for token, words in ((reads, ("forbidden", "submit")), ("", ("unauthenticated",))):
+            with tempfile.NamedTemporaryFile("w", suffix=".json") as file:
+                file.write(json.dumps(frictionless()))
+                file.flush()
+                done = subprocess.run([sys.executable, "-m", "signorini.umbridge", "smooth=" + file.name], cwd=TOP,
+                                      env=environment(server, token), capture_output=True, text=True, timeout=60)
+            equal(done.returncode, 1, "without the right token")
+            check(all(word in done.stderr for word in words), done.stderr)
 
 
 class Protocol:
@@ -366,25 +512,31 @@ def suite(folder, url):
 
 
 def main():
+    hasty = with_friction()
+    hasty["problem"]["solver"] = {"max_iterations": 1}
     with Server("--memory-budget-bytes", str(2 << 30)) as server:
-        register(server, "punch", with_friction())
-        register(server, "smooth", frictionless())
-        model = umbridge.HTTPModel(server.url + "/umbridge", "punch")
-        evaluate(server, model)
-        differentiate(model)
-        known_derivatives(server)
-        be_refused(server, model)
-        from_other_ways(server)
-        for folder in sys.argv[1:2]:
-            suite(folder, server.url + "/umbridge")
-        server.call("DELETE", "/v1/models/smooth")
-        register(server, "plain", frictionless(indentation=0))
-        passed = conformity(server.url + "/umbridge")
-        for folder in sys.argv[1:2]:
-            suite(folder, server.url + "/umbridge")
+        with bridge(server, {"punch": with_friction(), "smooth": frictionless(), "hasty": hasty}) as url:
+            model = umbridge.HTTPModel(url, "punch")
+            evaluate(server, url, model)
+            differentiate(model)
+            known_derivatives(url)
+            be_refused(url, model)
+            submitted = server.json("/v1/jobs/count")["total"]
+            wrong_requests(url)
+            equal(server.json("/v1/jobs/count")["total"], submitted, "jobs of requests that were refused")
+            from_other_ways(url)
+            for folder in sys.argv[1:2]:
+                suite(folder, url)
+        wrong_definitions(server)
+        with bridge(server, {"punch": with_friction(), "plain": frictionless(indentation=0)}) as url:
+            passed = conformity(url)
+            for folder in sys.argv[1:2]:
+                suite(folder, url)
     with Server("--memory-budget-bytes", str(2 << 30)) as server:
         as_documented(server)
     with_tokens()
+    without_the_service()
+    stopped()
     print("figure: %d of 22 checks of the protocol; the package umbridge drives the service, with the numbers of jobs bit by bit and "
           "derivatives that are known (%d checks in all)" % (passed, outside.checks))
 

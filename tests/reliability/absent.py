@@ -35,7 +35,7 @@ VOLATILE = re.compile(rb'"(stored_bytes|version|uptime_s|last_used_at)":(?:[0-9.
 def fill(server):
     """Something in each table; the paths that find it, and the submits that are repeated."""
     punch = example("rectangular_punch", refine=0)
-    submits, found = [], ["/v1/jobs", "/v1/sweeps", "/v1/meshes", "/v1/models", "/v1/tokens", "/v1/owners", "/v1/jobs/count?group_by=status"]
+    submits, found = [], ["/v1/jobs", "/v1/sweeps", "/v1/meshes", "/v1/tokens", "/v1/owners", "/v1/jobs/count?group_by=status"]
     for n in range(3):
         body = submission(punch, name="name %d" % n, labels={"kind": "label %d" % n}, cache="refresh")
         job = server.call("POST", "/v1/jobs", body, Prefer="wait=30", Idempotency_Key="key %d" % n).json()
@@ -47,8 +47,6 @@ def fill(server):
     server.finished(gone)
     equal(server.call("DELETE", "/v1/jobs/" + gone).status, 204, "a deleted job")
     mesh = server.call("POST", "/v1/meshes", MESH, content_type="application/octet-stream").json()["hash"]
-    equal(server.call("PUT", "/v1/models/punch", {
-        "problem": punch, "inputs": [["/contacts/0/indentation"]], "outputs": [{"scalars": ["normal_force"]}]}).status, 201, "a model")
     sweeps = []
     for values in ([0.1, 0.2], [0.15]):
         axis = {"path": "/contacts/0/friction/coefficient", "values": values}
@@ -56,7 +54,7 @@ def fill(server):
         server.call("GET", "/v1/sweeps/%s?wait=30" % sweep)
         sweeps.append(sweep)
     equal(server.call("DELETE", "/v1/sweeps/" + sweeps[1]).status, 204, "a deleted sweep")
-    found += ["/v1/jobs/" + gone, "/v1/sweeps/" + sweeps[1], "/v1/meshes/" + mesh, "/v1/models/punch"]
+    found += ["/v1/jobs/" + gone, "/v1/sweeps/" + sweeps[1], "/v1/meshes/" + mesh]
     found += ["/v1/sweeps/%s%s" % (sweeps[0], part) for part in ("", "/members", "/results", "/events")]
     return found, submits
 

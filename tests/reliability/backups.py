@@ -30,8 +30,6 @@ ROUNDS, EARLIER, STEP = (20, 1500, 1) if SOAK else (2, 40, 8)
 EXAMPLES = ("rectangular_punch", "cylinder", "annular_punch", "cylinder_on_end", "sheet")
 MESH = (TOP / "tests/data/gmsh/fillet-mixed-msh41-binary.msh").read_bytes()
 OTHER_MESH = (TOP / "tests/data/gmsh/hertz-tri6-msh41-binary.msh").read_bytes()
-# of a problem on the first mesh
-MODEL = {"inputs": [["/contacts/0/indentation"]], "outputs": [{"scalars": ["normal_force"]}]}
 FAILED, FOLDER, LOCKED, SCHEMA, DAMAGED = 1, 4, 5, 6, 7
 PARTS = ("", "/problem", "/result", "/history", "/events", "/fields")
 ENOSPC = 28
@@ -101,7 +99,6 @@ def under_load(folder):
     with Server() as server:
         answer = server.call("POST", "/v1/meshes", MESH, content_type="application/octet-stream")
         mesh = answer.json()["hash"]
-        equal(server.call("PUT", "/v1/models/pressed", dict(MODEL, problem=on_mesh(mesh))).status, 201, "a model")
         for n in range(EARLIER):
             server.submit(example(EXAMPLES[n % 5]), cache="refresh")
         load = Load(server, mesh)
@@ -131,7 +128,6 @@ def under_load(folder):
                 equal(len(there), manifest["jobs"], "jobs in the backup")
                 equal([job for job in acknowledged if job not in there], [], "acknowledged, and not in the backup")
                 equal(restored.json("/v1/meshes/" + mesh)["hash"], mesh, "the mesh")
-                equal(restored.json("/v1/models/pressed"), server.json("/v1/models/pressed"), "the model")
                 for job in there:
                     equal(restored.finished(job)["status"], "succeeded", "the job")
                     here, original = answers(restored, job), answers(server, job)

@@ -2,14 +2,15 @@
 
     upgrades.py [--soak] [SEED]
 
-A store is filled by the service: jobs of each kind of end, one that waits, labels, keys, a mesh, a sweep, a model, a deletion. For
+A store is filled by the service: jobs of each kind of end, one that waits, labels, keys, a mesh, a sweep, a deletion. For
 each earlier version of its tables, a store is made by the migrations up to that one, and gets what that version would
 have stored of all this. The service starts on it, and what was stored is served as before, byte by byte where that
-version stored it; the waiting job is solved. On the way it is backed up and restored as it is. Then the upgrade is killed before its n-th write or sync, and started again.
+version stored it; the waiting job is solved; models, which the service no longer has, are files. On the way it is backed up and restored as it is. Then the upgrade is killed before its n-th write or sync, and started again.
 A store of a later version is refused.
 """
 
 import hashlib
+import json
 import pathlib
 import random
 import shutil
@@ -37,13 +38,13 @@ OLD_NAMES = {("job", "twin_of"): "coalesced_into"}
 NOT_COPIED = ("_sqlx_migrations", "sqlite_sequence", "progress", "owner_size")
 # the first version that stores results compactly
 COMPACT = 10
-# the first version that has models
-MODELS = 12
-MODEL = {"problem": example(), "inputs": [["/contacts/0/indentation"]], "outputs": [{"scalars": ["normal_force"]}]}
+# the versions that had models
+MODELS = range(12, 14)
+MODEL = {"title": None, "inputs": [["/contacts/0/indentation"]], "outputs": [{"scalars": ["normal_force"]}]}
 PIECE_BYTES = 256 << 10
 
 
-def everything(server, jobs, mesh, sweep, model):
+def everything(server, jobs, mesh, sweep):
     """Digests of what is served, by path."""
     paths = ["/v1/jobs/%s%s" % (job, part) for job in jobs
              for part in ("/problem", "/result", "/history", "/fields", "/events")]
@@ -52,8 +53,6 @@ def everything(server, jobs, mesh, sweep, model):
         paths.append("/v1/sweeps/%s/results?format=csv" % sweep)
     if mesh:
         paths.append("/v1/meshes/" + mesh)
-    if model:
-        paths.append("/v1/models/" + model)
     found = {}
     for path in paths:
         answer = server.call("GET", path)
@@ -87,7 +86,6 @@ def fill(server):
         jobs[job] = problem["contacts"][0]["boundary"]
     upload = server.call("POST", "/v1/meshes", MESH, content_type="application/octet-stream")
     mesh = upload.json()["hash"]
-    equal(server.call("PUT", "/v1/models/punch", MODEL).status, 201, "the model")
     sweep = {"base": example(), "axes": [{"path": "/contacts/0/friction/coefficient", "values": [0.1, 0.2, 0.3]}]}
     answer = server.call("POST", "/v1/sweeps", sweep)
     equal(answer.status // 100, 2, "the sweep, %r" % answer)
@@ -150,9 +148,9 @@ def older(source, fields, folder, version):
     store.execute("begin")
     tables = [name for name, in store.execute("select name from main.sqlite_schema where type = 'table'")]
     # rows before those that refer to them
-    order = ("problem", "job", "mesh", "mesh_piece", "sweep", "model")
+    order = ("problem", "job", "mesh", "mesh_piece", "sweep")
     for table in sorted(tables, key=lambda name: (name not in order, order.index(name) if name in order else name)):
-        if table in NOT_COPIED:
+        if table in NOT_COPIED or table in ("model", "model_problem"):
             continue
         ours = [column for _, column, *_ in store.execute("pragma main.table_info(%s)" % table)]
         theirs = {column for _, column, *_ in store.execute("pragma new.table_info(%s)" % table)}
@@ -164,6 +162,10 @@ def older(source, fields, folder, version):
             where = " where abs(job_id) in (select id from new.job where sweep is null)"
         store.execute("insert into main.%s (%s) select %s from new.%s%s" % (
             table, ", ".join(old for old, _ in pairs), ", ".join(new for _, new in pairs), table, where))
+    if version in MODELS:
+        columns = "(id, owner, name, description, created_at, updated_at)"
+        store.execute("insert into model %s values (1, 'local', 'punch', ?, 1, 1)" % columns, (json.dumps(MODEL),))
+        store.execute("insert into model_problem (model, body) values (1, ?)", (json.dumps(example()),))
     if version < COMPACT:
         as_json(store, fields)
     if 6 <= version < 11:
@@ -197,10 +199,13 @@ def compare(server, version, known, before, kept):
         equal(now, kept, "what jobs of version %d keep" % version)
     else:
         check(all(now[job] > kept[job] for job in jobs), "what jobs of version %d keep: %r" % (version, now))
-    after = everything(server, jobs, mesh if version >= 2 else None, sweep if version >= 8 else None,
-                       "punch" if version >= MODELS else None)
+    after = everything(server, jobs, mesh if version >= 2 else None, sweep if version >= 8 else None)
     for path, found in after.items():
         equal(found, before[path], "%s of a store of version %d" % (path, version))
+    kept_model = server.data / "models/punch,local.json"
+    equal(kept_model.exists(), version in MODELS, "a file of a model of version %d" % version)
+    if version in MODELS:
+        equal(json.loads(kept_model.read_text()), dict(MODEL, problem=example()), "the model of version %d" % version)
     for job in jobs:
         equal(server.json("/v1/jobs/" + job)["status"], "succeeded", "a job of version %d" % version)
     labeled = [job["name"] for job in server.every_job(**{"label.n": "3"})]
@@ -217,7 +222,7 @@ def compare(server, version, known, before, kept):
 def killed(make, known, before, kept, dice):
     """The upgrade is killed before its n-th write or sync; then it is done, from what that left."""
     kills = 0
-    for version in (1, 5, 8):
+    for version in (1, 5, 8, 12):
         with Faulty() as server:
             server.kill()
             n = 1
@@ -252,7 +257,7 @@ def main():
         folder = pathlib.Path(name)
         with Server() as server:
             known = fill(server)
-            before = everything(server, known[0], known[1], known[2], "punch")
+            before = everything(server, known[0], known[1], known[2])
             kept = sizes(server)
             check(all(status == 200 for status, _ in before.values()), "before: %r" % before)
             answers = {job["id"]: server.call("GET", "/v1/jobs/%s/fields?format=json" % job["id"]) for job in server.every_job()}

@@ -34,12 +34,6 @@ const POLICY: &[(&str, &[&str])] = &[
             "GetPlot",
             "GetMesh",
             "ListMeshes",
-            "GetModel",
-            "ListModels",
-            "UmBridgeInfo",
-            "UmBridgeModelInfo",
-            "UmBridgeInputSizes",
-            "UmBridgeOutputSizes",
             "GetSweep",
             "ListSweeps",
             "ListSweepMembers",
@@ -55,15 +49,6 @@ const POLICY: &[(&str, &[&str])] = &[
         ],
     ),
     (
-        "read+submit",
-        &[
-            "UmBridgeEvaluate",
-            "UmBridgeGradient",
-            "UmBridgeApplyJacobian",
-            "UmBridgeApplyHessian",
-        ],
-    ),
-    (
         "submit",
         &[
             "ValidateProblem",
@@ -73,7 +58,6 @@ const POLICY: &[(&str, &[&str])] = &[
             "RetryJob",
             "UpdateJob",
             "UploadMesh",
-            "PutModel",
             "CreateSweep",
             "CreateMemberJob",
         ],
@@ -87,7 +71,6 @@ const POLICY: &[(&str, &[&str])] = &[
             "DeleteJob",
             "DeleteJobs",
             "DeleteMesh",
-            "DeleteModel",
             "CancelSweep",
             "DeleteSweep",
         ],
@@ -112,15 +95,7 @@ type Case = (String, Option<String>, Option<&'static [&'static str]>);
 struct Cases(Vec<Case>);
 
 /// What an administrator may use.
-const EVERYTHING: &[&str] = &[
-    "open",
-    "identified",
-    "read",
-    "submit",
-    "read+submit",
-    "cancel",
-    "admin",
-];
+const EVERYTHING: &[&str] = &["open", "identified", "read", "submit", "cancel", "admin"];
 
 pub(crate) async fn create(server: &Server, admin: Option<&str>, body: Value) -> (String, String) {
     let mut request = server.post("/v1/tokens").json(&body);
@@ -177,10 +152,7 @@ async fn with_tokens() -> (Server, String, Cases) {
         ("read", &["open", "identified", "read"][..]),
         ("submit", &["open", "identified", "submit"]),
         ("cancel", &["open", "identified", "cancel"]),
-        (
-            "read+submit",
-            &["open", "identified", "read", "submit", "read+submit"],
-        ),
+        ("read+submit", &["open", "identified", "read", "submit"]),
         ("admin", EVERYTHING),
     ] {
         let all: Vec<&str> = scopes.split('+').collect();

@@ -20,7 +20,6 @@
 mod check;
 mod neighbours;
 mod numbers;
-mod parametrised;
 mod path;
 mod plan;
 mod read;
@@ -30,7 +29,6 @@ mod values;
 pub use check::{Group, MOST_TOLD, groups, has_own_meshes};
 pub use neighbours::Neighbour;
 pub use numbers::{Problems, Read};
-pub use parametrised::Parametrised;
 pub use path::{MOST_POINTER_BYTES, MOST_POINTER_TOKENS};
 pub use plan::{MOST_BYTES, MOST_MEMBERS, MOST_PATHS, MOST_VALUE_BYTES, Mode, Plan};
 pub use read::{Sweep, read};

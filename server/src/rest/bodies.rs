@@ -430,7 +430,7 @@ pub(super) fn bare_problem(text: &str) -> Result<Read<Problem>, ApiError> {
 
 /// The violation of a body that is the problem itself instead of an object with the field `problem`: one, not one
 /// for each field of the problem.
-pub(super) fn missing_envelope(body: &Object<'_>) -> Option<Violation> {
+fn missing_envelope(body: &Object<'_>) -> Option<Violation> {
     let bare = body.has("analysis") || body.has("mesh");
     (bare && !body.has("problem")).then(|| Violation {
         pointer: PROBLEM.into(),
@@ -442,7 +442,7 @@ pub(super) fn missing_envelope(body: &Object<'_>) -> Option<Violation> {
 }
 
 /// The field `problem`.
-pub(super) fn problem(body: &mut Object<'_>) -> Option<Problem> {
+fn problem(body: &mut Object<'_>) -> Option<Problem> {
     let hint = "Send {\"problem\": {…}}.";
     let raw = body.require("problem", "the problem to solve", hint)?;
     let problem = files::parse(raw.get());

@@ -51,12 +51,8 @@ impl Call {
 
     /// The same of a body that is declared as a merge patch.
     pub(super) async fn merge_patch(&mut self) -> Result<String, ApiError> {
-        self.text(self.service.max_body_bytes).await
-    }
-
-    /// The body as text, whatever it is declared as, if it has at most so many bytes.
-    pub(super) async fn text(&mut self, limit_bytes: usize) -> Result<String, ApiError> {
         let body = std::mem::take(&mut self.body);
+        let limit_bytes = self.service.max_body_bytes;
         body::json_text(&self.headers, body, limit_bytes, &self.received).await
     }
 

@@ -12,7 +12,6 @@ use super::{
     filters::FILTERS,
     headers::{IF_MATCH, IF_NONE_MATCH, PREFER},
     input::{Input, RawInput},
-    model_body,
 };
 use crate::{cli::examples, error::ApiError, formats::Format, verbs::lists::ORDER_BY};
 
@@ -218,16 +217,6 @@ fn changed_bodies_are_read_or_refused() {
             kind(
                 bodies::batch(&text).and_then(|jobs| jobs.map_err(ApiError::InvalidProblem)),
                 |jobs| jobs.len().min(3).to_string(),
-            ),
-            kind(
-                model_body::model(&text).and_then(|model| model.map_err(ApiError::InvalidProblem)),
-                |model| {
-                    format!(
-                        "{} {}",
-                        model.inputs.len().min(3),
-                        model.outputs.len().min(3)
-                    )
-                },
             ),
             kind(bodies::bare_problem(&text).and_then(found), |_| {
                 String::new()

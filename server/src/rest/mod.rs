@@ -23,7 +23,7 @@
 //! | answers: entity tags, digests, ranges | `data` |
 //! | log line, metrics and span of a request | `observe`, `request_target` |
 //! | refused requests in the log | `refused` |
-//! | handlers by subject | `jobs`, `submit`, `events`, `results`, `plots`, `sweeps`, `meshes`, `models`, `tokens`, `service`, `umbridge` |
+//! | handlers by subject | `jobs`, `submit`, `events`, `results`, `plots`, `sweeps`, `meshes`, `tokens`, `service` |
 //! | the page at /docs | `docs` |
 
 // Requests: parameters and headers, bodies, the caller.
@@ -38,7 +38,6 @@ mod forwarded;
 mod headers;
 mod input;
 mod limits;
-mod model_body;
 mod object;
 mod origin;
 
@@ -56,14 +55,12 @@ mod docs;
 mod events;
 mod jobs;
 mod meshes;
-mod models;
 mod plots;
 mod results;
 mod service;
 mod submit;
 mod sweeps;
 mod tokens;
-mod umbridge;
 
 // The list of operations, and what is made from it.
 mod openapi;

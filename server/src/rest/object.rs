@@ -258,7 +258,7 @@ fn is_null(raw: &RawValue) -> bool {
 }
 
 /// The violation of a value of the wrong type.
-pub(super) fn wrong_type(pointer: &str, raw: &RawValue, expected: &str) -> Violation {
+fn wrong_type(pointer: &str, raw: &RawValue, expected: &str) -> Violation {
     Violation {
         pointer: pointer.into(),
         reason: Reason::WrongType,

@@ -62,8 +62,7 @@ const INTRODUCTION: &str = "The same operations, names and numbers as over gRPC 
 [/v1/schema/problem.json](v1/schema/problem.json). \
 Units are chosen by the client and must be consistent; stresses are negative in compression; times are RFC 3339 in UTC. \
 Unknown names are refused, in bodies and in queries. Every error is a document of RFC 9457; its `code` \
-is stable, and its `type` is the address of an explanation. Below /umbridge errors have the form of that protocol, \
-alone or beside these.";
+is stable, and its `type` is the address of an explanation.";
 
 /// Collects the schemas that operations refer to.
 struct Schemas {
@@ -116,15 +115,7 @@ impl Schemas {
             described["responses"][answer.status.to_string()] = self.answer(answer);
         }
         for (status, codes) in by_status(&operation.errors()) {
-            let (own, failure) = (
-                &mut described["responses"][status.to_string()],
-                self.failure(&codes),
-            );
-            *own = match own.take() {
-                Value::Null => failure,
-                // an error of UM-Bridge of the same status
-                own => either(own, failure),
-            };
+            described["responses"][status.to_string()] = self.failure(&codes);
         }
         described
     }
@@ -170,23 +161,6 @@ impl Schemas {
         all.insert("Error".into(), error_schema(&violation.to_value()));
         all
     }
-}
-
-/// Two answers of one status.
-fn either(mut one: Value, mut other: Value) -> Value {
-    let text = |answer: &Value| {
-        answer["description"]
-            .as_str()
-            .unwrap_or_default()
-            .to_owned()
-    };
-    one["description"] = json!(format!("{}; {}", text(&one), text(&other)));
-    if let Value::Object(content) = other["content"].take() {
-        for (media, described) in content {
-            one["content"][media] = described;
-        }
-    }
-    one
 }
 
 fn parameter(parameter: &Description) -> Value {

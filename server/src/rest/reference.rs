@@ -42,8 +42,7 @@ const INTRODUCTION: &str = "# The API
 Generated from the list of operations (`server/src/rest/operations`) by `signorini openapi --reference`; the same
 list makes the routes, `/openapi.json` and the test that every rpc has its route. Bodies are described there, a
 problem by `signorini schema`; `/docs` shows all of it and can try it out. Unknown names are refused, in bodies
-and in queries. Every error is a document of RFC 9457 with one of the codes below. Below `/umbridge` errors have the form
-of that protocol, alone or beside these ([UM-Bridge](umbridge.md)).
+and in queries. Every error is a document of RFC 9457 with one of the codes below.
 
 ";
 
@@ -59,14 +58,7 @@ fn section(out: &mut String, operation: &Operation) {
     let who = match operation.access {
         Access::Open => "everyone, without a token".to_owned(),
         Access::Identified => "every token".to_owned(),
-        Access::Needs([scope]) => format!("tokens with the scope `{}`", <&str>::from(scope)),
-        Access::Needs(scopes) => {
-            let words: Vec<String> = scopes
-                .iter()
-                .map(|scope| format!("`{}`", <&str>::from(scope)))
-                .collect();
-            format!("tokens with the scopes {}", words.join(" and "))
-        }
+        Access::Needs(scope) => format!("tokens with the scope `{}`", <&str>::from(scope)),
     };
     let _ = writeln!(out, "- for {who}");
     let named = |parameter: &&Description| parameter.location != Location::Path;

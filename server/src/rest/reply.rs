@@ -9,7 +9,6 @@ use axum::{
     middleware::Next,
     response::{IntoResponse, Response},
 };
-use serde_json::json;
 
 use super::{coding, refused};
 use crate::{
@@ -65,12 +64,7 @@ fn with_document(mut response: Response, path: &str) -> Response {
     };
     let code = error.code().kind().code;
     refused::note(code, path);
-    let mut document = error.document(&link(path));
-    if path.starts_with("/umbridge/") {
-        // its clients know this form alone, and show what is in it
-        document["error"] = json!({ "type": code, "message": error.to_string() });
-    }
-    let document = document.to_string();
+    let document = error.document(&link(path)).to_string();
     let (mut parts, _) = response.into_parts();
     parts.headers.insert(
         header::CONTENT_TYPE,

@@ -21,7 +21,6 @@ pub(super) enum Table {
     Labels,
     Keys,
     Meshes,
-    Models,
     Sweeps,
     Deleted,
 }
@@ -34,7 +33,6 @@ impl Table {
             Table::Labels => "labels",
             Table::Keys => "request keys",
             Table::Meshes => "meshes",
-            Table::Models => "models",
             Table::Sweeps => "sweeps",
             Table::Deleted => "deleted jobs",
         };

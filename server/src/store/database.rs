@@ -177,7 +177,7 @@ impl Store {
             })
             .connect_with(writing)
             .await?;
-        migrations::run(&writer).await?;
+        migrations::run(&writer, path).await?;
         if rebuild == Rebuild::IfItCannotGiveBack {
             // before there are connections that read
             compact::enable_giving_back(&mut *writer.acquire().await?, path).await?;

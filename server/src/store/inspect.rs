@@ -15,7 +15,7 @@ use super::{
     error::{Record, Result, StoreError},
     events,
     folder::{DATABASE, Folder, unusable},
-    intact, keys, meshes, migrations, models, problems,
+    intact, keys, meshes, migrations, problems,
     progress::{self, Known},
     rows::find,
     salvage::{copy_job, copy_the_rest, insert, new_store},
@@ -171,7 +171,6 @@ impl Report {
             tx.commit().await?;
         }
         self.check_meshes(source, target).await?;
-        self.check_models(source, target).await?;
         self.check_request_keys(source, target).await?;
         self.check_sweeps(source, target).await?;
         self.check_tokens(source, target).await?;
@@ -316,46 +315,6 @@ impl Report {
                         // it becomes an administrator's
                         Err(error) => self.finding("owners of meshes", &error),
                     }
-                    tx.commit().await?;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    async fn check_models(
-        &mut self,
-        source: &mut SqliteConnection,
-        target: Option<&Store>,
-    ) -> Result<()> {
-        let rows = sqlx::query("select * from model order by id").fetch_all(&mut *source);
-        let rows = match rows.await {
-            Ok(rows) => rows,
-            Err(error) => {
-                self.finding("models", &error.into());
-                return Ok(());
-            }
-        };
-        for row in &rows {
-            let read = async {
-                let model = models::described(row)?;
-                models::problem(source, model.key).await?;
-                Ok(model.key)
-            };
-            match read.await {
-                Err(error) => self.finding("model", &error),
-                Ok(key) => {
-                    let Some(target) = target else { continue };
-                    let mut tx = target.begin().await?;
-                    insert(&mut tx, "model", row).await?;
-                    let problem =
-                        sqlx::query("select * from model_problem where model = ?").bind(key);
-                    insert(
-                        &mut tx,
-                        "model_problem",
-                        &problem.fetch_one(&mut *source).await?,
-                    )
-                    .await?;
                     tx.commit().await?;
                 }
             }

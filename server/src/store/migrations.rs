@@ -1,17 +1,20 @@
 //! The tables and their history: `migrations/`, compiled in.
 
-use std::{borrow::Cow, collections::BTreeMap};
+use std::{borrow::Cow, collections::BTreeMap, path::Path};
 
 use sqlx::{
     Connection, SqlSafeStr, SqliteConnection, SqlitePool,
     migrate::{Migration, MigrationType, Migrator},
 };
 
-use super::error::{Result, StoreError};
+use super::{
+    error::{Result, StoreError},
+    model_files,
+};
 
 /// Every step, with the name of its file. They are listed here instead of found by `sqlx::migrate!`, which would
 /// compile sqlx and SQLite a second time for the compiler to run; a test compares the list with the folder.
-const STEPS: [(i64, &str, &str); 13] = [
+const STEPS: [(i64, &str, &str); 14] = [
     (1, "jobs", include_str!("../../../migrations/0001_jobs.sql")),
     (
         2,
@@ -73,6 +76,11 @@ const STEPS: [(i64, &str, &str); 13] = [
         "owners lists",
         include_str!("../../../migrations/0013_owners_lists.sql"),
     ),
+    (
+        14,
+        "no models",
+        include_str!("../../../migrations/0014_no_models.sql"),
+    ),
 ];
 
 /// The version of the tables of this program.
@@ -80,8 +88,9 @@ pub(super) fn last_step() -> i64 {
     STEPS.len() as i64
 }
 
-/// Brings the tables up to date, and checks that they are those of this version.
-pub(super) async fn run(database: &SqlitePool) -> Result<()> {
+/// Brings the tables of the store in this folder up to date, and checks that they are those of this version.
+pub(super) async fn run(database: &SqlitePool, folder: &Path) -> Result<()> {
+    model_files::write(&mut *database.acquire().await?, folder).await?;
     migrator().run(database).await?;
     let mut connection = database.acquire().await?;
     let found = schema(&mut connection).await?;
@@ -186,8 +195,6 @@ pub(super) fn migrator() -> Migrator {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-
-    use std::path::Path;
 
     use super::*;
 

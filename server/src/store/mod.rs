@@ -30,7 +30,7 @@
 //! | results, which are written in parts, encoded and read | `results`, `parts`, `encoding`, `snapshot` |
 //! | sweeps | `sweeps` |
 //! | meshes | `meshes` |
-//! | models | `models` |
+//! | models of earlier versions, as files | `model_files` |
 //! | tokens | `tokens` |
 //! | what a disk has changed: checksums of rows | `checksum` |
 //! | what a disk has changed: parts of results | `intact` |
@@ -82,6 +82,7 @@ mod clock;
 mod compact;
 mod database;
 mod migrations;
+mod model_files;
 mod pages;
 mod waiting;
 
@@ -126,7 +127,6 @@ mod scrub;
 
 // What is not a job.
 mod meshes;
-mod models;
 mod settings;
 mod space;
 mod tokens;

@@ -16,7 +16,7 @@ use super::{
     damage::Table,
     database::Store,
     error::{Record, Result, StoreError},
-    keys, meshes, models, rows, sweeps,
+    keys, meshes, rows, sweeps,
 };
 
 /// How long after one reading the next begins.
@@ -35,7 +35,7 @@ const BY_JOB: &str = "index of the request keys by job";
 type Check = fn(&SqliteRow) -> Result<()>;
 
 /// Tables whose rows are few, or small, with the check of a row if it has a checksum.
-const TABLES: [(Table, &str, Option<Check>); 9] = [
+const TABLES: [(Table, &str, Option<Check>); 8] = [
     (Table::Keys, "request_key", Some(keys::check)),
     (Table::Jobs, "job", None),
     (Table::Labels, "job_label", None),
@@ -45,11 +45,6 @@ const TABLES: [(Table, &str, Option<Check>); 9] = [
         Some(|row| meshes::described(row).map(drop)),
     ),
     (Table::Meshes, "mesh_owner", None),
-    (
-        Table::Models,
-        "model",
-        Some(|row| models::described(row).map(drop)),
-    ),
     (
         Table::Sweeps,
         "sweep",

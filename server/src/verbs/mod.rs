@@ -18,8 +18,6 @@
 //! | sweeps | `sweeps` |
 //! | results: summary, iterations, profiles, fields, figures | `results`, `history`, `profiles`, `fields` with `fields_in_memory`, `plots` |
 //! | meshes and their uploads | `meshes`, `uploads` |
-//! | parametrised problems | `models` |
-//! | UM-Bridge | `umbridge` |
 //! | who a caller is | `identify` |
 //! | tokens | `tokens` |
 //! | the queue | `queue` |
@@ -60,10 +58,6 @@ pub mod history;
 pub mod plots;
 pub mod profiles;
 pub mod results;
-
-// Parametrised problems, and what UM-Bridge asks of them.
-pub mod models;
-pub mod umbridge;
 
 // Who makes a request; tokens.
 pub mod identify;

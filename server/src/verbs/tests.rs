@@ -12,7 +12,6 @@ use super::{
     fields, history, jobs,
     key::IDEMPOTENCY_KEY,
     lists,
-    models::{self, ModelRequest},
     page::Paging,
     plots::{self, Figure},
     profiles::{self, Points},
@@ -20,7 +19,6 @@ use super::{
     service::Service,
     submit,
     sweeps::{self, SweepRequest},
-    umbridge::{self, Kind, ModelError, Pair, With},
     watch::{self, Until},
 };
 use crate::{
@@ -33,7 +31,6 @@ use crate::{
     fake,
     formats::Format,
     job::{Cache, Job, JobId, Status},
-    model::Output,
     queue::{Queue, Solver},
     store::{Edit, Filter, GroupBy, Store},
     sweep::Sweep,
@@ -217,93 +214,6 @@ async fn keys_and_ids_belong_to_the_owner_who_used_them() {
     assert_eq!(create(service, ada, Some(id)).await.id, id);
     let theirs = submit::create(service, bob, request(), Some(id), None).await;
     assert!(matches!(theirs, Err(ApiError::IdConflict(_))));
-}
-
-fn model() -> ModelRequest {
-    ModelRequest {
-        title: None,
-        problem: fake::problem(),
-        inputs: vec![vec!["/contacts/0/indentation".into()]],
-        outputs: vec![Output::Scalars {
-            scalars: vec!["normal_force".into()],
-        }],
-    }
-}
-
-#[tokio::test]
-async fn a_model_of_another_owner_does_not_exist() {
-    let folder = tempfile::tempdir().unwrap();
-    let service = &service(folder.path()).await;
-    service.queue.start();
-    let (ada, bob, admin) = (&caller("ada"), &caller("bob"), &Caller::local());
-    let (made, new) = models::put(service, ada, "punch".into(), model())
-        .await
-        .unwrap();
-    assert!(new);
-    assert_eq!(
-        (made.owner.as_str(), &made.description.base_input),
-        ("ada", &vec![vec![0.1]])
-    );
-    unknown("get", models::get(service, bob, "punch").await);
-    unknown("delete", models::delete(service, bob, "punch").await);
-    let listed = models::list(service, bob, &Paging::default()).await;
-    assert!(listed.unwrap().items.is_empty());
-    assert!(umbridge::names(service, bob).await.unwrap().is_empty());
-    let input = || vec![vec![0.1]];
-    let pair = Pair {
-        out_wrt: 0,
-        in_wrt: 0,
-    };
-    for refused in [
-        umbridge::model(service, bob, "punch").await.err(),
-        umbridge::evaluate(service, bob, "punch", input())
-            .await
-            .err(),
-        umbridge::derivative(service, bob, "punch", pair, input(), With::Sens(vec![1.0]))
-            .await
-            .err(),
-        umbridge::derivative(service, bob, "punch", pair, input(), With::Vec(vec![1.0]))
-            .await
-            .err(),
-        umbridge::apply_hessian(service, bob, "punch").await.err(),
-    ] {
-        assert!(
-            matches!(refused, Some(ModelError::Protocol(Kind::ModelNotFound, _))),
-            "{refused:?}"
-        );
-    }
-    // each has one of the name, and an administrator all; their jobs are their own
-    models::put(service, bob, "punch".into(), model())
-        .await
-        .unwrap();
-    assert_eq!(umbridge::names(service, admin).await.unwrap(), ["punch"]);
-    assert_eq!(
-        models::get(service, admin, "punch")
-            .await
-            .unwrap()
-            .model
-            .owner,
-        "ada"
-    );
-    let evaluated = umbridge::evaluate(service, bob, "punch", input()).await;
-    assert_eq!(
-        evaluated.unwrap(),
-        [[fake::solution().summary.normal_force]]
-    );
-    let count = async |caller| {
-        let counted = lists::count(service, caller, &Filter::default(), None).await;
-        counted.unwrap().total
-    };
-    assert_eq!((count(ada).await, count(bob).await), (0, 1));
-    models::delete(service, admin, "punch").await.unwrap();
-    assert_eq!(
-        models::get(service, admin, "punch")
-            .await
-            .unwrap()
-            .model
-            .owner,
-        "bob"
-    );
 }
 
 async fn create_sweep(service: &Arc<Service>, caller: &Caller, key: Option<&str>) -> Sweep {

@@ -19,6 +19,7 @@ From the ground up:
     Sweep       one problem with many values, as one table
     figures     what can be drawn, and in which style
     errors      what can go wrong
+    umbridge    a problem as a function of vectors, also for programs that speak UM-Bridge; imported by itself
 
 Where to look in this package, for those who change it:
 
@@ -34,6 +35,7 @@ Where to look in this package, for those who change it:
     figures, _style, _about      figures, their look, and the texts in them
     _html, _progress             what notebooks show; the line of progress
     local                        a service for as long as a script runs
+    umbridge, _model, _parametrised   the server of UM-Bridge; a problem as a function; its definition, paths of numbers
 """
 
 from . import errors, examples, figures, mesh, obstacle, problem

@@ -14,12 +14,10 @@ mod operation;
 // The groups.
 mod jobs;
 mod meshes;
-mod models;
 mod results;
 mod service;
 mod sweeps;
 mod tokens;
-mod umbridge;
 
 use axum::Router;
 
@@ -32,7 +30,7 @@ use crate::caller::Access;
 pub(super) const DESCRIPTION: Access = operation::READ;
 
 /// The groups in the order in which they are documented: name, subject and operations.
-pub(super) const GROUPS: [Group; 8] = [
+pub(super) const GROUPS: [Group; 6] = [
     ("jobs", "Submit, get, list, watch, cancel", jobs::operations),
     ("results", "What a job has computed", results::operations),
     (
@@ -41,16 +39,6 @@ pub(super) const GROUPS: [Group; 8] = [
         sweeps::operations,
     ),
     ("meshes", "Stored once, for many jobs", meshes::operations),
-    (
-        "models",
-        "Parametrised problems, registered for clients of UM-Bridge",
-        models::operations,
-    ),
-    (
-        "umbridge",
-        "The protocol of UM-Bridge, version 1.0: registered models as functions of vectors",
-        umbridge::operations,
-    ),
     (
         "service",
         "Checking a problem without a job, and the service itself",
@@ -118,22 +106,9 @@ mod tests {
             .collect();
         let named: BTreeSet<String> = named.into_iter().map(str::to_owned).collect();
         assert_eq!(named, rpcs());
-        // plots, pages and documents, what is asked by HTTP everywhere (probes, metrics), and UM-Bridge, which is a
-        // protocol over HTTP, with the models that it evaluates, have no rpc
+        // plots, pages and documents, and what is asked by HTTP everywhere (probes, metrics), have no rpc
         let rest_only = [
             "/v1/jobs/{id}/plots/{plot}",
-            "/v1/models/{name}", // PUT
-            "/v1/models",
-            "/v1/models/{name}", // GET
-            "/v1/models/{name}", // DELETE
-            "/umbridge/Info",
-            "/umbridge/ModelInfo",
-            "/umbridge/InputSizes",
-            "/umbridge/OutputSizes",
-            "/umbridge/Evaluate",
-            "/umbridge/Gradient",
-            "/umbridge/ApplyJacobian",
-            "/umbridge/ApplyHessian",
             "/docs",
             "/docs/{file}",
             "/openapi.json",

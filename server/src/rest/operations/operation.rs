@@ -18,12 +18,10 @@ use crate::{
 // Who may use an operation; an entry begins with it, so that none is without.
 pub(super) const OPEN: Access = Access::Open;
 pub(super) const IDENTIFIED: Access = Access::Identified;
-pub(super) const READ: Access = Access::Needs(&[Scope::Read]);
-pub(super) const SUBMIT: Access = Access::Needs(&[Scope::Submit]);
-/// Submits what it also returns the results of.
-pub(super) const READ_AND_SUBMIT: Access = Access::Needs(&[Scope::Read, Scope::Submit]);
-pub(super) const CANCEL: Access = Access::Needs(&[Scope::Cancel]);
-pub(super) const ADMIN: Access = Access::Needs(&[Scope::Admin]);
+pub(super) const READ: Access = Access::Needs(Scope::Read);
+pub(super) const SUBMIT: Access = Access::Needs(Scope::Submit);
+pub(super) const CANCEL: Access = Access::Needs(Scope::Cancel);
+pub(super) const ADMIN: Access = Access::Needs(Scope::Admin);
 
 /// An operation of the API.
 pub(in crate::rest) struct Operation {
@@ -49,14 +47,14 @@ pub(in crate::rest) struct Operation {
     pub(in crate::rest) needs_body: bool,
     /// An example of the body.
     pub(in crate::rest) example: Option<Value>,
-    /// The successful answers, and those of UM-Bridge's own errors.
+    /// The successful answers.
     pub(in crate::rest) answers: Vec<Answer>,
     /// It refuses unknown parameters.
     strict: bool,
     errors: Vec<Code>,
 }
 
-/// A successful answer, or one of UM-Bridge's own errors.
+/// A successful answer.
 pub(in crate::rest) struct Answer {
     pub(in crate::rest) status: u16,
     pub(in crate::rest) meaning: &'static str,
@@ -226,17 +224,10 @@ impl Operation {
         if self.body.is_some() {
             codes.push(Code::RequestTimeout);
         }
-        // all that reads jobs, problems, meshes or models, and all that writes
-        if [
-            "/v1/jobs",
-            "/v1/problems",
-            "/v1/meshes",
-            "/v1/models",
-            "/v1/sweeps",
-            "/umbridge",
-        ]
-        .iter()
-        .any(|path| self.path.starts_with(path))
+        // all that reads jobs, problems or meshes, and all that writes
+        if ["/v1/jobs", "/v1/problems", "/v1/meshes", "/v1/sweeps"]
+            .iter()
+            .any(|path| self.path.starts_with(path))
         {
             codes.push(Code::CorruptData);
         }

@@ -8,7 +8,6 @@ use super::*;
 use crate::{
     job::{JobId, ResultAvailable},
     mesh::MeshInfo,
-    model::Description,
     store::{damage::Table, parts::Part as ResultPart},
 };
 
@@ -369,14 +368,6 @@ async fn a_changed_bit_makes_no_second_job_and_hides_nothing() {
         .unwrap()
         .jobs
         .remove(0);
-    let model = Description {
-        title: None,
-        inputs: vec![],
-        outputs: vec![],
-        base_input: vec![],
-    };
-    let put = store.put_model(("ada", "modzero"), &model, "{}", 9);
-    put.await.unwrap().unwrap();
     store.close().await;
     drop(store);
     let labeled = Filter {
@@ -388,7 +379,7 @@ async fn a_changed_bit_makes_no_second_job_and_hides_nothing() {
         ..Filter::default()
     };
     let (mut told, mut tried) = (0, 0);
-    for text in ["valzero", "namezero", "keyzero", "modzero"] {
+    for text in ["valzero", "namezero", "keyzero"] {
         let places = places(folder.path(), text);
         assert!(places.len() > 1, "{text}");
         for place in places {
@@ -409,10 +400,6 @@ async fn a_changed_bit_makes_no_second_job_and_hides_nothing() {
                     Ok(found) => assert_eq!(found.len(), 1, "{text} at {place}"),
                     Err(error) => assert!(matches!(error, StoreError::Damaged(_)), "{error}"),
                 }
-            }
-            match store.model(Owners::All, "ada", "modzero").await {
-                Ok(found) => assert!(found.is_some(), "{text} at {place}"),
-                Err(error) => assert!(matches!(error, StoreError::Damaged(_)), "{error}"),
             }
             match store.submit(submission(), false).await {
                 Ok(again) => assert_eq!(again.jobs[0].id, first.id, "{text} at {place}"),

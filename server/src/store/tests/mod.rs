@@ -3,7 +3,6 @@
 
 mod backups;
 mod damage;
-mod models;
 mod owners;
 mod plans;
 mod simulation;

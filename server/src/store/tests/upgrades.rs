@@ -167,3 +167,62 @@ async fn a_store_of_an_earlier_version_is_inspected_after_its_upgrade() {
     // these jobs were written by hand, without events
     assert_eq!((report.jobs, report.intact), (3, 3), "{report:?}");
 }
+
+/// Every step before that which drops models.
+const WITH_MODELS: [&str; 13] = [
+    "0001_jobs.sql",
+    "0002_meshes.sql",
+    "0003_job_api.sql",
+    "0004_owners.sql",
+    "0005_coalesced_jobs.sql",
+    "0006_digests.sql",
+    "0007_memory.sql",
+    "0008_sweeps.sql",
+    "0009_tokens.sql",
+    "0010_space.sql",
+    "0011_warnings.sql",
+    "0012_models.sql",
+    "0013_owners_lists.sql",
+];
+
+/// Two owners with a model of the same name, a title with a quotation mark and a number that no shorter text has; a third whose
+/// row a disk has changed.
+const MODELS: [&str; 2] = [
+    r#"insert into model (owner, name, description, created_at, updated_at, checksum) values
+        ('ada', 'punch', '{"title":"a \"flat\" punch","inputs":[["/a"]],"outputs":[{"scalars":["normal_force"]}],"base_input":[[0.1]]}', 1, 2, null),
+        ('..', 'punch', '{"title":null,"inputs":[["/b"]],"outputs":[],"base_input":[[1.0]]}', 1, 2, null),
+        ('eve', 'punch', '{"title":null,"inputs":[["/c"]],"outputs":[],"base_input":[[1.0]]}', 1, 2, 7)"#,
+    r#"insert into model_problem (model, body) values
+        (1, '{"a":0.10000000000000000555}'), (2, '{"b":1}'), (3, '{"c":1}')"#,
+];
+
+#[tokio::test]
+async fn registered_models_become_files_before_their_tables_go() {
+    let folder = tempfile::tempdir().unwrap();
+    older_store(folder.path(), &WITH_MODELS, &MODELS).await;
+    let store = Store::open(folder.path()).await.unwrap();
+    let read = |owner: &str| {
+        let name = format!("models/punch,{owner}.json");
+        std::fs::read_to_string(folder.path().join(name))
+    };
+    assert_eq!(
+        read("ada").unwrap(),
+        r#"{"title":"a \"flat\" punch","inputs":[["/a"]],"outputs":[{"scalars":["normal_force"]}],"problem":{"a":0.10000000000000000555}}"#
+    );
+    assert_eq!(
+        read("..").unwrap(),
+        r#"{"title":null,"inputs":[["/b"]],"outputs":[],"problem":{"b":1}}"#
+    );
+    assert!(read("eve").is_err(), "it was damaged");
+    let tables: i64 =
+        sqlx::query_scalar("select count(*) from sqlite_schema where name like '%model%'")
+            .fetch_one(&store.reader)
+            .await
+            .unwrap();
+    assert_eq!(tables, 0);
+    store.close().await;
+    // a store without the tables has no folder for them
+    std::fs::remove_dir_all(folder.path().join("models")).unwrap();
+    Store::open(folder.path()).await.unwrap().close().await;
+    assert!(read("ada").is_err());
+}
