@@ -7,11 +7,14 @@ use sqlx::{
     migrate::{Migration, MigrationType, Migrator},
 };
 
-use super::error::{Result, StoreError};
+use super::{
+    error::{Result, StoreError},
+    rows,
+};
 
 /// Every step, with the name of its file. They are listed here instead of found by `sqlx::migrate!`, which would
 /// compile sqlx and SQLite a second time for the compiler to run; a test compares the list with the folder.
-const STEPS: [(i64, &str, &str); 13] = [
+const STEPS: [(i64, &str, &str); 14] = [
     (1, "jobs", include_str!("../../../migrations/0001_jobs.sql")),
     (
         2,
@@ -72,6 +75,11 @@ const STEPS: [(i64, &str, &str); 13] = [
         13,
         "owners lists",
         include_str!("../../../migrations/0013_owners_lists.sql"),
+    ),
+    (
+        14,
+        "sealed jobs",
+        include_str!("../../../migrations/0014_sealed_jobs.sql"),
     ),
 ];
 
@@ -148,9 +156,9 @@ pub(super) async fn check(connection: &mut SqliteConnection) -> Result<()> {
 /// An error if the tables are of an earlier version.
 pub(super) async fn are_current(connection: &mut SqliteConnection) -> Result<()> {
     let steps: i64 = sqlx::query_scalar("select count(*) from _sqlx_migrations")
-        .fetch_one(connection)
+        .fetch_one(&mut *connection)
         .await?;
-    match steps == last_step() {
+    match steps == last_step() && !rows::has_old_rows(connection).await? {
         true => Ok(()),
         false => Err(StoreError::Schema(
             "the store is of an earlier version of this program: start the service on it once, which brings it up to date".into(),
