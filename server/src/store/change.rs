@@ -5,7 +5,6 @@
 //! counted, its events are appended, its move in the queue, its watchers and its line in the log are kept for after the commit.
 
 use std::{
-    borrow::Cow,
     collections::{BTreeMap, BTreeSet},
     mem,
     sync::Arc,
@@ -29,7 +28,7 @@ use super::{
 };
 use crate::{
     event::Payload,
-    job::{Job, JobId, Status},
+    job::{Job, JobId, Progress, Status},
     memory::Budget,
     metrics::METRICS,
     time::Time,
@@ -195,6 +194,20 @@ impl Change<'_> {
         events::insert(&mut self.tx, key, first, attempt, events).await
     }
 
+    /// Appends events of the current attempt, with the progress after them.
+    pub(super) async fn append_with_progress(
+        &mut self,
+        key: i64,
+        events: &[(Time, Payload)],
+        progress: &Progress,
+    ) -> Result<()> {
+        let events = self.store.events_by_our_clock(events);
+        self.append(key, &events).await?;
+        let progress = Some(progress.clone());
+        self.set(key, |row| row.job.progress = progress).await?;
+        Ok(())
+    }
+
     /// Deletes a job that has ended, with what only this job has.
     pub(super) async fn delete(&mut self, job: &Job) -> Result<()> {
         let now = self.now();
@@ -324,14 +337,6 @@ impl Change<'_> {
     /// This moment, by the clock of the store.
     pub(super) fn now(&self) -> Time {
         self.store.now()
-    }
-
-    /// Events, at times of the clock of the store.
-    pub(super) fn events_by_our_clock<'e>(
-        &self,
-        events: &'e [(Time, Payload)],
-    ) -> Cow<'e, [(Time, Payload)]> {
-        self.store.events_by_our_clock(events)
     }
 
     /// Jobs that have changed since a savepoint.

@@ -10,7 +10,7 @@ use super::{
     coalescing,
     database::Store,
     error::{Result, StoreError},
-    events::{self, FinalBatch},
+    events::FinalBatch,
     lifecycle,
     parts::Parts,
     results,
@@ -108,7 +108,9 @@ impl Store {
             results::write_at_end(change.sql().await?, key, parts).await?;
         }
         if !last.events.is_empty() {
-            events::append_with_progress(&mut change, key, &last.events, &last.progress).await?;
+            change
+                .append_with_progress(key, &last.events, &last.progress)
+                .await?;
         }
         let job = change.read(key).await?;
         match self.is_asked_to_stop(&job) {

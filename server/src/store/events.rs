@@ -3,7 +3,6 @@
 use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 
 use super::{
-    change::Change,
     checksum::Checksum,
     database::Store,
     error::{Record, Result, StoreError},
@@ -38,7 +37,7 @@ impl Store {
             if !change.is_current(key, attempt).await? {
                 return Ok(false);
             }
-            append_with_progress(&mut change, key, payloads, progress).await?;
+            change.append_with_progress(key, payloads, progress).await?;
             change.commit().await?;
             Ok(true)
         };
@@ -70,20 +69,6 @@ impl Store {
         };
         self.damages.noting(read).await
     }
-}
-
-/// Appends events of the current attempt, with the progress after them.
-pub(super) async fn append_with_progress(
-    change: &mut Change<'_>,
-    key: i64,
-    payloads: &[(Time, Payload)],
-    progress: &Progress,
-) -> Result<()> {
-    let payloads = change.events_by_our_clock(payloads);
-    change.append(key, &payloads).await?;
-    let progress = Some(progress.clone());
-    let set = change.set(key, |row| row.job.progress = progress);
-    set.await.map(drop)
 }
 
 /// At most `limit` events after number `after`, in order; an error if one is damaged or missing.
