@@ -19,7 +19,7 @@ pub const MIN_PRIORITY: i32 = -10;
 pub const MAX_PRIORITY: i32 = 10;
 
 /// A problem submitted to the service, as clients see it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Job {
     /// The store's own number, in order of arrival; never shown.
     #[serde(skip)]
@@ -365,6 +365,7 @@ impl From<Reason> for Code {
     Debug,
     PartialEq,
     Eq,
+    Default,
     PartialOrd,
     Ord,
     Serialize,
@@ -378,6 +379,7 @@ impl From<Reason> for Code {
 #[strum(serialize_all = "snake_case")]
 pub enum ResultAvailable {
     /// Nothing.
+    #[default]
     None,
     /// The last state of a job that did not converge or was canceled, or the finished load steps of one that
     /// runs.

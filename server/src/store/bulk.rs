@@ -9,8 +9,7 @@ use super::{
     end::end,
     error::Result,
     fields::remove_fields,
-    lifecycle::Ending,
-    rows::find,
+    rules::Ending,
 };
 use crate::{
     caller::Owners,
@@ -60,11 +59,11 @@ impl Store {
         let mut change = self.control_change().await?;
         let (mut batch, start) = (Batch::default(), Instant::now());
         for key in keys {
-            let found = find(change.sql(), *key).await;
+            let found = change.find(*key).await;
             // a damaged one stays as it is
             match change.unless_damage_of(*key, found).await?.flatten() {
                 Some(job) if job.status == Status::Queued => {
-                    end(&mut change, &job, &Ending::canceled()).await?;
+                    end(&mut change, job.key, &Ending::canceled()).await?;
                     batch.done += 1;
                 }
                 Some(job) if job.status == Status::Running => batch.running.push(*key),
@@ -121,7 +120,7 @@ async fn discard(change: &mut Change<'_>, what: Discard<'_>, key: i64) -> Result
         Discard::OldFields(before) => (before, true),
     };
     // as it is now, and by its own record, which has a checksum: it may have been pinned
-    let job = find(change.sql(), key).await?;
+    let job = change.find(key).await?;
     let old = |job: &Job| !job.pinned && job.finished_at.is_some_and(|at| at < before);
     let Some(job) = job.filter(old) else {
         return Ok(false);

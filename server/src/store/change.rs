@@ -1,8 +1,12 @@
-//! One transaction of the single writer, and its effects once it is committed: changes to the waiting jobs that are
-//! kept in memory, and jobs whose watchers are to be notified.
+//! One transaction of the single writer, and its effects once it is committed.
+//!
+//! A job is changed by [`Change::update`] and in no other way: a function of its row, from which everything else follows. The
+//! row is written whole, with its checksum, before the next statement of the transaction or its commit; its version is
+//! counted, its events are appended, its move in the queue, its watchers and its line in the log are kept for after the commit.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
+    mem,
     sync::Arc,
 };
 
@@ -11,32 +15,43 @@ use tokio::sync::MutexGuard;
 use tracing::info;
 
 use super::{
+    checksum::Value,
     damage::Damages,
     database::{Store, Writing},
     error::{Result, StoreError},
+    events,
     intact::{self, WHOLE},
     problems::{self, StoredProblem},
-    rows,
+    rows::{self, JobRow},
+    rules::{self, Ended},
     waiting::{Move, Owner},
 };
 use crate::{
-    job::{Job, JobId, Reason, Status},
+    event::Payload,
+    job::{Job, JobId, Progress, Status},
     memory::Budget,
     metrics::METRICS,
     time::Time,
 };
 
+/// Rows that a transaction keeps in memory. Some change all jobs that wait.
+const MOST_ROWS: usize = 256;
+
 /// An open transaction.
 pub(super) struct Change<'a> {
     store: &'a Store,
     tx: Writing,
+    /// Rows of jobs as this transaction has changed them, by their keys.
+    rows: BTreeMap<i64, Cached>,
+    /// Those of them that are not written yet.
+    unwritten: BTreeSet<i64>,
+    /// The key of the next job, once one was inserted.
+    next_key: Option<i64>,
     moves: Vec<Move>,
     /// How many more jobs of each owner wait by these moves.
     more: BTreeMap<Owner, isize>,
     /// Jobs that have changed, for their watchers.
     changed: Vec<i64>,
-    /// Rows of jobs that need a new checksum.
-    touched: BTreeSet<i64>,
     /// What the log will tell of jobs that end or are deleted.
     log_lines: Vec<(JobId, LogLine)>,
     /// Held until the moves are applied: no other change begins before, so that moves are applied in the order of
@@ -44,15 +59,16 @@ pub(super) struct Change<'a> {
     _lock: MutexGuard<'a, ()>,
 }
 
+/// A row of a job.
+struct Cached {
+    row: JobRow,
+    /// Its values in the database.
+    stored: Vec<Value>,
+}
+
 /// What the log tells of a job.
 enum LogLine {
-    Ended {
-        owner: String,
-        times_s: Option<(f64, f64)>,
-        status: Status,
-        reason: Option<Reason>,
-        detail: String,
-    },
+    Ended(Ended),
     Deleted,
 }
 
@@ -65,7 +81,7 @@ pub(super) struct Savepoint {
 }
 
 impl Store {
-    /// Begins a transaction that may change jobs that wait.
+    /// Begins a transaction that may change jobs.
     pub(super) async fn change(&self) -> Result<Change<'_>> {
         self.reserve.has_room()?;
         self.control_change().await
@@ -78,19 +94,166 @@ impl Store {
             _lock: lock,
             store: self,
             tx: self.begin_control().await?,
+            rows: BTreeMap::new(),
+            unwritten: BTreeSet::new(),
+            next_key: None,
             moves: vec![],
             more: BTreeMap::new(),
             changed: vec![],
-            touched: BTreeSet::new(),
             log_lines: vec![],
         })
     }
 }
 
+/// Jobs, read and changed.
 impl Change<'_> {
-    /// The connection, for statements.
-    pub(super) fn sql(&mut self) -> &mut SqliteConnection {
-        &mut self.tx
+    /// The job with this key, as this transaction has left it, if it exists.
+    pub(super) async fn find(&mut self, key: i64) -> Result<Option<Job>> {
+        let found = self.cached(key).await?;
+        Ok(found.map(|cached| cached.row.job.clone()))
+    }
+
+    /// The same of a job that must exist.
+    pub(super) async fn read(&mut self, key: i64) -> Result<Job> {
+        self.find(key).await?.ok_or_else(|| rows::missing(key))
+    }
+
+    /// Whether this attempt of the job is the current one, and running.
+    pub(super) async fn is_current(&mut self, key: i64, attempt: i32) -> Result<bool> {
+        let found = self.cached(key).await?.map(|cached| &cached.row.job);
+        Ok(found.is_some_and(|job| job.status == Status::Running && job.attempt == attempt))
+    }
+
+    /// Accepts a job; `new` makes its row from its key, which is returned.
+    pub(super) async fn insert(&mut self, new: impl FnOnce(i64) -> JobRow) -> Result<i64> {
+        let key = match self.next_key {
+            Some(key) => key,
+            None => rows::next_key(&mut self.tx).await?,
+        };
+        self.next_key = Some(key + 1);
+        let mut row = new(key);
+        let event = rules::event(None, &row.job, self.now());
+        row.last_seq = event.iter().len() as i64;
+        self.move_job(rules::moves(None, &row.job));
+        let stored = rows::insert(&mut self.tx, &row).await?;
+        let (first, attempt) = (1, row.job.attempt);
+        events::insert(&mut self.tx, key, first, attempt, event.as_slice()).await?;
+        self.keep(key, Cached { row, stored }).await?;
+        Ok(key)
+    }
+
+    /// Changes a job, which must exist, by this step. All that follows from the change follows here. Returns the job as it
+    /// is now.
+    pub(super) async fn update(
+        &mut self,
+        key: i64,
+        step: impl FnOnce(&mut JobRow) -> Result<()>,
+    ) -> Result<Job> {
+        let now = self.now();
+        let cached = self.cached(key).await?;
+        let cached = cached.ok_or_else(|| rows::missing(key))?;
+        let mut new = cached.row.clone();
+        step(&mut new)?;
+        if new == cached.row {
+            return Ok(new.job);
+        }
+        new.job.version += i64::from(rules::is_new_version(&cached.row.job, &new.job));
+        new.derive();
+        let job = new.job.clone();
+        let old = mem::replace(&mut cached.row, new).job;
+        self.unwritten.insert(key);
+        self.move_job(rules::moves(Some(&old), &job));
+        if old.status != job.status {
+            self.changed.push(key);
+        }
+        if let Some(ended) = rules::ended(&old, &job) {
+            self.log_lines.push((job.id, LogLine::Ended(ended)));
+        }
+        if let Some(event) = rules::event(Some(&old), &job, now) {
+            self.append(key, &[event]).await?;
+        }
+        Ok(job)
+    }
+
+    /// The same by a step that no status forbids.
+    pub(super) async fn set(&mut self, key: i64, step: impl FnOnce(&mut JobRow)) -> Result<Job> {
+        let step = |row: &mut JobRow| {
+            step(row);
+            Ok(())
+        };
+        self.update(key, step).await
+    }
+
+    /// Appends events to those of a job, which must exist.
+    pub(super) async fn append(&mut self, key: i64, events: &[(Time, Payload)]) -> Result<()> {
+        let cached = self.cached(key).await?;
+        let row = &mut cached.ok_or_else(|| rows::missing(key))?.row;
+        let (first, attempt) = (row.last_seq + 1, row.job.attempt);
+        row.last_seq += events.len() as i64;
+        self.unwritten.insert(key);
+        events::insert(&mut self.tx, key, first, attempt, events).await
+    }
+
+    /// Appends events of the current attempt, with the progress after them.
+    pub(super) async fn append_with_progress(
+        &mut self,
+        key: i64,
+        events: &[(Time, Payload)],
+        progress: &Progress,
+    ) -> Result<()> {
+        let events = self.store.events_by_our_clock(events);
+        self.append(key, &events).await?;
+        let progress = Some(progress.clone());
+        self.set(key, |row| row.job.progress = progress).await?;
+        Ok(())
+    }
+
+    /// Deletes a job that has ended, with what only this job has.
+    pub(super) async fn delete(&mut self, job: &Job) -> Result<()> {
+        let now = self.now();
+        rows::delete(self.sql().await?, job, now).await?;
+        self.rows.remove(&job.key);
+        self.changed.push(job.key);
+        self.log_lines.push((job.id, LogLine::Deleted));
+        Ok(())
+    }
+
+    /// The row with this key, if it exists.
+    async fn cached(&mut self, key: i64) -> Result<Option<&mut Cached>> {
+        if !self.rows.contains_key(&key) {
+            let Some((row, stored)) = rows::find_row(&mut self.tx, key).await? else {
+                return Ok(None);
+            };
+            self.keep(key, Cached { row, stored }).await?;
+        }
+        Ok(self.rows.get_mut(&key))
+    }
+
+    async fn keep(&mut self, key: i64, cached: Cached) -> Result<()> {
+        if self.rows.len() >= MOST_ROWS {
+            self.write_rows().await?;
+            self.rows.clear();
+        }
+        self.rows.insert(key, cached);
+        Ok(())
+    }
+
+    /// Writes the rows that have changed.
+    async fn write_rows(&mut self) -> Result<()> {
+        for key in mem::take(&mut self.unwritten) {
+            if let Some(Cached { row, stored }) = self.rows.get_mut(&key) {
+                *stored = rows::update(&mut self.tx, stored, row).await?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Change<'_> {
+    /// The connection, for statements: they find all jobs as they are now.
+    pub(super) async fn sql(&mut self) -> Result<&mut SqliteConnection> {
+        self.write_rows().await?;
+        Ok(&mut self.tx)
     }
 
     /// What was found damaged.
@@ -103,10 +266,14 @@ impl Change<'_> {
         self.store.budget()
     }
 
-    /// Changes the waiting jobs in memory, once this is committed.
-    pub(super) fn move_job(&mut self, change: Move) {
-        self.count(&change, 1);
-        self.moves.push(change);
+    /// An owner has a turn, once this is committed.
+    pub(super) fn take_turn(&mut self, turn: Move) {
+        self.moves.push(turn);
+    }
+
+    fn move_job(&mut self, moves: Vec<Move>) {
+        moves.iter().for_each(|change| self.count(change, 1));
+        self.moves.extend(moves);
     }
 
     /// Counts a move, or takes it back: looking at all moves for every job of a large submission would take minutes.
@@ -119,41 +286,6 @@ impl Change<'_> {
             Move::Start(_) | Move::Stop(_) | Move::Turn { .. } => return,
         };
         *self.more.entry(owner.clone()).or_default() += sign * more;
-    }
-
-    /// Records that this job has changed.
-    pub(super) fn changed(&mut self, key: i64) {
-        self.changed.push(key);
-    }
-
-    /// The row of this job has changed.
-    pub(super) fn touched(&mut self, key: i64) {
-        self.touched.insert(key);
-    }
-
-    /// A job ends: told in the log and counted, once this is committed. `times_s`: how long it waited and ran, if it ran.
-    pub(super) fn ended(
-        &mut self,
-        job: &Job,
-        times_s: Option<(f64, f64)>,
-        status: Status,
-        reason: Option<Reason>,
-        detail: String,
-    ) {
-        let (id, owner) = (job.id, job.owner.clone());
-        let ended = LogLine::Ended {
-            owner,
-            times_s,
-            status,
-            reason,
-            detail,
-        };
-        self.log_lines.push((id, ended));
-    }
-
-    /// A job is deleted: told in the log, once this is committed.
-    pub(super) fn deleted(&mut self, id: JobId) {
-        self.log_lines.push((id, LogLine::Deleted));
     }
 
     /// What was read, unless it is damaged, which is noted.
@@ -238,7 +370,7 @@ impl Change<'_> {
     /// Sets a point to roll back to. There is one at a time: it is released or rolled back to before the next is set.
     pub(super) async fn savepoint(&mut self) -> Result<Savepoint> {
         sqlx::query("savepoint submission")
-            .execute(self.sql())
+            .execute(self.sql().await?)
             .await?;
         Ok(Savepoint {
             moves: self.moves.len(),
@@ -250,15 +382,18 @@ impl Change<'_> {
     /// Keeps the changes since the savepoint.
     pub(super) async fn release(&mut self) -> Result<()> {
         sqlx::query("release submission")
-            .execute(self.sql())
+            .execute(self.sql().await?)
             .await?;
         Ok(())
     }
 
     /// Undoes the changes since this savepoint.
     pub(super) async fn roll_back_to(&mut self, savepoint: Savepoint) -> Result<()> {
+        self.rows.clear();
+        self.unwritten.clear();
+        self.next_key = None;
         sqlx::query("rollback to submission")
-            .execute(self.sql())
+            .execute(self.sql().await?)
             .await?;
         self.release().await?;
         for change in self.moves.split_off(savepoint.moves) {
@@ -272,9 +407,7 @@ impl Change<'_> {
     /// Commits: the changes are on the disk when this returns, and only then applied to the jobs in memory. Returns the
     /// jobs that have changed.
     pub(super) async fn commit(mut self) -> Result<Vec<i64>> {
-        for key in &self.touched {
-            rows::seal(&mut self.tx, *key).await?;
-        }
+        self.write_rows().await?;
         self.tx.commit().await?;
         let mut waiting = self.store.waiting_jobs();
         for change in self.moves {
@@ -290,13 +423,13 @@ impl LogLine {
     fn log(&self, job: JobId) {
         match self {
             LogLine::Deleted => info!(job.id = %job, "job {job} was deleted"),
-            LogLine::Ended {
+            LogLine::Ended(Ended {
                 owner,
                 times_s,
                 status,
                 reason,
                 detail,
-            } => {
+            }) => {
                 let (status, reason): (&'static str, _) =
                     ((*status).into(), reason.map(<&'static str>::from));
                 let words = [

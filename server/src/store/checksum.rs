@@ -4,7 +4,11 @@
 //! checksum beside their data. It finds every change of up to 32 neighbouring bits and misses one in 4 · 10⁹ of the
 //! others, costs 4 bytes in each of many millions of events instead of 32, and is in the dependencies anyway, of `zip`.
 
-use sqlx::{Column, Decode, Row, Sqlite, TypeInfo, ValueRef, sqlite::SqliteRow};
+use sqlx::{
+    Column, Decode, Row, Sqlite, TypeInfo, ValueRef,
+    query::Query,
+    sqlite::{SqliteArguments, SqliteRow},
+};
 
 use super::error::{Record, Result, StoreError};
 
@@ -83,30 +87,96 @@ impl Checksum {
     }
 }
 
-/// The checksum of a whole row, as it was read with `select *`.
-pub(super) fn of_row(row: &SqliteRow) -> Result<i64> {
-    let mut sum = Checksum::new();
-    for column in row.columns() {
-        if column.name() == COLUMN {
-            continue;
-        }
-        let value = row.try_get_raw(column.ordinal())?;
-        if value.is_null() {
-            sum = sum.null();
-            continue;
-        }
-        let kind = value.type_info().name().to_owned();
-        sum = match kind.as_str() {
-            "INTEGER" => sum.int(decode(value)?),
-            "REAL" => sum.real(decode(value)?),
-            "TEXT" => sum.text(decode(value)?),
-            _ => sum.bytes(decode(value)?),
-        };
-    }
-    Ok(sum.stored())
+/// A value of a row, as SQLite keeps it.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Value {
+    Null,
+    Int(i64),
+    Real(f64),
+    Text(String),
+    Bytes(Vec<u8>),
 }
 
-/// Whether a whole row is as it was written.
+impl From<i64> for Value {
+    fn from(value: i64) -> Value {
+        Value::Int(value)
+    }
+}
+
+impl From<&str> for Value {
+    fn from(text: &str) -> Value {
+        Value::Text(text.to_owned())
+    }
+}
+
+impl From<String> for Value {
+    fn from(text: String) -> Value {
+        Value::Text(text)
+    }
+}
+
+impl<T: Into<Value>> From<Option<T>> for Value {
+    fn from(some: Option<T>) -> Value {
+        some.map_or(Value::Null, T::into)
+    }
+}
+
+/// Gives values to a statement.
+pub(super) fn bind<'q, 'v>(
+    query: Query<'q, Sqlite, SqliteArguments>,
+    values: impl Iterator<Item = &'v Value>,
+) -> Query<'q, Sqlite, SqliteArguments> {
+    values.fold(query, |query, value| match value.clone() {
+        Value::Null => query.bind(None::<i64>),
+        Value::Int(value) => query.bind(value),
+        Value::Real(value) => query.bind(value),
+        Value::Text(value) => query.bind(value),
+        Value::Bytes(value) => query.bind(value),
+    })
+}
+
+/// The values of a row that was read with `select *`, but for its checksum.
+pub(super) fn values(row: &SqliteRow) -> Result<Vec<Value>> {
+    let columns = row.columns().iter();
+    let columns = columns.filter(|column| column.name() != COLUMN);
+    columns.map(|column| value(row, column.ordinal())).collect()
+}
+
+/// The value in one place of a row.
+pub(super) fn value(row: &SqliteRow, place: usize) -> Result<Value> {
+    let value = row.try_get_raw(place)?;
+    if value.is_null() {
+        return Ok(Value::Null);
+    }
+    let kind = value.type_info().name().to_owned();
+    Ok(match kind.as_str() {
+        "INTEGER" => Value::Int(decode(value)?),
+        "REAL" => Value::Real(decode(value)?),
+        "TEXT" => Value::Text(decode(value)?),
+        _ => Value::Bytes(decode(value)?),
+    })
+}
+
+/// The checksum of all values of a row.
+pub(super) fn of_values(values: &[Value]) -> i64 {
+    let sum = values
+        .iter()
+        .fold(Checksum::new(), |sum, value| match value {
+            Value::Null => sum.null(),
+            Value::Int(value) => sum.int(*value),
+            Value::Real(value) => sum.real(*value),
+            Value::Text(value) => sum.text(value),
+            Value::Bytes(value) => sum.bytes(value),
+        });
+    sum.stored()
+}
+
+/// The checksum of a whole row, as it was read with `select *`.
+pub(super) fn of_row(row: &SqliteRow) -> Result<i64> {
+    Ok(of_values(&values(row)?))
+}
+
+/// Whether a whole row is as it was written. One of an earlier version has no checksum, and is accepted.
 pub(super) fn row_is_intact(row: &SqliteRow) -> Result<bool> {
     let stored: Option<i64> = row.try_get(COLUMN)?;
     Ok(match stored {
@@ -115,9 +185,7 @@ pub(super) fn row_is_intact(row: &SqliteRow) -> Result<bool> {
     })
 }
 
-pub(super) fn decode<'r, T: Decode<'r, Sqlite>>(
-    value: <Sqlite as sqlx::Database>::ValueRef<'r>,
-) -> Result<T> {
+fn decode<'r, T: Decode<'r, Sqlite>>(value: <Sqlite as sqlx::Database>::ValueRef<'r>) -> Result<T> {
     let decoded = <T as Decode<'r, Sqlite>>::decode(value);
     decoded.map_err(|error| StoreError::from(sqlx::Error::Decode(error)))
 }

@@ -8,8 +8,7 @@ use super::{
     database::Store,
     end,
     error::{Result, StoreError},
-    lifecycle::{self, Ending},
-    rows::read,
+    rules::Ending,
     submission::Claim,
     waiting::Move,
 };
@@ -38,7 +37,7 @@ impl Store {
 async fn next(change: &mut Change<'_>) -> Result<Option<(Job, Move)>> {
     let mut damaged = BTreeSet::new();
     while let Some((key, turn)) = change.next(&damaged) {
-        let found = read(change.sql(), key).await;
+        let found = change.read(key).await;
         match change.unless_damaged(found).await? {
             Some(job) => return Ok(Some((job, turn))),
             None => damaged.insert(key),
@@ -61,8 +60,8 @@ pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
         if waiting.cache == Cache::Use
             && let Some(source) = coalescing::earlier_result(change, &waiting.input_hash).await?
         {
-            coalescing::answer(change, &waiting, &source).await?;
-            coalescing::end_coalesced(change, &waiting).await?;
+            coalescing::answer(change, waiting.key, &source).await?;
+            coalescing::end_coalesced(change, waiting.key).await?;
             continue;
         }
         if waiting.cache == Cache::Use
@@ -80,13 +79,14 @@ pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
         let Some(memory) = change.budget().reserve(needed) else {
             return Ok(None);
         };
-        let job = lifecycle::start_attempt(change, &waiting).await?;
-        change.move_job(turn);
+        let now = change.now();
+        let job = change.update(waiting.key, |row| row.start(now)).await?;
+        change.take_turn(turn);
         let (problem, mesh) = match stored {
             Ok(stored) => (stored.body, stored.mesh),
             // it fails alone, and does not stop the queue
             Err(StoreError::Damaged(damage)) => {
-                end::end(change, &job, &Ending::damaged(&damage)).await?;
+                end::end(change, job.key, &Ending::damaged(&damage)).await?;
                 continue;
             }
             Err(error) => return Err(error),

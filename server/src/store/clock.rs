@@ -7,7 +7,7 @@ use super::{
     error::{Result, StoreError},
     events,
     pauses::Pause,
-    rows::{from_row, read},
+    rows::from_row,
 };
 use crate::{event::Payload, time::Time};
 
@@ -164,20 +164,14 @@ impl Store {
             "select id from job indexed by job_expiry where status = 'queued' and expires_at < ?",
         )
         .bind(change.now().micros().saturating_add(pause))
-        .fetch_all(change.sql())
+        .fetch_all(change.sql().await?)
         .await?;
         for key in short {
-            // a damaged row gets no new checksum
-            let job = read(change.sql(), key).await;
-            if change.unless_damage_of(key, job).await?.is_none() {
-                continue;
-            }
-            sqlx::query("update job set expires_at = expires_at + ?, checksum = null where id = ?")
-                .bind(pause)
-                .bind(key)
-                .execute(change.sql())
-                .await?;
-            change.touched(key);
+            let later = |at: Time| Time::from_micros(at.micros().saturating_add(pause));
+            let extended = change.set(key, |row| row.expires_at = row.expires_at.map(later));
+            let extended = extended.await;
+            // a damaged one stays as it is
+            change.unless_damage_of(key, extended).await?;
         }
         change.commit().await.map(drop)
     }

@@ -12,12 +12,11 @@ use super::{
     database::Store,
     error::{Result, StoreError},
     intact::{self, WHOLE},
-    lifecycle::{self, Ending},
-    results,
-    rows::{from_row, read},
+    lifecycle, results,
+    rows::{JobRow, from_row},
+    rules::Ending,
     sizes,
     submission::NewJob,
-    waiting::{Move, Place},
 };
 use crate::job::{Job, Reason, Status};
 
@@ -46,13 +45,13 @@ pub(super) async fn earlier_result(
     let rows = sqlx::query(EARLIER_RESULT)
         .bind(input_hash)
         .bind(env!("CARGO_PKG_VERSION"))
-        .fetch_all(change.sql())
+        .fetch_all(change.sql().await?)
         .await?;
     for row in &rows {
         // a damaged one answers nobody
         if let Some(job) = change.unless_damaged(from_row(row)).await?
             // what has lost its fields answers nobody
-            && !sizes::lost_fields(change.sql(), job.key).await?
+            && !sizes::lost_fields(change.sql().await?, job.key).await?
             && change.has_intact_result(&job).await?
         {
             return Ok(Some(job));
@@ -115,7 +114,7 @@ pub(super) async fn primary_for(
         .bind(&new.input_hash)
         .bind(new.priority)
         .bind(owner)
-        .fetch_optional(change.sql())
+        .fetch_optional(change.sql().await?)
         .await?;
     Ok(match primary {
         Some(primary) if count_coalesced(change, primary).await? < MOST_COALESCED => Some(primary),
@@ -126,7 +125,7 @@ pub(super) async fn primary_for(
 async fn count_coalesced(change: &mut Change<'_>, primary: i64) -> Result<i64> {
     let count = sqlx::query_scalar("select count(*) from job where coalesced_into = ?")
         .bind(primary)
-        .fetch_one(change.sql());
+        .fetch_one(change.sql().await?);
     Ok(count.await?)
 }
 
@@ -137,7 +136,7 @@ pub(super) async fn coalesce_into_running(change: &mut Change<'_>, job: &Job) ->
         .bind(&job.input_hash)
         .bind(ONLY_RUNNING)
         .bind(&job.owner)
-        .fetch_optional(change.sql())
+        .fetch_optional(change.sql().await?)
         .await?;
     let Some(primary) = primary else {
         return Ok(false);
@@ -150,10 +149,9 @@ pub(super) async fn coalesce_into_running(change: &mut Change<'_>, job: &Job) ->
         return Ok(false);
     }
     let coalesced = coalesced_jobs(change, job.key).await?;
-    coalesce(change, coalesced.iter().chain([job]), primary).await?;
-    let place = Place::of(job);
-    change.move_job(Move::Leave(place.clone()));
-    change.move_job(Move::Attach(place.owner));
+    for job in coalesced.iter().chain([job]) {
+        coalesce(change, job.key, primary).await?;
+    }
     Ok(true)
 }
 
@@ -161,7 +159,7 @@ pub(super) async fn coalesce_into_running(change: &mut Change<'_>, job: &Job) ->
 pub(super) async fn coalesced_jobs(change: &mut Change<'_>, primary: i64) -> Result<Vec<Job>> {
     let rows = sqlx::query("select * from job where coalesced_into = ? order by priority desc, id")
         .bind(primary)
-        .fetch_all(change.sql())
+        .fetch_all(change.sql().await?)
         .await?;
     let mut jobs = vec![];
     for row in &rows {
@@ -171,98 +169,68 @@ pub(super) async fn coalesced_jobs(change: &mut Change<'_>, primary: i64) -> Res
 }
 
 /// Ends the jobs coalesced into one that has ended in the same way, or puts the first of them in its place.
-pub(super) async fn end_coalesced(change: &mut Change<'_>, primary: &Job) -> Result<()> {
-    let coalesced = coalesced_jobs(change, primary.key).await?;
+pub(super) async fn end_coalesced(change: &mut Change<'_>, primary: i64) -> Result<()> {
+    let coalesced = coalesced_jobs(change, primary).await?;
     let Some(first) = coalesced.first() else {
         return Ok(());
     };
-    let primary = read(change.sql(), primary.key).await?;
+    let primary = change.read(primary).await?;
     if !is_shared(primary.status, primary.reason) {
         return replace_primary(change, first, primary.key).await;
     }
     for job in &coalesced {
-        answer(change, job, &primary).await?;
+        answer(change, job.key, &primary).await?;
     }
     Ok(())
 }
 
-/// A primary now waits with this priority: if a job coalesced into it has a higher one, that job takes its place.
-pub(super) async fn replace_if_outranked(
-    change: &mut Change<'_>,
-    primary: i64,
-    priority: i32,
-) -> Result<()> {
+/// A primary waits: if a job coalesced into it has a higher priority, that job takes its place.
+pub(super) async fn replace_if_outranked(change: &mut Change<'_>, primary: i64) -> Result<()> {
     let coalesced = coalesced_jobs(change, primary).await?;
-    match coalesced.first() {
-        Some(first) if first.priority > priority => replace_primary(change, first, primary).await,
-        _ => Ok(()),
+    let Some(first) = coalesced.first() else {
+        return Ok(());
+    };
+    match first.priority > change.read(primary).await?.priority {
+        true => replace_primary(change, first, primary).await,
+        false => Ok(()),
     }
 }
 
 /// Lets a job wait for a worker in place of its primary, and the first of every other owner in their own turn, each with the
 /// other jobs of that primary and of the same owner coalesced into it.
 async fn replace_primary(change: &mut Change<'_>, job: &Job, primary: i64) -> Result<()> {
-    detach(change, job, job.priority).await?;
+    change.set(job.key, JobRow::waits_by_itself).await?;
     let others = coalesced_jobs(change, primary).await?;
     let mut first_of = BTreeMap::from([(job.owner.clone(), job.key)]);
     for other in &others {
         match first_of.get(&other.owner) {
-            Some(first) => coalesce(change, [other].into_iter(), *first).await?,
+            Some(first) => coalesce(change, other.key, *first).await?,
             None => {
                 first_of.insert(other.owner.clone(), other.key);
-                detach(change, other, other.priority).await?;
+                change.set(other.key, JobRow::waits_by_itself).await?;
             }
         }
     }
     Ok(())
 }
 
-/// Coalesces these jobs, which are not damaged, into this primary.
-async fn coalesce(
-    change: &mut Change<'_>,
-    jobs: impl Iterator<Item = &Job>,
-    primary: i64,
-) -> Result<()> {
-    for job in jobs {
-        sqlx::query("update job set coalesced_into = ?, checksum = null where id = ?")
-            .bind(primary)
-            .bind(job.key)
-            .execute(change.sql())
-            .await?;
-        change.touched(job.key);
-    }
-    Ok(())
+/// Coalesces a job into this primary.
+async fn coalesce(change: &mut Change<'_>, key: i64, primary: i64) -> Result<()> {
+    let set = change.set(key, |row| row.job.coalesced_into = Some(primary));
+    set.await.map(drop)
 }
 
-/// Lets a coalesced job wait for a worker itself, with this priority.
-async fn detach(change: &mut Change<'_>, job: &Job, priority: i32) -> Result<()> {
-    let key = job.key;
-    sqlx::query("update job set coalesced_into = null, checksum = null where id = ?")
-        .bind(key)
-        .execute(change.sql())
-        .await?;
-    change.touched(key);
-    let place = Place {
-        priority,
-        ..Place::of(job)
-    };
-    change.move_job(Move::Detach(place.owner.clone()));
-    change.move_job(Move::Enter(place));
-    Ok(())
-}
-
-/// A coalesced job now has this priority: if its primary still waits with a lower one, the job is detached from it.
+/// The priority of a coalesced job may have changed: if its primary waits with a lower one, it waits by itself.
 pub(super) async fn detach_if_ahead(
     change: &mut Change<'_>,
     job: &Job,
     primary: i64,
-    priority: i32,
 ) -> Result<()> {
-    let primary = read(change.sql(), primary).await?;
-    if primary.status != Status::Queued || primary.priority >= priority {
-        return Ok(());
+    let primary = change.read(primary).await?;
+    if primary.status == Status::Queued && primary.priority < job.priority {
+        change.set(job.key, JobRow::waits_by_itself).await?;
     }
-    detach(change, job, priority).await
+    Ok(())
 }
 
 /// Whether the end of a job is also that of the jobs coalesced into it.
@@ -277,27 +245,14 @@ fn is_shared(status: Status, reason: Option<Reason>) -> bool {
 }
 
 /// Starts a queued job and ends it at once, with the result of another one of the same input.
-pub(super) async fn answer(change: &mut Change<'_>, job: &Job, source: &Job) -> Result<()> {
-    let job = lifecycle::start_attempt(change, job).await?;
+pub(super) async fn answer(change: &mut Change<'_>, key: i64, source: &Job) -> Result<()> {
+    let now = change.now();
+    let job = change
+        .update(key, |row| row.start_with_answer(source, now))
+        .await?;
     if job.attempt > 1 {
         // pieces that an earlier attempt had written when it was interrupted
-        results::remove(change.sql(), job.key).await?;
+        results::remove(change.sql().await?, key).await?;
     }
-    sqlx::query(
-        "update job set cached_from = ?, coalesced_into = null, checksum = null,
-                        result_job = (select coalesce(result_job, id) from job where id = ?) where id = ?",
-    )
-    .bind(source.id.0.to_string())
-    .bind(source.key)
-    .bind(job.key)
-    .execute(change.sql())
-    .await?;
-    let ending = Ending {
-        status: source.status,
-        reason: source.reason,
-        failure: source.failure.clone(),
-        result: source.result_available,
-        warnings: source.warnings.clone(),
-    };
-    lifecycle::end_job(change, &job, &ending).await
+    lifecycle::end_job(change, key, &Ending::like(source)).await
 }

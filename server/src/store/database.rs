@@ -31,6 +31,7 @@ use super::{
     pauses::Pauses,
     progress::{self, Known, LastCommit, Progress},
     reserve::Reserve,
+    rows,
     submission::{Inbox, Pending},
     waiting::WaitingJobs,
 };
@@ -178,6 +179,7 @@ impl Store {
             .connect_with(writing)
             .await?;
         migrations::run(&writer, path).await?;
+        rows::seal_old_rows(&writer).await?;
         if rebuild == Rebuild::IfItCannotGiveBack {
             // before there are connections that read
             compact::enable_giving_back(&mut *writer.acquire().await?, path).await?;

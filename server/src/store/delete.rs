@@ -5,8 +5,7 @@ use std::time::Duration;
 use sqlx::SqliteConnection;
 
 use super::{
-    change::Change, damage::Table, database::Store, error::Result, results, rows::find, sizes,
-    sweeps,
+    change::Change, damage::Table, database::Store, error::Result, results, sizes, sweeps,
 };
 use crate::{
     caller::Owners,
@@ -62,7 +61,7 @@ pub(super) async fn delete(
     owners: Owners<'_>,
     key: i64,
 ) -> Result<Deletion> {
-    let job = find(change.sql(), key).await?;
+    let job = change.find(key).await?;
     let Some(job) = job.filter(|job| owners.include(&job.owner)) else {
         return Ok(Deletion::Unknown);
     };
@@ -73,26 +72,10 @@ pub(super) async fn delete(
     Ok(Deletion::Deleted)
 }
 
-/// What only this job has. Statements are sent together where they can be: to hand one to the thread of the connection costs as
-/// much as to run it, and retention removes hundreds in a second.
-const OF_ITS_OWN: &str = "
-    insert into deleted_job (uuid, id, owner, deleted_at) values (?2, ?1, ?3, ?4);
-    delete from event where job_id = ?1;
-    delete from job_label where job_id = ?1;
-    delete from job_size where job_id = ?1;
-    delete from job where id = ?1;";
-
 /// Removes a job that has ended, and what it has in common with others if it was the last of them.
 pub(super) async fn remove(change: &mut Change<'_>, job: &Job) -> Result<()> {
-    let now = change.now();
-    let tx = change.sql();
-    sqlx::query(OF_ITS_OWN)
-        .bind(job.key)
-        .bind(job.id.0.to_string())
-        .bind(&job.owner)
-        .bind(now.micros())
-        .execute(&mut *tx)
-        .await?;
+    change.delete(job).await?;
+    let tx = change.sql().await?;
     sizes::hand_on(tx, job).await?;
     sqlx::query(
         "delete from problem where input_hash = ?1 and not exists (select 1 from job where input_hash = ?1)",
@@ -107,10 +90,8 @@ pub(super) async fn remove(change: &mut Change<'_>, job: &Job) -> Result<()> {
     if let Some(sweep) = job.sweep
         && !sweeps::remove_without_jobs(change, sweep).await?
     {
-        sweeps::keep_failures(change.sql(), job).await?;
+        sweeps::keep_failures(change.sql().await?, job).await?;
     }
-    change.deleted(job.id);
-    change.changed(job.key);
     Ok(())
 }
 

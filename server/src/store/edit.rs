@@ -1,15 +1,8 @@
 //! Editing a job: its name and labels, its priority, whether it is pinned.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, mem};
 
-use super::{
-    coalescing,
-    database::Store,
-    error::Result,
-    labels,
-    rows::{read, with_id},
-    waiting::{Move, Place},
-};
+use super::{coalescing, database::Store, error::Result, labels, rows::with_id};
 use crate::{
     caller::Owners,
     job::{Job, JobId},
@@ -26,6 +19,18 @@ pub struct Edit {
     pub priority: Option<i32>,
     /// Never deleted because of its age.
     pub pinned: Option<bool>,
+}
+
+impl Edit {
+    fn apply(&self, job: &mut Job) {
+        job.name = self.name.clone().unwrap_or_else(|| job.name.take());
+        job.labels = self
+            .labels
+            .clone()
+            .unwrap_or_else(|| mem::take(&mut job.labels));
+        job.priority = self.priority.unwrap_or(job.priority);
+        job.pinned = self.pinned.unwrap_or(job.pinned);
+    }
 }
 
 impl Store {
@@ -50,52 +55,24 @@ impl Store {
         versions: Option<&[i64]>,
     ) -> Result<Option<std::result::Result<Job, i64>>> {
         let mut change = self.control_change().await?;
-        let Some(job) = with_id(change.sql(), owners, id).await? else {
+        let Some(job) = with_id(change.sql().await?, owners, id).await? else {
             return Ok(None);
         };
         if versions.is_some_and(|versions| !versions.contains(&job.version)) {
             return Ok(Some(Err(job.version)));
         }
         let key = job.key;
-        let name = edit.name.as_ref().unwrap_or(&job.name);
-        let labels = edit.labels.as_ref().unwrap_or(&job.labels);
-        let priority = edit.priority.unwrap_or(job.priority);
-        let pinned = edit.pinned.unwrap_or(job.pinned);
-        let same = *name == job.name
-            && *labels == job.labels
-            && priority == job.priority
-            && pinned == job.pinned;
-        if !same {
-            sqlx::query(
-                "update job set name = ?, labels = ?, priority = ?, pinned = ?, version = version + 1,
-                                checksum = null where id = ?",
-            )
-            .bind(name)
-            .bind(serde_json::to_string(labels)?)
-            .bind(priority)
-            .bind(pinned)
-            .bind(key)
-            .execute(change.sql())
-            .await?;
-            change.touched(key);
-            if *labels != job.labels {
-                sqlx::query("delete from job_label where job_id = ?")
-                    .bind(key)
-                    .execute(change.sql())
-                    .await?;
-                labels::write(&mut change, key, &job.owner, job.created_at, labels).await?;
-            }
-            if job.waits_for_a_worker() && priority != job.priority {
-                let place = Place::of(&job);
-                change.move_job(Move::Leave(place.clone()));
-                change.move_job(Move::Enter(Place { priority, ..place }));
-                coalescing::replace_if_outranked(&mut change, key, priority).await?;
-            }
-            if let Some(source) = job.coalesced_into {
-                coalescing::detach_if_ahead(&mut change, &job, source, priority).await?;
-            }
+        let edited = change.set(key, |row| edit.apply(&mut row.job)).await?;
+        if edited.labels != job.labels {
+            labels::replace(&mut change, &edited).await?;
         }
-        let edited = read(change.sql(), key).await?;
+        if edited.waits_for_a_worker() && edited.priority != job.priority {
+            coalescing::replace_if_outranked(&mut change, key).await?;
+        }
+        if let Some(primary) = edited.coalesced_into {
+            coalescing::detach_if_ahead(&mut change, &edited, primary).await?;
+        }
+        let edited = change.read(key).await?;
         change.commit().await?;
         let mut edited = [edited];
         self.try_complete(&mut edited).await;

@@ -10,15 +10,16 @@ use super::{
     coalescing,
     database::Store,
     error::{Result, StoreError},
-    events::{self, FinalBatch},
-    lifecycle::{self, Ending},
+    events::FinalBatch,
+    lifecycle,
     parts::Parts,
     results,
-    rows::{find, read},
+    rows::JobRow,
+    rules::{self, Cancel, Ending},
 };
 use crate::{
     failpoint::{self, Point},
-    job::{Job, Reason, ResultAvailable, Status},
+    job::{Job, Reason},
     time::Time,
 };
 
@@ -44,31 +45,23 @@ impl Store {
 
     async fn try_to_request_cancel(&self, key: i64) -> Result<CancelOutcome> {
         let mut change = self.control_change().await?;
-        let Some(job) = find(change.sql(), key).await? else {
+        let Some(job) = change.find(key).await? else {
             return Ok(CancelOutcome::AlreadyTerminal); // and was deleted since
         };
         let attempt = job.attempt;
-        match job.status {
-            Status::Queued => {
-                end(&mut change, &job, &Ending::canceled()).await?;
+        match rules::canceling(&job) {
+            Cancel::End => {
+                end(&mut change, key, &Ending::canceled()).await?;
                 return Ok(CancelOutcome::Canceled(change.commit().await?));
             }
-            Status::Running if job.cancel_requested => {}
-            Status::Running => {
+            Cancel::Asked => {}
+            Cancel::Ask => {
                 // kept even if it cannot be stored: no later result makes the job succeed
                 self.cancels().insert(key);
-                sqlx::query(
-                    "update job set cancel_requested = 1, version = version + 1, checksum = null where id = ?",
-                )
-                .bind(key)
-                .execute(change.sql())
-                .await?;
-                change.touched(key);
+                change.set(key, JobRow::ask_to_stop).await?;
                 change.commit().await?;
             }
-            Status::Succeeded | Status::Failed | Status::Canceled => {
-                return Ok(CancelOutcome::AlreadyTerminal);
-            }
+            Cancel::TooLate => return Ok(CancelOutcome::AlreadyTerminal),
         }
         Ok(CancelOutcome::Requested { attempt })
     }
@@ -108,31 +101,22 @@ impl Store {
             Some(_) => self.change().await?,
             None => self.control_change().await?,
         };
-        // the row is read whole, so that a damaged one is not given a new checksum below
-        let found = find(change.sql(), key).await?;
-        if !found.is_some_and(|job| job.status == Status::Running && job.attempt == attempt) {
+        if !change.is_current(key, attempt).await? {
             return Ok(None);
         }
+        if let Some(parts) = result {
+            results::write_at_end(change.sql().await?, key, parts).await?;
+        }
         if !last.events.is_empty() {
-            let events = self.events_by_our_clock(&last.events);
-            events::append_with_progress(change.sql(), key, attempt, &events, &last.progress)
+            change
+                .append_with_progress(key, &last.events, &last.progress)
                 .await?;
         }
-        if let Some(parts) = result {
-            results::write_at_end(change.sql(), key, parts).await?;
+        let job = change.read(key).await?;
+        match self.is_asked_to_stop(&job) {
+            true => end(&mut change, key, &ending.after_a_request_to_stop()).await?,
+            false => end(&mut change, key, ending).await?,
         }
-        let job = read(change.sql(), key).await?;
-        // a client was told that it ends: what was found before the solver noticed that is a partial result
-        let canceled = Ending {
-            result: ending.result.min(ResultAvailable::Partial),
-            warnings: ending.warnings.clone(),
-            ..Ending::canceled()
-        };
-        let ending = match self.is_asked_to_stop(&job) {
-            true if ending.status == Status::Succeeded => &canceled,
-            _ => ending,
-        };
-        end(&mut change, &job, ending).await?;
         if failpoint::fails(Point::Ended, job.id) {
             return Err(StoreError::Full);
         }
@@ -171,11 +155,11 @@ impl Store {
         let expired: Vec<i64> = sqlx::query_scalar(EXPIRED)
             .bind(now.micros())
             .bind(AT_ONCE)
-            .fetch_all(change.sql())
+            .fetch_all(change.sql().await?)
             .await?;
         for key in expired {
             // as it is now: it may have been coalesced into one that has just ended
-            let Ok(job) = self.damages.noting(read(change.sql(), key)).await else {
+            let Ok(job) = self.damages.noting(change.read(key)).await else {
                 continue; // damaged: others still end
             };
             let detail = format!(
@@ -184,7 +168,7 @@ impl Store {
             );
             end(
                 &mut change,
-                &job,
+                key,
                 &Ending::failed(Reason::QueueExpired, detail),
             )
             .await?;
@@ -201,7 +185,7 @@ pub(super) const EXPIRED: &str = "select id from job indexed by job_expiry
      order by expires_at limit ?";
 
 /// Ends a job, and the jobs coalesced into it or replaces it by the first of them.
-pub(super) async fn end(change: &mut Change<'_>, job: &Job, ending: &Ending) -> Result<()> {
-    lifecycle::end_job(change, job, ending).await?;
-    coalescing::end_coalesced(change, job).await
+pub(super) async fn end(change: &mut Change<'_>, key: i64, ending: &Ending) -> Result<()> {
+    lifecycle::end_job(change, key, ending).await?;
+    coalescing::end_coalesced(change, key).await
 }

@@ -6,11 +6,10 @@ use super::{
     checksum::Checksum,
     database::Store,
     error::{Record, Result, StoreError},
-    rows::{find, seal},
 };
 use crate::{
     event::{Event, Payload},
-    job::{Progress, Status},
+    job::Progress,
     time::Time,
 };
 
@@ -34,16 +33,12 @@ impl Store {
         progress: &Progress,
     ) -> Result<bool> {
         let write = async {
-            let mut tx = self.begin().await?;
-            // the row is read whole, so that a damaged one is not given a new checksum below
-            let job = find(&mut tx, key).await?;
-            if !job.is_some_and(|job| job.status == Status::Running && job.attempt == attempt) {
+            let mut change = self.change().await?;
+            if !change.is_current(key, attempt).await? {
                 return Ok(false);
             }
-            let payloads = self.events_by_our_clock(payloads);
-            append_with_progress(&mut tx, key, attempt, &payloads, progress).await?;
-            seal(&mut tx, key).await?;
-            tx.commit().await?;
+            change.append_with_progress(key, payloads, progress).await?;
+            change.commit().await?;
             Ok(true)
         };
         self.writing(write).await
@@ -154,38 +149,14 @@ fn record(key: i64, seq: i64) -> Record {
     Record::of_job(key, format!("event {seq}"))
 }
 
-/// Appends events, with the progress after them.
-pub(super) async fn append_with_progress(
+/// Inserts events of an attempt; `first`: the number of the first of them.
+pub(super) async fn insert(
     tx: &mut SqliteConnection,
     key: i64,
-    attempt: i32,
-    payloads: &[(Time, Payload)],
-    progress: &Progress,
-) -> Result<()> {
-    append(tx, key, attempt, payloads).await?;
-    sqlx::query("update job set progress = ?, checksum = null where id = ?")
-        .bind(serde_json::to_string(progress)?)
-        .bind(key)
-        .execute(tx)
-        .await?;
-    Ok(())
-}
-
-/// Numbers events and appends them.
-pub(super) async fn append(
-    tx: &mut SqliteConnection,
-    key: i64,
+    first: i64,
     attempt: i32,
     payloads: &[(Time, Payload)],
 ) -> Result<()> {
-    let last: i64 = sqlx::query_scalar(
-        "update job set last_seq = last_seq + ?, checksum = null where id = ? returning last_seq",
-    )
-    .bind(payloads.len() as i64)
-    .bind(key)
-    .fetch_one(&mut *tx)
-    .await?;
-    let first = last - payloads.len() as i64 + 1;
     for (seq, (t, payload)) in (first..).zip(payloads) {
         let (t, kind, body) = (t.micros(), payload.kind(), serde_json::to_string(payload)?);
         let checksum = checksum(key, seq, attempt, t, kind, &body).stored();

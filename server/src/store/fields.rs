@@ -1,6 +1,6 @@
 //! The fields of a job, which are most of its result, deleted by themselves.
 
-use super::{change::Change, database::Store, delete::Deletion, error::Result, rows::find, sizes};
+use super::{change::Change, database::Store, delete::Deletion, error::Result, sizes};
 use crate::{caller::Owners, job::Job};
 
 impl Store {
@@ -12,7 +12,7 @@ impl Store {
 
     async fn try_to_delete_fields(&self, owners: Owners<'_>, key: i64) -> Result<Deletion> {
         let mut change = self.control_change().await?;
-        let job = find(change.sql(), key).await?;
+        let job = change.find(key).await?;
         let Some(job) = job.filter(|job| owners.include(&job.owner)) else {
             return Ok(Deletion::Unknown);
         };
@@ -27,7 +27,7 @@ impl Store {
 
 /// Deletes the fields of a job that has ended, unless another job with the same result still has them.
 pub(super) async fn remove_fields(change: &mut Change<'_>, job: &Job) -> Result<()> {
-    let tx = change.sql();
+    let tx = change.sql().await?;
     sqlx::query("update job_size set fields = 2 where job_id = ? and fields = 1")
         .bind(job.key)
         .execute(&mut *tx)

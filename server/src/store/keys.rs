@@ -11,7 +11,7 @@ use super::{
     database::Store,
     delete::{deleted_id, owner_of_deleted},
     error::{Record, Result, StoreError},
-    rows::{find, read},
+    rows::find,
     submission::{NewJob, RequestKey},
 };
 use crate::{
@@ -70,9 +70,9 @@ pub(super) async fn already_submitted(
     key: Option<&RequestKey>,
 ) -> Result<Option<Vec<Job>>> {
     if let Some(key) = key {
-        match jobs_of_key(change.sql(), owner, key).await? {
+        match jobs_of_key(change.sql().await?, owner, key).await? {
             None => change.damages().have_all_keys(&key.payload)?,
-            Some(keys) => match remaining(change.sql(), keys).await? {
+            Some(keys) => match remaining(change.sql().await?, keys).await? {
                 Some(old) => return Ok(Some(old)),
                 None => change.damages().have_all(&[Table::Jobs, Table::Deleted])?,
             },
@@ -84,16 +84,16 @@ pub(super) async fn already_submitted(
         let found: Option<(i64, String, Option<String>)> =
             sqlx::query_as("select id, owner, payload from job where uuid = ?")
                 .bind(id.0.to_string())
-                .fetch_optional(change.sql())
+                .fetch_optional(change.sql().await?)
                 .await?;
         match found {
             Some((key, theirs, Some(payload)))
                 if theirs == owner && payload == new.payload && jobs.len() == 1 =>
             {
-                old.push(read(change.sql(), key).await?);
+                old.push(change.read(key).await?);
             }
             Some(_) => return Err(StoreError::IdConflict(id)),
-            None => match owner_of_deleted(change.sql(), id).await? {
+            None => match owner_of_deleted(change.sql().await?, id).await? {
                 Some(theirs) if theirs == owner => return Err(StoreError::Deleted(id)),
                 // of another owner: whether that job still exists is not revealed
                 Some(_) => return Err(StoreError::IdConflict(id)),
@@ -123,7 +123,7 @@ pub(super) async fn remember(
     .bind(count)
     .bind(change.now().micros())
     .bind(checksum(owner, key, first, count).stored())
-    .execute(change.sql())
+    .execute(change.sql().await?)
     .await?;
     Ok(())
 }

@@ -1,29 +1,30 @@
 //! Labels in a table of their own, for searches.
 
-use std::collections::BTreeMap;
-
 use super::{change::Change, error::Result};
-use crate::time::Time;
+use crate::job::Job;
 
-/// Writes the labels of a job of this owner.
-pub(super) async fn write(
-    change: &mut Change<'_>,
-    key: i64,
-    owner: &str,
-    created_at: Time,
-    labels: &BTreeMap<String, String>,
-) -> Result<()> {
-    for (name, value) in labels {
+/// Writes the labels of a job.
+pub(super) async fn write(change: &mut Change<'_>, job: &Job) -> Result<()> {
+    for (name, value) in &job.labels {
         sqlx::query(
             "insert into job_label (key, value, created_at, job_id, owner) values (?, ?, ?, ?, ?)",
         )
         .bind(name)
         .bind(value)
-        .bind(created_at.micros())
-        .bind(key)
-        .bind(owner)
-        .execute(change.sql())
+        .bind(job.created_at.micros())
+        .bind(job.key)
+        .bind(&job.owner)
+        .execute(change.sql().await?)
         .await?;
     }
     Ok(())
+}
+
+/// Writes the labels of a job in place of earlier ones.
+pub(super) async fn replace(change: &mut Change<'_>, job: &Job) -> Result<()> {
+    sqlx::query("delete from job_label where job_id = ?")
+        .bind(job.key)
+        .execute(change.sql().await?)
+        .await?;
+    write(change, job).await
 }

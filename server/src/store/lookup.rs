@@ -5,7 +5,7 @@ use super::{
     database::Store,
     error::Result,
     problems,
-    rows::{find, with_id},
+    rows::{find_row, with_id},
 };
 use crate::{
     caller::Owners,
@@ -32,13 +32,11 @@ impl Store {
     pub async fn problem(&self, key: i64) -> Result<Option<(Option<String>, String)>> {
         let read = async {
             let mut tx = self.reader.begin().await?;
-            let Some(job) = find(&mut tx, key).await? else {
+            let Some((row, _)) = find_row(&mut tx, key).await? else {
                 return Ok(None);
             };
-            let title = sqlx::query_scalar("select title from job where id = ?");
-            let title = title.bind(key).fetch_one(&mut *tx).await?;
-            let body = problems::read(&mut tx, &job).await?.body;
-            Ok(Some((title, body)))
+            let body = problems::read(&mut tx, &row.job).await?.body;
+            Ok(Some((row.title, body)))
         };
         self.damages.noting(read).await
     }

@@ -9,12 +9,12 @@ use sqlx::{
 
 use super::{
     error::{Result, StoreError},
-    model_files,
+    model_files, rows,
 };
 
 /// Every step, with the name of its file. They are listed here instead of found by `sqlx::migrate!`, which would
 /// compile sqlx and SQLite a second time for the compiler to run; a test compares the list with the folder.
-const STEPS: [(i64, &str, &str); 14] = [
+const STEPS: [(i64, &str, &str); 15] = [
     (1, "jobs", include_str!("../../../migrations/0001_jobs.sql")),
     (
         2,
@@ -80,6 +80,11 @@ const STEPS: [(i64, &str, &str); 14] = [
         14,
         "no models",
         include_str!("../../../migrations/0014_no_models.sql"),
+    ),
+    (
+        15,
+        "sealed jobs",
+        include_str!("../../../migrations/0015_sealed_jobs.sql"),
     ),
 ];
 
@@ -157,9 +162,9 @@ pub(super) async fn check(connection: &mut SqliteConnection) -> Result<()> {
 /// An error if the tables are of an earlier version.
 pub(super) async fn are_current(connection: &mut SqliteConnection) -> Result<()> {
     let steps: i64 = sqlx::query_scalar("select count(*) from _sqlx_migrations")
-        .fetch_one(connection)
+        .fetch_one(&mut *connection)
         .await?;
-    match steps == last_step() {
+    match steps == last_step() && !rows::has_old_rows(connection).await? {
         true => Ok(()),
         false => Err(StoreError::Schema(
             "the store is of an earlier version of this program: start the service on it once, which brings it up to date".into(),

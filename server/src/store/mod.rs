@@ -76,7 +76,12 @@ mod pauses;
 mod progress;
 mod reserve;
 
-// The database; one transaction of its single writer; the waiting jobs, mirrored in memory.
+// The row of a job, the rules of how it may change, and what follows; the jobs that wait, mirrored in memory.
+mod rows;
+mod rules;
+mod waiting;
+
+// The database; one transaction of its single writer.
 mod change;
 mod clock;
 mod compact;
@@ -84,17 +89,15 @@ mod database;
 mod migrations;
 mod model_files;
 mod pages;
-mod waiting;
 
-// A job: its row, its labels, its events, its result.
+// What belongs to a job: its labels, its events, its result.
 mod events;
 mod labels;
 mod problems;
 mod results;
-mod rows;
 mod sizes;
 
-// Its lifecycle: attempts and end; coalesced with others of the same input; claimed, ended, requeued.
+// Its lifecycle: its end; coalesced with others of the same input; claimed, ended, requeued.
 mod claim;
 mod coalescing;
 mod end;
@@ -159,12 +162,12 @@ pub use self::{
     filter::{Cursor, Filter, GroupBy, Order, OrderBy},
     health::Health,
     inspect::{Report, inspect},
-    lifecycle::Ending,
     meshes::{Removal, StoredMesh},
     parts::{PIECE_BYTES, PIECES_PER_COMMIT, Part, Parts, ProfilePoints},
     progress::accept,
     restore::{Restored, restore},
     retention::{Retention, Retired, keep_within},
+    rules::Ending,
     sizes::OwnerSize,
     snapshot::Snapshot,
     space::{Space, compact_folder},

@@ -9,7 +9,7 @@ use super::{
     error::Result,
     rows::find,
     sizes,
-    waiting::{Move, Owner, Place},
+    waiting::{Move, Owner, Place, WaitingJobs},
 };
 use crate::job::{Job, QueuePosition, Status, Waiting};
 
@@ -20,6 +20,12 @@ pub(super) const WAITING: &str = "select priority, owner, id from job indexed by
 impl Store {
     /// Reads the waiting jobs, when the store is opened.
     pub(super) async fn read_waiting_jobs(&self) -> Result<()> {
+        *self.waiting_jobs() = self.waiting_in_database().await?;
+        Ok(())
+    }
+
+    /// The waiting jobs as the database has them; whose turn it was is not stored.
+    pub(super) async fn waiting_in_database(&self) -> Result<WaitingJobs> {
         let waiting = match sqlx::query_as(WAITING).fetch_all(&self.reader).await {
             Ok(waiting) => waiting,
             // a page or a name that cannot be read: the others go on
@@ -34,7 +40,7 @@ impl Store {
             .fetch_all(&self.reader)
             .await
             .unwrap_or_default();
-        let mut mirror = self.waiting_jobs();
+        let mut mirror = WaitingJobs::default();
         let mut names: BTreeSet<Owner> = BTreeSet::new();
         // one text for all jobs of an owner
         let mut named = |name: String| match names.get(name.as_str()) {
@@ -59,7 +65,7 @@ impl Store {
         for owner in running {
             mirror.apply(Move::Start(named(owner)));
         }
-        Ok(())
+        Ok(mirror)
     }
 
     /// The same as `WAITING`, without jobs that cannot be read.

@@ -9,12 +9,11 @@ use super::{
     database::Store,
     end::end,
     error::Result,
-    events,
-    lifecycle::{self, Ending},
-    rows::{from_row, is_current, read},
+    rows::from_row,
+    rules::{self, Ending, Interrupted},
 };
 use crate::{
-    event::{Payload, Requeue},
+    event::Requeue,
     job::{Job, Reason, Status},
 };
 
@@ -28,18 +27,14 @@ impl Store {
 
     async fn try_to_requeue_drained(&self, key: i64, attempt: i32) -> Result<Option<Status>> {
         let mut change = self.control_change().await?;
-        if !is_current(change.sql(), key, attempt).await? {
+        if !change.is_current(key, attempt).await? {
             return Ok(None);
         }
-        let job = read(change.sql(), key).await?;
+        let job = change.read(key).await?;
         // the client that asked it to stop does not have to wait for the restart
-        let status = if self.is_asked_to_stop(&job) {
-            end(&mut change, &job, &Ending::canceled()).await?;
-            Status::Canceled
-        } else {
-            requeue(&mut change, &job, Requeue::Drain).await?;
-            Status::Queued
-        };
+        let stop = self.is_asked_to_stop(&job);
+        interrupt(&mut change, &job, Requeue::Drain, stop, "").await?;
+        let status = change.read(key).await?.status;
         change.commit().await?;
         self.cancels().remove(&key);
         Ok(Some(status))
@@ -54,7 +49,7 @@ impl Store {
     async fn try_to_requeue_interrupted(&self) -> Result<usize> {
         let mut change = self.control_change().await?;
         let rows = sqlx::query("select * from job where status = 'running'")
-            .fetch_all(change.sql())
+            .fetch_all(change.sql().await?)
             .await?;
         if rows.is_empty() {
             return Ok(0); // nothing is written: the disk may be full
@@ -65,12 +60,12 @@ impl Store {
                 continue; // damaged: the service starts with the others
             };
             // the service that stopped could not store that it requeued it
-            match self.was_stopped && !job.cancel_requested {
-                true => requeue(&mut change, &job, Requeue::Drain).await?,
-                false => {
-                    requeue_after_death(&mut change, &job, "the service died with it").await?;
-                }
-            }
+            let why = match self.was_stopped {
+                true => Requeue::Drain,
+                false => Requeue::WorkerLost,
+            };
+            let (stop, how) = (job.cancel_requested, "the service died with it");
+            interrupt(&mut change, &job, why, stop, how).await?;
             interrupted.push(job);
         }
         change.commit().await?;
@@ -96,30 +91,38 @@ impl Store {
 
     async fn try_to_requeue_lost(&self, key: i64, attempt: i32, how: &str) -> Result<Vec<i64>> {
         let mut change = self.control_change().await?;
-        if !is_current(change.sql(), key, attempt).await? {
+        if !change.is_current(key, attempt).await? {
             return Ok(vec![]);
         }
-        let mut job = read(change.sql(), key).await?;
-        job.cancel_requested = self.is_asked_to_stop(&job);
-        requeue_after_death(&mut change, &job, how).await?;
+        let job = change.read(key).await?;
+        let stop = self.is_asked_to_stop(&job);
+        interrupt(&mut change, &job, Requeue::WorkerLost, stop, how).await?;
         let changed = change.commit().await?;
         self.cancels().remove(&key);
         Ok(changed)
     }
 }
 
-/// Requeues a job whose process died, or ends it.
-async fn requeue_after_death(change: &mut Change<'_>, job: &Job, how: &str) -> Result<()> {
-    if job.cancel_requested {
-        return end(change, job, &Ending::canceled()).await;
+/// Requeues a job that was interrupted, or ends it. `stop`: a client has asked it to stop; `how`: in which way its process
+/// died, if it did.
+async fn interrupt(
+    change: &mut Change<'_>,
+    job: &Job,
+    why: Requeue,
+    stop: bool,
+    how: &str,
+) -> Result<()> {
+    match rules::interrupted(job, why, stop) {
+        Interrupted::Cancel => end(change, job.key, &Ending::canceled()).await,
+        Interrupted::Requeue(why) => requeue(change, job.key, why).await,
+        Interrupted::Fail => {
+            let deaths = count_deaths(change.sql().await?, job.key).await? + 1;
+            let detail = format!(
+                "the process died during {deaths} attempts at this job; the last time {how}"
+            );
+            end(change, job.key, &Ending::failed(Reason::WorkerLost, detail)).await
+        }
     }
-    if job.attempt < job.max_attempts {
-        return requeue(change, job, Requeue::WorkerLost).await;
-    }
-    let deaths = count_deaths(change.sql(), job.key).await? + 1;
-    let detail =
-        format!("the process died during {deaths} attempts at this job; the last time {how}");
-    end(change, job, &Ending::failed(Reason::WorkerLost, detail)).await
 }
 
 /// How many attempts at a job ended with the process, before the current one.
@@ -132,32 +135,13 @@ async fn count_deaths(tx: &mut SqliteConnection, key: i64) -> Result<i64> {
 }
 
 /// Puts a running job back in the queue.
-async fn requeue(change: &mut Change<'_>, job: &Job, reason: Requeue) -> Result<()> {
-    lifecycle::set_status(change, job, Status::Queued).await?;
-    // The attempt keeps its number, by which events are distinguished; if it does not count, one more is allowed.
-    let one_more = i32::from(reason == Requeue::Drain);
-    sqlx::query("update job set max_attempts = max_attempts + ?, checksum = null where id = ?")
-        .bind(one_more)
-        .bind(job.key)
-        .execute(change.sql())
-        .await?;
-    // its time in the queue begins again, and that of the jobs coalesced into it
-    let coalesced = coalescing::coalesced_jobs(change, job.key).await?;
-    let now = change.now().micros();
-    for key in coalesced.iter().map(|job| job.key).chain([job.key]) {
-        sqlx::query(
-            "update job set expires_at = ? + cast(queue_ttl_s * 1e6 as integer), checksum = null where id = ?",
-        )
-        .bind(now)
-        .bind(key)
-        .execute(change.sql())
-        .await?;
-        change.touched(key);
+async fn requeue(change: &mut Change<'_>, key: i64, why: Requeue) -> Result<()> {
+    let now = change.now();
+    change.update(key, |row| row.requeue(why, now)).await?;
+    // as its time in the queue begins again, so does that of the jobs coalesced into it
+    for job in coalescing::coalesced_jobs(change, key).await? {
+        change.set(job.key, |row| row.waits_from(now)).await?;
     }
     // it no longer runs: a coalesced job of higher priority does not have to wait for it
-    coalescing::replace_if_outranked(change, job.key, job.priority).await?;
-    let requeued = [(change.now(), Payload::requeued(reason))];
-    events::append(change.sql(), job.key, job.attempt, &requeued).await?;
-    change.changed(job.key);
-    Ok(())
+    coalescing::replace_if_outranked(change, key).await
 }

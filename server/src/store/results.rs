@@ -12,8 +12,9 @@ use super::{
     error::Result,
     intact,
     parts::{Part, Parts, Piece},
-    rows::{is_current, partial_key, seal},
+    rows::{is_current, partial_key},
 };
+use crate::job::ResultAvailable;
 
 impl Store {
     /// Writes the result of an attempt in several short transactions, all but its last megabyte, which is
@@ -45,23 +46,21 @@ impl Store {
     /// the current one.
     pub async fn write_partial(&self, key: i64, attempt: i32, parts: &Parts) -> Result<bool> {
         let write = async {
-            let mut tx = self.begin().await?;
-            if !is_current(&mut tx, key, attempt).await? {
+            let mut change = self.change().await?;
+            if !change.is_current(key, attempt).await? {
                 return Ok(false);
             }
-            remove(&mut tx, partial_key(key)).await?;
+            let tx = change.sql().await?;
+            remove(tx, partial_key(key)).await?;
             for group in parts.groups() {
-                insert(&mut tx, partial_key(key), &group).await?;
+                insert(tx, partial_key(key), &group).await?;
             }
-            write_info(&mut tx, partial_key(key), parts).await?;
-            sqlx::query(
-                "update job set result_available = 'partial', checksum = null where id = ?",
-            )
-            .bind(key)
-            .execute(&mut *tx)
-            .await?;
-            seal(&mut tx, key).await?;
-            tx.commit().await?;
+            write_info(tx, partial_key(key), parts).await?;
+            let partial = ResultAvailable::Partial;
+            change
+                .set(key, |row| row.job.result_available = partial)
+                .await?;
+            change.commit().await?;
             Ok(true)
         };
         self.writing(write).await

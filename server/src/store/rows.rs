@@ -1,12 +1,13 @@
-//! A row of the table `job` as a [`Job`].
+//! A row of the table `job`: read, checked, and written. Only this file has statements that write this table.
 
 use std::{collections::BTreeMap, str::FromStr};
 
-use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
+use serde::Serialize;
+use sqlx::{AssertSqlSafe, Row, SqliteConnection, SqlitePool, sqlite::SqliteRow};
 use uuid::Uuid;
 
 use super::{
-    checksum,
+    checksum::{self, Value},
     error::{Record, Result, StoreError},
 };
 use crate::{
@@ -17,36 +18,44 @@ use crate::{
     time::Time,
 };
 
-/// The job with this key, which must exist.
-pub(super) async fn read(tx: &mut SqliteConnection, key: i64) -> Result<Job> {
-    let found = find(tx, key).await?;
-    found.ok_or_else(|| Record::of_job(key, "record").damaged("it is missing"))
+/// All that is stored in a row: the job as clients see it, and what only the store needs.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct JobRow {
+    pub(super) job: Job,
+    /// The problem's title.
+    pub(super) title: Option<String>,
+    /// Fingerprint of everything that the client submitted; none in rows of early versions.
+    pub(super) payload: Option<String>,
+    /// The key of the result of another job, with which this one was answered.
+    pub(super) result_job: Option<i64>,
+    /// When it fails unless it was started before.
+    pub(super) expires_at: Option<Time>,
+    /// The version of this program that ended it.
+    pub(super) solver_version: Option<String>,
+    /// Number of its last event.
+    pub(super) last_seq: i64,
 }
 
-/// Gives the row of a job that this transaction has changed its checksum. Every statement that changes a job sets it
-/// to null, so that one which is not renewed does not deny what is right.
-pub(super) async fn seal(tx: &mut SqliteConnection, key: i64) -> Result<()> {
-    let row = sqlx::query("select * from job where id = ? and checksum is null")
-        .bind(key)
-        .fetch_optional(&mut *tx)
-        .await?;
-    if let Some(row) = row {
-        sqlx::query("update job set checksum = ? where id = ?")
-            .bind(checksum::of_row(&row)?)
-            .bind(key)
-            .execute(tx)
-            .await?;
-    }
-    Ok(())
+/// The error that a job is missing which must exist.
+pub(super) fn missing(key: i64) -> StoreError {
+    Record::of_job(key, "record").damaged("it is missing")
 }
 
 /// The job with this key, if it still exists.
 pub(super) async fn find(connection: &mut SqliteConnection, key: i64) -> Result<Option<Job>> {
+    Ok(find_row(connection, key).await?.map(|(row, _)| row.job))
+}
+
+/// The row of the job with this key, if it still exists, and its values as they are stored.
+pub(super) async fn find_row(
+    connection: &mut SqliteConnection,
+    key: i64,
+) -> Result<Option<(JobRow, Vec<Value>)>> {
     let row = sqlx::query("select * from job where id = ?")
         .bind(key)
         .fetch_optional(connection)
         .await?;
-    row.as_ref().map(from_row).transpose()
+    row.as_ref().map(checked).transpose()
 }
 
 /// The job with this public id, without its queue position. A job of another owner is not found.
@@ -79,29 +88,131 @@ pub(super) async fn is_current(tx: &mut SqliteConnection, key: i64, attempt: i32
     .await?)
 }
 
+/// The key of the next job: no key is given twice, not even that of a deleted job.
+pub(super) async fn next_key(tx: &mut SqliteConnection) -> Result<i64> {
+    let next = "select coalesce((select seq from sqlite_sequence where name = 'job'), 0) + 1";
+    Ok(sqlx::query_scalar(next).fetch_one(tx).await?)
+}
+
+/// Inserts a row; returns its values as they are stored.
+pub(super) async fn insert(tx: &mut SqliteConnection, row: &JobRow) -> Result<Vec<Value>> {
+    let (names, values) = row.columns()?;
+    let places = "?, ".repeat(names.len());
+    let names = names.join(", ");
+    let statement = format!("insert into job ({names}, checksum) values ({places}?)");
+    checksum::bind(sqlx::query(AssertSqlSafe(statement)), values.iter())
+        .bind(checksum::of_values(&values))
+        .execute(tx)
+        .await?;
+    Ok(values)
+}
+
+/// Writes a row that is in the table as `stored`, and its checksum; returns its values as they are stored now. Columns that
+/// stay as they are, and with them their indexes, are not written.
+pub(super) async fn update(
+    tx: &mut SqliteConnection,
+    stored: &[Value],
+    row: &JobRow,
+) -> Result<Vec<Value>> {
+    let (names, values) = row.columns()?;
+    let columns = names.iter().zip(values.iter().zip(stored));
+    let changed: Vec<_> = columns.filter(|(_, (new, old))| new != old).collect();
+    if changed.is_empty() {
+        return Ok(values);
+    }
+    let names = changed.iter().map(|(name, _)| format!("{name} = ?, "));
+    let names: String = names.collect();
+    let statement = format!("update job set {names}checksum = ? where id = ?");
+    let new = changed.iter().map(|(_, (new, _))| *new);
+    let done = checksum::bind(sqlx::query(AssertSqlSafe(statement)), new)
+        .bind(checksum::of_values(&values))
+        .bind(row.job.key)
+        .execute(tx)
+        .await?;
+    match done.rows_affected() {
+        1 => Ok(values),
+        _ => Err(missing(row.job.key)),
+    }
+}
+
+/// Deletes a job, and what only this job has. Statements are sent together: to hand one to the thread of the connection costs
+/// as much as to run it, and retention removes hundreds in a second.
+pub(super) async fn delete(tx: &mut SqliteConnection, job: &Job, now: Time) -> Result<()> {
+    let of_its_own = "
+        insert into deleted_job (uuid, id, owner, deleted_at) values (?2, ?1, ?3, ?4);
+        delete from event where job_id = ?1;
+        delete from job_label where job_id = ?1;
+        delete from job_size where job_id = ?1;
+        delete from job where id = ?1;";
+    sqlx::query(of_its_own)
+        .bind(job.key)
+        .bind(job.id.0.to_string())
+        .bind(&job.owner)
+        .bind(now.micros())
+        .execute(tx)
+        .await?;
+    Ok(())
+}
+
+/// Gives rows of versions that wrote no checksums theirs, once, when a store of such a version is first opened. What cannot
+/// be read does not prevent the start: it is damaged in any case.
+pub(super) async fn seal_old_rows(writer: &SqlitePool) -> Result<()> {
+    if !has_old_rows(&mut *writer.acquire().await?).await? {
+        return Ok(());
+    }
+    let mut tx = writer.begin_with("begin immediate").await?;
+    let keys = sqlx::query_scalar::<_, i64>("select id from job where checksum is null");
+    for key in keys.fetch_all(&mut *tx).await.unwrap_or_default() {
+        let row = sqlx::query("select * from job where id = ?").bind(key);
+        let row = row.fetch_one(&mut *tx).await.map_err(StoreError::from);
+        let Ok(sum) = row.and_then(|row| checksum::of_row(&row)) else {
+            continue;
+        };
+        sqlx::query("update job set checksum = ? where id = ?")
+            .bind(sum)
+            .bind(key)
+            .execute(&mut *tx)
+            .await?;
+    }
+    sqlx::query("delete from setting where name = 'jobs_without_checksums'")
+        .execute(&mut *tx)
+        .await?;
+    Ok(tx.commit().await?)
+}
+
+/// Whether there may be rows of versions that wrote no checksums: migration 14 notes it.
+pub(super) async fn has_old_rows(connection: &mut SqliteConnection) -> Result<bool> {
+    let noted = "select exists (select 1 from setting where name = 'jobs_without_checksums')";
+    Ok(sqlx::query_scalar(noted).fetch_one(connection).await?)
+}
+
 /// A row of the table as a job, if it is as it was written.
 pub(super) fn from_row(row: &SqliteRow) -> Result<Job> {
-    let read = || match checksum::row_is_intact(row)? {
-        true => parse(row),
-        false => Err(corrupt("checksum")),
+    checked(row).map(|(row, _)| row.job)
+}
+
+/// A row of the table, if it is as it was written, and its values.
+fn checked(row: &SqliteRow) -> Result<(JobRow, Vec<Value>)> {
+    let read = || {
+        let values = checksum::values(row)?;
+        match row.try_get::<Option<i64>, _>("checksum")? {
+            Some(sum) if sum == checksum::of_values(&values) => Ok((parse(row)?, values)),
+            _ => Err(corrupt("checksum")),
+        }
     };
     let record = || Record {
         job: row.try_get("id").ok(),
         name: "record".into(),
     };
-    read().map_err(|error| error.reading(record))
+    read().map_err(|error: StoreError| error.reading(record))
 }
 
-fn parse(row: &SqliteRow) -> Result<Job> {
+fn parse(row: &SqliteRow) -> Result<JobRow> {
     let uuid: &str = row.try_get("uuid")?;
-    let id = JobId(Uuid::try_parse(uuid).map_err(|_| corrupt("uuid"))?);
-    let status: Status = word("status", row.try_get("status")?)?;
     let reason: Option<&str> = row.try_get("reason")?;
     let time = |name: &str| -> Result<Option<Time>> {
         Ok(row.try_get::<Option<i64>, _>(name)?.map(Time::from_micros))
     };
-    let created_at = Time::from_micros(row.try_get("created_at")?);
-    let (started_at, finished_at) = (time("started_at")?, time("finished_at")?);
     let progress: Option<&str> = row.try_get("progress")?;
     let failure: Option<&str> = row.try_get("failure")?;
     let warnings: Option<&str> = row.try_get("warnings")?;
@@ -110,20 +221,13 @@ fn parse(row: &SqliteRow) -> Result<Job> {
         let read = |text| Uuid::try_parse(text).map(JobId).map_err(|_| corrupt(name));
         uuid.map(read).transpose()
     };
-    let key: i64 = row.try_get("id")?;
-    let result_key = match row.try_get::<Option<i64>, _>("result_job")? {
-        Some(other) => other,
-        None if status.is_terminal() => key,
-        None => partial_key(key),
-    };
     let failure: Option<Failure> = failure.map(serde_json::from_str).transpose()?;
-    let mut job = Job {
-        key,
-        result_key,
+    let job = Job {
+        key: row.try_get("id")?,
         coalesced_into: row.try_get("coalesced_into")?,
         cache: word("cache", row.try_get("cache")?)?,
-        id,
-        status,
+        id: JobId(Uuid::try_parse(uuid).map_err(|_| corrupt("uuid"))?),
+        status: word("status", row.try_get("status")?)?,
         reason: reason.map(|text| word("reason", text)).transpose()?,
         cancel_requested: row.try_get("cancel_requested")?,
         version: row.try_get("version")?,
@@ -138,14 +242,9 @@ fn parse(row: &SqliteRow) -> Result<Job> {
         parent: other("parent")?,
         sweep: other("sweep")?.map(|JobId(uuid)| SweepId(uuid)),
         pinned: row.try_get("pinned")?,
-        created_at,
-        started_at,
-        finished_at,
-        queue_wait_s: started_at.map(|start| created_at.seconds_until(start)),
-        run_s: started_at
-            .zip(finished_at)
-            .map(|(start, end)| start.seconds_until(end)),
-        queue: None,
+        created_at: Time::from_micros(row.try_get("created_at")?),
+        started_at: time("started_at")?,
+        finished_at: time("finished_at")?,
         progress: progress.map(serde_json::from_str).transpose()?,
         limits: Limits {
             timeout_s: row.try_get("timeout_s")?,
@@ -158,11 +257,91 @@ fn parse(row: &SqliteRow) -> Result<Job> {
         }),
         result_available: word("result_available", row.try_get("result_available")?)?,
         warnings: warnings.map_or(Ok(vec![]), serde_json::from_str)?,
-        stored_bytes: None,
-        links: BTreeMap::new(),
+        // what follows from the rest, below; and what others fill in
+        ..Job::default()
     };
-    job.links = links(&job);
-    Ok(job)
+    let mut row = JobRow {
+        job,
+        title: row.try_get("title")?,
+        payload: row.try_get("payload")?,
+        result_job: row.try_get("result_job")?,
+        expires_at: time("expires_at")?,
+        solver_version: row.try_get("solver_version")?,
+        last_seq: row.try_get("last_seq")?,
+    };
+    row.derive();
+    Ok(row)
+}
+
+impl JobRow {
+    /// Fills in what follows from the rest.
+    pub(super) fn derive(&mut self) {
+        let job = &mut self.job;
+        job.result_key = match self.result_job {
+            Some(other) => other,
+            None if job.status.is_terminal() => job.key,
+            None => partial_key(job.key),
+        };
+        let started = job.started_at;
+        job.queue_wait_s = started.map(|start| job.created_at.seconds_until(start));
+        let run = started.zip(job.finished_at);
+        job.run_s = run.map(|(start, end)| start.seconds_until(end));
+        job.links = links(job);
+    }
+
+    /// Names and values of its columns, in the order of the table, but for the checksum. A column that a migration adds is
+    /// added here and where rows are read.
+    fn columns(&self) -> Result<(Vec<&'static str>, Vec<Value>)> {
+        let job = &self.job;
+        let uuid = |id: Option<JobId>| Value::from(id.map(|id| id.0.to_string()));
+        let micros = |time: Option<Time>| Value::from(time.map(Time::micros));
+        let warnings = (!job.warnings.is_empty()).then_some(&job.warnings);
+        let columns = [
+            ("id", job.key.into()),
+            ("uuid", uuid(Some(job.id))),
+            ("status", <&str>::from(job.status).into()),
+            ("reason", job.reason.map(<&str>::from).into()),
+            ("cancel_requested", i64::from(job.cancel_requested).into()),
+            ("version", job.version.into()),
+            ("name", job.name.as_deref().into()),
+            ("title", self.title.as_deref().into()),
+            ("labels", json(Some(&job.labels))?),
+            ("owner", job.owner.as_str().into()),
+            ("priority", i64::from(job.priority).into()),
+            ("attempt", i64::from(job.attempt).into()),
+            ("max_attempts", i64::from(job.max_attempts).into()),
+            ("input_hash", job.input_hash.as_str().into()),
+            ("created_at", micros(Some(job.created_at))),
+            ("started_at", micros(job.started_at)),
+            ("finished_at", micros(job.finished_at)),
+            ("progress", json(job.progress.as_ref())?),
+            ("failure", json(job.failure.as_ref())?),
+            (
+                "result_available",
+                <&str>::from(job.result_available).into(),
+            ),
+            ("last_seq", self.last_seq.into()),
+            ("payload", self.payload.as_deref().into()),
+            ("parent", uuid(job.parent)),
+            ("pinned", i64::from(job.pinned).into()),
+            ("cache", <&str>::from(job.cache).into()),
+            ("cached_from", uuid(job.cached_from)),
+            ("result_job", self.result_job.into()),
+            ("coalesced_into", job.coalesced_into.into()),
+            ("timeout_s", Value::Real(job.limits.timeout_s)),
+            ("queue_ttl_s", Value::Real(job.limits.queue_ttl_s)),
+            ("expires_at", micros(self.expires_at)),
+            ("solver_version", self.solver_version.as_deref().into()),
+            ("sweep", uuid(job.sweep.map(|SweepId(id)| JobId(id)))),
+            ("warnings", json(warnings)?),
+        ];
+        Ok(columns.into_iter().unzip())
+    }
+}
+
+fn json<T: Serialize>(value: Option<&T>) -> Result<Value> {
+    let text = value.map(serde_json::to_string).transpose()?;
+    Ok(text.into())
 }
 
 /// The value of a word in this column.
@@ -223,4 +402,23 @@ fn plots(job: &Job) -> Vec<&'static str> {
     .into_iter()
     .filter_map(|(plot, is_there)| is_there.then_some(plot))
     .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::store::Store;
+
+    #[tokio::test]
+    async fn the_columns_are_those_of_the_table() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path()).await.unwrap();
+        let names = "select name from pragma_table_info('job') where name <> 'checksum'";
+        let names: Vec<String> = sqlx::query_scalar(names)
+            .fetch_all(&store.reader)
+            .await
+            .unwrap();
+        assert_eq!(names, JobRow::default().columns().unwrap().0);
+    }
 }

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use sqlx::{AssertSqlSafe, Column, Row, SqliteConnection, TypeInfo, ValueRef, sqlite::SqliteRow};
+use sqlx::{AssertSqlSafe, Column, Row, SqliteConnection, sqlite::SqliteRow};
 
 use super::{
-    checksum,
+    checksum::{self, Value},
     database::{Rebuild, Store, Writing, with_advice},
     error::{Result, StoreError},
-    rows::seal,
+    rows::JobRow,
     sizes,
 };
 use crate::job::{Job, ResultAvailable};
@@ -93,7 +93,7 @@ pub(super) async fn copy_the_rest(
     target: &Store,
     last: i64,
 ) -> Result<()> {
-    let mut tx = target.begin().await?;
+    let mut change = target.change().await?;
     let lost_fields = sqlx::query_scalar("select job_id from job_size where fields = 2");
     let lost_fields: Vec<i64> = lost_fields
         .fetch_all(&mut *source)
@@ -101,25 +101,21 @@ pub(super) async fn copy_the_rest(
         .unwrap_or_default();
     let deleted = sqlx::query("select * from deleted_job").fetch_all(source);
     for row in deleted.await.unwrap_or_default() {
-        insert(&mut tx, "deleted_job", &row).await?;
+        insert(change.sql().await?, "deleted_job", &row).await?;
     }
     // a job waits by itself if the one that it waited for was not copied; the next one like it coalesces them again
-    let detached = "update job set coalesced_into = null, checksum = null
-         where coalesced_into not in (select id from job) returning id";
-    let mut changed: Vec<i64> = sqlx::query_scalar(detached).fetch_all(&mut *tx).await?;
-    let unsealed = "select id from job where checksum is null";
-    changed.extend(
-        sqlx::query_scalar::<_, i64>(unsealed)
-            .fetch_all(&mut *tx)
-            .await?,
-    );
-    for key in changed {
-        seal(&mut tx, key).await?;
+    let alone = "select id from job where coalesced_into not in (select id from job)";
+    let alone: Vec<i64> = sqlx::query_scalar(alone)
+        .fetch_all(change.sql().await?)
+        .await?;
+    for key in alone {
+        change.set(key, JobRow::waits_by_itself).await?;
     }
+    let tx = change.sql().await?;
     let ended = "select id from job where finished_at is not null";
     let ended: Vec<i64> = sqlx::query_scalar(ended).fetch_all(&mut *tx).await?;
     for key in ended {
-        sizes::count(&mut tx, key).await?;
+        sizes::count(&mut *tx, key).await?;
     }
     for key in lost_fields {
         sqlx::query("update job_size set fields = 2 where job_id = ?")
@@ -132,32 +128,21 @@ pub(super) async fn copy_the_rest(
         .bind(last)
         .execute(&mut *tx)
         .await?;
-    tx.commit().await
+    change.commit().await.map(drop)
 }
 
 /// Inserts a row as it was read from the same table of another store.
-pub(super) async fn insert(tx: &mut Writing, table: &str, row: &SqliteRow) -> Result<()> {
+pub(super) async fn insert(tx: &mut SqliteConnection, table: &str, row: &SqliteRow) -> Result<()> {
     let names: Vec<&str> = row.columns().iter().map(|column| column.name()).collect();
     let places = vec!["?"; names.len()].join(", ");
     let statement = format!(
         "insert or ignore into {table} ({}) values ({places})",
         names.join(", ")
     );
-    let mut query = sqlx::query(AssertSqlSafe(statement));
-    for column in row.columns() {
-        let value = row.try_get_raw(column.ordinal())?;
-        let kind = match value.is_null() {
-            true => "NULL".to_owned(),
-            false => value.type_info().name().to_owned(),
-        };
-        query = match kind.as_str() {
-            "NULL" => query.bind(None::<i64>),
-            "INTEGER" => query.bind(checksum::decode::<i64>(value)?),
-            "REAL" => query.bind(checksum::decode::<f64>(value)?),
-            "TEXT" => query.bind(checksum::decode::<String>(value)?),
-            _ => query.bind(checksum::decode::<Vec<u8>>(value)?),
-        };
-    }
-    query.execute(&mut **tx).await?;
+    let values = (0..names.len()).map(|place| checksum::value(row, place));
+    let values: Vec<Value> = values.collect::<Result<_>>()?;
+    checksum::bind(sqlx::query(AssertSqlSafe(statement)), values.iter())
+        .execute(tx)
+        .await?;
     Ok(())
 }

@@ -13,16 +13,14 @@ use super::{
     claim, coalescing,
     database::Store,
     error::{Result, StoreError},
-    events, keys, labels, meshes, problems,
-    rows::read,
+    keys, labels, meshes, problems,
+    rows::JobRow,
     submission::{Accepted, MOST_PER_COMMIT, NewJob, Pending, QueueLimits, Submission},
     sweeps,
-    waiting::{Move, Place},
 };
 use crate::{
-    event::Payload,
     failpoint::{self, Point},
-    job::{Cache, Status},
+    job::Cache,
 };
 
 impl Store {
@@ -125,7 +123,7 @@ async fn accept(
     for new in &jobs {
         let key = insert(change, &owner, new, limits).await?;
         if let (Some(sweep), Some(members)) = (sweep_key, groups.next()) {
-            sweeps::insert_members(change.sql(), sweep, key, members).await?;
+            sweeps::insert_members(change.sql().await?, sweep, key, members).await?;
         }
         inserted.push(key);
     }
@@ -138,7 +136,7 @@ async fn accept(
     };
     let mut accepted = vec![];
     for key in inserted {
-        accepted.push(read(change.sql(), key).await?);
+        accepted.push(change.read(key).await?);
     }
     if accepted
         .iter()
@@ -185,9 +183,8 @@ pub(super) async fn insert(
         Cache::Refresh | Cache::Off => None,
     };
     let coalesced_into = match (&answer, new.cache) {
-        (Some(source), _) => Some(source.key), // until it is answered below
         (None, Cache::Use) => coalescing::primary_for(change, owner, new).await?,
-        (None, _) => None,
+        _ => None,
     };
     if answer.is_none() && change.waiting() >= limits.queued as usize {
         return Err(StoreError::QueueFull);
@@ -199,49 +196,21 @@ pub(super) async fn insert(
         return Err(StoreError::OwnerQueueFull);
     }
     if answer.is_none() {
-        meshes::require(change.sql(), new.mesh.as_deref()).await?;
+        meshes::require(change.sql().await?, new.mesh.as_deref()).await?;
     }
-    problems::write(change.sql(), new).await?;
+    problems::write(change.sql().await?, new).await?;
     let now = change.now();
-    let expires_at = now.after_s(new.limits.queue_ttl_s);
-    let key: i64 = sqlx::query_scalar(
-        "insert into job (uuid, status, name, title, labels, priority, input_hash, created_at, payload, parent,
-                          cache, coalesced_into, timeout_s, queue_ttl_s, expires_at, owner, sweep)
-         values (?, 'queued', ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) returning id",
-    )
-    .bind(new.id.unwrap_or_default().0.to_string())
-    .bind(&new.name)
-    .bind(&new.title)
-    .bind(serde_json::to_string(&new.labels)?)
-    .bind(new.priority)
-    .bind(&new.input_hash)
-    .bind(now.micros())
-    .bind(&new.payload)
-    .bind(new.parent.map(|id| id.0.to_string()))
-    .bind(<&str>::from(new.cache))
-    .bind(coalesced_into)
-    .bind(new.limits.timeout_s)
-    .bind(new.limits.queue_ttl_s)
-    .bind(expires_at.micros())
-    .bind(owner)
-    .bind(new.sweep.map(|id| id.0.to_string()))
-    .fetch_one(change.sql())
-    .await?;
-    change.touched(key);
-    labels::write(change, key, owner, now, &new.labels).await?;
-    let queued = [(now, Payload::status(Status::Queued))];
-    events::append(change.sql(), key, 0, &queued).await?;
-    change.move_job(match coalesced_into {
-        None => Move::Enter(Place {
-            priority: new.priority,
-            owner: owner.into(),
-            key,
-        }),
-        Some(_) => Move::Attach(owner.into()),
-    });
+    let key = change
+        .insert(|key| {
+            let mut row = JobRow::accepted(key, owner, new, now);
+            row.job.coalesced_into = coalesced_into;
+            row
+        })
+        .await?;
+    let job = change.read(key).await?;
+    labels::write(change, &job).await?;
     if let Some(source) = answer {
-        let job = read(change.sql(), key).await?;
-        coalescing::answer(change, &job, &source).await?;
+        coalescing::answer(change, key, &source).await?;
     }
     Ok(key)
 }

@@ -373,7 +373,7 @@ impl Store {
 pub(super) async fn insert(change: &mut Change<'_>, owner: &str, new: &NewSweep) -> Result<i64> {
     let now = change.now();
     let members: usize = new.groups.iter().map(Vec::len).sum();
-    let tx = change.sql();
+    let tx = change.sql().await?;
     let key: i64 = sqlx::query_scalar(
         "insert into sweep (uuid, owner, name, labels, paths, created_at, members) values (?, ?, ?, ?, ?, ?, ?) returning id",
     )
@@ -420,7 +420,7 @@ pub(super) async fn insert_members(
 /// Deletes a sweep; false if it has jobs.
 async fn delete(change: &mut Change<'_>, key: i64) -> Result<bool> {
     let now = change.now().micros();
-    let tx = change.sql();
+    let tx = change.sql().await?;
     let left: bool = sqlx::query_scalar(
         "select exists (select 1 from job join sweep on sweep.uuid = job.sweep where sweep.id = ?)",
     )
@@ -449,7 +449,7 @@ async fn delete(change: &mut Change<'_>, key: i64) -> Result<bool> {
 pub(super) async fn remove_without_jobs(change: &mut Change<'_>, id: SweepId) -> Result<bool> {
     let key: Option<i64> = sqlx::query_scalar("select id from sweep where uuid = ?")
         .bind(id.0.to_string())
-        .fetch_optional(change.sql())
+        .fetch_optional(change.sql().await?)
         .await?;
     match key {
         Some(key) => delete(change, key).await,

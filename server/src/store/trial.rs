@@ -5,10 +5,9 @@ use super::{
     end::end,
     error::Result,
     keys,
-    lifecycle::{self, Ending},
     parts::{Part, Parts},
     results,
-    rows::read,
+    rules::Ending,
     submission::{NewJob, QueueLimits, RequestKey},
     submit,
 };
@@ -52,9 +51,9 @@ impl Store {
         let mut change = self.control_change().await?;
         let key = submit::insert(&mut change, "", &job, UNLIMITED).await?;
         keys::remember(&mut change, "", &request, &[key]).await?;
-        let job = read(change.sql(), key).await?;
-        let job = lifecycle::start_attempt(&mut change, &job).await?;
-        results::write_at_end(change.sql(), key, &result).await?;
-        end(&mut change, &job, &ending).await
+        let now = change.now();
+        change.update(key, |row| row.start(now)).await?;
+        results::write_at_end(change.sql().await?, key, &result).await?;
+        end(&mut change, key, &ending).await
     }
 }

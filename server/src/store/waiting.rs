@@ -45,7 +45,7 @@ struct OwnerState {
 }
 
 /// A job in its place in the queue.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Place {
     pub(super) priority: i32,
     pub(super) owner: Owner,
@@ -64,7 +64,7 @@ impl Place {
 }
 
 /// What a transaction changes about the jobs that wait; applied when it is committed.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) enum Move {
     /// A job waits for a worker.
     Enter(Place),
@@ -84,7 +84,7 @@ pub(super) enum Move {
 
 impl Move {
     /// What takes it back.
-    fn inverse(self) -> Move {
+    pub(super) fn inverse(self) -> Move {
         match self {
             Move::Enter(place) => Move::Leave(place),
             Move::Leave(place) => Move::Enter(place),
@@ -249,6 +249,23 @@ impl WaitingJobs {
     /// How many of this owner's jobs run.
     pub(super) fn running(&self, owner: &str) -> usize {
         self.owners.get(owner).map_or(0, |state| state.running)
+    }
+}
+
+#[cfg(test)]
+impl WaitingJobs {
+    /// Fails unless both have the same jobs, whoever had their turn.
+    pub(super) fn assert_same(&self, other: &WaitingJobs) {
+        let busy = |jobs: &WaitingJobs| -> BTreeMap<Owner, (usize, usize)> {
+            let states = jobs.owners.iter();
+            let states = states.map(|(owner, has)| (owner.clone(), (has.running, has.coalesced)));
+            states.filter(|(_, has)| *has != (0, 0)).collect()
+        };
+        assert_eq!(self.rows, other.rows);
+        assert_eq!(
+            (self.count, self.coalesced, busy(self)),
+            (other.count, other.coalesced, busy(other))
+        );
     }
 }
 

@@ -222,6 +222,73 @@ async fn no_column_can_change_unnoticed() {
     assert!(store.health().await.unwrap().damaged > 10);
 }
 
+/// No statement leaves a row without its checksum, and none gives it one later.
+#[tokio::test]
+async fn a_job_without_a_checksum_is_damaged_and_stays_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let mut jobs = vec![];
+    for input in ["1", "2", "3"] {
+        let accepted = store.submit(by("ada", vec![new(input)], None), false).await;
+        jobs.extend(accepted.unwrap().jobs);
+    }
+    let running = store.claim_next().await.unwrap().0.unwrap().job;
+    assert_eq!(running.key, jobs[0].key);
+    let harm = "update job set checksum = null where id < 3";
+    sqlx::query(harm).execute(&store.writer).await.unwrap();
+    let damaged = |told: &StoreError| told.is_damage_of(1) || told.is_damage_of(2);
+    let (key, events) = (running.key, [(crate::time::Time::now(), fake_event())]);
+    let progress = Default::default();
+    let appended = store.append_events(key, 1, &events, &progress).await;
+    assert!(appended.is_err_and(|told| damaged(&told)));
+    let parts = Parts::of_a_summary();
+    let partial = store.write_partial(key, 1, &parts).await;
+    assert!(partial.is_err_and(|told| damaged(&told)));
+    let (ending, last) = (Ending::canceled(), FinalBatch::default());
+    let ended = store.finish(key, 1, &ending, last, None);
+    assert!(ended.await.is_err_and(|told| damaged(&told)));
+    let lost = store.requeue_lost(key, 1, "so").await;
+    assert!(lost.is_err_and(|told| damaged(&told)));
+    let drained = store.requeue_drained(key, 1).await;
+    assert!(drained.is_err_and(|told| damaged(&told)));
+    let edit = Edit {
+        pinned: Some(true),
+        ..Edit::default()
+    };
+    let edited = store.edit(Owners::All, jobs[1].id, &edit, None).await;
+    assert!(edited.is_err_and(|told| damaged(&told)));
+    let canceled = store.request_cancel(2).await;
+    assert!(canceled.is_err_and(|told| damaged(&told)));
+    assert_eq!(store.cancel_queued(&[2]).await.unwrap().done, 0);
+    assert!(store.delete(Owners::All, 2).await.is_err());
+    let found = store.job(Owners::All, jobs[1].id).await;
+    assert!(found.is_err_and(|told| damaged(&told)));
+    // the others go on
+    let next = store.claim_next().await.unwrap().0.unwrap().job;
+    assert_eq!(next.key, jobs[2].key);
+    let left = "select id from job where checksum is null order by id";
+    let left: Vec<i64> = sqlx::query_scalar(left)
+        .fetch_all(&store.reader)
+        .await
+        .unwrap();
+    assert_eq!(left, [1, 2]);
+    assert_eq!(store.health().await.unwrap().damaged, 2);
+    store.close().await;
+    let report = inspect(folder.path(), None).await.unwrap();
+    let told = |key: usize| {
+        let name = jobs[key].id.to_string();
+        report
+            .findings
+            .iter()
+            .any(|line| line.contains(&name) && line.contains("checksum"))
+    };
+    assert!(told(0) && told(1) && !told(2), "{report:?}");
+}
+
+fn fake_event() -> crate::event::Payload {
+    crate::event::Payload::Iteration(crate::fake::timed(1))
+}
+
 #[tokio::test]
 async fn a_damaged_result_answers_no_other_job() {
     let folder = tempfile::tempdir().unwrap();

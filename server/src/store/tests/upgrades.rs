@@ -120,6 +120,45 @@ async fn nothing_of_an_earlier_version_is_removed_before_a_day_has_passed() {
     assert_eq!(late.jobs, 1);
 }
 
+/// Rows of versions that wrote no checksums are given theirs once, whether or not the first start dies before it has done so;
+/// from then on one without a checksum is damaged.
+#[tokio::test]
+async fn jobs_of_a_version_without_checksums_are_given_theirs_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let migrations = ["0001_jobs.sql", "0002_meshes.sql", "0003_job_api.sql"];
+    older_store(folder.path(), &migrations, &BEFORE_OWNERS).await;
+    std::fs::remove_dir_all(folder.path().join("migrations")).unwrap();
+    // the start dies after the last migration
+    let options = SqliteConnectOptions::new().filename(folder.path().join("signorini.db"));
+    let db = SqlitePool::connect_with(options).await.unwrap();
+    migrations::run(&db, folder.path()).await.unwrap();
+    let unsealed = "select count(*) from job where checksum is null";
+    let left: i64 = sqlx::query_scalar(unsealed).fetch_one(&db).await.unwrap();
+    assert_eq!(left, 3);
+    db.close().await;
+    let early = inspect(folder.path(), None).await;
+    assert!(matches!(early, Err(StoreError::Schema(_))), "{early:?}");
+    let store = Store::open(folder.path()).await.unwrap();
+    let sealed: Vec<i64> = sqlx::query_scalar("select checksum from job order by id")
+        .fetch_all(&store.reader)
+        .await
+        .unwrap();
+    assert_eq!(sealed.len(), 3);
+    let harm = "update job set checksum = null where id = 2";
+    sqlx::query(harm).execute(&store.writer).await.unwrap();
+    store.close().await;
+    drop(store);
+    let store = Store::open(folder.path()).await.unwrap();
+    let left: i64 = sqlx::query_scalar(unsealed)
+        .fetch_one(&store.reader)
+        .await
+        .unwrap();
+    assert_eq!(left, 1, "a later start gives none");
+    store.close().await;
+    let report = inspect(folder.path(), None).await.unwrap();
+    assert_eq!((report.jobs, report.intact), (3, 2), "{report:?}");
+}
+
 #[tokio::test]
 async fn a_store_from_before_owners_keeps_its_coalesced_and_its_deleted_jobs() {
     let folder = tempfile::tempdir().unwrap();

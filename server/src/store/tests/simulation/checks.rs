@@ -78,7 +78,8 @@ impl World {
         status.map(|word| word.parse().unwrap())
     }
 
-    /// Checks the jobs, and their new events; `thorough`: all their events.
+    /// Checks the jobs, and their new events; `thorough`: all their events. A row without its checksum, or with another,
+    /// could not be listed.
     pub(super) async fn check(&mut self, thorough: bool) {
         let jobs = self.listed().await;
         let found: Vec<i64> = jobs.iter().map(|job| job.key).collect();
@@ -90,6 +91,8 @@ impl World {
         let ours = self.running.iter().map(|(key, work)| (*key, work.attempt));
         assert_eq!(running, ours.collect::<Vec<_>>(), "attempts that run");
         self.check_queue(&jobs);
+        let stored = self.store.waiting_in_database().await.unwrap();
+        self.store.waiting_jobs().assert_same(&stored);
         for job in &jobs {
             check_job(job, &jobs);
             self.check_end(job);
