@@ -160,7 +160,7 @@ fn mode(raw: Option<&RawValue>, found: &mut Findings) -> Option<Mode> {
 }
 
 /// The violation of a pointer that leads nowhere in the problem.
-pub(super) fn leads_nowhere(path: &Path, nowhere: &Nowhere) -> Violation {
+fn leads_nowhere(path: &Path, nowhere: &Nowhere) -> Violation {
     let Nowhere {
         parent,
         token,

@@ -316,7 +316,7 @@ fn rounded(value: f64) -> f64 {
 }
 
 /// A finite number as JSON: a whole one without a fraction, so that it may be a count.
-pub(super) fn number(value: f64) -> String {
+fn number(value: f64) -> String {
     const EXACT: f64 = 9_007_199_254_740_992.0;
     if value.fract() == 0.0 && value.abs() < EXACT {
         format!("{}", value as i64)
