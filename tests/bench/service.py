@@ -15,12 +15,14 @@ import os
 import pathlib
 import random
 import sqlite3
+import struct
 import subprocess
 import sys
 import tempfile
 import time
 import urllib.parse
 import uuid
+import zlib
 
 TESTS = pathlib.Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(TESTS), str(TESTS / "peers")]
@@ -169,6 +171,15 @@ def submits():
         "the queue", "accepted", "solved meanwhile", "accepted/s", "answer p50, ms", "p99, ms"), rows)
 
 
+def checksum(row):
+    """Of a row, as the service has it: CRC-32 of kind, place, length and bytes of each value that is not null."""
+    pack = {int: lambda value: (b"i", struct.pack("<q", value)), float: lambda value: (b"r", struct.pack("<d", value)),
+            str: lambda value: (b"t", value.encode())}
+    values = [value for column, value in row.items() if column != "checksum"]
+    packed = [(place, *pack[type(value)](value)) for place, value in enumerate(values) if value is not None]
+    return zlib.crc32(b"".join(struct.pack("<cIQ", kind, place, len(body)) + body for place, kind, body in packed))
+
+
 def fill(server, jobs, dice):
     """Rows as the service writes them, straight into its file: copies of two real jobs, one in the queue."""
     database = sqlite3.connect(server.data / "signorini.db")
@@ -206,7 +217,7 @@ def fill(server, jobs, dice):
                 row["expires_at"] = now + 86_400_000_000
             if status != "queued":
                 row.update(started_at=created + 5_000, finished_at=created + dice.randrange(20_000, 60_000_000))
-            yield [row[column] for column in columns]
+            yield [checksum(row) if column == "checksum" else row[column] for column in columns]
 
     database.executemany("insert into job (%s) values (%s)" % (", ".join(columns), ", ".join("?" * len(columns))), rows())
     database.executemany(
