@@ -83,12 +83,15 @@ pub(super) fn pdf(figure: &Document<'_>, fonts: &Fonts, size: Size) -> Result<Ve
     }
     named.finish();
     let mut states = resources.ext_g_states();
-    for thousandths in &page.opacities {
-        let opacity = f32::from(*thousandths) / 1000.0;
-        let mut state = states
-            .insert(Name(opacity_name(*thousandths).as_bytes()))
+    for state in &page.opacities {
+        let opacity = f32::from(state.1) / 1000.0;
+        let mut written = states
+            .insert(Name(opacity_name(*state).as_bytes()))
             .start::<pdf_writer::writers::ExtGraphicsState<'_>>();
-        state.stroking_alpha(opacity).non_stroking_alpha(opacity);
+        match state.0 {
+            'F' => written.non_stroking_alpha(opacity),
+            _ => written.stroking_alpha(opacity),
+        };
     }
     states.finish();
     resources.finish();
@@ -102,8 +105,8 @@ pub(super) fn pdf(figure: &Document<'_>, fonts: &Fonts, size: Size) -> Result<Ve
 }
 
 /// Opacities are graphics states with a name each.
-fn opacity_name(thousandths: u16) -> String {
-    format!("A{thousandths}")
+fn opacity_name((what, thousandths): (char, u16)) -> String {
+    format!("{what}{thousandths}")
 }
 
 fn compressed(bytes: &[u8]) -> Result<Vec<u8>, String> {
@@ -195,23 +198,23 @@ impl Part {
 struct Page {
     content: Content,
     parts: [Part; 2],
-    /// Those that there are (thousandths).
-    opacities: BTreeSet<u16>,
+    /// Those that there are (thousandths), of what is filled and of lines.
+    opacities: BTreeSet<(char, u16)>,
     clipped: bool,
 }
 
 impl Page {
-    fn opacity(&mut self, paint: Paint) {
-        let thousandths = (paint.opacity * 1000.0).round() as u16;
-        self.opacities.insert(thousandths);
+    /// Opacity and colour of what is filled (`F`) or of lines (`S`).
+    fn paint(&mut self, what: char, paint: Paint) {
+        let state = (what, (paint.opacity * 1000.0).round() as u16);
+        self.opacities.insert(state);
         self.content
-            .set_parameters(Name(opacity_name(thousandths).as_bytes()));
-    }
-
-    fn fill_colour(&mut self, paint: Paint) {
-        self.opacity(paint);
+            .set_parameters(Name(opacity_name(state).as_bytes()));
         let [r, g, b] = paint.rgb.map(|part| f32::from(part) / 255.0);
-        self.content.set_fill_rgb(r, g, b);
+        match what {
+            'F' => self.content.set_fill_rgb(r, g, b),
+            _ => self.content.set_stroke_rgb(r, g, b),
+        };
     }
 
     fn path(&mut self, path: &Path) {
@@ -247,38 +250,46 @@ impl Page {
 }
 
 impl Canvas for Page {
-    fn fill(&mut self, path: &Path, rule: FillRule, paint: Paint) {
-        self.fill_colour(paint);
+    fn shape(
+        &mut self,
+        path: &Path,
+        inside: Option<(FillRule, Paint)>,
+        line: Option<(Stroke, Paint)>,
+    ) {
+        if let Some((_, paint)) = inside {
+            self.paint('F', paint);
+        }
+        let rule = inside.map(|(rule, _)| rule);
+        let lined = line.is_some();
+        if let Some((stroke, paint)) = line {
+            self.paint('S', paint);
+            self.content
+                .set_line_width(stroke.width)
+                .set_line_cap(match stroke.round_ends {
+                    true => LineCapStyle::RoundCap,
+                    false => LineCapStyle::ButtCap,
+                })
+                .set_line_join(match stroke.round_joins {
+                    true => LineJoinStyle::RoundJoin,
+                    false => LineJoinStyle::MiterJoin,
+                })
+                // as SVG has it
+                .set_miter_limit(4.0)
+                .set_dash_pattern(stroke.dashes, 0.0);
+        }
         self.path(path);
-        match rule {
-            FillRule::EvenOdd => self.content.fill_even_odd(),
-            FillRule::Winding => self.content.fill_nonzero(),
+        match (rule, lined) {
+            (Some(FillRule::EvenOdd), true) => self.content.fill_even_odd_and_stroke(),
+            (Some(FillRule::Winding), true) => self.content.fill_nonzero_and_stroke(),
+            (Some(FillRule::EvenOdd), false) => self.content.fill_even_odd(),
+            (Some(FillRule::Winding), false) => self.content.fill_nonzero(),
+            (None, true) => self.content.stroke(),
+            (None, false) => self.content.end_path(),
         };
     }
 
-    fn stroke(&mut self, path: &Path, stroke: &Stroke, paint: Paint) {
-        self.opacity(paint);
-        let [r, g, b] = paint.rgb.map(|part| f32::from(part) / 255.0);
-        self.content
-            .set_stroke_rgb(r, g, b)
-            .set_line_width(stroke.width)
-            .set_line_cap(match stroke.round_ends {
-                true => LineCapStyle::RoundCap,
-                false => LineCapStyle::ButtCap,
-            })
-            .set_line_join(match stroke.round_joins {
-                true => LineJoinStyle::RoundJoin,
-                false => LineJoinStyle::MiterJoin,
-            })
-            // as SVG has it
-            .set_miter_limit(4.0)
-            .set_dash_pattern(stroke.dashes.iter().copied(), 0.0);
-        self.path(path);
-        self.content.stroke();
-    }
-
     fn letters(&mut self, line: &Line<'_>, paint: Paint) {
-        self.fill_colour(paint);
+        self.paint('F', paint);
         let ([x, y], [cos, sin]) = (line.start, line.along);
         for letters in line.letters.chunk_by(|a, b| a.font == b.font) {
             let (font, from) = (letters[0].font, letters[0].place * line.size);

@@ -2,7 +2,7 @@
 
 use roxmltree::Document;
 use tiny_skia::{
-    FillRule, LineCap, LineJoin, Mask, Paint as Colour, Path, Pixmap, Rect, StrokeDash, Transform,
+    FillRule, LineCap, LineJoin, Paint as Colour, Path, Pixmap, Rect, StrokeDash, Transform,
 };
 
 use super::MILLIMETRES_PER_INCH;
@@ -12,7 +12,7 @@ use crate::plot::Size;
 
 const DOTS_PER_INCH: f64 = 300.0;
 const LEAST_DOTS_PER_INCH: f64 = 100.0;
-/// Pixels at most: a figure of many panels has fewer to an inch, and with too few it could not be read. Each takes seven bytes
+/// Pixels at most: a figure of many panels has fewer to an inch, and with too few it could not be read. Each takes eight bytes
 /// while it is drawn.
 pub(super) const MOST_PIXELS: f64 = 8e6;
 
@@ -63,8 +63,8 @@ pub(super) fn png(figure: &Document<'_>, fonts: &Fonts, size: Size) -> Result<Ve
 
 struct Pixels<'a> {
     pixels: Pixmap,
-    /// Where it can be drawn on, pixel by pixel.
-    clip: Option<Mask>,
+    /// What was drawn before, and the rectangle that alone is drawn on now (units of the drawing).
+    clip: Option<(Pixmap, [f32; 4])>,
     /// From the units of the drawing to pixels.
     scale: Transform,
     fonts: &'a Fonts,
@@ -78,12 +78,19 @@ fn colour(paint: Paint) -> Colour<'static> {
 }
 
 impl Canvas for Pixels<'_> {
-    fn fill(&mut self, path: &Path, rule: FillRule, paint: Paint) {
-        let (paint, clip) = (colour(paint), self.clip.as_ref());
-        self.pixels.fill_path(path, &paint, rule, self.scale, clip);
-    }
-
-    fn stroke(&mut self, path: &Path, stroke: &Stroke, paint: Paint) {
+    fn shape(
+        &mut self,
+        path: &Path,
+        inside: Option<(FillRule, Paint)>,
+        line: Option<(Stroke, Paint)>,
+    ) {
+        if let Some((rule, paint)) = inside {
+            self.pixels
+                .fill_path(path, &colour(paint), rule, self.scale, None);
+        }
+        let Some((stroke, paint)) = line else {
+            return;
+        };
         let stroke = tiny_skia::Stroke {
             width: stroke.width,
             line_cap: match stroke.round_ends {
@@ -94,12 +101,11 @@ impl Canvas for Pixels<'_> {
                 true => LineJoin::Round,
                 false => LineJoin::Miter,
             },
-            dash: StrokeDash::new(stroke.dashes.clone(), 0.0),
+            dash: StrokeDash::new(stroke.dashes, 0.0),
             ..tiny_skia::Stroke::default()
         };
-        let (paint, clip) = (colour(paint), self.clip.as_ref());
         self.pixels
-            .stroke_path(path, &paint, &stroke, self.scale, clip);
+            .stroke_path(path, &colour(paint), &stroke, self.scale, None);
     }
 
     fn letters(&mut self, line: &Line<'_>, paint: Paint) {
@@ -107,16 +113,40 @@ impl Canvas for Pixels<'_> {
             .fonts
             .outlines(line.letters, line.size, line.start, line.along);
         if let Some(path) = outlines {
-            self.fill(&path, FillRule::Winding, paint);
+            self.shape(&path, Some((FillRule::Winding, paint)), None);
         }
     }
 
     fn clip(&mut self, to: Option<Rect>) {
-        self.clip = to.and_then(|rect| {
-            let mut mask = Mask::new(self.pixels.width(), self.pixels.height())?;
-            let path = tiny_skia::PathBuilder::from_rect(rect);
-            mask.fill_path(&path, FillRule::Winding, true, self.scale);
-            Some(mask)
+        if let Some((before, inside)) = self.clip.take() {
+            self.restore(&before, inside);
+        }
+        self.clip = to.map(|rect| {
+            let inside = [rect.left(), rect.top(), rect.right(), rect.bottom()];
+            (self.pixels.clone(), inside)
         });
+    }
+}
+
+impl Pixels<'_> {
+    /// Outside of a rectangle (left, top, right, bottom) the pixels are again what they were: a mask while drawing would
+    /// shift the colours where shapes touch.
+    fn restore(&mut self, before: &Pixmap, inside: [f32; 4]) {
+        let width = self.pixels.width() as usize;
+        let scales = [self.scale.sx, self.scale.sy, self.scale.sx, self.scale.sy];
+        let [left, top, right, bottom] =
+            [0, 1, 2, 3].map(|side| (inside[side] * scales[side]).round().max(0.0) as usize);
+        let right = right.min(width);
+        let left = left.min(right);
+        let rows = self.pixels.data_mut().chunks_exact_mut(4 * width);
+        let rows = rows.zip(before.data().chunks_exact(4 * width));
+        for (row, (now, before)) in rows.enumerate() {
+            if (top..bottom).contains(&row) {
+                now[..4 * left].copy_from_slice(&before[..4 * left]);
+                now[4 * right..].copy_from_slice(&before[4 * right..]);
+            } else {
+                now.copy_from_slice(before);
+            }
+        }
     }
 }

@@ -8,10 +8,13 @@ use super::letters::{Fonts, Letter};
 
 /// What a figure is drawn on. Places and lengths are in units of the drawing, y is down.
 pub(super) trait Canvas {
-    /// The inside of a path.
-    fn fill(&mut self, path: &Path, rule: FillRule, paint: Paint);
-    /// A line along a path.
-    fn stroke(&mut self, path: &Path, stroke: &Stroke, paint: Paint);
+    /// The inside of a path, and a line along it.
+    fn shape(
+        &mut self,
+        path: &Path,
+        inside: Option<(FillRule, Paint)>,
+        line: Option<(Stroke, Paint)>,
+    );
     /// Letters on a line.
     fn letters(&mut self, line: &Line<'_>, paint: Paint);
     /// What follows is seen inside of this alone; everywhere with `None`.
@@ -93,22 +96,24 @@ fn shape(node: Node<'_, '_>, from: [f32; 2], canvas: &mut impl Canvas) -> Result
     let Some(path) = outline(node, from)? else {
         return Ok(());
     };
-    if let Some(paint) = paint(node, "fill")? {
-        let rule = match node.attribute("fill-rule") {
-            Some("evenodd") => FillRule::EvenOdd,
-            _ => FillRule::Winding,
-        };
-        canvas.fill(&path, rule, paint);
-    }
-    if let Some(paint) = paint(node, "stroke")? {
-        let stroke = Stroke {
-            width: inherited(node, "stroke-width").map_or(Ok(1.0), number)?,
-            round_ends: inherited(node, "stroke-linecap") == Some("round"),
-            round_joins: inherited(node, "stroke-linejoin") == Some("round"),
-            dashes: inherited(node, "stroke-dasharray").map_or(Ok(vec![]), numbers)?,
-        };
-        canvas.stroke(&path, &stroke, paint);
-    }
+    let rule = match node.attribute("fill-rule") {
+        Some("evenodd") => FillRule::EvenOdd,
+        _ => FillRule::Winding,
+    };
+    let inside = paint(node, "fill")?.map(|paint| (rule, paint));
+    let line = match paint(node, "stroke")? {
+        None => None,
+        Some(paint) => {
+            let stroke = Stroke {
+                width: inherited(node, "stroke-width").map_or(Ok(1.0), number)?,
+                round_ends: inherited(node, "stroke-linecap") == Some("round"),
+                round_joins: inherited(node, "stroke-linejoin") == Some("round"),
+                dashes: inherited(node, "stroke-dasharray").map_or(Ok(vec![]), numbers)?,
+            };
+            Some((stroke, paint))
+        }
+    };
+    canvas.shape(&path, inside, line);
     Ok(())
 }
 
@@ -341,19 +346,22 @@ mod tests {
     struct Said(Vec<String>);
 
     impl Canvas for Said {
-        fn fill(&mut self, path: &Path, _: FillRule, paint: Paint) {
-            let b = path.bounds();
-            let corners = [b.left(), b.top(), b.right(), b.bottom()];
-            self.0.push(format!(
-                "fill {corners:?} {:?} {}",
-                paint.rgb, paint.opacity
-            ));
-        }
-
-        fn stroke(&mut self, _: &Path, stroke: &Stroke, _: Paint) {
-            let Stroke { width, dashes, .. } = stroke;
-            self.0
-                .push(format!("stroke {width} {} {dashes:?}", stroke.round_joins));
+        fn shape(
+            &mut self,
+            path: &Path,
+            inside: Option<(FillRule, Paint)>,
+            line: Option<(Stroke, Paint)>,
+        ) {
+            if let Some((_, Paint { rgb, opacity })) = inside {
+                let b = path.bounds();
+                let corners = [b.left(), b.top(), b.right(), b.bottom()];
+                self.0.push(format!("fill {corners:?} {rgb:?} {opacity}"));
+            }
+            if let Some((stroke, _)) = line {
+                let (width, dashes) = (stroke.width, stroke.dashes);
+                self.0
+                    .push(format!("stroke {width} {} {dashes:?}", stroke.round_joins));
+            }
         }
 
         fn letters(&mut self, line: &Line<'_>, _: Paint) {
