@@ -19,7 +19,8 @@
 //! | editing a job | `edit` |
 //! | deleting a job | `delete` |
 //! | the life of a job: claimed, ended, requeued | `claim`, `end`, `requeue` |
-//! | the life of a job: every change of status | `lifecycle` |
+//! | the row of a job; how it may change, and what follows | `rows`, `rules` |
+//! | the end of a job | `lifecycle` |
 //! | a transaction of the writer and what follows its commit: the mirror of the queue, watchers, the log line of a job's end | `change` |
 //! | whose turn it is | `waiting` |
 //! | positions in the queue | `positions` |
