@@ -44,6 +44,11 @@ impl Size {
             Size::Slide => 254.0,
         }
     }
+
+    /// Width on paper, in inches.
+    pub(crate) fn inches(self) -> f64 {
+        self.millimetres() / 25.4
+    }
 }
 
 /// How a figure is drawn.

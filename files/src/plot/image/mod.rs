@@ -25,7 +25,6 @@ pub enum Image {
     Pdf,
 }
 
-const MILLIMETRES_PER_INCH: f64 = 25.4;
 /// Largest SVG that is converted (bytes): what is made of it while it is drawn takes several times as much.
 const LARGEST: usize = 4 << 20;
 

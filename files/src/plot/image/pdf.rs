@@ -14,7 +14,6 @@ use roxmltree::Document;
 use subsetter::GlyphRemapper;
 use tiny_skia::{FillRule, Path, PathSegment, Point, Rect};
 
-use super::MILLIMETRES_PER_INCH;
 use super::letters::{Font, Fonts};
 use super::svg::{self, Canvas, Line, Paint, Stroke};
 use crate::plot::Size;
@@ -36,7 +35,7 @@ const NUMBERING: SystemInfo<'static> = SystemInfo {
 /// The figure as PDF of its size on paper.
 pub(super) fn pdf(figure: &Document<'_>, fonts: &Fonts, size: Size) -> Result<Vec<u8>, String> {
     let [wide, high] = svg::size(figure)?;
-    let width = (size.millimetres() / MILLIMETRES_PER_INCH * POINTS_PER_INCH) as f32;
+    let width = (size.inches() * POINTS_PER_INCH) as f32;
     let scale = width / wide;
     let height = high * scale;
     if height > HIGHEST {

@@ -5,7 +5,6 @@ use tiny_skia::{
     FillRule, LineCap, LineJoin, Paint as Colour, Path, Pixmap, Rect, StrokeDash, Transform,
 };
 
-use super::MILLIMETRES_PER_INCH;
 use super::letters::Fonts;
 use super::svg::{self, Canvas, Line, Paint, Stroke};
 use crate::plot::Size;
@@ -19,7 +18,7 @@ pub(super) const MOST_PIXELS: f64 = 8e6;
 /// The figure as PNG of its size on paper.
 pub(super) fn png(figure: &Document<'_>, fonts: &Fonts, size: Size) -> Result<Vec<u8>, String> {
     let [width, height] = svg::size(figure)?.map(f64::from);
-    let wanted = size.millimetres() / MILLIMETRES_PER_INCH * DOTS_PER_INCH / width;
+    let wanted = size.inches() * DOTS_PER_INCH / width;
     let scale = wanted.min((MOST_PIXELS / (width * height)).sqrt());
     if scale < wanted * LEAST_DOTS_PER_INCH / DOTS_PER_INCH {
         return Err("it is too high for pixels that could be read: ask for .svg".to_owned());
