@@ -46,7 +46,7 @@ impl Size {
     }
 
     /// Width on paper, in inches.
-    pub(crate) fn inches(self) -> f64 {
+    pub(super) fn inches(self) -> f64 {
         self.millimetres() / 25.4
     }
 }

@@ -10,9 +10,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::{
     change::Change,
     database::Store,
+    end_job::end_job,
     error::{Result, StoreError},
     intact::{self, WHOLE},
-    lifecycle, results,
+    results,
     rows::{JobRow, from_row},
     rules::Ending,
     sizes,
@@ -254,5 +255,5 @@ pub(super) async fn answer(change: &mut Change<'_>, key: i64, source: &Job) -> R
         // pieces that an earlier attempt had written when it was interrupted
         results::remove(change.sql().await?, key).await?;
     }
-    lifecycle::end_job(change, key, &Ending::like(source)).await
+    end_job(change, key, &Ending::like(source)).await
 }

@@ -9,9 +9,9 @@ use super::{
     change::Change,
     coalescing,
     database::Store,
+    end_job::end_job,
     error::{Result, StoreError},
     events::FinalBatch,
-    lifecycle,
     parts::Parts,
     results,
     rows::JobRow,
@@ -186,6 +186,6 @@ pub(super) const EXPIRED: &str = "select id from job indexed by job_expiry
 
 /// Ends a job, and the jobs coalesced into it or replaces it by the first of them.
 pub(super) async fn end(change: &mut Change<'_>, key: i64, ending: &Ending) -> Result<()> {
-    lifecycle::end_job(change, key, ending).await?;
+    end_job(change, key, ending).await?;
     coalescing::end_coalesced(change, key).await
 }

@@ -20,7 +20,7 @@
 //! | deleting a job | `delete` |
 //! | the life of a job: claimed, ended, requeued | `claim`, `end`, `requeue` |
 //! | the row of a job; how it may change, and what follows | `rows`, `rules` |
-//! | the end of a job | `lifecycle` |
+//! | the end of one job, with all that belongs to it | `end_job` |
 //! | a transaction of the writer and what follows its commit: the mirror of the queue, watchers, the log line of a job's end | `change` |
 //! | whose turn it is | `waiting` |
 //! | positions in the queue | `positions` |
@@ -98,11 +98,11 @@ mod problems;
 mod results;
 mod sizes;
 
-// Its lifecycle: its end; coalesced with others of the same input; claimed, ended, requeued.
+// Its end; coalesced with others of the same input; claimed, ended, requeued.
 mod claim;
 mod coalescing;
 mod end;
-mod lifecycle;
+mod end_job;
 mod requeue;
 
 // Sweeps, which are solved by jobs.

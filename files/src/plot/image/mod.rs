@@ -34,9 +34,11 @@ const LARGEST: usize = 4 << 20;
 ///
 /// The reason in words, if the SVG cannot be read or drawn.
 pub fn write(svg: String, size: Size, image: Image) -> Result<Vec<u8>, String> {
-    if image == Image::Svg {
-        return Ok(svg.into_bytes());
-    }
+    let draw = match image {
+        Image::Svg => return Ok(svg.into_bytes()),
+        Image::Png => pixels::png,
+        Image::Pdf => pdf::pdf,
+    };
     if svg.len() > LARGEST {
         return Err(format!(
             "it is too large to be converted ({} MB of SVG, at most {}): ask for .svg",
@@ -45,11 +47,7 @@ pub fn write(svg: String, size: Size, image: Image) -> Result<Vec<u8>, String> {
         ));
     }
     let figure = Document::parse(&svg).map_err(|error| error.to_string())?;
-    let fonts = Fonts::new()?;
-    match image {
-        Image::Pdf => pdf::pdf(&figure, &fonts, size),
-        Image::Png | Image::Svg => pixels::png(&figure, &fonts, size),
-    }
+    draw(&figure, &Fonts::new()?, size)
 }
 
 #[cfg(test)]
