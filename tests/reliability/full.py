@@ -38,7 +38,7 @@ class Volume(Attacked):
         self.wrapper = [*enter, str(self.keeper.pid)]
 
     def inside(self):
-        return pathlib.Path("/proc/%d/root%s" % (self.process.pid, self.data))
+        return pathlib.Path("/proc/%d/root%s" % (self.keeper.pid, self.data))
 
     def fill(self):
         """To the last byte; the server's own files stay."""
@@ -84,11 +84,10 @@ def one_round(server):
     refuse(server)
     with Bystander(server):
         control(server, ended, running, queued)
-    server.fill()
-    time.sleep(1)
     # the first start must not use up what the second needs
     for start in ("a start", "a second start"):
         server.stop()
+        server.fill()  # what the write-ahead log has given back
         server.start()
         equal(server.call("GET", "/readyz").body.startswith(b"degraded"), True, "readiness of %s on a full disk" % start)
     equal(server.json("/v1/jobs/" + queued[1])["status"], "queued", "a job that waits, after a start on a full disk")
@@ -184,10 +183,13 @@ class Meshes:
 
     def fill(self):
         self.number += 1
-        answer = self.server.call("POST", "/v1/meshes", mesh(self.number), content_type="application/octet-stream")
-        check(answer.status in (201, 507), "an upload to a disk that fills: %r" % answer)
-        if answer.status == 201:
-            self.hashes.append(answer.json()["hash"])
+        # where no large file fits any more the disk is not full yet
+        for lines in (60, 10):
+            answer = self.server.call("POST", "/v1/meshes", mesh(self.number, lines), content_type="application/octet-stream")
+            check(answer.status in (201, 507), "an upload to a disk that fills: %r" % answer)
+            if answer.status == 201:
+                self.hashes.append(answer.json()["hash"])
+                break
         return answer.status
 
     def remove(self):

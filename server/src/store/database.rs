@@ -147,6 +147,8 @@ impl Store {
     ) -> Result<(Store, mpsc::Receiver<Pending>)> {
         let mut folder = Folder::lock(path)?;
         folder.is_complete()?;
+        // before SQLite opens the database, for which it needs space even to read
+        let reserve = Reserve::new(path);
         let known = progress::read(path)?;
         let database = folder.database();
         let options = SqliteConnectOptions::new()
@@ -158,7 +160,6 @@ impl Store {
         }
         folder.prepare()?;
         folder.tighten();
-        let reserve = Reserve::new(path);
         let identity = Identity::of(&folder)?;
         let writing = options
             .clone()

@@ -35,7 +35,7 @@ pub(super) struct Reserve {
 }
 
 impl Reserve {
-    /// Takes the space, if there is some; if not, frees what was kept for this start.
+    /// Takes the space, if there is some; if not, or if nothing else is left, frees what was kept for this start.
     pub(super) fn new(folder: &Path) -> Reserve {
         let reserve = Reserve {
             path: folder.join(FILE),
@@ -44,6 +44,8 @@ impl Reserve {
         };
         if !reserve.retake() {
             let _ = fs::remove_file(&reserve.path); // the watch tells that there is no space
+        } else if reserve.is_disk_full() {
+            reserve.release(); // it was taken by the last run, and others have taken what was left
         }
         reserve
     }
