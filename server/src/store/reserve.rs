@@ -105,10 +105,13 @@ impl Reserve {
         }
     }
 
-    /// Takes what the next start needs, if there is room: this one may have needed what was there.
+    /// Takes what the next start needs, or as much of it as there is: this start may have used some of what was there.
     pub(super) fn keep_for_a_start(&self) {
-        if let Err(error) = allocate(&self.path, FOR_A_START) {
-            tracing::debug!(%error, "{}: {error}", self.path.display());
+        for part in [1, 2, 4, 8] {
+            match allocate(&self.path, FOR_A_START / part) {
+                Ok(()) => return,
+                Err(error) => tracing::debug!(%error, "{}: {error}", self.path.display()),
+            }
         }
     }
 }
