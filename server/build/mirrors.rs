@@ -101,7 +101,7 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     // jobs
     fields("Limits", "job::Limits").defaulted(),
     names("Cache", "job::Cache").defaulted(),
-    fields("Job", "job::Job").answer().ours(&["key: _", "result_key: _", "coalesced_into: _", "cache: _", "links: _"]),
+    fields("Job", "job::Job").answer().ours(&["key: _", "mesh: _", "memory_bytes: _", "coalesced_into: _", "cache: _", "links: _"]),
     names("Status", "job::Status"),
     names("ResultAvailable", "job::ResultAvailable").answer(),
     fields("QueuePosition", "job::QueuePosition").answer(),

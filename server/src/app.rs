@@ -113,11 +113,11 @@ fn worker_process() -> Command {
 /// jobs the queue requeues later.
 async fn clean_up(store: &Store) -> store::Result<()> {
     store.requeue_interrupted().await?;
-    let orphans = store.remove_orphaned_mesh_pieces().await?;
-    if orphans > 0 {
+    let pieces = store.discard_unattached().await?;
+    if pieces > 0 {
         info!(
-            orphans,
-            "{orphans} pieces of meshes from interrupted uploads were removed"
+            pieces,
+            "{pieces} pieces of meshes and results were removed, which were being written when the service ended"
         );
     }
     Ok(())

@@ -24,9 +24,12 @@ pub struct Job {
     /// The store's own number, in order of arrival; never shown.
     #[serde(skip)]
     pub key: i64,
-    /// The key under which the store keeps its result.
+    /// The stored mesh that its problem names.
     #[serde(skip)]
-    pub result_key: i64,
+    pub mesh: Option<String>,
+    /// Memory that it is estimated to need (bytes); unknown for those of early versions.
+    #[serde(skip)]
+    pub memory_bytes: Option<u64>,
     /// The key of the job that it is coalesced into: it is not solved itself, but ends with the result of that job.
     #[serde(skip)]
     pub coalesced_into: Option<i64>,

@@ -200,11 +200,11 @@ def taken_away():
 
 
 def damaged_table(server, folder):
-    """The database is damaged where results are stored: a job is solved, and its end cannot be stored."""
+    """The database is damaged where sizes of jobs are stored: a job is solved, and its end cannot be stored."""
     data = crash(server, folder)
     with sqlite3.connect(data / "signorini.db") as connection:
         connection.execute("pragma wal_checkpoint(truncate)")
-        place = "select rootpage - 1, page_size from sqlite_schema, pragma_page_size where name = 'result_part'"
+        place = "select rootpage - 1, page_size from sqlite_schema, pragma_page_size where name = 'job_size'"
         (page, size), = connection.execute(place)
     connection.close()
     with (data / "signorini.db").open("r+b") as file:

@@ -28,6 +28,7 @@ from outside import BINARY, TOP, Server, submission, talkative
 
 SEED = next((int(word) for word in sys.argv[1:] if word.isdigit()), random.randrange(1 << 32))
 STEPS = sorted((TOP / "migrations").glob("*.sql"))
+VERSIONS = [int(step.stem[:4]) for step in STEPS]
 EXAMPLES = ("rectangular_punch", "cylinder", "annular_punch", "cylinder_on_end", "sheet")
 MESH = (TOP / "tests/data/gmsh/fillet-mixed-msh41-binary.msh").read_bytes()
 SCHEMA = 6
@@ -36,8 +37,9 @@ KILLS = 400 if SOAK else 5
 OLD_NAMES = {("job", "twin_of"): "coalesced_into"}
 # what a table has that was filled from another one, or belongs to the new store alone
 NOT_COPIED = ("_sqlx_migrations", "sqlite_sequence", "progress", "owner_size")
-# the first version that stores results compactly
-COMPACT = 10
+# the first version that stores results compactly, and the first that has nothing but content by its hash
+COMPACT, CONTENT = 10, 18
+MOVED = ("problem", "result_part", "result_info", "mesh_piece", "sweep_definition", "content", "content_piece", "attachment")
 # the versions that had models
 MODELS = range(12, 14)
 MODEL = {"title": None, "inputs": [["/contacts/0/indentation"]], "outputs": [{"scalars": ["normal_force"]}]}
@@ -103,30 +105,130 @@ def fill(server):
     return jobs, mesh, sweep, gone, canceled, answer.json()["id"]
 
 
-def checksum(texts):
-    """Of a row of texts: CRC-32 of kind, place, length and bytes of each that is not null."""
-    pairs = [(place, text.encode()) for place, text in enumerate(texts) if text is not None]
-    return zlib.crc32(b"".join(struct.pack("<cIQ", b"t", place, len(text)) + text for place, text in pairs))
+def checksum(values):
+    """Of a row: CRC-32 of kind, place, length and bytes of each value that is not null."""
+    kinds = {int: (b"i", lambda value: struct.pack("<q", value)), float: (b"r", lambda value: struct.pack("<d", value)),
+             str: (b"t", str.encode), bytes: (b"b", bytes)}
+    packed = b""
+    for place, value in enumerate(values):
+        if value is not None:
+            kind, pack = kinds[type(value)]
+            packed += struct.pack("<cIQ", kind, place, len(pack(value))) + pack(value)
+    return zlib.crc32(packed)
 
 
-def as_json(store, fields):
-    """Results as versions before COMPACT stored them: as JSON, here without checksums."""
-    key_of = dict(store.execute("select uuid, coalesce(result_job, id) from new.job"))
-    fields = {key_of[job.removeprefix("job_")]: text for job, text in fields.items()}
-    parts = store.execute("select job_id, name, encoding from new.result_info where encoding is not null").fetchall()
-    for job, name, encoding in parts:
-        rows = store.execute("select body from main.result_part where job_id = ? and name = ? order by piece", (job, name))
-        stored = b"".join(body for body, in rows.fetchall())
-        if not stored:
-            continue  # of a job that this version does not have
-        text = zlib.decompress(stored, -15) if encoding == 1 else fields[job]
-        store.execute("delete from main.result_part where job_id = ? and name = ?", (job, name))
-        for place in range(0, len(text), PIECE_BYTES):
-            store.execute("insert into main.result_part (job_id, name, piece, body) values (?, ?, ?, ?)",
-                          (job, name, place // PIECE_BYTES, text[place:place + PIECE_BYTES]))
-    columns = [column for _, column, *_ in store.execute("pragma main.table_info(result_info)")]
-    if "checksum" in columns:
-        store.execute("update main.result_info set checksum = null")
+def attached(store, kind):
+    """What is attached to jobs or meshes of the new store: bytes by number and name."""
+    rows = store.execute("select key, name, body from new.attachment join new.content_piece using (content) "
+                         "where kind = ? order by key, name, piece", (kind,))
+    found = {}
+    for key, name, body in rows:
+        found[key, name] = found.get((key, name), b"") + body
+    return found
+
+
+def parts(result, fields):
+    """The parts of a stored result: name, encoding, size and hash of the JSON, stored bytes."""
+    length, = struct.unpack_from("<I", result, 1)
+    place, body = 9, 9 + length
+
+    def number():
+        nonlocal place
+        value = shift = 0
+        while True:
+            byte = result[place]
+            place += 1
+            value |= (byte & 127) << shift
+            shift += 7
+            if byte < 128:
+                return value
+
+    def text():
+        nonlocal place
+        count = number()
+        place += count
+        return result[place - count:place]
+
+    for _ in range(number()):
+        name, encoding, size, digest, stored = text().decode(), number(), number(), text(), number()
+        yield name, encoding or None, size, digest, fields if name == "fields" else result[body:body + stored]
+        body += stored
+
+
+def insert(store, table, row):
+    """A row, but for what this version of the table does not have."""
+    ours = [column for _, column, *_ in store.execute("pragma main.table_info(%s)" % table)]
+    row = {column: value for column, value in row.items() if column in ours}
+    store.execute("insert into main.%s (%s) values (%s)" % (table, ", ".join(row), ", ".join("?" * len(row))), list(row.values()))
+
+
+def insert_pieces(store, table, start, body):
+    for number, place in enumerate(range(0, len(body), PIECE_BYTES)):
+        row = dict(start, piece=number, body=body[place:place + PIECE_BYTES])
+        insert(store, table, dict(row, checksum=checksum(row.values())))
+
+
+def before_content(store, fields, version):
+    """What versions before CONTENT stored in tables of their own."""
+    tables = [name for name, in store.execute("select name from main.sqlite_schema where type = 'table'")]
+    jobs = {row["id"]: row for row in rows(store, "select * from new.job where id in (select id from main.job)")}
+    own = {row["uuid"]: row["id"] for row in jobs.values() if row["cached_from"] is None}
+    for (key, name), body in attached(store, "job").items():
+        job = jobs.get(key)
+        if job is None:
+            continue  # of a sweep, which this version does not have
+        if name == "problem":
+            problem = [job["input_hash"], body.decode(), job["mesh"], job["memory_bytes"]]
+            columns = "input_hash", "body", "mesh", "memory_bytes"
+            known = store.execute("select 1 from main.problem where input_hash = ?", problem[:1]).fetchone()
+            if known is None:
+                sum_of = problem if version >= 7 else problem[:3]
+                insert(store, "problem", dict(zip(columns, problem), checksum=checksum(sum_of)))
+        elif name == "definition" and "sweep_definition" in tables:
+            sweep, = store.execute("select id from new.sweep where uuid = ?", (job["sweep"],)).fetchone()
+            if store.execute("select 1 from main.sweep_definition where sweep = ?", (sweep,)).fetchone() is None:
+                row = dict(sweep=sweep, body=body.decode())
+                insert(store, "sweep_definition", dict(row, checksum=checksum(row.values())))
+        elif name == "result" and job["cached_from"] is None:
+            old_result(store, job, body, attached(store, "job").get((key, "fields")), fields, version)
+    for mesh in rows(store, "select * from new.mesh") if version >= 2 else ():
+        body = attached(store, "mesh")[mesh["id"], "mesh"]
+        insert_pieces(store, "mesh_piece", {"hash": mesh["hash"]}, body)
+        if version >= 6:
+            store.execute("update main.mesh set pieces = ?", (-(-len(body) // PIECE_BYTES),))
+    if version >= 3:
+        for job in jobs.values():
+            if job["cached_from"] is not None:
+                store.execute("update main.job set result_job = ? where id = ?", (own[job["cached_from"]], job["id"]))
+    if version >= 6:
+        for table in ("job", "mesh"):
+            for row in rows(store, "select * from main." + table):
+                row.pop("checksum")
+                store.execute("update main.%s set checksum = ? where id = ?" % table, (checksum(row.values()), row["id"]))
+
+
+def old_result(store, job, result, columns, fields, version):
+    """A result part by part; before COMPACT as JSON, here without checksums."""
+    for name, encoding, size, digest, stored in parts(result, columns):
+        if name == "history" and job["result_available"] == "partial":
+            continue  # it was that of the events
+        start = {"job_id": job["id"], "name": name}
+        info = dict(start, bytes=size, digest=digest, encoding=encoding, stored_digest=hashlib.sha256(stored).digest())
+        if version >= COMPACT:
+            info["checksum"] = checksum(info.values())
+            insert_pieces(store, "result_part", start, stored)
+        else:
+            text = zlib.decompress(stored, -15) if encoding == 1 else fields["job_" + job["uuid"]]
+            for number, place in enumerate(range(0, len(text), PIECE_BYTES)):
+                insert(store, "result_part", dict(start, piece=number, body=text[place:place + PIECE_BYTES]))
+        if version >= 3:
+            insert(store, "result_info", info)
+
+
+def rows(store, question):
+    found = store.execute(question)
+    names = [column[0] for column in found.description]
+    return [dict(zip(names, row)) for row in found.fetchall()]
 
 
 def older(source, fields, folder, version):
@@ -139,7 +241,9 @@ def older(source, fields, folder, version):
     # as the library writes it
     (create,), = store.execute("select sql from new.sqlite_schema where name = '_sqlx_migrations'")
     store.execute(create)
-    for step in STEPS[:version]:
+    for step in STEPS:
+        if int(step.stem[:4]) > version:
+            continue
         text = step.read_bytes()
         store.executescript(text.decode())
         number, name = step.stem.split("_", 1)
@@ -148,9 +252,9 @@ def older(source, fields, folder, version):
     store.execute("begin")
     tables = [name for name, in store.execute("select name from main.sqlite_schema where type = 'table'")]
     # rows before those that refer to them
-    order = ("problem", "job", "mesh", "mesh_piece", "sweep")
+    order = ("job", "mesh", "sweep", "content")
     for table in sorted(tables, key=lambda name: (name not in order, order.index(name) if name in order else name)):
-        if table in NOT_COPIED or table in ("model", "model_problem"):
+        if table in NOT_COPIED or table in ("model", "model_problem") or (version < CONTENT and table in MOVED):
             continue
         ours = [column for _, column, *_ in store.execute("pragma main.table_info(%s)" % table)]
         theirs = {column for _, column, *_ in store.execute("pragma new.table_info(%s)" % table)}
@@ -158,23 +262,16 @@ def older(source, fields, folder, version):
         pairs = [pair for pair in pairs if pair[1] in theirs]
         # before sweeps, no job was one of them
         where = " where sweep is null" if table == "job" and version < 8 else ""
-        if table in ("event", "result_part", "result_info", "job_label") and version < 8:
-            where = " where abs(job_id) in (select id from new.job where sweep is null)"
+        if table in ("event", "job_label") and version < 8:
+            where = " where job_id in (select id from new.job where sweep is null)"
         store.execute("insert into main.%s (%s) select %s from new.%s%s" % (
             table, ", ".join(old for old, _ in pairs), ", ".join(new for _, new in pairs), table, where))
     if version in MODELS:
         columns = "(id, owner, name, description, created_at, updated_at)"
         store.execute("insert into model %s values (1, 'local', 'punch', ?, 1, 1)" % columns, (json.dumps(MODEL),))
         store.execute("insert into model_problem (model, body) values (1, ?)", (json.dumps(example()),))
-    if version < COMPACT:
-        as_json(store, fields)
-    if 6 <= version < 11:
-        # their checksums are those of rows with warnings
-        store.execute("update main.job set checksum = null where id in (select id from new.job where warnings is not null)")
-    if version == 6:
-        # its checksum was that of the columns of the time
-        for row in store.execute("select input_hash, body, mesh from main.problem").fetchall():
-            store.execute("update main.problem set checksum = ? where input_hash = ?", (checksum(row), row[0]))
+    if version < CONTENT:
+        before_content(store, fields, version)
     if version >= 6:
         (count,), = store.execute("select commits from new.progress")
         store.execute("update main.progress set commits = ?", (count,))
@@ -222,7 +319,7 @@ def compare(server, version, known, before, kept):
 def killed(make, known, before, kept, dice):
     """The upgrade is killed before its n-th write or sync; then it is done, from what that left."""
     kills = 0
-    for version in (1, 5, 8, 12):
+    for version in (1, 5, 8, 12, 15, 17):
         with Faulty() as server:
             server.kill()
             n = 1
@@ -268,7 +365,7 @@ def main():
         def make(data, version):
             older(folder / "new.db", fields, data, version)
 
-        for version in range(1, len(STEPS) + 1):
+        for version in VERSIONS:
             server, made = Server(), folder / ("version %d" % version)
             make(made, version)
             # by way of a backup, which this version makes of it as it is
@@ -280,7 +377,7 @@ def main():
                 server.start()
                 compare(server, version, known, before, kept)
         later = folder / "later"
-        make(later, len(STEPS))
+        make(later, VERSIONS[-1])
         with sqlite3.connect(later / "signorini.db") as store:
             store.execute("insert into _sqlx_migrations (version, description, success, checksum, execution_time) values (99, '', 1, x'00', 0)")
         store.close()

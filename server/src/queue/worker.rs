@@ -206,7 +206,11 @@ async fn end_with_retries(
     parts: Option<Parts>,
 ) {
     let mut backoff = Backoff::default();
-    while let Err(cause) = try_to_end(queue, job, &ending, &last, parts.as_ref()).await {
+    let stored = loop {
+        let cause = match try_to_end(queue, job, &ending, &last, parts.as_ref()).await {
+            Ok(stored) => break stored,
+            Err(cause) => cause,
+        };
         if backoff.gives_up(job.id, job.key, &cause) {
             return;
         }
@@ -214,16 +218,24 @@ async fn end_with_retries(
         if !backoff.wait(&queue.stopping).await {
             return;
         }
+    };
+    // another one has ended it meanwhile
+    if !stored
+        && let Some(parts) = parts
+        && let Err(cause) = queue.store.discard_parts(&parts).await
+    {
+        warn!(%cause, "what was written of the result of job {} stays until the next start: {cause}", job.id);
     }
 }
 
+/// Stores the result and the end of an attempt; false when it is no longer the current one.
 async fn try_to_end(
     queue: &Queue,
     job: &Job,
     ending: &Ending,
     last: &FinalBatch,
     parts: Option<&Parts>,
-) -> crate::store::Result<()> {
+) -> crate::store::Result<bool> {
     let (key, attempt) = (job.key, job.attempt);
     if failpoint::fails(Point::Solved, job.id) {
         return Err(StoreError::Full);
@@ -233,7 +245,7 @@ async fn try_to_end(
         None => true,
     };
     if !current {
-        return Ok(());
+        return Ok(false);
     }
     if failpoint::fails(Point::AlmostStored, job.id) {
         return Err(StoreError::Full);
@@ -241,9 +253,10 @@ async fn try_to_end(
     let changed = queue
         .store
         .finish(key, attempt, ending, last.clone(), parts);
-    if let Some(changed) = changed.await? {
-        failpoint::pass(Point::Unannounced, job.id);
-        queue.announce(&changed);
-    }
-    Ok(())
+    let Some(changed) = changed.await? else {
+        return Ok(false);
+    };
+    failpoint::pass(Point::Unannounced, job.id);
+    queue.announce(&changed);
+    Ok(true)
 }

@@ -16,12 +16,11 @@ use tracing::info;
 
 use super::{
     checksum::Value,
+    content::{self, Holder, name},
     damage::Damages,
     database::{Store, Writing},
     error::{Result, StoreError},
-    events,
-    intact::{self, WHOLE},
-    problems::{self, StoredProblem},
+    events, results,
     rows::{self, JobRow},
     rules::{self, Ended},
     waiting::{Move, Owner},
@@ -307,31 +306,27 @@ impl Change<'_> {
     }
 
     /// The problem of a job. It is read beside the transaction first: a page that cannot be read would end that.
-    pub(super) async fn problem(&mut self, job: &Job) -> Result<StoredProblem> {
-        let mut reader = self.store.reader.acquire().await?;
-        match problems::find(&mut reader, job).await {
-            Ok(Some(found)) => Ok(found),
-            Err(error) if !error.is_damage_of(job.key) => {
-                Err(error.reading(|| problems::record(job)))
-            }
+    pub(super) async fn problem(&mut self, job: &Job) -> Result<String> {
+        let (holder, mut reader) = (Holder::Job(job.key), self.store.reader.acquire().await?);
+        match content::try_to_read_text(&mut reader, holder, name::PROBLEM).await {
             // this transaction may have written it, or mended it
-            Ok(None) | Err(_) => problems::read(&mut self.tx, job).await,
+            Err(error) if error.is_damage_of(job.key) => {
+                content::read_text(&mut self.tx, holder, name::PROBLEM).await
+            }
+            read => read.map_err(|error| error.reading(|| holder.record(name::PROBLEM))),
         }
     }
 
     /// Whether the result of a job that has ended is as it was written; checked once, and beside the transaction, as above.
-    pub(super) async fn has_intact_result(&self, job: &Job) -> Result<bool> {
-        let (store, key) = (self.store, job.result_key);
-        if store.intact.contains(key, WHOLE) {
-            return Ok(true);
-        }
-        let mut reader = store.reader.acquire().await?;
-        let checked = intact::check_stored(&mut reader, key).await;
-        let intact = self.unless_damaged(checked).await?.is_some();
-        if intact {
-            store.intact.insert(key, WHOLE);
-        }
-        Ok(intact)
+    pub(super) async fn has_intact_result(&mut self, job: &Job) -> Result<bool> {
+        // this transaction may have attached it
+        let attached = content::all(self.sql().await?, Holder::Job(job.key)).await;
+        let mut reader = self.store.reader.acquire().await?;
+        let checked = async {
+            results::check_stored(&mut reader, &self.store.intact, job.key, attached?).await
+        };
+        let checked = checked.await;
+        Ok(self.unless_damaged(checked).await?.is_some())
     }
 
     /// This moment, by the clock of the store.

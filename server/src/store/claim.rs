@@ -69,9 +69,9 @@ pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
         {
             continue;
         }
-        let stored = change.problem(&waiting).await;
-        let needed = match &stored {
-            Ok(stored) => stored.memory_bytes,
+        let problem = change.problem(&waiting).await;
+        let needed = match &problem {
+            Ok(_) => waiting.memory_bytes,
             // it is not going to be solved
             Err(_) => Some(0),
         };
@@ -82,8 +82,8 @@ pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
         let now = change.now();
         let job = change.update(waiting.key, |row| row.start(now)).await?;
         change.take_turn(turn);
-        let (problem, mesh) = match stored {
-            Ok(stored) => (stored.body, stored.mesh),
+        let problem = match problem {
+            Ok(problem) => problem,
             // it fails alone, and does not stop the queue
             Err(StoreError::Damaged(damage)) => {
                 end::end(change, job.key, &Ending::damaged(&damage)).await?;
@@ -95,9 +95,9 @@ pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
             return Err(StoreError::Full);
         }
         return Ok(Some(Claim {
+            mesh: job.mesh.clone(),
             job,
             problem,
-            mesh,
             memory,
         }));
     }

@@ -9,10 +9,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
     change::Change,
+    content::{self, Holder},
     database::Store,
     end_job::end_job,
     error::{Result, StoreError},
-    intact::{self, WHOLE},
     results,
     rows::{JobRow, from_row},
     rules::Ending,
@@ -95,12 +95,9 @@ impl Store {
         let Some(Ok(job)) = row.as_ref().map(from_row) else {
             return Ok(());
         };
-        if !self.intact.contains(job.result_key, WHOLE) {
-            let mut connection = self.reader.acquire().await?;
-            intact::check_stored(&mut connection, job.result_key).await?;
-            self.intact.insert(job.result_key, WHOLE);
-        }
-        Ok(())
+        let mut connection = self.reader.acquire().await?;
+        let attached = content::all(&mut connection, Holder::Job(job.key)).await?;
+        results::check_stored(&mut connection, &self.intact, job.key, attached).await
     }
 }
 
@@ -251,9 +248,11 @@ pub(super) async fn answer(change: &mut Change<'_>, key: i64, source: &Job) -> R
     let job = change
         .update(key, |row| row.start_with_answer(source, now))
         .await?;
+    let tx = change.sql().await?;
     if job.attempt > 1 {
-        // pieces that an earlier attempt had written when it was interrupted
-        results::remove(change.sql().await?, key).await?;
+        // that of finished load steps of an earlier attempt
+        results::remove(tx, key).await?;
     }
+    results::share(tx, source.key, key).await?;
     end_job(change, key, &Ending::like(source)).await
 }

@@ -31,7 +31,6 @@ use super::{
     pauses::Pauses,
     progress::{self, Known, LastCommit, Progress},
     reserve::Reserve,
-    rows,
     submission::{Inbox, Pending},
     waiting::WaitingJobs,
 };
@@ -180,7 +179,6 @@ impl Store {
             .connect_with(writing)
             .await?;
         migrations::run(&writer, path).await?;
-        rows::seal_old_rows(&writer).await?;
         if rebuild == Rebuild::IfItCannotGiveBack {
             // before there are connections that read
             compact::enable_giving_back(&mut *writer.acquire().await?, path).await?;

@@ -4,9 +4,7 @@ use std::time::Duration;
 
 use sqlx::SqliteConnection;
 
-use super::{
-    change::Change, damage::Table, database::Store, error::Result, results, sizes, sweeps,
-};
+use super::{change::Change, damage::Table, database::Store, error::Result, sweeps};
 use crate::{
     caller::Owners,
     job::{Job, JobId},
@@ -27,7 +25,7 @@ pub enum Deletion {
 }
 
 impl Store {
-    /// Deletes a job that has ended, with its events, and with its result unless other jobs were answered with it.
+    /// Deletes a job that has ended, with its events and its result. Others that were answered with it keep it.
     pub async fn delete(&self, owners: Owners<'_>, key: i64) -> Result<Deletion> {
         self.control(|| self.try_to_delete(owners, key)).await
     }
@@ -72,35 +70,15 @@ pub(super) async fn delete(
     Ok(Deletion::Deleted)
 }
 
-/// Removes a job that has ended, and what it has in common with others if it was the last of them.
+/// Removes a job that has ended, and the sweep that it was the last job of.
 pub(super) async fn remove(change: &mut Change<'_>, job: &Job) -> Result<()> {
     change.delete(job).await?;
-    let tx = change.sql().await?;
-    sizes::hand_on(tx, job).await?;
-    sqlx::query(
-        "delete from problem where input_hash = ?1 and not exists (select 1 from job where input_hash = ?1)",
-    )
-    .bind(&job.input_hash)
-    .execute(&mut *tx)
-    .await?;
-    remove_unused_result(tx, job.key).await?;
-    if job.result_key != job.key {
-        remove_unused_result(tx, job.result_key).await?;
-    }
     if let Some(sweep) = job.sweep
         && !sweeps::remove_without_jobs(change, sweep).await?
     {
         sweeps::keep_failures(change.sql().await?, job).await?;
     }
     Ok(())
-}
-
-/// Removes the result under this key unless a job has it; its fields unless a job still has them.
-async fn remove_unused_result(tx: &mut SqliteConnection, result: i64) -> Result<()> {
-    match is_in_use(tx, result).await? {
-        true => sizes::remove_unused_fields(tx, result).await,
-        false => results::remove(tx, result).await,
-    }
 }
 
 /// The owner of a job that was deleted recently; `None` if there was no such job.
@@ -126,14 +104,4 @@ pub(super) async fn deleted_id(
         .fetch_optional(connection)
         .await?;
     Ok(uuid.and_then(|text| text.parse().ok()).map(JobId))
-}
-
-/// Whether a job has the result under this key, as its own or from another job.
-async fn is_in_use(tx: &mut SqliteConnection, result: i64) -> Result<bool> {
-    Ok(sqlx::query_scalar(
-        "select exists (select 1 from job where id = ?1) or exists (select 1 from job where result_job = ?1)",
-    )
-    .bind(result)
-    .fetch_one(tx)
-    .await?)
 }

@@ -28,27 +28,9 @@ pub(super) enum Encoding {
     Columns,
 }
 
-impl Encoding {
-    /// As it is stored.
-    pub(super) fn stored(self) -> Option<i64> {
-        match self {
-            Encoding::Plain => None,
-            Encoding::Deflated => Some(1),
-            Encoding::Columns => Some(2),
-        }
-    }
-
-    /// As it was stored; `None` if it is unknown.
-    pub(super) fn from_stored(stored: Option<i64>) -> Option<Encoding> {
-        [Encoding::Plain, Encoding::Deflated, Encoding::Columns]
-            .into_iter()
-            .find(|encoding| encoding.stored() == stored)
-    }
-}
-
 /// The content of a part.
 #[derive(Debug)]
-pub(super) enum Content {
+pub(super) enum Decoded {
     /// Its JSON.
     Json(Vec<u8>),
     /// Fields.
@@ -60,7 +42,7 @@ pub(super) fn decoded(
     stored: Vec<u8>,
     encoding: Encoding,
     expected: &PartInfo,
-) -> std::result::Result<(PartInfo, Content), String> {
+) -> std::result::Result<(PartInfo, Decoded), String> {
     let json = match encoding {
         Encoding::Plain => stored,
         Encoding::Deflated => {
@@ -75,10 +57,10 @@ pub(super) fn decoded(
             let json_bytes = usize::try_from(expected.bytes).unwrap_or(usize::MAX);
             let fields = columns::decode(&stored, json_bytes)?;
             let info = info_of_fields(&fields).map_err(|error| error.to_string())?;
-            return Ok((info, Content::Fields(Box::new(fields))));
+            return Ok((info, Decoded::Fields(Box::new(fields))));
         }
     };
-    Ok((info_of_json(&json), Content::Json(json)))
+    Ok((info_of_json(&json), Decoded::Json(json)))
 }
 
 /// The memory that a part of fields takes at most while it is read, in bytes: what is stored, which begins with `first`, and what is
@@ -232,8 +214,8 @@ mod tests {
             let before = held() - stored.capacity() as i64;
             forget_highest();
             let read = match decoded(stored, encoding, &info).unwrap().1 {
-                Content::Fields(fields) => *fields,
-                Content::Json(json) => serde_json::from_slice(&json).unwrap(),
+                Decoded::Fields(fields) => *fields,
+                Decoded::Json(json) => serde_json::from_slice(&json).unwrap(),
             };
             let took = (highest() - before) as usize;
             assert!(took <= most, "{encoding:?}: {took} of {most} bytes");

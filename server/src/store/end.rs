@@ -105,7 +105,7 @@ impl Store {
             return Ok(None);
         }
         if let Some(parts) = result {
-            results::write_at_end(change.sql().await?, key, parts).await?;
+            results::attach(&mut change, key, parts).await?;
         }
         if !last.events.is_empty() {
             change

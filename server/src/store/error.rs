@@ -101,8 +101,7 @@ impl Record {
     /// A record of a job.
     pub(super) fn of_job(key: i64, name: impl Into<String>) -> Record {
         Record {
-            // a partial result is stored under the negative
-            job: Some(key.abs()),
+            job: Some(key),
             name: name.into(),
         }
     }

@@ -1,6 +1,12 @@
 //! The fields of a job, which are most of its result, deleted by themselves.
 
-use super::{change::Change, database::Store, delete::Deletion, error::Result, sizes};
+use super::{
+    change::Change,
+    content::{self, Holder, name},
+    database::Store,
+    delete::Deletion,
+    error::Result,
+};
 use crate::{caller::Owners, job::Job};
 
 impl Store {
@@ -25,12 +31,12 @@ impl Store {
     }
 }
 
-/// Deletes the fields of a job that has ended, unless another job with the same result still has them.
+/// Deletes the fields of a job that has ended. Others with the same result keep them.
 pub(super) async fn remove_fields(change: &mut Change<'_>, job: &Job) -> Result<()> {
     let tx = change.sql().await?;
     sqlx::query("update job_size set fields = 2 where job_id = ? and fields = 1")
         .bind(job.key)
         .execute(&mut *tx)
         .await?;
-    sizes::remove_unused_fields(tx, job.result_key).await
+    content::detach(tx, Holder::Job(job.key), &[name::FIELDS]).await
 }

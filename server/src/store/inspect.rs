@@ -11,14 +11,16 @@ use sqlx::{
 };
 
 use super::{
+    content::{self, Holder, name},
     database::{Store, Writing, compare_with_the_past},
     error::{Record, Result, StoreError},
     events,
     folder::{DATABASE, Folder, unusable},
-    intact, keys, meshes, migrations, problems,
+    keys, meshes, migrations,
     progress::{self, Known},
+    results::StoredResult,
     rows::find,
-    salvage::{copy_job, copy_the_rest, insert, new_store},
+    salvage::{copy_content, copy_job, copy_the_rest, insert, new_store},
     sweeps, tokens,
 };
 use crate::{
@@ -299,11 +301,8 @@ impl Report {
                     let Some(target) = target else { continue };
                     let mut tx = target.begin().await?;
                     insert(&mut tx, "mesh", row).await?;
-                    let pieces = "select * from mesh_piece where hash = ?";
-                    let pieces = sqlx::query(pieces).bind(&hash).fetch_all(&mut *source);
-                    for piece in pieces.await? {
-                        insert(&mut tx, "mesh_piece", &piece).await?;
-                    }
+                    let mesh = Holder::Mesh(row.try_get("id")?);
+                    copy_content(source, &mut tx, mesh).await?;
                     let owners = "select * from mesh_owner where hash = ?";
                     let owners = sqlx::query(owners).bind(&hash).fetch_all(&mut *source);
                     match owners.await.map_err(StoreError::from) {
@@ -354,7 +353,7 @@ impl Report {
 }
 
 impl Report {
-    /// Checks sweeps, their definitions and the rows of their members; they are copied row by row, members by the numbers
+    /// Checks sweeps and the rows of their members; they are copied row by row, members by the numbers
     /// of their jobs.
     async fn check_sweeps(
         &mut self,
@@ -363,13 +362,8 @@ impl Report {
     ) -> Result<()> {
         type Check = fn(&SqliteRow) -> Result<()>;
         let of_sweep: Check = |row| sweeps::intact(row, row.try_get("id")?);
-        let tables: [(&str, &str, Check); 4] = [
+        let tables: [(&str, &str, Check); 3] = [
             ("sweep", "select * from sweep order by id", of_sweep),
-            (
-                "sweep_definition",
-                "select * from sweep_definition",
-                sweeps::check_definition,
-            ),
             (
                 "sweep_member",
                 "select * from sweep_member order by sweep, number",
@@ -456,7 +450,11 @@ async fn name(source: &mut SqliteConnection, key: i64) -> String {
 
 /// An error if the problem, an event or a part of the result of a job is missing or damaged.
 async fn check_parts(source: &mut SqliteConnection, job: &Job) -> Result<()> {
-    problems::read(source, job).await?;
+    let has = Holder::Job(job.key);
+    content::read_text(source, has, name::PROBLEM).await?;
+    if job.sweep.is_some() {
+        content::read_text(source, has, name::DEFINITION).await?;
+    }
     let (mut after, mut ended) = (0, false);
     loop {
         let events = events::read(source, job.key, after, EVENTS_PER_READ).await?;
@@ -472,7 +470,9 @@ async fn check_parts(source: &mut SqliteConnection, job: &Job) -> Result<()> {
     match job.result_available {
         ResultAvailable::None => Ok(()),
         ResultAvailable::Partial | ResultAvailable::Final => {
-            intact::check_result(source, job.result_key).await
+            let missing = || Record::of_job(job.key, "result").damaged("it is missing");
+            let result = StoredResult::of(source, job.key).await?;
+            result.ok_or_else(missing)?.check(source).await
         }
     }
 }

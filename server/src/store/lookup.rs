@@ -1,10 +1,10 @@
 //! One job: found by its public id; details of it by its key.
 
 use super::{
+    content::{self, Holder, name},
     damage::Table,
     database::Store,
     error::Result,
-    problems,
     rows::{find_row, with_id},
 };
 use crate::{
@@ -35,7 +35,7 @@ impl Store {
             let Some((row, _)) = find_row(&mut tx, key).await? else {
                 return Ok(None);
             };
-            let body = problems::read(&mut tx, &row.job).await?.body;
+            let body = content::read_text(&mut tx, Holder::Job(key), name::PROBLEM).await?;
             Ok(Some((row.title, body)))
         };
         self.damages.noting(read).await

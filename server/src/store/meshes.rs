@@ -3,7 +3,8 @@
 use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 
 use super::{
-    checksum::{self, Checksum},
+    checksum,
+    content::{self, Fingerprint, Holder, name},
     damage::Table,
     database::Store,
     error::{Record, Result, StoreError},
@@ -80,33 +81,6 @@ impl Store {
         self.damages.noting(read).await
     }
 
-    /// Writes pieces of a mesh, numbered from `first`. They are used only after `insert_mesh`.
-    pub async fn write_mesh_pieces(
-        &self,
-        hash: &str,
-        first: i64,
-        pieces: &[Vec<u8>],
-    ) -> Result<()> {
-        let write = async {
-            let mut tx = self.begin().await?;
-            for (piece, body) in (first..).zip(pieces) {
-                // the same file may be uploaded twice at once, or again after an interruption: its pieces are the same
-                sqlx::query(
-                    "insert or replace into mesh_piece (hash, piece, body, checksum) values (?, ?, ?, ?)",
-                )
-                .bind(hash)
-                .bind(piece)
-                .bind(body)
-                .bind(piece_checksum(hash, piece, body).stored())
-                .execute(&mut *tx)
-                .await?;
-            }
-            tx.commit().await?;
-            Ok(())
-        };
-        self.writing(write).await
-    }
-
     /// Makes a stored mesh one of this owner's, too; false if it was before. `None`: it is not stored.
     pub async fn own_mesh(&self, owner: &str, hash: &str) -> Result<Option<bool>> {
         let write = async {
@@ -126,30 +100,22 @@ impl Store {
         self.writing(write).await
     }
 
-    /// Completes a mesh with this number of pieces as this owner's; false if it was theirs already. `None`: some pieces
-    /// were removed meanwhile, with an earlier mesh of the same file, and must be written again.
+    /// Completes a mesh, whose body was written before, as this owner's; false if it was theirs already. `None`: some of the body
+    /// was removed meanwhile, with an earlier mesh of the same file, and must be written again.
     pub async fn insert_mesh(
         &self,
         owner: &str,
         info: &MeshInfo,
-        pieces: i64,
+        body: &Fingerprint,
     ) -> Result<Option<bool>> {
         let write = async {
             let mut tx = self.begin().await?;
-            let there: i64 = sqlx::query_scalar("select count(*) from mesh_piece where hash = ?")
-                .bind(&info.hash)
-                .fetch_one(&mut *tx)
-                .await?;
-            if there != pieces {
-                return Ok(None);
-            }
             let key: Option<i64> = sqlx::query_scalar(
-                "insert into mesh (hash, info, created_at, pieces) values (?, ?, ?, ?) on conflict do nothing returning id",
+                "insert into mesh (hash, info, created_at) values (?, ?, ?) on conflict do nothing returning id",
             )
             .bind(&info.hash)
             .bind(serde_json::to_string(info)?)
             .bind(info.created_at.micros())
-            .bind(pieces)
             .fetch_optional(&mut *tx)
             .await?;
             if let Some(key) = key {
@@ -162,6 +128,10 @@ impl Store {
                     .bind(key)
                     .execute(&mut *tx)
                     .await?;
+                let attach = content::attach_written(&mut tx, Holder::Mesh(key), name::MESH, body);
+                if !attach.await? {
+                    return Ok(None);
+                }
             }
             let new = own(&mut tx, owner, &info.hash, info.created_at).await?;
             tx.commit().await?;
@@ -172,8 +142,12 @@ impl Store {
 
     /// The parsed mesh as it was written.
     pub async fn mesh_body(&self, hash: &str) -> Result<Option<Vec<u8>>> {
-        let mut connection = self.reader.acquire().await?;
-        self.damages.noting(read_body(&mut connection, hash)).await
+        let read = async {
+            // one transaction sees one state: a mesh with its body, or no mesh
+            let mut tx = self.reader.begin().await?;
+            read_body(&mut tx, hash).await
+        };
+        self.damages.noting(read).await
     }
 
     /// Removes a mesh of these owners, unless one of their jobs that wait or run needs it. Its content goes with the last
@@ -220,46 +194,15 @@ impl Store {
         if is_needed(&mut tx, None, hash).await? {
             return Ok(Removal::InUse);
         }
-        for statement in [
-            "delete from mesh where hash = ?",
-            "delete from mesh_piece where hash = ?",
-        ] {
-            sqlx::query(statement).bind(hash).execute(&mut *tx).await?;
+        if let Some(key) = key_of(&mut tx, hash).await? {
+            content::detach(&mut tx, Holder::Mesh(key), &[name::MESH]).await?;
         }
+        sqlx::query("delete from mesh where hash = ?")
+            .bind(hash)
+            .execute(&mut *tx)
+            .await?;
         tx.commit().await?;
         Ok(Removal::Removed)
-    }
-
-    /// Removes the pieces of an upload that could not be stored, unless another one has completed the mesh. One that is
-    /// being stored meanwhile notices that they are missing.
-    pub async fn remove_incomplete_mesh(&self, hash: &str) -> Result<()> {
-        self.control(|| async {
-            let mut tx = self.begin_control().await?;
-            let delete = "delete from mesh_piece where hash = ?1 and not exists (select 1 from mesh where hash = ?1)";
-            sqlx::query(delete).bind(hash).execute(&mut *tx).await?;
-            tx.commit().await
-        })
-        .await
-    }
-
-    /// Removes the pieces of uploads that were interrupted.
-    pub async fn remove_orphaned_mesh_pieces(&self) -> Result<u64> {
-        let some: bool = sqlx::query_scalar(
-            "select exists (select 1 from mesh_piece where hash not in (select hash from mesh))",
-        )
-        .fetch_one(&self.reader)
-        .await?;
-        if !some {
-            return Ok(0); // nothing is written: the disk may be full
-        }
-        self.control(|| async {
-            let mut tx = self.begin_control().await?;
-            let delete = "delete from mesh_piece where hash not in (select hash from mesh)";
-            let done = sqlx::query(delete).execute(&mut *tx).await?;
-            tx.commit().await?;
-            Ok(done.rows_affected())
-        })
-        .await
     }
 }
 
@@ -279,46 +222,32 @@ async fn own(tx: &mut SqliteConnection, owner: &str, hash: &str, now: Time) -> R
 /// Whether a job that waits or runs needs the mesh: one of this owner, or any.
 async fn is_needed(tx: &mut SqliteConnection, owner: Option<&str>, hash: &str) -> Result<bool> {
     let needed = sqlx::query_scalar(
-        "select exists (select 1 from problem join job using (input_hash)
-         where problem.mesh = ?1 and job.status in ('queued', 'running') and (?2 is null or job.owner = ?2))",
+        "select exists (select 1 from job indexed by job_by_mesh
+         where mesh = ?1 and status in ('queued', 'running') and (?2 is null or owner = ?2))",
     );
     Ok(needed.bind(hash).bind(owner).fetch_one(tx).await?)
 }
 
-/// How many pieces the mesh has; one of them: its number, its bytes, its checksum.
-type Piece = (Option<i64>, i64, Vec<u8>, Option<i64>);
-
-/// The pieces of a mesh in one, if all are there as they were written.
+/// The body of a mesh as it was written; `None` if it is not stored.
 pub(super) async fn read_body(
     connection: &mut SqliteConnection,
     hash: &str,
 ) -> Result<Option<Vec<u8>>> {
-    // one statement sees one state: a mesh with all its pieces, or no mesh
-    let pieces: Vec<Piece> = sqlx::query_as(
-        "select pieces, piece, body, mesh_piece.checksum from mesh_piece join mesh using (hash)
-         where hash = ? order by piece",
-    )
-    .bind(hash)
-    .fetch_all(&mut *connection)
-    .await
-    .map_err(|error| StoreError::from(error).reading(|| record(hash)))?;
-    if pieces.is_empty() {
-        let row = sqlx::query("select 1 from mesh where hash = ?").bind(hash);
-        return match row.fetch_optional(connection).await? {
-            Some(_) => Err(record(hash).damaged("it has no pieces")),
-            None => Ok(None),
-        };
+    let named = |error: StoreError| error.reading(|| record(hash));
+    let Some(key) = key_of(connection, hash).await.map_err(named)? else {
+        return Ok(None);
+    };
+    let body = content::find(connection, Holder::Mesh(key), name::MESH).await;
+    match body.map_err(named)? {
+        Some(body) => Ok(Some(body.read(connection).await.map_err(named)?)),
+        None => Err(record(hash).damaged("it has no body")),
     }
-    let count = pieces.len() as i64;
-    let mut whole = vec![];
-    for (number, (all, piece, body, checksum)) in (0..).zip(pieces) {
-        if piece != number || all.is_some_and(|all| all != count) {
-            return Err(record(hash).damaged("a piece is missing"));
-        }
-        piece_checksum(hash, piece, &body).verify(checksum, || record(hash))?;
-        whole.extend(body);
-    }
-    Ok(Some(whole))
+}
+
+/// The number of a stored mesh.
+async fn key_of(connection: &mut SqliteConnection, hash: &str) -> Result<Option<i64>> {
+    let key = sqlx::query_scalar("select id from mesh where hash = ?").bind(hash);
+    Ok(key.fetch_optional(connection).await?)
 }
 
 /// A row of the table as the description of a mesh.
@@ -332,10 +261,6 @@ pub(super) fn described(row: &SqliteRow) -> Result<StoredMesh> {
         serde_json::from_str(row.try_get("info")?).map_err(|error| record().damaged(error))?;
     let key = row.try_get("id")?;
     Ok(StoredMesh { key, info })
-}
-
-fn piece_checksum(hash: &str, piece: i64, body: &[u8]) -> Checksum {
-    Checksum::new().text(hash).int(piece).bytes(body)
 }
 
 fn record(hash: &str) -> Record {

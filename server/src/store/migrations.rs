@@ -9,12 +9,12 @@ use sqlx::{
 
 use super::{
     error::{Result, StoreError},
-    model_files, rows,
+    model_files, old_content,
 };
 
 /// Every step, with the name of its file. They are listed here instead of found by `sqlx::migrate!`, which would
 /// compile sqlx and SQLite a second time for the compiler to run; a test compares the list with the folder.
-const STEPS: [(i64, &str, &str); 15] = [
+const STEPS: [(i64, &str, &str); 17] = [
     (1, "jobs", include_str!("../../../migrations/0001_jobs.sql")),
     (
         2,
@@ -86,16 +86,30 @@ const STEPS: [(i64, &str, &str); 15] = [
         "sealed jobs",
         include_str!("../../../migrations/0015_sealed_jobs.sql"),
     ),
+    (
+        17,
+        "content",
+        include_str!("../../../migrations/0017_content.sql"),
+    ),
+    (
+        18,
+        "only content",
+        include_str!("../../../migrations/0018_only_content.sql"),
+    ),
 ];
 
 /// The version of the tables of this program.
 pub(super) fn last_step() -> i64 {
-    STEPS.len() as i64
+    STEPS.last().map_or(0, |(version, ..)| *version)
 }
 
 /// Brings the tables of the store in this folder up to date, and checks that they are those of this version.
 pub(super) async fn run(database: &SqlitePool, folder: &Path) -> Result<()> {
     model_files::write(&mut *database.acquire().await?, folder).await?;
+    if !has_step(&mut *database.acquire().await?, CONTENT + 1).await? {
+        migrator_to(CONTENT).run(database).await?;
+        old_content::move_all(database).await?;
+    }
     migrator().run(database).await?;
     let mut connection = database.acquire().await?;
     let found = schema(&mut connection).await?;
@@ -164,7 +178,7 @@ pub(super) async fn are_current(connection: &mut SqliteConnection) -> Result<()>
     let steps: i64 = sqlx::query_scalar("select count(*) from _sqlx_migrations")
         .fetch_one(&mut *connection)
         .await?;
-    match steps == last_step() && !rows::has_old_rows(connection).await? {
+    match steps == STEPS.len() as i64 {
         true => Ok(()),
         false => Err(StoreError::Schema(
             "the store is of an earlier version of this program: start the service on it once, which brings it up to date".into(),
@@ -181,8 +195,27 @@ async fn schema(connection: &mut SqliteConnection) -> Result<BTreeMap<String, Op
     Ok(all.into_iter().collect())
 }
 
-/// The steps that bring the tables of an older version up to date.
+/// The step after which `old_content` moves what earlier versions stored.
+pub(super) const CONTENT: i64 = 17;
+
+/// Whether the tables have this step.
+async fn has_step(connection: &mut SqliteConnection, version: i64) -> Result<bool> {
+    let any = "select exists (select 1 from sqlite_schema where name = '_sqlx_migrations')";
+    if !sqlx::query_scalar(any).fetch_one(&mut *connection).await? {
+        return Ok(false);
+    }
+    let step = "select exists (select 1 from _sqlx_migrations where version = ?)";
+    let step = sqlx::query_scalar(step).bind(version);
+    Ok(step.fetch_one(connection).await?)
+}
+
+/// All steps: they bring the tables of an older version up to date.
 pub(super) fn migrator() -> Migrator {
+    migrator_to(last_step())
+}
+
+/// The steps up to this one.
+pub(super) fn migrator_to(last: i64) -> Migrator {
     let migration = |(version, description, sql): (i64, &'static str, &'static str)| {
         let description = Cow::Borrowed(description);
         let without_transaction = false;
@@ -194,7 +227,8 @@ pub(super) fn migrator() -> Migrator {
             without_transaction,
         )
     };
-    Migrator::with_migrations(STEPS.map(migration).to_vec())
+    let steps = STEPS.into_iter().filter(|(version, ..)| *version <= last);
+    Migrator::with_migrations(steps.map(migration).collect())
 }
 
 #[cfg(test)]

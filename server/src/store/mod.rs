@@ -28,13 +28,15 @@
 //! | lists of jobs: pages and the indexes they use | `list` |
 //! | lists of jobs: labels | `labels` |
 //! | events of a job | `events` |
-//! | results, which are written in parts, encoded and read | `results`, `parts`, `encoding`, `snapshot` |
+//! | bytes by their hash, and what has them: problems, results, definitions of sweeps, meshes | `content`, `unattached`, `migrations/0017_content.sql` |
+//! | results: their parts, written and read | `results`, `parts`, `encoding`, `snapshot` |
+//! | what earlier versions stored, moved to content | `old_content` |
 //! | sweeps | `sweeps` |
 //! | meshes | `meshes` |
 //! | models of earlier versions, as files | `model_files` |
 //! | tokens | `tokens` |
 //! | what a disk has changed: checksums of rows | `checksum` |
-//! | what a disk has changed: parts of results | `intact` |
+//! | what a disk has changed: content that was found intact | `intact` |
 //! | what a disk has changed: what was found so far | `damage` |
 //! | what a disk has changed: whether the database still takes a job | `trial` |
 //! | what a disk has changed: reading all keys in the background | `scrub` |
@@ -66,8 +68,11 @@ mod encoding;
 mod entries;
 mod error;
 mod filter;
-mod parts;
 mod submission;
+
+// Bytes by their hash, and what has them.
+mod content;
+mod parts;
 
 // The folder and its files; what was found damaged, or intact.
 mod damage;
@@ -89,14 +94,16 @@ mod compact;
 mod database;
 mod migrations;
 mod model_files;
+mod old_content;
 mod pages;
 
-// What belongs to a job: its labels, its events, its result.
+// What belongs to a job: its labels, its events, its problem and result.
 mod events;
 mod labels;
-mod problems;
+mod lookup;
 mod results;
 mod sizes;
+mod unattached;
 
 // Its end; coalesced with others of the same input; claimed, ended, requeued.
 mod claim;
@@ -119,10 +126,9 @@ mod retention;
 mod submit;
 mod trial;
 
-// Read: one job, its queue position, its result; many jobs.
+// Read: its queue position, its result; many jobs.
 mod health;
 mod list;
-mod lookup;
 mod positions;
 mod snapshot;
 
@@ -151,6 +157,7 @@ use self::database::Rebuild;
 pub use self::{
     backup::{Backup, Manifest, back_up},
     complaint::Complaint,
+    content::{Fingerprint, PIECE_BYTES, PIECES_PER_COMMIT},
     database::Store,
     database::with_advice,
     delete::Deletion,
@@ -164,7 +171,7 @@ pub use self::{
     health::Health,
     inspect::{Report, inspect},
     meshes::{Removal, StoredMesh},
-    parts::{PIECE_BYTES, PIECES_PER_COMMIT, Part, Parts, ProfilePoints},
+    parts::{Part, Parts, ProfilePoints},
     progress::accept,
     restore::{Restored, restore},
     retention::{Retention, Retired, keep_within},

@@ -1,25 +1,40 @@
-//! The stored form of a result: named parts, each in pieces.
+//! The stored form of a result: named parts behind an index of them, and the fields by themselves.
+//!
+//! The parts are one content ([`name::RESULT`]), so that a job whose input has a result gets all of it by one row: a version,
+//! length and checksum of the index, the index, the parts one after the other. The fields, which can be deleted alone, are another
+//! ([`name::FIELDS`]); the index says how they are encoded.
+//!
+//! [`name::RESULT`]: super::content::name::RESULT
+//! [`name::FIELDS`]: super::content::name::FIELDS
 
-use std::collections::BTreeMap;
+use std::{borrow::Cow, collections::BTreeMap};
 
 use files::columns;
 use serde::{Deserialize, Serialize};
 use solver::solution::{ContactProfile, Fields};
 
-use super::encoding::{
-    Encoding, PartInfo, deflated, deflated_json, digest, info_of_fields, info_of_json,
+use super::{
+    content::{Fingerprint, NewContent, name},
+    encoding::{Encoding, PartInfo, deflated, deflated_json, info_of_fields, info_of_json},
 };
 use crate::run::{Document, Step};
 
-/// Bytes of one piece of a stored result or mesh: larger rows make SQLite chain pages, and readers need more memory.
-pub const PIECE_BYTES: usize = 256 << 10;
-/// Pieces per transaction: 1 MiB occupies the single writer for some ten milliseconds, so that a
-/// cancel or a submission during the write of a large result is still answered at once.
-pub const PIECES_PER_COMMIT: usize = 4;
+/// The version of the form: a later one may be another.
+const VERSION: u8 = 1;
+/// Bytes before the index: the version, its length and its CRC-32.
+pub(super) const HEADER_BYTES: usize = 9;
 
 /// The stored form of a document.
-#[derive(Debug, Serialize, Deserialize)]
-pub struct Parts(pub(super) Vec<Part>);
+#[derive(Debug)]
+pub struct Parts {
+    parts: Vec<Part>,
+    /// What is stored before the parts: header and index.
+    index: Vec<u8>,
+    /// Of index and parts.
+    result: Fingerprint,
+    /// Of the fields, if there are some.
+    fields: Option<Fingerprint>,
+}
 
 /// A part of a result.
 #[derive(Debug, Serialize, Deserialize)]
@@ -30,9 +45,17 @@ pub struct Part {
     /// The bytes that are stored. Between processes they follow the message.
     #[serde(skip)]
     pub body: Vec<u8>,
-    /// Their SHA-256.
-    pub(super) stored_digest: Vec<u8>,
     pub(super) info: PartInfo,
+}
+
+/// A part in the index.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Entry {
+    pub(super) name: String,
+    pub(super) encoding: Encoding,
+    pub(super) info: PartInfo,
+    /// Bytes that are stored; those of fields are stored elsewhere.
+    pub(super) bytes: usize,
 }
 
 impl Part {
@@ -45,7 +68,7 @@ impl Part {
     #[cfg(test)]
     pub(crate) fn json(self) -> Vec<u8> {
         match super::encoding::decoded(self.body, self.encoding, &self.info) {
-            Ok((_, super::encoding::Content::Json(json))) => json,
+            Ok((_, super::encoding::Decoded::Json(json))) => json,
             other => panic!("{other:?}"),
         }
     }
@@ -57,20 +80,17 @@ impl Part {
             name,
             encoding: Encoding::Deflated,
             info,
-            stored_digest: digest(&body),
             body,
         })
     }
 
     /// A part from its JSON.
     pub(super) fn new(name: String, json: &[u8]) -> Part {
-        let body = deflated(json);
         Part {
             name,
             encoding: Encoding::Deflated,
             info: info_of_json(json),
-            stored_digest: digest(&body),
-            body,
+            body: deflated(json),
         }
     }
 
@@ -80,12 +100,15 @@ impl Part {
         let body = columns::encode(fields, law)
             .map_err(<serde_json::Error as serde::ser::Error>::custom)?;
         Ok(Part {
-            name: "fields".into(),
+            name: name::FIELDS.into(),
             encoding: Encoding::Columns,
-            stored_digest: digest(&body),
             body,
             info,
         })
+    }
+
+    fn is_fields(&self) -> bool {
+        self.name == name::FIELDS
     }
 }
 
@@ -138,52 +161,100 @@ impl Parts {
         if !document.fields.x.is_empty() {
             parts.push(Part::of_fields(&document.fields, &document.law)?);
         }
-        Ok(Some(Parts(parts)))
+        Ok(Some(Parts::new(parts)))
+    }
+
+    /// From parts, also those of another process.
+    pub fn new(parts: Vec<Part>) -> Parts {
+        let entries = parts.iter().map(|part| Entry {
+            name: part.name.clone(),
+            encoding: part.encoding,
+            info: part.info.clone(),
+            bytes: match part.is_fields() {
+                true => 0,
+                false => part.body.len(),
+            },
+        });
+        let index = write_index(&entries.collect::<Vec<_>>());
+        let in_result = parts.iter().filter(|part| !part.is_fields());
+        let chunks = in_result.map(|part| &*part.body);
+        let result = Fingerprint::of([&*index].into_iter().chain(chunks));
+        let fields = parts.iter().find(|part| part.is_fields());
+        Parts {
+            result,
+            fields: fields.map(|part| Fingerprint::of([&*part.body])),
+            parts,
+            index,
+        }
     }
 
     /// One after the other, for another process.
     pub fn into_parts(self) -> impl Iterator<Item = Part> {
-        self.0.into_iter()
-    }
-
-    /// From those of another process.
-    pub fn from_parts(parts: Vec<Part>) -> Parts {
-        Parts(parts)
+        self.parts.into_iter()
     }
 
     /// The stored size of all parts together.
     pub fn bytes(&self) -> usize {
-        self.0.iter().map(|part| part.body.len()).sum()
+        self.parts.iter().map(|part| part.body.len()).sum()
     }
 
-    /// All pieces, in groups that are written together.
-    pub(super) fn groups(&self) -> Vec<Vec<Piece<'_>>> {
-        let mut groups: Vec<Vec<Piece<'_>>> = vec![vec![]];
-        let mut bytes = 0;
-        for part in &self.0 {
-            for (number, body) in (0..).zip(part.body.chunks(PIECE_BYTES)) {
-                if bytes + body.len() > PIECES_PER_COMMIT * PIECE_BYTES {
-                    groups.push(vec![]);
-                    bytes = 0;
-                }
-                bytes += body.len();
-                if let Some(group) = groups.last_mut() {
-                    group.push(Piece {
-                        name: &part.name,
-                        number,
-                        body,
-                    });
-                }
-            }
-        }
-        groups
+    /// What is stored, with the names under which it is attached to the job.
+    pub(super) fn contents(&self) -> Vec<(&'static str, NewContent<'_>)> {
+        let bodies = |fields| {
+            let parts = self
+                .parts
+                .iter()
+                .filter(move |part| part.is_fields() == fields);
+            parts.map(|part| &*part.body)
+        };
+        let result = NewContent {
+            fingerprint: Cow::Borrowed(&self.result),
+            chunks: [&*self.index].into_iter().chain(bodies(false)).collect(),
+        };
+        let fields = self.fields.iter().map(|fields| NewContent {
+            fingerprint: Cow::Borrowed(fields),
+            chunks: bodies(true).collect(),
+        });
+        let fields = fields.map(|content| (name::FIELDS, content));
+        [(name::RESULT, result)].into_iter().chain(fields).collect()
+    }
+
+    /// The hashes of what is stored.
+    pub(super) fn fingerprints(&self) -> Vec<&Fingerprint> {
+        [&self.result].into_iter().chain(&self.fields).collect()
     }
 }
 
-pub(super) struct Piece<'a> {
-    pub(super) name: &'a str,
-    pub(super) number: i64,
-    pub(super) body: &'a [u8],
+/// The index of parts, with what is stored before it.
+pub(super) fn write_index(entries: &[Entry]) -> Vec<u8> {
+    // writing to memory does not fail
+    let index = postcard::to_stdvec(entries).unwrap_or_default();
+    let mut stored = vec![VERSION];
+    stored.extend((index.len() as u32).to_le_bytes());
+    stored.extend(crc32fast::hash(&index).to_le_bytes());
+    stored.extend(index);
+    stored
+}
+
+/// How long the index is that follows this header. `Err`: what is wrong with it.
+pub(super) fn index_bytes(stored: &[u8]) -> std::result::Result<usize, String> {
+    match stored.first_chunk::<5>() {
+        Some([VERSION, length @ ..]) => Ok(u32::from_le_bytes(*length) as usize),
+        Some(_) => Err("it is stored in a way that this program does not know".into()),
+        None => Err("it is too short".into()),
+    }
+}
+
+/// The index in what begins with a header. `Err`: what is wrong with it.
+pub(super) fn read_index(stored: &[u8]) -> std::result::Result<Vec<Entry>, String> {
+    let end = HEADER_BYTES + index_bytes(stored)?;
+    let index = stored
+        .get(HEADER_BYTES..end)
+        .ok_or("its index is cut off")?;
+    if stored[HEADER_BYTES - 4..HEADER_BYTES] != crc32fast::hash(index).to_le_bytes() {
+        return Err("the checksum of its index is not that of its content".into());
+    }
+    postcard::from_bytes(index).map_err(|error| error.to_string())
 }
 
 /// The points at which a stored profile has its values.

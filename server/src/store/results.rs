@@ -1,61 +1,64 @@
-//! Writing results, in pieces.
-//!
-//! Pieces are stored under the key of the job that was solved; other jobs may be answered with them. The partial
-//! result of a running job (its finished load steps) is stored under the negative of its key, so that the final
-//! result can be written beside it and replaces it when the job ends.
+//! The result of a job: written, in pieces before its end, and read, part by part.
 
 use sqlx::SqliteConnection;
 
 use super::{
+    change::Change,
+    content::{self, Content, Holder, PIECES_PER_COMMIT, name},
     database::Store,
-    encoding::Content,
-    error::Result,
-    intact,
-    parts::{Part, Parts, Piece},
-    rows::{is_current, partial_key},
+    encoding::{self, Decoded, PartInfo, decoded},
+    error::{Record, Result},
+    intact::Intact,
+    parts::{Entry, HEADER_BYTES, Parts, index_bytes, read_index},
+    rows::is_current,
 };
 use crate::job::ResultAvailable;
 
+/// What is attached to a job that has a result.
+const NAMES: [&str; 2] = [name::RESULT, name::FIELDS];
+
+/// Up to this size of its JSON a part is decoded where it is read: that takes a millisecond or two.
+const INLINE_BYTES: u64 = 256 << 10;
+
 impl Store {
-    /// Writes the result of an attempt in several short transactions, all but its last megabyte, which is
-    /// written when the job ends; false when the attempt is no longer the current one.
+    /// Writes the content of a large result in several short transactions; false when the attempt is no longer the current
+    /// one. Small content is written when the job ends.
     pub async fn write_before_end(&self, key: i64, attempt: i32, parts: &Parts) -> Result<bool> {
-        let write = async {
-            let groups = parts.groups();
-            let Some((_, all_but_last)) = groups.split_last() else {
-                return Ok(true);
-            };
-            for (n, group) in all_but_last.iter().enumerate() {
-                let mut tx = self.begin().await?;
-                if !is_current(&mut tx, key, attempt).await? {
+        for (_, content) in parts.contents() {
+            let pieces = content.pieces();
+            if pieces.len() == 1 {
+                continue;
+            }
+            for (group, pieces) in pieces.chunks(PIECES_PER_COMMIT).enumerate() {
+                let current = async {
+                    let mut connection = self.reader.acquire().await?;
+                    is_current(&mut connection, key, attempt).await
+                };
+                if !self.writing(current).await? {
                     return Ok(false);
                 }
-                if n == 0 {
-                    // removes the pieces of an earlier attempt that was interrupted while it wrote them
-                    remove(&mut tx, key).await?;
-                }
-                insert(&mut tx, key, group).await?;
-                tx.commit().await?;
+                let first = group * PIECES_PER_COMMIT;
+                self.write_pieces(&content.fingerprint, first, pieces)
+                    .await?;
             }
-            Ok(true)
-        };
-        self.writing(write).await
+        }
+        Ok(true)
     }
 
-    /// Stores the partial result of a running job in place of an earlier one; false when the attempt is no longer
-    /// the current one.
+    /// Removes what was written of a result that no job has.
+    pub async fn discard_parts(&self, parts: &Parts) -> Result<()> {
+        self.discard_content(&parts.fingerprints()).await
+    }
+
+    /// Stores the partial result of a running job (its finished load steps) in place of an earlier one; false when the attempt is
+    /// no longer the current one.
     pub async fn write_partial(&self, key: i64, attempt: i32, parts: &Parts) -> Result<bool> {
         let write = async {
             let mut change = self.change().await?;
             if !change.is_current(key, attempt).await? {
                 return Ok(false);
             }
-            let tx = change.sql().await?;
-            remove(tx, partial_key(key)).await?;
-            for group in parts.groups() {
-                insert(tx, partial_key(key), &group).await?;
-            }
-            write_info(tx, partial_key(key), parts).await?;
+            attach(&mut change, key, parts).await?;
             let partial = ResultAvailable::Partial;
             change
                 .set(key, |row| row.job.result_available = partial)
@@ -65,100 +68,238 @@ impl Store {
         };
         self.writing(write).await
     }
+
+    /// The memory that reading a part of the result of this job takes at most, in bytes; `None` if there is no such part.
+    pub async fn part_memory(&self, key: i64, part: &str) -> Result<Option<usize>> {
+        let read = async {
+            let mut connection = self.reader.acquire().await?;
+            let Some(found) = StoredResult::of(&mut connection, key).await? else {
+                return Ok(None);
+            };
+            found.memory_to_read(&mut connection, part).await
+        };
+        self.damages.noting(read).await
+    }
 }
 
-/// Writes the last pieces of a result, and the size and hash of each part, in the transaction that ends the job.
-pub(super) async fn write_at_end(tx: &mut SqliteConnection, key: i64, parts: &Parts) -> Result<()> {
-    let groups = parts.groups();
-    if groups.len() == 1 {
-        remove(tx, key).await?;
+/// Compares the content of a result with its hash, without decoding it, which would take a hundred times as long: what is in
+/// it is compared when it is served. What was found intact before is not read again.
+pub(super) async fn check_stored(
+    connection: &mut SqliteConnection,
+    intact: &Intact,
+    key: i64,
+    attached: Vec<Content>,
+) -> Result<()> {
+    if !attached.iter().any(|content| content.name == name::RESULT) {
+        return Err(Record::of_job(key, name::RESULT).damaged("it is missing"));
     }
-    if let Some(last) = groups.last() {
-        insert(tx, key, last).await?;
-    }
-    write_info(tx, key, parts).await
-}
-
-/// The partial result of a running job becomes its result; but its history is that of its events, which continued
-/// after the last finished load step.
-pub(super) async fn keep_partial(tx: &mut SqliteConnection, key: i64) -> Result<()> {
-    remove(tx, key).await?;
-    let names: Vec<String> =
-        sqlx::query_scalar("select distinct name from result_part where job_id = ?")
-            .bind(partial_key(key))
-            .fetch_all(&mut *tx)
-            .await?;
-    // a checksum includes the key, so the rows are written anew; partial results are small
-    for name in names.into_iter().filter(|name| name != "history") {
-        // partial results have no fields
-        let read = intact::read_part(tx, partial_key(key), &name).await?;
-        if let Some((_, Content::Json(json))) = read {
-            let parts = Parts(vec![Part::new(name, &json)]);
-            for group in parts.groups() {
-                insert(tx, key, &group).await?;
-            }
-            write_info(tx, key, &parts).await?;
+    for content in attached {
+        if NAMES.contains(&content.name.as_str()) && !intact.contains(content.id) {
+            let checked = content.check(connection).await;
+            checked.map_err(|error| error.reading(|| content.record()))?;
+            intact.insert(content.id);
         }
     }
-    remove(tx, partial_key(key)).await
+    Ok(())
 }
 
-/// Removes the result under this key.
+/// Attaches a result to a job in place of an earlier one.
+pub(super) async fn attach(change: &mut Change<'_>, key: i64, parts: &Parts) -> Result<()> {
+    let tx = change.sql().await?;
+    remove(tx, key).await?;
+    for (name, content) in parts.contents() {
+        content::attach(tx, Holder::Job(key), name, &content).await?;
+    }
+    Ok(())
+}
+
+/// Gives a job the result of another one.
+pub(super) async fn share(tx: &mut SqliteConnection, from: i64, to: i64) -> Result<()> {
+    content::copy(tx, from, to, &NAMES).await
+}
+
+/// Removes the result of a job.
 pub(super) async fn remove(tx: &mut SqliteConnection, key: i64) -> Result<()> {
-    sqlx::query(
-        "delete from result_part where job_id = ?1; delete from result_info where job_id = ?1;",
-    )
-    .bind(key)
-    .execute(tx)
-    .await?;
-    Ok(())
+    content::detach(tx, Holder::Job(key), &NAMES).await
 }
 
-/// Writes pieces.
-async fn insert(tx: &mut SqliteConnection, key: i64, group: &[Piece<'_>]) -> Result<()> {
-    for Piece { name, number, body } in group {
-        let checksum = intact::piece_checksum(key, name, *number, body).stored();
-        sqlx::query(
-            "insert into result_part (job_id, name, piece, body, checksum) values (?, ?, ?, ?, ?)",
-        )
-        .bind(key)
-        .bind(*name)
-        .bind(number)
-        .bind(*body)
-        .bind(checksum)
-        .execute(&mut *tx)
-        .await?;
+/// The result of a job as it is stored: its index is read, its parts are not.
+pub(super) struct StoredResult {
+    key: i64,
+    content: Content,
+    /// The fields, if they are kept.
+    fields: Option<Content>,
+    entries: Vec<Entry>,
+    /// The first pieces, up to the end of the index.
+    begin: Vec<u8>,
+}
+
+impl StoredResult {
+    /// The result of a job, if it has one.
+    pub(super) async fn of(
+        connection: &mut SqliteConnection,
+        key: i64,
+    ) -> Result<Option<StoredResult>> {
+        let read = StoredResult::read_index(connection, key).await;
+        read.map_err(|error| error.reading(|| Record::of_job(key, name::RESULT)))
     }
-    Ok(())
-}
 
-/// Writes the size and hash of each part.
-async fn write_info(tx: &mut SqliteConnection, key: i64, parts: &Parts) -> Result<()> {
-    for part in &parts.0 {
-        let (bytes, encoding) = (part.info.bytes as i64, part.encoding.stored());
-        let checksum = intact::info_checksum(
+    async fn read_index(
+        connection: &mut SqliteConnection,
+        key: i64,
+    ) -> Result<Option<StoredResult>> {
+        let (mut content, mut fields) = (None, None);
+        for attached in content::all(connection, Holder::Job(key)).await? {
+            match attached.name.as_str() {
+                name::RESULT => content = Some(attached),
+                name::FIELDS => fields = Some(attached),
+                _ => {}
+            }
+        }
+        let Some(content) = content else {
+            return Ok(None);
+        };
+        let damaged = |cause: String| content.record().damaged(cause);
+        let mut begin = content.piece(connection, 0).await?;
+        let index_end = HEADER_BYTES + index_bytes(&begin).map_err(damaged)?;
+        for number in 1..content.fingerprint.pieces() {
+            if begin.len() >= index_end {
+                break;
+            }
+            begin.extend(content.piece(connection, number).await?);
+        }
+        let entries = read_index(&begin).map_err(damaged)?;
+        Ok(Some(StoredResult {
             key,
-            &part.name,
-            &(
-                bytes,
-                part.info.digest.clone(),
-                encoding,
-                Some(part.stored_digest.clone()),
-            ),
-        );
-        sqlx::query(
-            "insert or replace into result_info (job_id, name, bytes, digest, checksum, encoding, stored_digest)
-             values (?, ?, ?, ?, ?, ?, ?)",
-        )
-        .bind(key)
-        .bind(&part.name)
-        .bind(bytes)
-        .bind(&part.info.digest)
-        .bind(checksum.stored())
-        .bind(encoding)
-        .bind(&part.stored_digest)
-        .execute(&mut *tx)
-        .await?;
+            content,
+            fields,
+            entries,
+            begin,
+        }))
     }
-    Ok(())
+
+    /// The names of all parts.
+    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+        let is_kept = |entry: &&Entry| entry.name != name::FIELDS || self.fields.is_some();
+        let entries = self.entries.iter().filter(is_kept);
+        entries.map(|entry| entry.name.as_str())
+    }
+
+    /// The number of the content of the fields, and size and hash of their JSON.
+    pub(super) fn fields(&self) -> Option<(i64, &PartInfo)> {
+        let (entry, _) = self.find(name::FIELDS)?;
+        Some((self.fields.as_ref()?.id, &entry.info))
+    }
+
+    /// A part in the index, with its place among the bytes of all parts.
+    fn find(&self, part: &str) -> Option<(&Entry, usize)> {
+        let mut place = 0usize;
+        for entry in &self.entries {
+            if entry.name == part {
+                return Some((entry, place));
+            }
+            place = place.saturating_add(entry.bytes);
+        }
+        None
+    }
+
+    fn record(&self, part: &str) -> Record {
+        Record::of_job(self.key, format!("result part {part}"))
+    }
+
+    /// A part, compared with its size and hash; `None` if there is no such part.
+    pub(super) async fn read(
+        &self,
+        connection: &mut SqliteConnection,
+        part: &str,
+    ) -> Result<Option<(PartInfo, Decoded)>> {
+        let Some((entry, place)) = self.find(part) else {
+            return Ok(None);
+        };
+        let stored = match (part, &self.fields) {
+            (name::FIELDS, None) => return Ok(None),
+            (name::FIELDS, Some(fields)) => fields.read(connection).await,
+            _ => self.bytes(connection, place, entry.bytes).await,
+        };
+        let stored = stored.map_err(|error| error.reading(|| self.record(part)))?;
+        let (expected, encoding) = (entry.info.clone(), entry.encoding);
+        let decode = move || decoded(stored, encoding, &expected);
+        // a large one takes a second, in which its thread would answer nobody
+        let decoded = match entry.info.bytes > INLINE_BYTES {
+            true => tokio::task::spawn_blocking(decode)
+                .await
+                .unwrap_or_else(|panic| Err(panic.to_string())),
+            false => decode(),
+        };
+        match decoded {
+            Ok((found, decoded)) if found == entry.info => Ok(Some((found, decoded))),
+            Ok((found, _)) => Err(self.record(part).damaged(format!(
+                "{} bytes of another hash in place of {}",
+                found.bytes, entry.info.bytes
+            ))),
+            Err(cause) => Err(self.record(part).damaged(cause)),
+        }
+    }
+
+    /// Bytes after the index, from the pieces that have them.
+    async fn bytes(
+        &self,
+        connection: &mut SqliteConnection,
+        place: usize,
+        length: usize,
+    ) -> Result<Vec<u8>> {
+        let first = HEADER_BYTES + index_bytes(&self.begin).unwrap_or_default() + place;
+        let end = first.saturating_add(length);
+        if end > self.content.fingerprint.bytes {
+            return Err(self.content.record().damaged("its index is of other parts"));
+        }
+        let begin = self.begin.get(first..).unwrap_or_default();
+        let mut found = begin[..begin.len().min(length)].to_vec();
+        while found.len() < length {
+            let place = first + found.len();
+            let (number, offset) = (place / content::PIECE_BYTES, place % content::PIECE_BYTES);
+            let piece = self.content.piece(connection, number).await?;
+            let more = piece.get(offset..).unwrap_or_default();
+            if more.is_empty() {
+                return Err(self.content.record().damaged("a piece is cut off"));
+            }
+            found.extend_from_slice(&more[..more.len().min(length - found.len())]);
+        }
+        Ok(found)
+    }
+
+    /// The memory that reading a part takes at most, in bytes; `None` if there is no such part.
+    async fn memory_to_read(
+        &self,
+        connection: &mut SqliteConnection,
+        part: &str,
+    ) -> Result<Option<usize>> {
+        let Some((entry, _)) = self.find(part) else {
+            return Ok(None);
+        };
+        let (first, stored) = match (part, &self.fields) {
+            (name::FIELDS, None) => return Ok(None),
+            (name::FIELDS, Some(fields)) => {
+                (fields.piece(connection, 0).await?, fields.fingerprint.bytes)
+            }
+            _ => (vec![], entry.bytes),
+        };
+        let json = usize::try_from(entry.info.bytes).unwrap_or(usize::MAX);
+        let memory = encoding::memory_to_read(&first, stored, entry.encoding, json);
+        memory
+            .map(Some)
+            .map_err(|cause| self.record(part).damaged(cause))
+    }
+
+    /// Reads every part, to check it; an error if one is damaged or the summary is missing.
+    pub(super) async fn check(&self, connection: &mut SqliteConnection) -> Result<()> {
+        if !self.names().any(|name| name == "summary") {
+            return Err(self.record("summary").damaged("it is missing"));
+        }
+        self.content.check(connection).await?;
+        for name in self.names() {
+            self.read(connection, name).await?;
+        }
+        Ok(())
+    }
 }

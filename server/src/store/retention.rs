@@ -357,8 +357,9 @@ impl Store {
     pub(super) async fn compare_sums(&self) -> Result<()> {
         let differ: bool = sqlx::query_scalar(
             "with of_jobs as (select owner, count(*) as jobs, sum(bytes) as bytes from job_size group by owner),
-                  of_meshes as (select owner, sum(length(body)) as bytes
-                                from mesh_owner join mesh_piece using (hash) group by owner)
+                  of_meshes as (select owner, sum(bytes) as bytes
+                                from mesh_owner join mesh using (hash) join attachment on kind = 'mesh' and key = mesh.id
+                                     join content on content.id = content group by owner)
              select exists (select 1 from owner_size left join of_jobs using (owner) left join of_meshes using (owner)
                             where owner_size.jobs <> coalesce(of_jobs.jobs, 0) or job_bytes <> coalesce(of_jobs.bytes, 0)
                                   or mesh_bytes <> coalesce(of_meshes.bytes, 0))

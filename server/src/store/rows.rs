@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, str::FromStr};
 
 use serde::Serialize;
-use sqlx::{AssertSqlSafe, Row, SqliteConnection, SqlitePool, sqlite::SqliteRow};
+use sqlx::{AssertSqlSafe, Row, SqliteConnection, sqlite::SqliteRow};
 use uuid::Uuid;
 
 use super::{
@@ -26,8 +26,6 @@ pub(super) struct JobRow {
     pub(super) title: Option<String>,
     /// Fingerprint of everything that the client submitted; none in rows of early versions.
     pub(super) payload: Option<String>,
-    /// The key of the result of another job, with which this one was answered.
-    pub(super) result_job: Option<i64>,
     /// When it fails unless it was started before.
     pub(super) expires_at: Option<Time>,
     /// The version of this program that ended it.
@@ -70,11 +68,6 @@ pub(super) async fn with_id(
         .await?;
     let job = row.as_ref().map(from_row).transpose()?;
     Ok(job.filter(|job| owners.include(&job.owner)))
-}
-
-/// The key under which the partial result of a running job is kept.
-pub(super) fn partial_key(key: i64) -> i64 {
-    -key
 }
 
 /// Whether this attempt of the job is the current one, and running.
@@ -143,6 +136,7 @@ pub(super) async fn delete(tx: &mut SqliteConnection, job: &Job, now: Time) -> R
         delete from event where job_id = ?1;
         delete from job_label where job_id = ?1;
         delete from job_size where job_id = ?1;
+        delete from attachment where kind = 'job' and key = ?1;
         delete from job where id = ?1;";
     sqlx::query(of_its_own)
         .bind(job.key)
@@ -152,38 +146,6 @@ pub(super) async fn delete(tx: &mut SqliteConnection, job: &Job, now: Time) -> R
         .execute(tx)
         .await?;
     Ok(())
-}
-
-/// Gives rows of versions that wrote no checksums theirs, once, when a store of such a version is first opened. What cannot
-/// be read does not prevent the start: it is damaged in any case.
-pub(super) async fn seal_old_rows(writer: &SqlitePool) -> Result<()> {
-    if !has_old_rows(&mut *writer.acquire().await?).await? {
-        return Ok(());
-    }
-    let mut tx = writer.begin_with("begin immediate").await?;
-    let keys = sqlx::query_scalar::<_, i64>("select id from job where checksum is null");
-    for key in keys.fetch_all(&mut *tx).await.unwrap_or_default() {
-        let row = sqlx::query("select * from job where id = ?").bind(key);
-        let row = row.fetch_one(&mut *tx).await.map_err(StoreError::from);
-        let Ok(sum) = row.and_then(|row| checksum::of_row(&row)) else {
-            continue;
-        };
-        sqlx::query("update job set checksum = ? where id = ?")
-            .bind(sum)
-            .bind(key)
-            .execute(&mut *tx)
-            .await?;
-    }
-    sqlx::query("delete from setting where name = 'jobs_without_checksums'")
-        .execute(&mut *tx)
-        .await?;
-    Ok(tx.commit().await?)
-}
-
-/// Whether there may be rows of versions that wrote no checksums: migration 14 notes it.
-pub(super) async fn has_old_rows(connection: &mut SqliteConnection) -> Result<bool> {
-    let noted = "select exists (select 1 from setting where name = 'jobs_without_checksums')";
-    Ok(sqlx::query_scalar(noted).fetch_one(connection).await?)
 }
 
 /// A row of the table as a job, if it is as it was written.
@@ -214,6 +176,7 @@ fn parse(row: &SqliteRow) -> Result<JobRow> {
         Ok(row.try_get::<Option<i64>, _>(name)?.map(Time::from_micros))
     };
     let progress: Option<&str> = row.try_get("progress")?;
+    let memory_bytes: Option<i64> = row.try_get("memory_bytes")?;
     let failure: Option<&str> = row.try_get("failure")?;
     let warnings: Option<&str> = row.try_get("warnings")?;
     let other = |name: &str| -> Result<Option<JobId>> {
@@ -257,6 +220,8 @@ fn parse(row: &SqliteRow) -> Result<JobRow> {
         }),
         result_available: word("result_available", row.try_get("result_available")?)?,
         warnings: warnings.map_or(Ok(vec![]), serde_json::from_str)?,
+        mesh: row.try_get("mesh")?,
+        memory_bytes: memory_bytes.map(i64::unsigned_abs),
         // what follows from the rest, below; and what others fill in
         ..Job::default()
     };
@@ -264,7 +229,6 @@ fn parse(row: &SqliteRow) -> Result<JobRow> {
         job,
         title: row.try_get("title")?,
         payload: row.try_get("payload")?,
-        result_job: row.try_get("result_job")?,
         expires_at: time("expires_at")?,
         solver_version: row.try_get("solver_version")?,
         last_seq: row.try_get("last_seq")?,
@@ -277,11 +241,6 @@ impl JobRow {
     /// Fills in what follows from the rest.
     pub(super) fn derive(&mut self) {
         let job = &mut self.job;
-        job.result_key = match self.result_job {
-            Some(other) => other,
-            None if job.status.is_terminal() => job.key,
-            None => partial_key(job.key),
-        };
         let started = job.started_at;
         job.queue_wait_s = started.map(|start| job.created_at.seconds_until(start));
         let run = started.zip(job.finished_at);
@@ -295,6 +254,7 @@ impl JobRow {
         let job = &self.job;
         let uuid = |id: Option<JobId>| Value::from(id.map(|id| id.0.to_string()));
         let micros = |time: Option<Time>| Value::from(time.map(Time::micros));
+        let memory_bytes = job.memory_bytes.map(|bytes| bytes as i64);
         let warnings = (!job.warnings.is_empty()).then_some(&job.warnings);
         let columns = [
             ("id", job.key.into()),
@@ -326,7 +286,7 @@ impl JobRow {
             ("pinned", i64::from(job.pinned).into()),
             ("cache", <&str>::from(job.cache).into()),
             ("cached_from", uuid(job.cached_from)),
-            ("result_job", self.result_job.into()),
+            ("memory_bytes", memory_bytes.into()),
             ("coalesced_into", job.coalesced_into.into()),
             ("timeout_s", Value::Real(job.limits.timeout_s)),
             ("queue_ttl_s", Value::Real(job.limits.queue_ttl_s)),
@@ -334,6 +294,7 @@ impl JobRow {
             ("solver_version", self.solver_version.as_deref().into()),
             ("sweep", uuid(job.sweep.map(|SweepId(id)| JobId(id)))),
             ("warnings", json(warnings)?),
+            ("mesh", job.mesh.as_deref().into()),
         ];
         Ok(columns.into_iter().unzip())
     }

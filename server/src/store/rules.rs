@@ -151,6 +151,8 @@ impl JobRow {
             sweep: new.sweep,
             created_at: now,
             limits: new.limits,
+            mesh: new.mesh.clone(),
+            memory_bytes: Some(new.memory_bytes.min(i64::MAX as u64)),
             ..Job::default()
         };
         let mut row = JobRow {
@@ -181,7 +183,6 @@ impl JobRow {
     pub(super) fn start_with_answer(&mut self, source: &Job, now: Time) -> Result<()> {
         self.start(now)?;
         self.job.cached_from = Some(source.id);
-        self.result_job = Some(source.result_key);
         Ok(())
     }
 
@@ -510,7 +511,6 @@ mod tests {
         row.derive();
         assert_eq!(row.job.result_available, ResultAvailable::Partial);
         assert_eq!((row.job.finished_at, row.job.run_s), (Some(NOW), Some(0.0)));
-        assert_eq!(row.job.result_key, row.job.key);
         let found = ending(Status::Succeeded).after_a_request_to_stop();
         assert_eq!(
             (found.status, found.result),
@@ -521,20 +521,16 @@ mod tests {
     }
 
     #[test]
-    fn an_answered_job_has_the_result_of_the_other_and_of_none_in_between() {
+    fn an_answered_job_ends_like_the_other() {
         let mut source = running();
         source.end(&ending(Status::Succeeded), NOW).unwrap();
-        source.result_job = Some(3);
         source.derive();
         let mut row = queued();
         row.job.coalesced_into = Some(source.job.key);
         row.start_with_answer(&source.job, NOW).unwrap();
         row.end(&Ending::like(&source.job), NOW).unwrap();
         row.derive();
-        assert_eq!(
-            (row.job.cached_from, row.job.result_key),
-            (Some(source.job.id), 3)
-        );
+        assert_eq!(row.job.cached_from, Some(source.job.id));
         assert_eq!(
             (row.job.status, row.job.coalesced_into),
             (Status::Succeeded, None)

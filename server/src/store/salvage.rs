@@ -6,12 +6,13 @@ use sqlx::{AssertSqlSafe, Column, Row, SqliteConnection, sqlite::SqliteRow};
 
 use super::{
     checksum::{self, Value},
+    content::{self, Holder, NewContent},
     database::{Rebuild, Store, Writing, with_advice},
     error::{Result, StoreError},
     rows::JobRow,
     sizes,
 };
-use crate::job::{Job, ResultAvailable};
+use crate::job::Job;
 
 /// A store in a folder that must be empty or missing.
 pub(super) async fn new_store(folder: &Path) -> Result<Store> {
@@ -31,17 +32,14 @@ pub(super) async fn new_store(folder: &Path) -> Result<Store> {
     Ok(store)
 }
 
-/// Copies a job with its problem, its events and its result.
+/// Copies a job with its events, and with its problem, its result and whatever else is attached to it.
 pub(super) async fn copy_job(
     source: &mut SqliteConnection,
     tx: &mut Writing,
     job: &Job,
 ) -> Result<()> {
     let by_key = |statement| sqlx::query(statement).bind(job.key);
-    let problem = "select * from problem where input_hash = ?";
-    let problem = sqlx::query(problem).bind(&job.input_hash);
     let rows = [
-        ("problem", problem.fetch_all(&mut *source).await?),
         (
             "job",
             by_key("select * from job where id = ?")
@@ -72,17 +70,18 @@ pub(super) async fn copy_job(
         .execute(&mut **tx)
         .await?;
     }
-    if job.result_available == ResultAvailable::None {
-        return Ok(());
-    }
-    for (table, statement) in [
-        ("result_info", "select * from result_info where job_id = ?"),
-        ("result_part", "select * from result_part where job_id = ?"),
-    ] {
-        let rows = sqlx::query(statement).bind(job.result_key);
-        for row in rows.fetch_all(&mut *source).await? {
-            insert(tx, table, &row).await?;
-        }
+    copy_content(source, tx, Holder::Job(job.key)).await
+}
+
+/// Copies what is attached, one after the other.
+pub(super) async fn copy_content(
+    source: &mut SqliteConnection,
+    tx: &mut Writing,
+    holder: Holder,
+) -> Result<()> {
+    for attached in content::all(source, holder).await? {
+        let bytes = attached.read(source).await?;
+        content::attach(tx, holder, &attached.name, &NewContent::new(&bytes)).await?;
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! Reads what is found by a key, a name or a hash, at the start and then once a day, beside the work: what an index lacks, or
 //! whose key has changed, would be said not to exist. Before a request key is said to be new the keys were read once.
 //!
-//! Events, results, problems and pieces of meshes are too large for it. Of them nothing is found by its content: they are
+//! Events and what is attached to jobs and meshes are too large for it. Of them nothing is found by its content: they are
 //! compared when they are read, and by `doctor`.
 
 use std::{sync::Weak, time::Duration};

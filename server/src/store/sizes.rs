@@ -40,9 +40,10 @@ fn size((owner, jobs, job_bytes, mesh_bytes): Columns) -> OwnerSize {
     }
 }
 
-pub(super) const WAITING_BYTES: &str =
-    "select coalesce(sum(octet_length(body)), 0) from problem where input_hash in
-         (select input_hash from job indexed by job_queued_by_owner where owner = ? and status = 'queued')";
+pub(super) const WAITING_BYTES: &str = "select coalesce(sum(bytes), 0) from content where id in
+         (select content from attachment where kind = 'job' and name = 'problem' and key in
+              (select min(id) from job indexed by job_queued_by_owner
+               where owner = ? and status = 'queued' group by input_hash))";
 
 impl Store {
     /// What an owner keeps.
@@ -106,85 +107,6 @@ pub(super) async fn count(tx: &mut SqliteConnection, key: i64) -> Result<()> {
     .bind(key)
     .execute(tx)
     .await?;
-    Ok(())
-}
-
-/// A job that has ended later than others, but is older, may be the first of those that were answered with a result whose own job is
-/// gone: then it has the result, and the one that had it no longer does.
-pub(super) async fn take_over(tx: &mut SqliteConnection, key: i64) -> Result<()> {
-    sqlx::query(
-        "with answered(result) as (select result_job from job where id = ?1 and result_job is not null)
-         update job_size set bytes = bytes -
-             (select coalesce(sum(length(body)), 0) from result_part where job_id = (select result from answered))
-         where job_id = (select min(id) from job where result_job = (select result from answered) and id > ?1)
-               and not exists (select 1 from job where id = (select result from answered))
-               and not exists (select 1 from job where result_job = (select result from answered) and id < ?1)",
-    )
-    .bind(key)
-    .execute(tx)
-    .await?;
-    Ok(())
-}
-
-/// Counts what a job that was just deleted shared with others, if it was counted for that job, for the next of them. One that
-/// has not ended yet counts it when it ends.
-pub(super) async fn hand_on(tx: &mut SqliteConnection, deleted: &Job) -> Result<()> {
-    let to_the_first_answered_and_to_the_oldest = "
-        update job_size set bytes = bytes +
-             (select coalesce(sum(length(body)), 0) from result_part where job_id = ?2)
-         where job_id = (select min(id) from job where result_job = ?2) and (?1 = ?2 or job_id > ?1)
-               and not exists (select 1 from job where id = ?2);
-        update job_size set bytes = bytes +
-             coalesce((select octet_length(body) from problem where input_hash = ?3), 0)
-         where job_id = (select id from job where input_hash = ?3 order by created_at, id limit 1)
-               and not exists (select 1 from job where input_hash = ?3 and (created_at, id) < (?4, ?1));";
-    sqlx::query(to_the_first_answered_and_to_the_oldest)
-        .bind(deleted.key)
-        .bind(deleted.result_key)
-        .bind(&deleted.input_hash)
-        .bind(deleted.created_at.micros())
-        .execute(&mut *tx)
-        .await?;
-    let Some(sweep) = deleted.sweep else {
-        return Ok(());
-    };
-    let of_the_first = "update job_size set bytes = bytes +
-             coalesce((select octet_length(body) from sweep_definition join sweep on sweep.id = sweep where uuid = ?1), 0)
-         where job_id = (select id from job where sweep = ?1 order by created_at, id limit 1)
-               and not exists (select 1 from job where sweep = ?1 and (created_at, id) < (?2, ?3))";
-    sqlx::query(of_the_first)
-        .bind(sweep.0.to_string())
-        .bind(deleted.created_at.micros())
-        .bind(deleted.key)
-        .execute(tx)
-        .await?;
-    Ok(())
-}
-
-/// Deletes the fields under this key, unless a job with that result still has them.
-pub(super) async fn remove_unused_fields(tx: &mut SqliteConnection, result: i64) -> Result<()> {
-    let needed: bool = sqlx::query_scalar(
-        "select exists (select 1 from job_size where job_id = ?1 and fields = 1)
-             or exists (select 1 from job join job_size on job_id = id where result_job = ?1 and fields = 1)",
-    )
-    .bind(result)
-    .fetch_one(&mut *tx)
-    .await?;
-    if needed {
-        return Ok(());
-    }
-    for statement in [
-        "update job_size set bytes = bytes - (select coalesce(sum(length(body)), 0) from result_part
-                                              where job_id = ?1 and name = 'fields')
-         where job_id = coalesce((select id from job where id = ?1), (select min(id) from job where result_job = ?1))",
-        "delete from result_part where job_id = ? and name = 'fields'",
-        "delete from result_info where job_id = ? and name = 'fields'",
-    ] {
-        sqlx::query(statement)
-            .bind(result)
-            .execute(&mut *tx)
-            .await?;
-    }
     Ok(())
 }
 

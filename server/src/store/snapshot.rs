@@ -6,72 +6,60 @@ use solver::solution::Fields;
 use sqlx::{Sqlite, Transaction};
 
 use super::{
+    content::name,
     damage::{Damages, Table},
     database::Store,
-    encoding::{Content, PartInfo},
-    error::Result,
-    intact,
+    encoding::{Decoded, PartInfo},
+    error::{Record, Result},
     parts::{ProfilePoints, profile_part},
+    results::StoredResult,
     rows::with_id,
 };
 use crate::{
     caller::Owners,
-    job::{Job, JobId},
+    job::{Job, JobId, ResultAvailable},
 };
 
-/// The name of the part that is served in pieces and in other formats.
-const FIELDS: &str = "fields";
-
 impl Store {
-    /// Size and hash of the JSON of the fields under this key, if they were read whole and found intact before.
+    /// Size and hash of the JSON of the fields of this job, if they were read whole and found intact before.
     pub async fn fields_info(&self, key: i64) -> Result<Option<PartInfo>> {
-        if !self.intact.contains(key, FIELDS) {
-            return Ok(None);
-        }
         let read = async {
             let mut connection = self.reader.acquire().await?;
-            let known = intact::part_info(&mut connection, key, FIELDS).await?;
-            Ok(known.map(|known| known.info))
+            let found = StoredResult::of(&mut connection, key).await?;
+            let fields = found.as_ref().and_then(StoredResult::fields);
+            let intact = fields.filter(|(content, _)| self.intact.contains(*content));
+            Ok(intact.map(|(_, info)| info.clone()))
         };
         self.damages.noting(read).await
     }
 
-    /// The memory that reading the fields under this key takes at most, in bytes; `None` if there are none.
+    /// The memory that reading the fields of this job takes at most, in bytes; `None` if there are none.
     pub async fn fields_memory(&self, key: i64) -> Result<Option<usize>> {
-        self.part_memory(key, FIELDS).await
+        self.part_memory(key, name::FIELDS).await
     }
 
-    /// The same of another part.
-    pub async fn part_memory(&self, key: i64, part: &str) -> Result<Option<usize>> {
-        let read = async {
-            let mut connection = self.reader.acquire().await?;
-            intact::memory_to_read(&mut connection, key, part).await
-        };
-        self.damages.noting(read).await
-    }
-
-    /// The fields under this key, with size and hash of their JSON.
+    /// The fields of this job, with size and hash of their JSON.
     pub async fn fields(&self, key: i64) -> Result<Option<(PartInfo, Fields)>> {
         let read = async {
             let mut connection = self.reader.acquire().await?;
-            let stored = intact::stored_part(&mut connection, key, FIELDS).await?;
-            drop(connection); // to decode them takes long
-            let Some(stored) = stored else {
+            let Some(found) = StoredResult::of(&mut connection, key).await? else {
                 return Ok(None);
             };
-            let (info, content) = stored.decoded().await?;
-            let fields = match content {
-                Content::Fields(fields) => *fields,
-                Content::Json(json) => serde_json::from_slice(&json)
-                    .map_err(|error| intact::part_of(key, FIELDS).damaged(error))?,
+            let Some((content, _)) = found.fields() else {
+                return Ok(None);
             };
+            let Some((info, decoded)) = found.read(&mut connection, name::FIELDS).await? else {
+                return Ok(None);
+            };
+            let fields = match decoded {
+                Decoded::Fields(fields) => *fields,
+                Decoded::Json(json) => serde_json::from_slice(&json)
+                    .map_err(|error| Record::of_job(key, name::FIELDS).damaged(error))?,
+            };
+            self.intact.insert(content);
             Ok(Some((info, fields)))
         };
-        let found = self.damages.noting(read).await?;
-        if found.is_some() {
-            self.intact.insert(key, FIELDS);
-        }
-        Ok(found)
+        self.damages.noting(read).await
     }
 
     /// A job and its result at one moment: the parts may be replaced while the job runs, and are removed when it is
@@ -86,6 +74,7 @@ impl Store {
             Ok(job.map(|job| Snapshot {
                 job,
                 tx,
+                result: None,
                 damages: self.damages.clone(),
             }))
         };
@@ -98,19 +87,39 @@ pub struct Snapshot {
     /// The job, without its queue position.
     pub job: Job,
     tx: Transaction<'static, Sqlite>,
+    /// Once it was asked for.
+    result: Option<StoredResult>,
     damages: Arc<Damages>,
 }
 
 impl Snapshot {
     /// The JSON of a part.
     pub async fn part(&mut self, part: &str) -> Result<Option<Vec<u8>>> {
-        let read = intact::read_part(&mut self.tx, self.job.result_key, part);
-        let found = self.damages.noting(read).await?;
-        Ok(match found {
-            Some((_, Content::Json(json))) => Some(json),
-            Some((_, Content::Fields(fields))) => Some(serde_json::to_vec(&fields)?),
+        // it went on after the last finished load step: its events tell the rest
+        let goes_on = self.job.result_available == ResultAvailable::Partial;
+        if part == "history" && goes_on && self.job.status.is_terminal() {
+            return Ok(None);
+        }
+        let damages = self.damages.clone();
+        let read = async {
+            self.read_index().await?;
+            match &self.result {
+                Some(result) => result.read(&mut self.tx, part).await,
+                None => Ok(None),
+            }
+        };
+        Ok(match damages.noting(read).await? {
+            Some((_, Decoded::Json(json))) => Some(json),
+            Some((_, Decoded::Fields(fields))) => Some(serde_json::to_vec(&fields)?),
             None => None,
         })
+    }
+
+    async fn read_index(&mut self) -> Result<()> {
+        if self.result.is_none() {
+            self.result = StoredResult::of(&mut self.tx, self.job.key).await?;
+        }
+        Ok(())
     }
 
     /// The profile of a boundary, at the end or at the end of a load step (from 0).
@@ -125,18 +134,13 @@ impl Snapshot {
 
     /// The boundaries that have a profile.
     pub async fn profiled_boundaries(&mut self) -> Result<Vec<String>> {
+        let damages = self.damages.clone();
+        damages.noting(self.read_index()).await?;
         let prefix = profile_part("", ProfilePoints::Nodes, None);
-        let names: Vec<String> = sqlx::query_scalar(
-            "select name from result_part where job_id = ? and piece = 0 and substr(name, 1, ?) = ? order by name",
-        )
-        .bind(self.job.result_key)
-        .bind(prefix.len() as i64)
-        .bind(&prefix)
-        .fetch_all(&mut *self.tx)
-        .await?;
-        Ok(names
-            .iter()
-            .map(|name| name[prefix.len()..].to_string())
-            .collect())
+        let names = self.result.iter().flat_map(StoredResult::names);
+        let boundaries = names.filter_map(|name| name.strip_prefix(&prefix));
+        let mut boundaries: Vec<String> = boundaries.map(str::to_owned).collect();
+        boundaries.sort_unstable();
+        Ok(boundaries)
     }
 }

@@ -11,9 +11,10 @@ use tokio::sync::{mpsc, oneshot};
 use super::{
     change::{Change, Savepoint},
     claim, coalescing,
+    content::{self, Holder, NewContent, name},
     database::Store,
     error::{Result, StoreError},
-    keys, labels, meshes, problems,
+    keys, labels, meshes,
     rows::JobRow,
     submission::{Accepted, MOST_PER_COMMIT, NewJob, Pending, QueueLimits, Submission},
     sweeps,
@@ -116,14 +117,19 @@ async fn accept(
     }
     let mut inserted = vec![];
     let sweep_key = match &sweep {
-        Some(new) => Some(sweeps::insert(change, &owner, new).await?),
+        Some(new) => Some((
+            sweeps::insert(change, &owner, new).await?,
+            NewContent::new(new.definition.as_bytes()),
+        )),
         None => None,
     };
     let mut groups = sweep.iter().flat_map(|sweep| &sweep.groups);
     for new in &jobs {
         let key = insert(change, &owner, new, limits).await?;
-        if let (Some(sweep), Some(members)) = (sweep_key, groups.next()) {
-            sweeps::insert_members(change.sql().await?, sweep, key, members).await?;
+        if let (Some((sweep, definition)), Some(members)) = (&sweep_key, groups.next()) {
+            let tx = change.sql().await?;
+            sweeps::insert_members(tx, *sweep, key, members).await?;
+            sweeps::attach_definition(tx, key, definition).await?;
         }
         inserted.push(key);
     }
@@ -198,7 +204,6 @@ pub(super) async fn insert(
     if answer.is_none() {
         meshes::require(change.sql().await?, new.mesh.as_deref()).await?;
     }
-    problems::write(change.sql().await?, new).await?;
     let now = change.now();
     let key = change
         .insert(|key| {
@@ -207,6 +212,9 @@ pub(super) async fn insert(
             row
         })
         .await?;
+    let problem = NewContent::new(new.problem.as_bytes());
+    let tx = change.sql().await?;
+    content::attach(tx, Holder::Job(key), name::PROBLEM, &problem).await?;
     let job = change.read(key).await?;
     labels::write(change, &job).await?;
     if let Some(source) = answer {

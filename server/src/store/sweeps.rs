@@ -11,6 +11,7 @@ use uuid::Uuid;
 use super::{
     change::Change,
     checksum::{self, Checksum},
+    content::{self, Holder, NewContent, name},
     damage::Table,
     database::Store,
     entries::{Entries, bytes_of},
@@ -122,8 +123,13 @@ impl Store {
     /// The definition of a sweep as JSON.
     pub async fn sweep_definition(&self, key: i64) -> Result<Option<String>> {
         let read = async {
-            let mut connection = self.reader.acquire().await?;
-            definition(&mut connection, key).await
+            let mut tx = self.reader.begin().await?;
+            match some_job(&mut tx, key).await? {
+                Some(job) => content::read_text(&mut tx, Holder::Job(job), name::DEFINITION)
+                    .await
+                    .map(Some),
+                None => Ok(None),
+            }
         };
         self.damages.noting(read).await
     }
@@ -175,11 +181,13 @@ impl Store {
         .bind(key)
         .fetch_one(&self.lists)
         .await?;
-        let definition: Option<i64> =
-            sqlx::query_scalar("select octet_length(body) from sweep_definition where sweep = ?")
-                .bind(key)
-                .fetch_optional(&self.lists)
-                .await?;
+        let definition: Option<i64> = sqlx::query_scalar(
+            "select bytes from sweep_member join attachment on kind = 'job' and key = job and name = 'definition'
+             join content on content.id = content where sweep = ? limit 1",
+        )
+        .bind(key)
+        .fetch_optional(&self.lists)
+        .await?;
         let definition = definition.unwrap_or_default();
         // of a grid each value is many members'
         let values = definition
@@ -248,25 +256,21 @@ impl Store {
     pub async fn members_task(&self, job: i64) -> Result<Option<MembersTask>> {
         let read = async {
             let mut tx = self.reader.begin().await?;
-            let members: Vec<(i64, i64, Option<i64>)> = sqlx::query_as(
-                "select sweep, number, seq from sweep_member where job = ? order by number",
+            let members: Vec<(i64, Option<i64>)> = sqlx::query_as(
+                "select number, seq from sweep_member where job = ? order by number",
             )
             .bind(job)
             .fetch_all(&mut *tx)
             .await?;
-            let Some((sweep, first, _)) = members.first() else {
+            let Some((first, _)) = members.first() else {
                 return Ok(None);
             };
-            let (sweep, first) = (*sweep, *first);
-            let Some(definition) = definition(&mut tx, sweep).await? else {
-                return Err(record(sweep, "definition").damaged("it is missing"));
-            };
-            let left = members.iter().filter(|(_, _, seq)| seq.is_none());
+            let left = members.iter().filter(|(_, seq)| seq.is_none());
             Ok(Some(MembersTask {
-                definition,
-                first: number(first),
-                group: members.iter().map(|(_, n, _)| number(*n)).collect(),
-                numbers: left.map(|(_, n, _)| number(*n)).collect(),
+                definition: content::read_text(&mut tx, Holder::Job(job), name::DEFINITION).await?,
+                first: number(*first),
+                group: members.iter().map(|(n, _)| number(*n)).collect(),
+                numbers: left.map(|(n, _)| number(*n)).collect(),
             }))
         };
         self.damages.noting(read).await
@@ -274,10 +278,8 @@ impl Store {
 
     /// The member that a job's own problem is, and the job that solves a member: by their keys.
     pub async fn some_job_of(&self, key: i64) -> Result<Option<i64>> {
-        let job = sqlx::query_scalar(
-            "select job.id from job join sweep on sweep.uuid = job.sweep where sweep.id = ? limit 1",
-        );
-        Ok(job.bind(key).fetch_optional(&self.reader).await?)
+        let mut connection = self.reader.acquire().await?;
+        some_job(&mut connection, key).await
     }
 
     /// Stores the rows of members that an attempt of a job has solved; returns their sweep, and `None` when the attempt
@@ -387,14 +389,16 @@ pub(super) async fn insert(change: &mut Change<'_>, owner: &str, new: &NewSweep)
     .fetch_one(&mut *tx)
     .await?;
     seal(tx, key).await?;
-    let checksum = Checksum::new().int(key).text(&new.definition).stored();
-    sqlx::query("insert into sweep_definition (sweep, body, checksum) values (?, ?, ?)")
-        .bind(key)
-        .bind(&new.definition)
-        .bind(checksum)
-        .execute(tx)
-        .await?;
     Ok(key)
+}
+
+/// Attaches the definition of its sweep to a job, so that it is kept as long as one of its jobs.
+pub(super) async fn attach_definition(
+    tx: &mut SqliteConnection,
+    job: i64,
+    definition: &NewContent<'_>,
+) -> Result<()> {
+    content::attach(tx, Holder::Job(job), name::DEFINITION, definition).await
 }
 
 /// Inserts members of a sweep that a job is to solve.
@@ -437,7 +441,6 @@ async fn delete(change: &mut Change<'_>, key: i64) -> Result<bool> {
         .await?;
     for statement in [
         "delete from sweep_member where sweep = ?",
-        "delete from sweep_definition where sweep = ?",
         "delete from sweep where id = ?",
     ] {
         sqlx::query(statement).bind(key).execute(&mut *tx).await?;
@@ -505,24 +508,12 @@ pub(super) fn check_member(row: &SqliteRow) -> Result<()> {
     checked(row).map(|_| ())
 }
 
-/// An error if the definition of a sweep is not as it was written.
-pub(super) fn check_definition(row: &SqliteRow) -> Result<()> {
-    let (key, body): (i64, String) = (row.try_get("sweep")?, row.try_get("body")?);
-    let what = || record(key, "definition");
-    Checksum::new()
-        .int(key)
-        .text(&body)
-        .verify(row.try_get("checksum")?, what)
-}
-
-async fn definition(connection: &mut SqliteConnection, key: i64) -> Result<Option<String>> {
-    let row = sqlx::query("select * from sweep_definition where sweep = ?")
-        .bind(key)
-        .fetch_optional(connection)
-        .await?;
-    let Some(row) = row else { return Ok(None) };
-    check_definition(&row)?;
-    Ok(Some(row.try_get("body")?))
+/// Some job of a sweep, which has its definition.
+async fn some_job(connection: &mut SqliteConnection, key: i64) -> Result<Option<i64>> {
+    let job = sqlx::query_scalar(
+        "select job.id from job join sweep on sweep.uuid = job.sweep where sweep.id = ? limit 1",
+    );
+    Ok(job.bind(key).fetch_optional(connection).await?)
 }
 
 fn record(key: i64, what: &str) -> Record {

@@ -43,7 +43,7 @@ impl Store {
             key: id.to_string(),
             payload: String::new(),
         };
-        let result = Parts(vec![Part::new("summary".into(), b"{}")]);
+        let result = Parts::new(vec![Part::new("summary".into(), b"{}")]);
         let ending = Ending {
             result: ResultAvailable::Partial,
             ..Ending::failed(Reason::Internal, "")
@@ -53,7 +53,7 @@ impl Store {
         keys::remember(&mut change, "", &request, &[key]).await?;
         let now = change.now();
         change.update(key, |row| row.start(now)).await?;
-        results::write_at_end(change.sql().await?, key, &result).await?;
+        results::attach(&mut change, key, &result).await?;
         end(&mut change, key, &ending).await
     }
 }

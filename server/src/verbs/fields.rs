@@ -25,7 +25,7 @@ pub struct StoredFields {
     /// Length and fingerprint.
     pub info: PartInfo,
     id: JobId,
-    result_key: i64,
+    key: i64,
     /// If they had to be read to know that they are intact.
     loaded: Option<Arc<LoadedFields>>,
 }
@@ -39,12 +39,11 @@ pub async fn fields(
     let found = with_result(service, caller, id).await?;
     let job = found.job.clone();
     drop(found);
-    let result_key = job.result_key;
     are_kept(service, &job).await?;
-    let (info, loaded) = match service.store.fields_info(result_key).await? {
+    let (info, loaded) = match service.store.fields_info(job.key).await? {
         Some(info) => (info, None),
         None => {
-            let loaded = load(service, result_key).await?;
+            let loaded = load(service, job.key).await?;
             let loaded = loaded.ok_or_else(|| no_result(&job))?;
             (loaded.info.clone(), Some(loaded))
         }
@@ -52,7 +51,7 @@ pub async fn fields(
     let content = StoredFields {
         info,
         id,
-        result_key,
+        key: job.key,
         loaded,
     };
     Ok(Found::new(job.result_available, content))
@@ -105,7 +104,7 @@ impl StoredFields {
         start: u64,
         end: u64,
     ) -> impl Stream<Item = Result<Vec<u8>, ApiError>> + Send + use<> {
-        let (service, id, key) = (service.clone(), self.id, self.result_key);
+        let (service, id, key) = (service.clone(), self.id, self.key);
         let loaded = self.loaded.clone();
         try_stream! {
             let loaded = match loaded {
@@ -146,7 +145,7 @@ pub async fn converted_fields(
     drop(found);
     are_kept(service, &job).await?;
     // before there is a permit to work: who has that must not wait for memory, which others keep until they have worked
-    let loaded = load(service, job.result_key).await?;
+    let loaded = load(service, job.key).await?;
     let loaded = loaded.ok_or_else(|| no_result(&job))?;
     let written = service.work(move || formats::fields(&loaded.fields, format));
     let content = written.await?.map_err(ApiError::internal)?;

@@ -27,7 +27,7 @@ use crate::{
     error::ApiError,
     mesh::MeshInfo,
     parameters::{Values, Variable},
-    store::{Cursor, PIECE_BYTES, PIECES_PER_COMMIT, Removal, StoredMesh},
+    store::{Cursor, Fingerprint, PIECE_BYTES, PIECES_PER_COMMIT, Removal, StoredMesh},
     violations,
 };
 
@@ -112,7 +112,7 @@ pub async fn upload(
     let parsed = service
         .work(move || parse(file, &folder, name, bytes as u64))
         .await??;
-    let (info, encoded) = parsed;
+    let (info, body, encoded) = parsed;
     let mesh_bytes = encoded.metadata().map_err(ApiError::internal)?.len();
     // those first that are about to be stored: one that is stored meanwhile counts twice for a moment, and never not at all
     let more = upload.read(mesh_bytes);
@@ -121,9 +121,9 @@ pub async fn upload(
     detached(async move {
         let _upload = upload;
         let encoded = tokio::fs::File::from_std(encoded);
-        let stored = store(&service, &owner, &info, encoded).await;
+        let stored = store(&service, &owner, &info, &body, encoded).await;
         if stored.is_err()
-            && let Err(cause) = service.store.remove_incomplete_mesh(&info.hash).await
+            && let Err(cause) = service.store.discard_content(&[&body]).await
         {
             warn!(%cause, "what was stored of mesh {} stays until the next start: {cause}", info.hash);
         }
@@ -143,7 +143,7 @@ fn parse(
     folder: &Path,
     hash: String,
     bytes: u64,
-) -> Result<(MeshInfo, File), ApiError> {
+) -> Result<(MeshInfo, Fingerprint, File), ApiError> {
     file.rewind().map_err(ApiError::internal)?;
     let encoded = tempfile::tempfile_in(folder).map_err(unwritten)?;
     let reader = BufReader::with_capacity(PIECE_BYTES, file);
@@ -151,6 +151,8 @@ fn parse(
     let info = MeshInfo::new(hash, bytes, (format, &mesh, warnings));
     let mut out = Kept {
         out: BufWriter::with_capacity(PIECE_BYTES, encoded),
+        hash: Sha256::new(),
+        bytes: 0,
         error: None,
     };
     if let Err(cause) = crate::mesh::write_stored(&mesh, &mut out) {
@@ -159,25 +161,34 @@ fn parse(
             .error
             .map_or_else(|| ApiError::internal(cause), unwritten));
     }
+    let body = Fingerprint {
+        hash: out.hash.finalize().to_vec(),
+        bytes: out.bytes,
+    };
     let file = out.out.into_inner();
     let mut encoded = file.map_err(|error| unwritten(error.into_error()))?;
     encoded.flush().map_err(unwritten)?;
-    Ok((info, encoded))
+    Ok((info, body, encoded))
 }
 
-/// A file with the error that has ended its writing.
+/// A file with the hash of what is written, and the error that has ended its writing.
 struct Kept {
     out: BufWriter<File>,
+    hash: Sha256,
+    bytes: usize,
     error: Option<io::Error>,
 }
 
 impl Write for Kept {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.out.write(bytes).map_err(|error| {
+        let written = self.out.write(bytes).map_err(|error| {
             let kind = error.kind();
             self.error = Some(error);
-            kind.into()
-        })
+            io::Error::from(kind)
+        })?;
+        self.hash.update(&bytes[..written]);
+        self.bytes += written;
+        Ok(written)
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -197,22 +208,23 @@ async fn store(
     service: &Service,
     owner: &str,
     info: &MeshInfo,
+    body: &Fingerprint,
     mut encoded: tokio::fs::File,
 ) -> Result<bool, ApiError> {
     loop {
-        let pieces = write_pieces(service, &info.hash, &mut encoded).await?;
-        if let Some(new) = service.store.insert_mesh(owner, info, pieces).await? {
+        write_pieces(service, body, &mut encoded).await?;
+        if let Some(new) = service.store.insert_mesh(owner, info, body).await? {
             return Ok(new);
         }
     }
 }
 
-/// Writes all pieces, and counts them.
+/// Writes all pieces.
 async fn write_pieces(
     service: &Service,
-    hash: &str,
+    body: &Fingerprint,
     encoded: &mut tokio::fs::File,
-) -> Result<i64, ApiError> {
+) -> Result<(), ApiError> {
     encoded.rewind().await.map_err(ApiError::internal)?;
     let mut first = 0;
     loop {
@@ -228,10 +240,10 @@ async fn write_pieces(
             group.push(piece);
         }
         if group.is_empty() {
-            return Ok(first);
+            return Ok(());
         }
-        service.store.write_mesh_pieces(hash, first, &group).await?;
-        first += group.len() as i64;
+        service.store.write_pieces(body, first, &group).await?;
+        first += group.len();
     }
 }
 

@@ -211,7 +211,7 @@ async fn fields_of(
     if plot == Plot::Deformed {
         fields::are_kept(service, &job).await?;
     }
-    let fields = fields::load(service, job.result_key).await?;
+    let fields = fields::load(service, job.key).await?;
     match plot == Plot::Deformed && fields.is_none() {
         true => Err(results::no_result(&job)),
         false => Ok(fields),

@@ -69,7 +69,7 @@ pub(super) async fn room_for(
     parts: &[&str],
 ) -> Result<Option<Share>, ApiError> {
     // without the connection that a snapshot holds: others need that while this waits
-    let key = jobs::snapshot(service, caller, id).await?.job.result_key;
+    let key = jobs::snapshot(service, caller, id).await?.job.key;
     let mut bytes = 0;
     for part in parts {
         bytes += service.store.part_memory(key, part).await?.unwrap_or(0);

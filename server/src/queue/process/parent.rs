@@ -216,7 +216,7 @@ impl Process {
                         continue;
                     }
                     Reply::Partial => {
-                        let parts = Parts::from_parts(std::mem::take(&mut parts));
+                        let parts = Parts::new(std::mem::take(&mut parts));
                         Told::Report(Report::Partial(Box::new(parts)))
                     }
                     Reply::Solved {
@@ -228,7 +228,7 @@ impl Process {
                             ending,
                             unverified,
                             iterations,
-                            parts: Parts::from_parts(parts),
+                            parts: Parts::new(parts),
                         }));
                     }
                     Reply::Ready => continue,

@@ -75,7 +75,7 @@ async fn a_running_job_whose_record_is_damaged_stops_and_frees_its_worker() {
 async fn a_job_whose_end_a_damaged_database_cannot_store_frees_its_worker() {
     let folder = tempfile::tempdir().unwrap();
     Store::open(folder.path()).await.unwrap().close().await;
-    Store::erase_table(folder.path(), "result_part").await;
+    Store::erase_table(folder.path(), "job_size").await;
     let store = Store::open(folder.path()).await.unwrap();
     let queue = Queue::new(store.clone(), Solver::Threads(fake::solve), 1);
     queue.start();
@@ -494,10 +494,7 @@ async fn partial_results_of_many_quick_steps_are_not_stored_after_each() {
         }
         tokio::time::sleep(Duration::from_millis(5)).await;
     };
-    assert_eq!(
-        (found.status, found.result_key),
-        (Status::Running, -job.key)
-    );
+    assert_eq!(found.status, Status::Running);
     rig.queue.cancel(job.key).await.unwrap();
     let done = rig.until_done(&job).await;
     assert_eq!(

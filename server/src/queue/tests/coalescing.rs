@@ -18,12 +18,12 @@ async fn an_earlier_result_answers_at_once_and_outlives_its_job() {
     assert_eq!(kinds, ["status", "status", "done"]);
     let part = |key| rig.store.json_of(key, "fields");
     let bytes = part(primary.key).await.unwrap().unwrap();
-    assert_eq!(cached.result_key, primary.key);
+    assert_eq!(cached.cached_from, Some(primary.id));
     rig.store.delete(Owners::All, primary.key).await.unwrap();
-    assert_eq!(part(cached.result_key).await.unwrap(), Some(bytes));
-    // and is deleted with the last job that was answered with it
+    assert_eq!(part(cached.key).await.unwrap(), Some(bytes));
+    // and goes with the last job that was answered with it
     rig.store.delete(Owners::All, cached.key).await.unwrap();
-    assert_eq!(part(cached.result_key).await.unwrap(), None);
+    assert_eq!(part(cached.key).await.unwrap(), None);
     let fresh = rig.submit_as(same()).await;
     assert_eq!(fresh.cached_from, None);
 }
@@ -72,7 +72,7 @@ async fn a_coalesced_job_ends_as_its_primary_ends() {
         .await
         .unwrap()
         .unwrap();
-    assert_eq!(coalesced.result_key, primary.key);
+    assert_eq!(coalesced.cached_from, Some(primary.id));
 }
 
 #[tokio::test]

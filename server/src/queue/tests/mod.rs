@@ -157,7 +157,7 @@ impl Rig {
             // the keys in the store are no part of the event
             Payload::Done { job: done } => Job {
                 key: job.key,
-                result_key: job.key,
+                memory_bytes: job.memory_bytes,
                 cache: job.cache,
                 ..*done
             },

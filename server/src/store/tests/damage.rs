@@ -13,10 +13,11 @@ use crate::{
 
 const PARTS: [&str; 4] = ["summary", "history", "steps", "fields"];
 
-fn result() -> Parts {
-    let part =
-        |name: &&str| ResultPart::new(name.to_string(), format!("{{\"{name}\":1.25}}").as_bytes());
-    Parts(PARTS.iter().map(part).collect())
+/// A result that no other job has.
+fn result_of(key: i64) -> Parts {
+    let json = |name: &str| format!("{{\"{name}\":{key}.25}}");
+    let part = |name: &&str| ResultPart::new(name.to_string(), json(name).as_bytes());
+    Parts::new(PARTS.iter().map(part).collect())
 }
 
 /// Submits a job, solves it, and returns it.
@@ -34,7 +35,7 @@ async fn solved(store: &Store, new: NewJob) -> Job {
         result: ResultAvailable::Final,
         warnings: vec![],
     };
-    let parts = result();
+    let parts = result_of(key);
     assert!(store.write_before_end(key, attempt, &parts).await.unwrap());
     let last = FinalBatch::default();
     let finished = store
@@ -65,8 +66,11 @@ async fn everything(store: &Store, id: JobId, mesh: &str) -> Vec<(&'static str, 
             }
             drop(found);
             let mut connection = store.reader.acquire().await.unwrap();
-            let info = intact::read_part(&mut connection, 1, "fields").await;
-            all.push(("info", text(info.map(|info| info.map(|(info, _)| info)))));
+            let result = results::StoredResult::of(&mut connection, 1).await;
+            let info = |result: Option<results::StoredResult>| {
+                result.and_then(|result| result.fields().map(|(_, info)| info.clone()))
+            };
+            all.push(("info", text(result.map(info))));
         }
     }
     all
@@ -121,11 +125,7 @@ async fn no_column_can_change_unnoticed() {
         "quality": { "least_jacobian_ratio": 1, "worst_element": 0 }, "created_at": "2023-11-14T22:13:20Z"
     }))
     .unwrap();
-    store
-        .write_mesh_pieces(&mesh.hash, 0, &[vec![1], vec![2]])
-        .await
-        .unwrap();
-    store.insert_mesh("local", &mesh, 2).await.unwrap().unwrap();
+    store_mesh(&store, "local", &mesh, &[1; PIECE_BYTES + 1]).await;
     let job = solved(
         &store,
         NewJob {
@@ -136,21 +136,26 @@ async fn no_column_can_change_unnoticed() {
     .await;
     let before = everything(&store, job.id, &mesh.hash).await;
     assert!(before.iter().all(|(_, read)| read.is_ok()), "{before:?}");
-    // by which a row is found: another value is another row
-    let found_by = ["id", "uuid", "job_id", "hash", "input_hash"];
+    // by which a row is found: another value is another row; and of which job's size content is a part
+    let not_compared = |table: &str| match table {
+        "job" => ["id", "uuid", "input_hash"].as_slice(),
+        "event" => &["job_id"],
+        "content" => &["id", "holder"],
+        "attachment" => &["kind", "key", "name"],
+        _ => &["id", "hash"],
+    };
     for table in [
         "job",
-        "problem",
         "event",
-        "result_info",
-        "result_part",
+        "content",
+        "content_piece",
+        "attachment",
         "mesh",
-        "mesh_piece",
     ] {
-        let key = if table == "event" { "seq" } else { "rowid" };
         let key = match table {
-            "result_info" => "name",
-            _ => key,
+            "event" => "seq",
+            "attachment" => "name",
+            _ => "rowid",
         };
         let rows = format!("select {key} as place, * from {table}");
         let rows = sqlx::query(AssertSqlSafe(rows))
@@ -159,7 +164,7 @@ async fn no_column_can_change_unnoticed() {
             .unwrap();
         for row in rows {
             for column in row.columns().iter().map(sqlx::Column::name).skip(1) {
-                if found_by.contains(&column) || (table == "result_info" && column == "name") {
+                if not_compared(table).contains(&column) {
                     continue;
                 }
                 let place = match row.try_get::<i64, _>("place") {
@@ -189,7 +194,9 @@ async fn no_column_can_change_unnoticed() {
                         _ => format!("'x' || {text}"),
                     },
                     blob if blob.starts_with("X'") => "x'00'".into(),
-                    number if matches!(column, "seq" | "piece") => format!("{number} + 100"),
+                    number if matches!(column, "seq" | "piece" | "content") => {
+                        format!("{number} + 100")
+                    }
                     number => format!("{number} + 1"),
                 };
                 put(&other, key).await;
@@ -298,7 +305,7 @@ async fn a_damaged_result_answers_no_other_job() {
         ..new("1")
     };
     let first = solved(&store, cached()).await;
-    set(&store, "result_part", 2, "body", "x'7b7d'").await;
+    set(&store, "content_piece", 2, "body", "x'7b7d'").await;
     let accepted = store
         .submit(by("ada", vec![cached()], None), false)
         .await
@@ -358,7 +365,7 @@ async fn a_damaged_job_does_not_stop_the_queue() {
     let store = Store::open(folder.path()).await.unwrap();
     submit_three(&store).await;
     store.damage_job(1).await;
-    set(&store, "problem", 2, "body", "'{}'").await;
+    set(&store, "content_piece", 2, "body", "x'7b7d'").await;
     let claim = store.claim_next().await.unwrap().0.unwrap();
     assert_eq!(claim.job.key, 3);
     let second = Filter {
@@ -535,7 +542,8 @@ async fn what_is_intact_is_saved_and_the_rest_is_named() {
             .await
             .unwrap();
     }
-    let third = "update result_part set body = x'00' where job_id = 3 and name = 'fields'";
+    let third = "update content_piece set body = x'00'
+                 where content = (select content from attachment where key = 3 and name = 'fields')";
     sqlx::query(third).execute(&store.writer).await.unwrap();
     set(&store, "job", 5, "owner", "'bob'").await;
     store.close().await;
@@ -546,19 +554,17 @@ async fn what_is_intact_is_saved_and_the_rest_is_named() {
     let told = report.findings.join("\n");
     assert_eq!((report.jobs, report.intact), (6, 3), "{told}");
     assert!(told.contains(&format!("{}: event 2", jobs[1].id)), "{told}");
-    assert!(
-        told.contains(&format!("{}: result part fields", jobs[2].id)),
-        "{told}"
-    );
+    assert!(told.contains(&format!("{}: fields", jobs[2].id)), "{told}");
     assert!(told.contains("(number 5): record"), "{told}");
     let saved = Store::open(new_folder.path()).await.unwrap();
     for kept in [&jobs[0], &jobs[3]] {
         let found = saved.job(Owners::All, kept.id).await.unwrap().unwrap();
         assert_eq!(format!("{found:?}"), format!("{kept:?}"));
         let mut found = saved.snapshot(Owners::All, kept.id).await.unwrap().unwrap();
+        let fields = format!("{{\"fields\":{}.25}}", kept.key);
         assert_eq!(
             found.part("fields").await.unwrap().unwrap(),
-            b"{\"fields\":1.25}"
+            fields.as_bytes()
         );
     }
     let labeled = Filter {
@@ -644,7 +650,7 @@ async fn a_page_of_one_job_that_cannot_be_read_disturbs_no_other() {
         warnings: vec![],
     };
     let large = format!("\"{}\"", "r".repeat(50_000)).into_bytes();
-    let result = Parts(vec![
+    let result = Parts::new(vec![
         ResultPart::new("summary".into(), b"{}"),
         ResultPart::plain(large),
     ]);
@@ -681,7 +687,7 @@ async fn a_damaged_problem_that_is_submitted_again_is_mended_before_it_is_claime
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
     solved(&store, new("1")).await;
-    set(&store, "problem", 1, "body", "'[]'").await;
+    set(&store, "content_piece", 1, "body", "x'5b5d'").await;
     let again = store.submit(by("ada", vec![new("1")], None), true).await;
-    assert_eq!(again.unwrap().claim.unwrap().problem, "{}");
+    assert_eq!(again.unwrap().claim.unwrap().problem, new("1").problem);
 }

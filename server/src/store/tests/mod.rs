@@ -42,10 +42,13 @@ impl Store {
     /// The JSON of a part of a result; `None` if there is no such part.
     pub(crate) async fn json_of(&self, key: i64, part: &str) -> Result<Option<Vec<u8>>> {
         let mut connection = self.reader.acquire().await?;
-        let found = intact::read_part(&mut connection, key, part).await?;
-        Ok(found.map(|(_, content)| match content {
-            encoding::Content::Json(json) => json,
-            encoding::Content::Fields(fields) => serde_json::to_vec(&fields).unwrap(),
+        let Some(result) = results::StoredResult::of(&mut connection, key).await? else {
+            return Ok(None);
+        };
+        let found = result.read(&mut connection, part).await?;
+        Ok(found.map(|(_, decoded)| match decoded {
+            encoding::Decoded::Json(json) => json,
+            encoding::Decoded::Fields(fields) => serde_json::to_vec(&fields).unwrap(),
         }))
     }
 }
@@ -57,7 +60,6 @@ impl parts::Part {
             name: "fields".into(),
             encoding: encoding::Encoding::Plain,
             info: encoding::info_of_json(&body),
-            stored_digest: encoding::digest(&body),
             body,
         }
     }
@@ -66,8 +68,17 @@ impl parts::Part {
 impl Parts {
     /// Those of a result that is nothing but a summary.
     pub(crate) fn of_a_summary() -> Parts {
-        Parts(vec![parts::Part::new("summary".into(), b"{}")])
+        Parts::new(vec![parts::Part::new("summary".into(), b"{}")])
     }
+}
+
+/// Stores a mesh with this body.
+async fn store_mesh(store: &Store, owner: &str, info: &crate::mesh::MeshInfo, body: &[u8]) {
+    let content = Fingerprint::of([body]);
+    let pieces: Vec<&[u8]> = body.chunks(PIECE_BYTES).collect();
+    store.write_pieces(&content, 0, &pieces).await.unwrap();
+    let inserted = store.insert_mesh(owner, info, &content).await;
+    inserted.unwrap().unwrap();
 }
 
 /// A job with an input of its own, whose result answers no other job.
@@ -83,7 +94,7 @@ fn new(input: &str) -> NewJob {
         sweep: None,
         title: None,
         input_hash: format!("sha256:{input}"),
-        problem: "{}".into(),
+        problem: format!("{{\"input\":\"{input}\"}}"),
         mesh: None,
         memory_bytes: 1 << 20,
         payload: "payload".into(),
@@ -158,7 +169,7 @@ async fn a_job_that_another_answers_keeps_no_piece_of_its_interrupted_attempt() 
         accepted.unwrap().claim.unwrap().job
     };
     let first = submit(0, Cache::Use).await;
-    let large = Parts(vec![parts::Part::plain(vec![b' '; 3 << 20])]);
+    let large = Parts::new(vec![parts::Part::plain(vec![b' '; 3 << 20])]);
     let written = store.write_before_end(first.key, first.attempt, &large);
     assert!(written.await.unwrap());
     store
@@ -182,12 +193,14 @@ async fn a_job_that_another_answers_keeps_no_piece_of_its_interrupted_attempt() 
     assert!(store.claim_next().await.unwrap().0.is_none());
     let answered = store.job(Owners::All, first.id).await.unwrap().unwrap();
     assert_eq!(answered.status, Status::Succeeded);
-    let left: i64 = sqlx::query_scalar("select count(*) from result_part where job_id = ?")
-        .bind(first.key)
+    // what was written of its own result is removed by whoever wrote it, and else at the next start
+    assert!(store.discard_unattached().await.unwrap() > 10);
+    assert_eq!(store.json_of(first.key, "fields").await.unwrap(), None);
+    let left: i64 = sqlx::query_scalar("select count(*) from content_piece")
         .fetch_one(&store.reader)
         .await
         .unwrap();
-    assert_eq!(left, 0);
+    assert_eq!(left, 2, "the problem and the result of both");
 }
 
 #[tokio::test]
@@ -204,12 +217,12 @@ async fn what_answers_a_job_is_checked_before_and_by_what_is_stored() {
     }
     let job = store.claim_next().await.unwrap().0.unwrap().job;
     // intact as it is stored, but not what it should decode to, which only whoever is served it needs to know
-    let body = vec![7; parts::PIECE_BYTES + 1];
+    let body = vec![7; PIECE_BYTES + 1];
     let fields = parts::Part {
         encoding: encoding::Encoding::Deflated,
         ..parts::Part::plain(body)
     };
-    let parts = Parts(vec![parts::Part::new("summary".into(), b"{}"), fields]);
+    let parts = Parts::new(vec![parts::Part::new("summary".into(), b"{}"), fields]);
     let ending = Ending {
         status: Status::Succeeded,
         reason: None,
@@ -220,16 +233,27 @@ async fn what_answers_a_job_is_checked_before_and_by_what_is_stored() {
     let last = FinalBatch::default();
     let ended = store.finish(job.key, 1, &ending, last, Some(&parts));
     ended.await.unwrap().unwrap();
-    let is_known = || store.intact.contains(job.key, intact::WHOLE);
+    let numbers =
+        "select content from attachment where key = ? and name <> 'problem' order by name";
+    let numbers: Vec<i64> = sqlx::query_scalar(numbers)
+        .bind(job.key)
+        .fetch_all(&store.reader)
+        .await
+        .unwrap();
+    let is_known = || numbers.iter().all(|number| store.intact.contains(*number));
     assert!(!is_known());
     // the other owner's turn is next
     store.check_result_for_next().await;
     assert!(is_known());
     assert!(store.json_of(job.key, "fields").await.is_err());
-    let missing = "delete from result_part where name = 'fields' and piece = 1";
-    sqlx::query(missing).execute(&store.writer).await.unwrap();
+    let missing = "delete from content_piece where content = ? and piece = 1";
+    let missing = sqlx::query(missing).bind(numbers[0]);
+    missing.execute(&store.writer).await.unwrap();
     let mut connection = store.reader.acquire().await.unwrap();
-    let checked = intact::check_stored(&mut connection, job.key).await;
+    let nothing = intact::Intact::default();
+    let attached = content::all(&mut connection, content::Holder::Job(job.key)).await;
+    let attached = attached.unwrap();
+    let checked = results::check_stored(&mut connection, &nothing, job.key, attached).await;
     assert!(
         matches!(checked, Err(StoreError::Damaged(_))),
         "{checked:?}"

@@ -31,8 +31,10 @@ async fn solve(store: &Store, owner: &str, job: NewJob, bytes: usize) -> Job {
         result: ResultAvailable::Final,
         warnings: vec![],
     };
-    let body = (0u64..).map(|n| (n.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 56) as u8);
-    let parts = Parts(vec![
+    // no two jobs have the same
+    let first = 1000 * claim.job.key as u64;
+    let body = (first..).map(|n| (n.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 56) as u8);
+    let parts = Parts::new(vec![
         Part::new("summary".into(), b"{}"),
         Part::plain(body.take(bytes).collect()),
     ]);
@@ -107,18 +109,14 @@ async fn what_jobs_and_meshes_take_is_counted_for_their_owners() {
     let own = job.stored_bytes.unwrap();
     assert!((10_000..13_000).contains(&own), "{own}");
     let again = solved(&store, "bob", "1", 10_000).await;
-    assert_eq!(again.result_key, job.result_key, "answered by the other");
+    assert_eq!(again.cached_from, Some(job.id), "answered by the other");
     assert!(
         again.stored_bytes.unwrap() < 3000,
         "{:?}",
         again.stored_bytes
     );
     let mesh = small_mesh();
-    store
-        .write_mesh_pieces(&mesh.hash, 0, &[vec![1; 500]])
-        .await
-        .unwrap();
-    store.insert_mesh("bob", &mesh, 1).await.unwrap().unwrap();
+    store_mesh(&store, "bob", &mesh, &[1; 500]).await;
     let of = async |owner| store.size_of_owner(owner).await.unwrap();
     assert_eq!((of("ada").await.jobs, of("ada").await.bytes()), (1, own));
     assert_eq!(of("bob").await.mesh_bytes, 500);
@@ -167,7 +165,7 @@ async fn problems_that_wait_are_counted_once_for_each_input() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
     let job = |input: &str| NewJob {
-        problem: "x".repeat(1000),
+        problem: input.repeat(1000),
         ..new(input)
     };
     let jobs = vec![job("1"), job("1"), job("2")];
@@ -182,7 +180,7 @@ async fn fields_are_deleted_by_themselves_and_with_the_last_job_that_has_them() 
     let store = Store::open(folder.path()).await.unwrap();
     let first = solved(&store, "ada", "1", 10_000).await;
     let second = solved(&store, "bob", "1", 10_000).await;
-    let fields = async || store.json_of(first.key, "fields").await.unwrap();
+    let fields = async |key| store.json_of(key, "fields").await.unwrap();
     let unknown = store
         .delete_fields(Owners::Only("eve"), first.key)
         .await
@@ -193,14 +191,15 @@ async fn fields_are_deleted_by_themselves_and_with_the_last_job_that_has_them() 
         .await
         .unwrap();
     assert!(store.lost_fields(first.key).await.unwrap());
-    assert!(!store.lost_fields(second.key).await.unwrap() && fields().await.is_some());
+    assert_eq!(fields(first.key).await, None);
+    assert!(!store.lost_fields(second.key).await.unwrap() && fields(second.key).await.is_some());
     store.delete_fields(Owners::All, second.key).await.unwrap();
-    assert!(fields().await.is_none());
+    assert_eq!(fields(second.key).await, None);
     assert!(store.json_of(first.key, "summary").await.unwrap().is_some());
     assert!(store.size_of_owner("ada").await.unwrap().bytes() < 3000);
     // what has lost its fields answers nobody
     let third = solved(&store, "ada", "1", 10_000).await;
-    assert_eq!((third.cached_from, third.result_key), (None, third.key));
+    assert_eq!(third.cached_from, None);
     let ada = store.size_of_owner("ada").await.unwrap();
     store.close().await;
     drop(store);
@@ -223,10 +222,16 @@ async fn fields_go_with_the_last_job_that_has_them_also_if_others_have_the_rest(
     let store = Store::open(folder.path()).await.unwrap();
     let first = solved(&store, "ada", "1", 10_000).await;
     let second = solved(&store, "bob", "1", 10_000).await;
+    let stored = async || {
+        let fields = "select count(*) from content where bytes = 10000";
+        let fields = sqlx::query_scalar::<_, i64>(fields).fetch_one(&store.reader);
+        fields.await.unwrap()
+    };
     store.delete_fields(Owners::All, first.key).await.unwrap();
-    assert!(store.json_of(first.key, "fields").await.unwrap().is_some());
-    store.delete(Owners::All, second.key).await.unwrap();
+    assert_eq!(stored().await, 1);
     assert!(store.json_of(first.key, "fields").await.unwrap().is_none());
+    store.delete(Owners::All, second.key).await.unwrap();
+    assert_eq!(stored().await, 0);
     assert!(store.json_of(first.key, "summary").await.unwrap().is_some());
     assert!(are_right(&store).await);
 }
@@ -496,11 +501,11 @@ async fn what_frees_space_works_on_a_full_disk() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open_unwatched(folder.path()).await.unwrap();
     let mesh = small_mesh();
-    let pieces = [vec![1; 500]];
-    for hash in [&mesh.hash, "sha256:incomplete"] {
-        store.write_mesh_pieces(hash, 0, &pieces).await.unwrap();
+    let contents = [vec![1; 500], vec![2; 500]].map(|body| (Fingerprint::of([&*body]), body));
+    store_mesh(&store, "bob", &mesh, &contents[0].1).await;
+    for (content, body) in &contents {
+        store.write_pieces(content, 0, &[body]).await.unwrap();
     }
-    store.insert_mesh("bob", &mesh, 1).await.unwrap().unwrap();
     let expiring = NewJob {
         limits: Limits {
             queue_ttl_s: 1.0,
@@ -512,15 +517,14 @@ async fn what_frees_space_works_on_a_full_disk() {
     submitted.unwrap();
     assert!(store.reserve.release());
     assert!(matches!(store.has_room(), Err(StoreError::Full)));
-    for hash in [&mesh.hash, "sha256:incomplete"] {
-        store.remove_incomplete_mesh(hash).await.unwrap();
+    for (content, _) in &contents {
+        store.discard_content(&[content]).await.unwrap();
     }
-    let pieces = "select group_concat(hash) from mesh_piece";
-    let pieces: String = sqlx::query_scalar(pieces)
-        .fetch_one(&store.reader)
-        .await
-        .unwrap();
-    assert_eq!(pieces, mesh.hash, "one that is complete stays");
+    let body = store.mesh_body(&mesh.hash).await.unwrap().unwrap();
+    assert_eq!(body, contents[0].1, "what has a mesh stays");
+    let left = "select count(*) from content where bytes = 500";
+    let left: sqlx::Result<i64> = sqlx::query_scalar(left).fetch_one(&store.reader).await;
+    assert_eq!(left.unwrap(), 1);
     let removed = store.remove_mesh(Owners::All, &mesh.hash).await.unwrap();
     assert_eq!(removed, Removal::Removed);
     assert_eq!(store.expire_queued(later()).await.unwrap().len(), 1);
@@ -591,7 +595,7 @@ fn fields_are_stored_as_columns_and_everything_else_deflated() {
     assert!(part.body.len() < 500, "{}", part.body.len());
     let (info, content) = encoding::decoded(part.body, part.encoding, &part.info).unwrap();
     assert_eq!(info, part.info);
-    assert!(matches!(content, encoding::Content::Fields(found) if *found == fields));
+    assert!(matches!(content, encoding::Decoded::Fields(found) if *found == fields));
 }
 
 const DAY_S: f64 = 86_400.0;

@@ -279,7 +279,7 @@ async fn a_canceled_job_does_not_succeed_even_if_the_cancel_could_not_be_stored(
             result: ResultAvailable::Final,
             warnings: vec![],
         };
-        let parts = Parts(vec![]);
+        let parts = Parts::new(vec![]);
         let last = FinalBatch::default();
         let finished = store
             .finish(job.key, job.attempt, &ending, last, Some(&parts))

@@ -66,7 +66,7 @@ async fn a_store_from_before_the_job_api_is_upgraded_with_its_content() {
         (jobs[0].status, jobs[0].limits),
         (Status::Succeeded, Limits::default())
     );
-    let key = jobs[0].result_key;
+    let key = jobs[0].key;
     let mut found = store
         .snapshot(Owners::All, jobs[0].id)
         .await
@@ -75,8 +75,9 @@ async fn a_store_from_before_the_job_api_is_upgraded_with_its_content() {
     assert_eq!(found.part("fields").await.unwrap().unwrap(), b"{}");
     drop(found);
     let mut connection = store.reader.acquire().await.unwrap();
-    let read = intact::read_part(&mut connection, key, "fields").await;
-    let (info, _) = read.unwrap().unwrap();
+    let result = results::StoredResult::of(&mut connection, key).await;
+    let result = result.unwrap().unwrap();
+    let (_, info) = result.fields().unwrap();
     assert_eq!((info.bytes, info.digest.len()), (2, 32));
     drop(connection);
     // the waiting job is in the queue, and does not count as having waited too long
@@ -120,18 +121,21 @@ async fn nothing_of_an_earlier_version_is_removed_before_a_day_has_passed() {
     assert_eq!(late.jobs, 1);
 }
 
-/// Rows of versions that wrote no checksums are given theirs once, whether or not the first start dies before it has done so;
-/// from then on one without a checksum is damaged.
+/// Rows of versions that wrote no checksums are given theirs once, whether or not the first start dies meanwhile; from then on
+/// one without a checksum is damaged.
 #[tokio::test]
 async fn jobs_of_a_version_without_checksums_are_given_theirs_once() {
     let folder = tempfile::tempdir().unwrap();
     let migrations = ["0001_jobs.sql", "0002_meshes.sql", "0003_job_api.sql"];
     older_store(folder.path(), &migrations, &BEFORE_OWNERS).await;
     std::fs::remove_dir_all(folder.path().join("migrations")).unwrap();
-    // the start dies after the last migration
+    // the start dies before anything is moved to content
     let options = SqliteConnectOptions::new().filename(folder.path().join("signorini.db"));
     let db = SqlitePool::connect_with(options).await.unwrap();
-    migrations::run(&db, folder.path()).await.unwrap();
+    migrations::migrator_to(migrations::CONTENT)
+        .run(&db)
+        .await
+        .unwrap();
     let unsealed = "select count(*) from job where checksum is null";
     let left: i64 = sqlx::query_scalar(unsealed).fetch_one(&db).await.unwrap();
     assert_eq!(left, 3);

@@ -11,9 +11,9 @@ const TABLES: [&str; 9] = [
     "job",
     "job_label",
     "event",
-    "problem",
-    "result_part",
-    "result_info",
+    "attachment",
+    "content",
+    "content_piece",
     "request_key",
     "deleted_job",
     "setting",
@@ -230,10 +230,11 @@ impl World {
     /// Every job has ended, every result can be read, every key is answered, and nothing else is left.
     pub(super) async fn check_the_end(&mut self) {
         self.check(true).await;
+        self.store.discard_unattached().await.unwrap();
         for job in self.listed().await {
             assert!(job.status.is_terminal(), "{job:?}");
             if job.result_available == ResultAvailable::Final {
-                let found = self.store.json_of(job.result_key, "summary").await.unwrap();
+                let found = self.store.json_of(job.key, "summary").await.unwrap();
                 let text = String::from_utf8(found.expect("a result")).unwrap();
                 assert!(text.contains(&job.input_hash), "{text}");
             }
@@ -252,9 +253,8 @@ impl World {
                 Err(error) => panic!("{error}"),
             }
         }
-        let counted = "select format('job %d (input %s, result %s, created %d): counted %d, kept %d; problem %d',
-                   id, input_hash, result_job, created_at, job_size.bytes, job_kept.bytes,
-                   (select octet_length(body) from problem where problem.input_hash = job.input_hash))
+        let counted = "select format('job %d (input %s, created %d): counted %d, kept %d',
+                   id, input_hash, created_at, job_size.bytes, job_kept.bytes)
              from job_kept left join job_size using (job_id) join job on id = job_id
              where job_size.bytes is not job_kept.bytes";
         let otherwise: Vec<String> = sqlx::query_scalar(counted)
@@ -263,13 +263,12 @@ impl World {
             .unwrap();
         assert_eq!(otherwise, Vec::<String>::new());
         for orphans in [
-            "select count(*) from result_part where not exists
-                 (select 1 from job where result_available <> 'none' and coalesce(result_job, id) = result_part.job_id)",
-            "select count(*) from result_info where not exists
-                 (select 1 from job where result_available <> 'none' and coalesce(result_job, id) = result_info.job_id)",
+            "select count(*) from attachment where not exists (select 1 from job where id = key)",
+            "select count(*) from attachment join job on id = key where attachment.name <> 'problem' and result_available = 'none'",
+            "select count(*) from content where not exists
+                 (select 1 from attachment where content = content.id and key = holder)",
+            "select count(*) from content_piece where content not in (select id from content)",
             "select count(*) from event where not exists (select 1 from job where id = job_id)",
-            "select count(*) from problem where not exists
-                 (select 1 from job where job.input_hash = problem.input_hash)",
             "select count(*) from job where checksum is null",
             "select count(*) from job_size where job_id not in (select job_id from job_kept)",
             "select count(*) from owner_size where (jobs, job_bytes) <>

@@ -122,7 +122,7 @@ impl World {
         if self.once_in(40) {
             parts.push(parts::Part::plain(vec![b' '; LARGE]));
         }
-        Parts(parts)
+        Parts::new(parts)
     }
 
     pub(super) async fn write_partial(&mut self) -> Result<()> {
@@ -169,7 +169,7 @@ impl World {
             None => self.parts_of(key),
         };
         let work = &self.running[&key];
-        let (attempt, large) = (work.attempt, parts.groups().len() > 1);
+        let (attempt, large) = (work.attempt, parts.bytes() > PIECE_BYTES);
         if large {
             self.note(format!("{key} begins to write a large result"));
             let written = self.store.write_before_end(key, attempt, &parts).await;
@@ -205,7 +205,7 @@ impl World {
             progress: self.progress(),
         };
         if let Some(parts) = &parts
-            && parts.groups().len() > 1
+            && parts.bytes() > PIECE_BYTES
             && ending.status != Status::Succeeded
         {
             // pieces that were written are no harm if the end is refused

@@ -1,0 +1,473 @@
+//! Content: bytes, stored once by their hash, in pieces, and attached to jobs and meshes under names.
+//!
+//! Large content is written before it is attached, in several short transactions; nobody reads it before. It goes with the last of
+//! what it was attached to, by a trigger (`migrations/0017_content.sql`); what was never attached, by
+//! [`Store::discard_content`] or at the next start. It is compared with its hash whenever it is read as a whole.
+//!
+//! [`Store::discard_content`]: super::Store::discard_content
+
+use std::borrow::Cow;
+
+use sha2::{Digest, Sha256};
+use sqlx::{AssertSqlSafe, Row, SqliteConnection, sqlite::SqliteRow};
+
+use super::{
+    checksum::Checksum,
+    error::{Record, Result},
+};
+
+/// Bytes of one piece: larger rows make SQLite chain pages, and readers need more memory.
+pub const PIECE_BYTES: usize = 256 << 10;
+/// Pieces per transaction: 1 MiB occupies the single writer for some ten milliseconds, so that a
+/// cancel or a submission during the write of a large result is still answered at once.
+pub const PIECES_PER_COMMIT: usize = 4;
+
+/// What has content, with its number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Holder {
+    Job(i64),
+    Mesh(i64),
+}
+
+/// Names under which content is attached.
+pub(super) mod name {
+    /// The problem of a job: its JSON without the title.
+    pub(in crate::store) const PROBLEM: &str = "problem";
+    /// The result of a job but for its fields, see `parts`.
+    pub(in crate::store) const RESULT: &str = "result";
+    /// The fields of a job.
+    pub(in crate::store) const FIELDS: &str = "fields";
+    /// The definition of the sweep of a job: JSON.
+    pub(in crate::store) const DEFINITION: &str = "definition";
+    /// A mesh, parsed.
+    pub(in crate::store) const MESH: &str = "mesh";
+}
+
+impl Holder {
+    fn kind_and_key(self) -> (&'static str, i64) {
+        match self {
+            Holder::Job(key) => ("job", key),
+            Holder::Mesh(key) => ("mesh", key),
+        }
+    }
+
+    /// Content of this name, in errors.
+    pub(super) fn record(self, name: &str) -> Record {
+        match self {
+            Holder::Job(key) => Record::of_job(key, name),
+            Holder::Mesh(key) => Record::named(format!("{name} number {key}")),
+        }
+    }
+}
+
+/// The hash of content, and how long it is.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Fingerprint {
+    /// SHA-256.
+    pub hash: Vec<u8>,
+    /// Bytes.
+    pub bytes: usize,
+}
+
+impl Fingerprint {
+    /// That of bytes which lie in several places.
+    pub(super) fn of<'a>(chunks: impl IntoIterator<Item = &'a [u8]>) -> Fingerprint {
+        let (mut hash, mut bytes) = (Sha256::new(), 0);
+        for chunk in chunks {
+            hash.update(chunk);
+            bytes += chunk.len();
+        }
+        let hash = hash.finalize().to_vec();
+        Fingerprint { hash, bytes }
+    }
+
+    /// How many pieces it is stored in: one if it is empty.
+    pub(super) fn pieces(&self) -> usize {
+        self.bytes.div_ceil(PIECE_BYTES).max(1)
+    }
+
+    fn checksum(&self) -> i64 {
+        let sum = Checksum::new().bytes(&self.hash);
+        sum.int(self.bytes as i64).stored()
+    }
+}
+
+/// Content that is to be stored: one after the other, these bytes.
+pub(super) struct NewContent<'a> {
+    pub(super) fingerprint: Cow<'a, Fingerprint>,
+    pub(super) chunks: Vec<&'a [u8]>,
+}
+
+impl<'a> NewContent<'a> {
+    /// Bytes of which the hash is not known yet.
+    pub(super) fn new(bytes: &'a [u8]) -> NewContent<'a> {
+        NewContent {
+            fingerprint: Cow::Owned(Fingerprint::of([bytes])),
+            chunks: vec![bytes],
+        }
+    }
+
+    /// Its pieces, in order.
+    pub(super) fn pieces(&self) -> Vec<Cow<'a, [u8]>> {
+        let mut pieces: Vec<Cow<'a, [u8]>> = vec![Cow::Borrowed(&[])];
+        for chunk in &self.chunks {
+            let mut chunk = *chunk;
+            // fills up the last piece first
+            if let Some(last) = pieces.last_mut().filter(|last| last.len() < PIECE_BYTES) {
+                let (more, rest) = chunk.split_at(chunk.len().min(PIECE_BYTES - last.len()));
+                last.to_mut().extend_from_slice(more);
+                chunk = rest;
+            }
+            pieces.extend(chunk.chunks(PIECE_BYTES).map(Cow::Borrowed));
+        }
+        pieces
+    }
+}
+
+/// Removes content that is not attached; how many pieces it had.
+pub(super) async fn remove(tx: &mut SqliteConnection, ids: &[i64]) -> Result<u64> {
+    let mut pieces = 0;
+    for id in ids {
+        let removed = sqlx::query("delete from content_piece where content = ?")
+            .bind(id)
+            .execute(&mut *tx)
+            .await?;
+        pieces += removed.rows_affected();
+        sqlx::query("delete from content where id = ?")
+            .bind(id)
+            .execute(&mut *tx)
+            .await?;
+    }
+    Ok(pieces)
+}
+
+/// Writes pieces of content, numbered from `first`. What a disk has changed since it was written before is mended so.
+pub(super) async fn write_pieces(
+    tx: &mut SqliteConnection,
+    content: &Fingerprint,
+    first: usize,
+    pieces: &[impl AsRef<[u8]>],
+) -> Result<()> {
+    let id = insert(tx, content).await?;
+    for (number, piece) in (first as i64..).zip(pieces) {
+        sqlx::query(
+            "insert into content_piece (content, piece, body) values (?, ?, ?)
+             on conflict do update set body = excluded.body where body <> excluded.body",
+        )
+        .bind(id)
+        .bind(number)
+        .bind(piece.as_ref())
+        .execute(&mut *tx)
+        .await?;
+    }
+    Ok(())
+}
+
+/// The number of content with this hash, which is new if there was none.
+async fn insert(tx: &mut SqliteConnection, content: &Fingerprint) -> Result<i64> {
+    let id = sqlx::query_scalar(
+        "insert into content (hash, bytes, checksum) values (?, ?, ?)
+         on conflict (hash) do update set bytes = excluded.bytes, checksum = excluded.checksum
+         returning id",
+    );
+    Ok(id
+        .bind(&content.hash)
+        .bind(content.bytes as i64)
+        .bind(content.checksum())
+        .fetch_one(tx)
+        .await?)
+}
+
+/// Attaches content under a name that has none, and writes those pieces of it that are not there.
+pub(super) async fn attach(
+    tx: &mut SqliteConnection,
+    holder: Holder,
+    name: &str,
+    content: &NewContent<'_>,
+) -> Result<()> {
+    let fingerprint = &*content.fingerprint;
+    if fingerprint.pieces() == 1 {
+        return attach_small(tx, holder, name, content).await;
+    }
+    if attach_written(tx, holder, name, fingerprint).await? {
+        return Ok(());
+    }
+    write_pieces(tx, fingerprint, 0, &content.pieces()).await?;
+    attach_written(tx, holder, name, fingerprint)
+        .await
+        .map(drop)
+}
+
+/// Writes and attaches content of one piece. Statements are sent together: to hand one to the thread of the connection costs as
+/// much as to run it, and each job has two of these.
+async fn attach_small(
+    tx: &mut SqliteConnection,
+    holder: Holder,
+    name: &str,
+    content: &NewContent<'_>,
+) -> Result<()> {
+    let fingerprint = &*content.fingerprint;
+    let (kind, key) = holder.kind_and_key();
+    sqlx::query(
+        "insert into content (hash, bytes, checksum) values (?1, ?2, ?3)
+             on conflict (hash) do update set bytes = excluded.bytes, checksum = excluded.checksum
+             where checksum <> excluded.checksum;
+         insert into content_piece (content, piece, body) select id, 0, ?4 from content where hash = ?1
+             on conflict do update set body = excluded.body where body <> excluded.body;
+         insert into attachment (kind, key, name, content, checksum) select ?5, ?6, ?7, id, ?8 from content where hash = ?1;",
+    )
+    .bind(&fingerprint.hash)
+    .bind(fingerprint.bytes as i64)
+    .bind(fingerprint.checksum())
+    .bind(content.chunks.concat())
+    .bind(kind)
+    .bind(key)
+    .bind(name)
+    .bind(attachment_checksum(kind, key, name, &fingerprint.hash))
+    .execute(tx)
+    .await?;
+    Ok(())
+}
+
+/// Attaches content that was written; false if some of it is not there.
+pub(super) async fn attach_written(
+    tx: &mut SqliteConnection,
+    holder: Holder,
+    name: &str,
+    content: &Fingerprint,
+) -> Result<bool> {
+    let id = insert(tx, content).await?;
+    if !has_all_pieces(tx, id, content).await? {
+        return Ok(false);
+    }
+    attach_stored(tx, holder, name, id, &content.hash).await?;
+    Ok(true)
+}
+
+async fn has_all_pieces(tx: &mut SqliteConnection, id: i64, content: &Fingerprint) -> Result<bool> {
+    let there: i64 = sqlx::query_scalar("select count(*) from content_piece where content = ?")
+        .bind(id)
+        .fetch_one(tx)
+        .await?;
+    Ok(there == content.pieces() as i64)
+}
+
+async fn attach_stored(
+    tx: &mut SqliteConnection,
+    holder: Holder,
+    name: &str,
+    id: i64,
+    hash: &[u8],
+) -> Result<()> {
+    let (kind, key) = holder.kind_and_key();
+    sqlx::query(
+        "insert into attachment (kind, key, name, content, checksum) values (?, ?, ?, ?, ?)",
+    )
+    .bind(kind)
+    .bind(key)
+    .bind(name)
+    .bind(id)
+    .bind(attachment_checksum(kind, key, name, hash))
+    .execute(tx)
+    .await?;
+    Ok(())
+}
+
+fn attachment_checksum(kind: &str, key: i64, name: &str, hash: &[u8]) -> i64 {
+    let sum = Checksum::new().text(kind).int(key).text(name);
+    sum.bytes(hash).stored()
+}
+
+/// Attaches what a job has under these names to another one, too.
+pub(super) async fn copy(
+    tx: &mut SqliteConnection,
+    from: i64,
+    to: i64,
+    names: &[&str],
+) -> Result<()> {
+    let attached = all(tx, Holder::Job(from)).await?;
+    let copied = attached
+        .iter()
+        .filter(|content| names.contains(&content.name.as_str()));
+    for content in copied {
+        attach_stored(
+            tx,
+            Holder::Job(to),
+            &content.name,
+            content.id,
+            &content.fingerprint.hash,
+        )
+        .await?;
+    }
+    Ok(())
+}
+
+/// Takes what is attached under these names away.
+pub(super) async fn detach(
+    tx: &mut SqliteConnection,
+    holder: Holder,
+    names: &[&str],
+) -> Result<()> {
+    let (kind, key) = holder.kind_and_key();
+    let places = vec!["?"; names.len()].join(", ");
+    let statement =
+        format!("delete from attachment where kind = ? and key = ? and name in ({places})");
+    let query = sqlx::query(AssertSqlSafe(statement)).bind(kind).bind(key);
+    let query = names.iter().fold(query, |query, name| query.bind(*name));
+    query.execute(tx).await?;
+    Ok(())
+}
+
+/// Content that is attached.
+#[derive(Debug)]
+pub(super) struct Content {
+    /// Its number.
+    pub(super) id: i64,
+    /// The name under which it is attached.
+    pub(super) name: String,
+    pub(super) fingerprint: Fingerprint,
+    record: Record,
+}
+
+const ATTACHED: &str =
+    "select name, attachment.checksum as attached, content, hash, bytes, content.checksum as stored
+     from attachment left join content on content.id = content where kind = ? and key = ?";
+
+/// What is attached under a name, if there is something.
+pub(super) async fn find(
+    connection: &mut SqliteConnection,
+    holder: Holder,
+    name: &str,
+) -> Result<Option<Content>> {
+    let (kind, key) = holder.kind_and_key();
+    let statement = format!("{ATTACHED} and name = ?");
+    let found = sqlx::query(AssertSqlSafe(statement))
+        .bind(kind)
+        .bind(key)
+        .bind(name)
+        .fetch_optional(connection)
+        .await?;
+    found.map(|row| attached(&row, holder)).transpose()
+}
+
+/// All that is attached, in the order of its names.
+pub(super) async fn all(connection: &mut SqliteConnection, holder: Holder) -> Result<Vec<Content>> {
+    let (kind, key) = holder.kind_and_key();
+    let statement = format!("{ATTACHED} order by name");
+    let found = sqlx::query(AssertSqlSafe(statement))
+        .bind(kind)
+        .bind(key)
+        .fetch_all(connection)
+        .await?;
+    found.iter().map(|row| attached(row, holder)).collect()
+}
+
+/// A row of attached content, if it is as it was written.
+fn attached(row: &SqliteRow, holder: Holder) -> Result<Content> {
+    let name: String = row.try_get("name")?;
+    let record = holder.record(&name);
+    let hash: Option<Vec<u8>> = row.try_get("hash")?;
+    let Some(hash) = hash else {
+        return Err(record.damaged("it is missing"));
+    };
+    let bytes: i64 = row.try_get("bytes")?;
+    let fingerprint = Fingerprint {
+        hash,
+        bytes: usize::try_from(bytes).unwrap_or(usize::MAX),
+    };
+    let (kind, key) = holder.kind_and_key();
+    let sums: (i64, i64) = (row.try_get("attached")?, row.try_get("stored")?);
+    let expected = (
+        attachment_checksum(kind, key, &name, &fingerprint.hash),
+        fingerprint.checksum(),
+    );
+    if sums != expected {
+        return Err(record.damaged("its checksum is not that of its content"));
+    }
+    Ok(Content {
+        id: row.try_get("content")?,
+        name,
+        fingerprint,
+        record,
+    })
+}
+
+/// The text that is attached under a name, where there must be one.
+pub(super) async fn read_text(
+    connection: &mut SqliteConnection,
+    holder: Holder,
+    name: &str,
+) -> Result<String> {
+    let read = try_to_read_text(connection, holder, name).await;
+    read.map_err(|error| error.reading(|| holder.record(name)))
+}
+
+/// As [`read_text`], but a page that cannot be read is an error of the database, not of the holder.
+pub(super) async fn try_to_read_text(
+    connection: &mut SqliteConnection,
+    holder: Holder,
+    name: &str,
+) -> Result<String> {
+    let found = find(connection, holder, name).await?;
+    let found = found.ok_or_else(|| holder.record(name).damaged("it is missing"))?;
+    let bytes = found.read(connection).await?;
+    String::from_utf8(bytes).map_err(|error| holder.record(name).damaged(error))
+}
+
+impl Content {
+    /// Where it is, in errors.
+    pub(super) fn record(&self) -> Record {
+        self.record.clone()
+    }
+
+    /// All of it, compared with its hash. What differs is an error of the holder, a page that cannot be read one of the database.
+    pub(super) async fn read(&self, connection: &mut SqliteConnection) -> Result<Vec<u8>> {
+        let mut whole = Vec::with_capacity(self.fingerprint.bytes.min(MOST_RESERVED));
+        for number in 0..self.fingerprint.pieces() {
+            whole.extend(self.piece(connection, number).await?);
+        }
+        self.compare(&Fingerprint::of([&*whole]))?;
+        Ok(whole)
+    }
+
+    /// Compares it with its hash, one piece after the other.
+    pub(super) async fn check(&self, connection: &mut SqliteConnection) -> Result<()> {
+        let (mut hash, mut bytes) = (Sha256::new(), 0);
+        for number in 0..self.fingerprint.pieces() {
+            let piece = self.piece(connection, number).await?;
+            hash.update(&piece);
+            bytes += piece.len();
+        }
+        let hash = hash.finalize().to_vec();
+        self.compare(&Fingerprint { hash, bytes })
+    }
+
+    fn compare(&self, found: &Fingerprint) -> Result<()> {
+        match *found == self.fingerprint {
+            true => Ok(()),
+            false => Err(self
+                .record
+                .clone()
+                .damaged("it is stored with another hash")),
+        }
+    }
+
+    /// One of its pieces, from 0; not compared with anything.
+    pub(super) async fn piece(
+        &self,
+        connection: &mut SqliteConnection,
+        number: usize,
+    ) -> Result<Vec<u8>> {
+        let body =
+            sqlx::query_scalar("select body from content_piece where content = ? and piece = ?")
+                .bind(self.id)
+                .bind(number as i64)
+                .fetch_optional(connection)
+                .await;
+        let body: Option<Vec<u8>> = body?;
+        body.ok_or_else(|| self.record.clone().damaged("a piece is missing"))
+    }
+}
+
+/// What is reserved for content before it is read: a number of bytes that a disk has changed must not take all memory.
+const MOST_RESERVED: usize = 64 << 20;
