@@ -210,8 +210,6 @@ def before_content(store, fields, version):
 def old_result(store, job, result, columns, fields, version):
     """A result part by part; before COMPACT as JSON, here without checksums."""
     for name, encoding, size, digest, stored in parts(result, columns):
-        if name == "history" and job["result_available"] == "partial":
-            continue  # it was that of the events
         start = {"job_id": job["id"], "name": name}
         info = dict(start, bytes=size, digest=digest, encoding=encoding, stored_digest=hashlib.sha256(stored).digest())
         if version >= COMPACT:

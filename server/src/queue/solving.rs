@@ -347,7 +347,10 @@ impl Partials {
         }
         // numbers that are not finite, and so have no JSON, are reported at the end
         let document = partial.document().ok();
-        let parts = document.and_then(|document| Parts::of(document, &mut || true).ok()?);
+        let parts = document.and_then(|mut document| {
+            document.history = vec![]; // its events tell that, up to now
+            Parts::of(document, &mut || true).ok()?
+        });
         self.next = match &parts {
             Some(parts) if parts.bytes() > MOST_BYTES => None,
             _ => Some(start + (start.elapsed() * self.part).max(self.pause)),

@@ -5,7 +5,7 @@
 //! others, costs 4 bytes in each of many millions of events instead of 32, and is in the dependencies anyway, of `zip`.
 
 use sqlx::{
-    Column, Decode, Row, Sqlite, TypeInfo, ValueRef,
+    AssertSqlSafe, Column, Decode, Row, Sqlite, SqliteConnection, TypeInfo, ValueRef,
     query::Query,
     sqlite::{SqliteArguments, SqliteRow},
 };
@@ -176,13 +176,27 @@ pub(super) fn of_row(row: &SqliteRow) -> Result<i64> {
     Ok(of_values(&values(row)?))
 }
 
-/// Whether a whole row is as it was written. One of an earlier version has no checksum, and is accepted.
+/// Whether a whole row is as it was written.
 pub(super) fn row_is_intact(row: &SqliteRow) -> Result<bool> {
     let stored: Option<i64> = row.try_get(COLUMN)?;
-    Ok(match stored {
-        Some(stored) => stored == of_row(row)?,
-        None => true,
-    })
+    Ok(stored == Some(of_row(row)?))
+}
+
+/// Gives the row of a table with this key its checksum, once its other columns are written.
+pub(super) async fn seal(
+    tx: &mut SqliteConnection,
+    table: &str,
+    key_column: &str,
+    key: impl Into<Value>,
+) -> Result<()> {
+    let key = [key.into()];
+    let statement = format!("select * from {table} where {key_column} = ?");
+    let row = bind(sqlx::query(AssertSqlSafe(statement)), key.iter());
+    let sum = of_row(&row.fetch_one(&mut *tx).await?)?;
+    let statement = format!("update {table} set {COLUMN} = ? where {key_column} = ?");
+    let update = sqlx::query(AssertSqlSafe(statement)).bind(sum);
+    bind(update, key.iter()).execute(tx).await?;
+    Ok(())
 }
 
 fn decode<'r, T: Decode<'r, Sqlite>>(value: <Sqlite as sqlx::Database>::ValueRef<'r>) -> Result<T> {

@@ -3,10 +3,10 @@
 //! It reads as the service does, one job after the other by its number, so that damage in one place does not hide what
 //! lies elsewhere. Nothing is written to the store that is inspected.
 
-use std::path::Path;
+use std::{collections::BTreeSet, path::Path};
 
 use sqlx::{
-    ConnectOptions, Connection, Row, SqliteConnection,
+    AssertSqlSafe, ConnectOptions, Connection, Row, SqliteConnection,
     sqlite::{SqliteConnectOptions, SqliteRow},
 };
 
@@ -172,60 +172,26 @@ impl Report {
         if let Some(tx) = writing {
             tx.commit().await?;
         }
-        self.check_meshes(source, target).await?;
-        self.check_request_keys(source, target).await?;
-        self.check_sweeps(source, target).await?;
-        self.check_tokens(source, target).await?;
+        let mut lost = BTreeSet::new();
+        for (table, check) in TABLES {
+            if !self.check_table(source, target, table, check).await? {
+                lost.insert(table);
+            }
+        }
+        if let Some(target) = target
+            && lost
+                .iter()
+                .any(|table| matches!(*table, "token" | "setting"))
+        {
+            // it may have been the last one: the new store lets nobody in without a token
+            let mut tx = target.begin().await?;
+            tokens::require_tokens(&mut tx).await?;
+            tx.commit().await?;
+        }
         match target {
             Some(target) => copy_the_rest(source, target, last).await,
             None => Ok(()),
         }
-    }
-
-    /// Checks who may use the service. If anything of that is damaged, the new store lets nobody in without a token: it may
-    /// have been the last one.
-    async fn check_tokens(
-        &mut self,
-        source: &mut SqliteConnection,
-        target: Option<&Store>,
-    ) -> Result<()> {
-        let rows = sqlx::query("select * from token").fetch_all(&mut *source);
-        let rows = rows.await.map_err(StoreError::from);
-        let settings = sqlx::query("select * from setting").fetch_all(&mut *source);
-        let settings = settings.await.map_err(StoreError::from);
-        let mut whole = true;
-        for (what, error) in [
-            ("tokens", rows.as_ref().err()),
-            ("settings", settings.as_ref().err()),
-        ] {
-            if let Some(error) = error {
-                self.finding(what, error);
-                whole = false;
-            }
-        }
-        let mut intact = vec![];
-        for row in rows.iter().flatten() {
-            match tokens::read(row) {
-                Ok(_) => intact.push(row),
-                Err(error) => {
-                    self.finding("token", &error);
-                    whole = false;
-                }
-            }
-        }
-        let Some(target) = target else { return Ok(()) };
-        let mut tx = target.begin().await?;
-        for row in intact {
-            insert(&mut tx, "token", row).await?;
-        }
-        for row in settings.iter().flatten() {
-            // one that cannot be decoded may have been the one that requires tokens
-            whole &= insert(&mut tx, "setting", row).await.is_ok();
-        }
-        if !whole {
-            tokens::require_tokens(&mut tx).await?;
-        }
-        tx.commit().await
     }
 
     /// Checks the tables and indexes as such.
@@ -276,126 +242,71 @@ impl Report {
         }
     }
 
-    async fn check_meshes(
+    /// Checks the rows of a table, one after the other, and copies those that are intact, a mesh with its body; whether all are.
+    async fn check_table(
         &mut self,
         source: &mut SqliteConnection,
         target: Option<&Store>,
-    ) -> Result<()> {
-        let rows = sqlx::query("select * from mesh order by id").fetch_all(&mut *source);
-        let rows = match rows.await {
+        table: &'static str,
+        check: Check,
+    ) -> Result<bool> {
+        let statement = AssertSqlSafe(format!("select * from {table}"));
+        let rows = match sqlx::query(statement).fetch_all(&mut *source).await {
             Ok(rows) => rows,
             Err(error) => {
-                self.finding("meshes", &error.into());
-                return Ok(());
+                self.finding(table, &error.into());
+                return Ok(false);
             }
         };
-        for row in &rows {
-            let hash: String = row.try_get("hash").unwrap_or_default();
-            let read = async {
-                meshes::described(row)?;
-                meshes::read_body(source, &hash).await
-            };
-            match read.await {
-                Err(error) => self.finding(&format!("mesh {hash}"), &error),
-                Ok(_) => {
-                    let Some(target) = target else { continue };
-                    let mut tx = target.begin().await?;
-                    insert(&mut tx, "mesh", row).await?;
-                    let mesh = Holder::Mesh(row.try_get("id")?);
-                    copy_content(source, &mut tx, mesh).await?;
-                    let owners = "select * from mesh_owner where hash = ?";
-                    let owners = sqlx::query(owners).bind(&hash).fetch_all(&mut *source);
-                    match owners.await.map_err(StoreError::from) {
-                        Ok(owners) => {
-                            for owner in owners {
-                                insert(&mut tx, "mesh_owner", &owner).await?;
-                            }
-                        }
-                        // it becomes an administrator's
-                        Err(error) => self.finding("owners of meshes", &error),
-                    }
-                    tx.commit().await?;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    async fn check_request_keys(
-        &mut self,
-        source: &mut SqliteConnection,
-        target: Option<&Store>,
-    ) -> Result<()> {
-        let rows = sqlx::query("select * from request_key").fetch_all(source);
-        let rows = match rows.await {
-            Ok(rows) => rows,
-            Err(error) => {
-                self.finding("request keys", &error.into());
-                return Ok(());
-            }
-        };
+        let mut whole = true;
         let mut tx = match target {
             Some(target) => Some(target.begin().await?),
             None => None,
         };
         for row in &rows {
-            match (keys::check(row), &mut tx) {
-                (Err(error), _) => self.finding("request key", &error),
-                (Ok(()), Some(tx)) => insert(tx, "request_key", row).await?,
-                (Ok(()), None) => {}
+            let checked = match (check(row), table) {
+                (Ok(()), "mesh") => check_body(source, row).await,
+                (checked, _) => checked,
+            };
+            if let Err(error) = checked {
+                self.finding(table, &error);
+                whole = false;
+                continue;
+            }
+            let Some(tx) = &mut tx else { continue };
+            insert(tx, table, row).await?;
+            if table == "mesh" {
+                copy_content(source, tx, Holder::Mesh(row.try_get("id")?)).await?;
             }
         }
-        match tx {
-            Some(tx) => tx.commit().await,
-            None => Ok(()),
+        if let Some(tx) = tx {
+            tx.commit().await?;
         }
+        Ok(whole)
     }
 }
 
-impl Report {
-    /// Checks sweeps and the rows of their members; they are copied row by row, members by the numbers
-    /// of their jobs.
-    async fn check_sweeps(
-        &mut self,
-        source: &mut SqliteConnection,
-        target: Option<&Store>,
-    ) -> Result<()> {
-        type Check = fn(&SqliteRow) -> Result<()>;
-        let of_sweep: Check = |row| sweeps::intact(row, row.try_get("id")?);
-        let tables: [(&str, &str, Check); 3] = [
-            ("sweep", "select * from sweep order by id", of_sweep),
-            (
-                "sweep_member",
-                "select * from sweep_member order by sweep, number",
-                sweeps::check_member,
-            ),
-            ("deleted_sweep", "select * from deleted_sweep", |_| Ok(())),
-        ];
-        for (table, statement, check) in tables {
-            let rows = match sqlx::query(statement).fetch_all(&mut *source).await {
-                Ok(rows) => rows,
-                Err(error) => {
-                    self.finding(table, &error.into());
-                    continue;
-                }
-            };
-            let mut tx = match target {
-                Some(target) => Some(target.begin().await?),
-                None => None,
-            };
-            for row in &rows {
-                match (check(row), &mut tx) {
-                    (Err(error), _) => self.finding(table, &error),
-                    (Ok(()), Some(tx)) => insert(tx, table, row).await?,
-                    (Ok(()), None) => {}
-                }
-            }
-            if let Some(tx) = tx {
-                tx.commit().await?;
-            }
-        }
-        Ok(())
-    }
+/// What is wrong with a row.
+type Check = fn(&SqliteRow) -> Result<()>;
+
+/// What is no part of a job: tables that are checked and copied row by row, in this order.
+const TABLES: [(&str, Check); 9] = [
+    ("mesh", |row| meshes::described(row).map(drop)),
+    // one whose owner cannot be read becomes an administrator's
+    ("mesh_owner", |_| Ok(())),
+    ("request_key", keys::check),
+    ("sweep", |row| sweeps::intact(row, row.try_get("id")?)),
+    ("sweep_member", sweeps::check_member),
+    ("deleted_sweep", |_| Ok(())),
+    ("deleted_job", |_| Ok(())),
+    ("token", |row| tokens::read(row).map(drop)),
+    ("setting", |_| Ok(())),
+];
+
+/// An error if the body of a mesh is missing or damaged.
+async fn check_body(source: &mut SqliteConnection, row: &SqliteRow) -> Result<()> {
+    let body = meshes::read_body(source, row.try_get("hash")?).await;
+    body.map(drop)
 }
 
 /// The numbers of jobs after this one of which there is a trace, in order.

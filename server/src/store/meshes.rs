@@ -119,15 +119,7 @@ impl Store {
             .fetch_optional(&mut *tx)
             .await?;
             if let Some(key) = key {
-                let row = sqlx::query("select * from mesh where id = ?")
-                    .bind(key)
-                    .fetch_one(&mut *tx)
-                    .await?;
-                sqlx::query("update mesh set checksum = ? where id = ?")
-                    .bind(checksum::of_row(&row)?)
-                    .bind(key)
-                    .execute(&mut *tx)
-                    .await?;
+                checksum::seal(&mut tx, "mesh", "id", key).await?;
                 let attach = content::attach_written(&mut tx, Holder::Mesh(key), name::MESH, body);
                 if !attach.await? {
                     return Ok(None);

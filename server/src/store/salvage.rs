@@ -94,14 +94,11 @@ pub(super) async fn copy_the_rest(
 ) -> Result<()> {
     let mut change = target.change().await?;
     let lost_fields = sqlx::query_scalar("select job_id from job_size where fields = 2");
-    let lost_fields: Vec<i64> = lost_fields
-        .fetch_all(&mut *source)
-        .await
-        .unwrap_or_default();
-    let deleted = sqlx::query("select * from deleted_job").fetch_all(source);
-    for row in deleted.await.unwrap_or_default() {
-        insert(change.sql().await?, "deleted_job", &row).await?;
-    }
+    let lost_fields: Vec<i64> = lost_fields.fetch_all(source).await.unwrap_or_default();
+    // owners of meshes that were not copied
+    sqlx::query("delete from mesh_owner where hash not in (select hash from mesh)")
+        .execute(change.sql().await?)
+        .await?;
     // a job waits by itself if the one that it waited for was not copied; the next one like it coalesces them again
     let alone = "select id from job where coalesced_into not in (select id from job)";
     let alone: Vec<i64> = sqlx::query_scalar(alone)

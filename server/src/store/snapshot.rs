@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     caller::Owners,
-    job::{Job, JobId, ResultAvailable},
+    job::{Job, JobId},
 };
 
 impl Store {
@@ -95,11 +95,6 @@ pub struct Snapshot {
 impl Snapshot {
     /// The JSON of a part.
     pub async fn part(&mut self, part: &str) -> Result<Option<Vec<u8>>> {
-        // it went on after the last finished load step: its events tell the rest
-        let goes_on = self.job.result_available == ResultAvailable::Partial;
-        if part == "history" && goes_on && self.job.status.is_terminal() {
-            return Ok(None);
-        }
         let damages = self.damages.clone();
         let read = async {
             self.read_index().await?;

@@ -341,7 +341,7 @@ impl Store {
                 }
             }
             sqlx::query(
-                "update sweep set last_seq = ?, succeeded = succeeded + ?, failed = failed + ?, checksum = null where id = ?",
+                "update sweep set last_seq = ?, succeeded = succeeded + ?, failed = failed + ? where id = ?",
             )
             .bind(last)
             .bind(succeeded)
@@ -349,7 +349,7 @@ impl Store {
             .bind(sweep)
             .execute(&mut *tx)
             .await?;
-            seal(&mut tx, sweep).await?;
+            checksum::seal(&mut tx, "sweep", "id", sweep).await?;
             tx.commit().await?;
             Ok(Some(sweep))
         };
@@ -388,7 +388,7 @@ pub(super) async fn insert(change: &mut Change<'_>, owner: &str, new: &NewSweep)
     .bind(members as i64)
     .fetch_one(&mut *tx)
     .await?;
-    seal(tx, key).await?;
+    checksum::seal(tx, "sweep", "id", key).await?;
     Ok(key)
 }
 
@@ -604,19 +604,6 @@ pub(super) fn intact(row: &SqliteRow, key: i64) -> Result<()> {
         true => Ok(()),
         false => Err(record(key, "record").damaged("its checksum is not that of its content")),
     }
-}
-
-async fn seal(tx: &mut SqliteConnection, key: i64) -> Result<()> {
-    let row = sqlx::query("select * from sweep where id = ?")
-        .bind(key)
-        .fetch_one(&mut *tx)
-        .await?;
-    sqlx::query("update sweep set checksum = ? where id = ?")
-        .bind(checksum::of_row(&row)?)
-        .bind(key)
-        .execute(tx)
-        .await?;
-    Ok(())
 }
 
 async fn with_id(

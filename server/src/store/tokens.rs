@@ -142,7 +142,7 @@ impl Store {
             .bind(token.revoked_at.map(Time::micros))
             .execute(&mut *tx)
             .await?;
-        seal(&mut tx, &token.id).await?;
+        checksum::seal(&mut tx, "token", "id", token.id.as_str()).await?;
         require_tokens(&mut tx).await?;
         tx.commit().await
     }
@@ -159,20 +159,6 @@ impl Store {
 /// From now on every request needs a token, also if all of them are lost.
 pub(super) async fn require_tokens(tx: &mut SqliteConnection) -> Result<()> {
     sqlx::query("insert into setting (name, value) values ('tokens_required', 'true') on conflict do nothing")
-        .execute(tx)
-        .await?;
-    Ok(())
-}
-
-/// Sets the checksum of a row that was written.
-async fn seal(tx: &mut SqliteConnection, id: &str) -> Result<()> {
-    let row = sqlx::query("select * from token where id = ?")
-        .bind(id)
-        .fetch_one(&mut *tx)
-        .await?;
-    sqlx::query("update token set checksum = ? where id = ?")
-        .bind(checksum::of_row(&row)?)
-        .bind(id)
         .execute(tx)
         .await?;
     Ok(())

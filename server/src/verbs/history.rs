@@ -77,8 +77,8 @@ impl StoredHistory {
         found: &mut Snapshot,
     ) -> Result<StoredHistory, ApiError> {
         let job = &found.job;
-        // a running job has more events than its finished load steps contain
-        if job.status.is_terminal() && job.result_available != ResultAvailable::None {
+        // a partial result ends with the last finished load step; the events go on
+        if job.status.is_terminal() && job.result_available == ResultAvailable::Final {
             let whole = found.part("history").await?;
             if let Some(whole) = whole {
                 return Ok(StoredHistory::Whole(whole));

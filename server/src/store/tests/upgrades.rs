@@ -228,6 +228,82 @@ const WITH_MODELS: [&str; 13] = [
     "0013_owners_lists.sql",
 ];
 
+/// A job that was deleted and whose result two others have, of which one has lost its fields; one whose result a disk has
+/// changed; one with a partial result that runs; one whose result is not complete.
+const BEFORE_CONTENT: [&str; 9] = [
+    "insert into problem (input_hash, body, mesh, memory_bytes) values ('sha256:1', '{}', 'sha256:m', 77)",
+    "insert into job (id, uuid, status, input_hash, created_at, started_at, finished_at, attempt, result_available, result_job)
+     values (2, '01890a5d-ac96-774b-bcce-b302099a8002', 'succeeded', 'sha256:1', 1, 2, 3, 1, 'final', 1),
+            (3, '01890a5d-ac96-774b-bcce-b302099a8003', 'succeeded', 'sha256:1', 1, 2, 3, 1, 'final', 1),
+            (4, '01890a5d-ac96-774b-bcce-b302099a8004', 'succeeded', 'sha256:1', 1, 2, 3, 1, 'final', null)",
+    "insert into job (id, uuid, status, input_hash, created_at, started_at, attempt, result_available)
+     values (5, '01890a5d-ac96-774b-bcce-b302099a8005', 'running', 'sha256:1', 1, 2, 1, 'partial'),
+            (6, '01890a5d-ac96-774b-bcce-b302099a8006', 'running', 'sha256:1', 1, 2, 1, 'none')",
+    "insert into job_size (job_id, owner, bytes, finished_at, fields) values
+        (2, 'local', 0, 3, 1), (3, 'local', 0, 3, 2), (4, 'local', 0, 3, 0)",
+    "insert into result_part (job_id, name, piece, body) values
+        (1, 'summary', 0, x'7b'), (1, 'summary', 1, x'7d'), (1, 'fields', 0, x'7b7d'), (4, 'summary', 0, x'7b7c'),
+        (-5, 'summary', 0, x'7b7d'), (6, 'summary', 0, x'7b7d')",
+    "insert into result_info (job_id, name, bytes, digest) values
+        (1, 'fields', 2, x'44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a'),
+        (4, 'summary', 2, x'44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a'),
+        (1, 'history', 2, x'44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a')",
+    "insert into mesh (hash, info, created_at) values ('sha256:m', '{}', 1)",
+    "insert into mesh_piece (hash, piece, body) values ('sha256:m', 0, x'01'), ('sha256:m', 1, x'02')",
+    "insert into mesh_owner (hash, owner, created_at) values ('sha256:m', 'local', 1)",
+];
+
+#[tokio::test]
+async fn what_earlier_versions_stored_becomes_content_of_the_jobs_that_had_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let all = Path::new(env!("CARGO_MANIFEST_DIR")).join("../migrations");
+    let names = std::fs::read_dir(all).unwrap();
+    let names = names.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut names: Vec<String> = names.filter(|name| name.as_str() < "0017").collect();
+    names.sort_unstable();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    older_store(folder.path(), &names, &BEFORE_CONTENT).await;
+    let store = Store::open(folder.path()).await.unwrap();
+    let part = async |key, part| {
+        let read = store.json_of(key, part).await;
+        read.map(|json| json.map(|json| String::from_utf8(json).unwrap()))
+    };
+    let whole = Some("{}".to_owned());
+    for key in [2, 3, 5] {
+        assert_eq!(part(key, "summary").await.unwrap(), whole, "job {key}");
+    }
+    assert_eq!(part(2, "fields").await.unwrap(), whole);
+    assert_eq!(part(3, "fields").await.unwrap(), None, "they were deleted");
+    assert_eq!(part(2, "history").await.unwrap(), None);
+    let changed = part(4, "summary").await;
+    assert!(changed.is_err_and(|told| told.is_damage_of(4)));
+    assert_eq!(part(6, "summary").await.unwrap(), None);
+    for key in 2..7 {
+        let (_, problem) = store.problem(key).await.unwrap().unwrap();
+        assert_eq!(problem, "{}");
+    }
+    assert_eq!(store.mesh_body("sha256:m").await.unwrap().unwrap(), [1, 2]);
+    let in_use = store.remove_mesh(Owners::All, "sha256:m").await.unwrap();
+    assert_eq!(in_use, Removal::InUse, "by the jobs that run");
+    let mut connection = store.reader.acquire().await.unwrap();
+    let running = rows::find(&mut connection, 5).await.unwrap().unwrap();
+    assert_eq!(
+        (running.mesh.as_deref(), running.memory_bytes),
+        (Some("sha256:m"), Some(77))
+    );
+    drop(connection);
+    // what is shared is counted once: the problem, the summary with its index, and the fields
+    let size = store.size_of_owner("local").await.unwrap();
+    assert_eq!(size.mesh_bytes, 2);
+    let of_content = "select sum(bytes) from content where holder in (2, 3, 4)";
+    let of_content: i64 = sqlx::query_scalar(of_content)
+        .fetch_one(&store.reader)
+        .await
+        .unwrap();
+    assert_eq!(size.job_bytes, of_content as u64);
+    store.compare_sums().await.unwrap();
+}
+
 /// Two owners with a model of the same name, a title with a quotation mark and a number that no shorter text has; a third whose
 /// row a disk has changed.
 const MODELS: [&str; 2] = [
