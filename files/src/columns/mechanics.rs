@@ -1,16 +1,17 @@
 //! Stresses from displacements by Hooke's law, as a prediction: thesis 2.2, and formulation 3.
 //!
-//! It repeats what the solver does for ordinary elements, in the same order of operations. The master elements are the solver's
-//! own (`solver::element`: their rules, shapes and map), and a change of one rounding there, or here, would make all that is
-//! stored unreadable; the files of `version_1` tell, in `stored.rs`. Of nearly incompressible elements it is a poor prediction,
-//! which costs space and nothing else.
+//! It repeats what the solver does for ordinary elements, in the same order of operations, with formulas of the master elements of
+//! its own (`version_1`): a change of one rounding there, or here, would make all that is stored unreadable; the files of
+//! `version_1` tell, in `stored.rs`. Of nearly incompressible elements it is a poor prediction, which costs space and nothing else.
 
 use solver::{
     elasticity::{COMPONENTS, Moduli, isotropic, orthotropic},
-    element::{AtNodes, Element, Family, Tabulated},
+    element::{AtNodes, Element, Family},
     problem::{Analysis, Elasticity, Problem},
     solution::{Fields, GaussFields},
 };
+
+use super::version_1::{self, Place};
 
 /// Materials that stresses are predicted with; a solved problem has few.
 pub(super) const MOST_MATERIALS: usize = u8::MAX as usize;
@@ -100,7 +101,7 @@ struct Strains {
 }
 
 impl Strains {
-    fn new(place: &Tabulated, nodes: &AtNodes<[f64; 2]>, axisymmetric: bool) -> Strains {
+    fn new(place: &Place, nodes: &AtNodes<[f64; 2]>, axisymmetric: bool) -> Strains {
         let mapped = place.map(nodes);
         Strains {
             dx: mapped.gradient.map(|[x, _]| x),
@@ -127,29 +128,28 @@ impl Strains {
 
 /// The places of a family of elements.
 struct Master {
-    rule: Vec<Tabulated>,
+    rule: Vec<Place>,
     shapes: Vec<AtNodes<f64>>,
-    stress: Vec<Tabulated>,
+    stress: Vec<Place>,
     to_nodes: AtNodes<[f64; 4]>,
 }
 
 impl Master {
     fn new(family: Family, order: u32) -> Master {
-        let rule = family.rule(order);
+        let rule = version_1::rule(family, order);
         let mut to_nodes = [[0.0; 4]; 8];
-        for (weights, place) in to_nodes.iter_mut().zip(family.places()) {
-            *weights = family.from_stress_points(*place);
+        for (weights, place) in to_nodes.iter_mut().zip(version_1::places(family)) {
+            *weights = version_1::from_stress_points(family, *place);
         }
-        let tabulate = |points: &[solver::element::GaussPoint]| {
-            points
-                .iter()
-                .map(|point| family.tabulate(point.place))
-                .collect()
+        let tabulate = |places: &[[f64; 2]]| {
+            let places = places.iter();
+            places.map(|place| Place::new(family, *place)).collect()
         };
+        let shapes = rule.iter().map(|place| version_1::shape(family, *place));
         Master {
             rule: tabulate(rule),
-            shapes: rule.iter().map(|point| family.shape(point.place)).collect(),
-            stress: tabulate(family.stress_points()),
+            shapes: shapes.collect(),
+            stress: tabulate(version_1::stress_points(family)),
             to_nodes,
         }
     }
@@ -171,7 +171,7 @@ impl Shape {
         axisymmetric: bool,
     ) -> Shape {
         let master = &masters[family as usize];
-        let strains = |places: &[Tabulated]| {
+        let strains = |places: &[Place]| {
             let strains = |place| Strains::new(place, &nodes, axisymmetric);
             places.iter().map(strains).collect()
         };
@@ -276,7 +276,7 @@ pub(super) fn predicted_stresses(known: &Known<'_>, law: &Law, materials: &[u8])
     let points = known
         .elements
         .iter()
-        .map(|e| e.family().rule(known.order).len())
+        .map(|e| version_1::rule(e.family(), known.order).len())
         .sum();
     let column = || Vec::with_capacity(points);
     let mut found = Stresses {

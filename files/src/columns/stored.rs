@@ -37,9 +37,8 @@ fn what_was_stored_by_version_1_is_read_bit_for_bit() {
         assert!(
             read.is_ok_and(|read| checksum(&read) == sum),
             "{name}: results that are stored would be reported as damaged. A prediction has changed, by a rounding at least: \
-             files/src/columns, or what it uses of solver::element (rule, places, sides, shape, tabulate, map, \
-             from_stress_points). Undo that; or keep the old formulas in files/src/columns for version 1, give the new ones \
-             another version, with files of its own, and have `decode` read both."
+             files/src/columns (mechanics, order, version_1). Undo that; or give the new formulas another version, with files \
+             of its own, and have `decode` read both."
         );
     }
 }

@@ -278,8 +278,11 @@ impl Store {
 
     /// The member that a job's own problem is, and the job that solves a member: by their keys.
     pub async fn some_job_of(&self, key: i64) -> Result<Option<i64>> {
-        let mut connection = self.reader.acquire().await?;
-        some_job(&mut connection, key).await
+        let read = async {
+            let mut tx = self.reader.begin().await?;
+            some_job(&mut tx, key).await
+        };
+        self.damages.noting(read).await
     }
 
     /// Stores the rows of members that an attempt of a job has solved; returns their sweep, and `None` when the attempt
@@ -508,12 +511,20 @@ pub(super) fn check_member(row: &SqliteRow) -> Result<()> {
     checked(row).map(|_| ())
 }
 
-/// Some job of a sweep, which has its definition.
+/// Some job of a sweep, which has its definition; `None`: the sweep was deleted.
 async fn some_job(connection: &mut SqliteConnection, key: i64) -> Result<Option<i64>> {
-    let job = sqlx::query_scalar(
-        "select job.id from job join sweep on sweep.uuid = job.sweep where sweep.id = ? limit 1",
-    );
-    Ok(job.bind(key).fetch_optional(connection).await?)
+    let row = sqlx::query("select * from sweep where id = ?")
+        .bind(key)
+        .fetch_optional(&mut *connection)
+        .await?;
+    let Some(row) = row else { return Ok(None) };
+    intact(&row, key)?;
+    let job =
+        sqlx::query_scalar("select id from job indexed by job_by_sweep where sweep = ? limit 1");
+    let job = job.bind(row.try_get::<&str, _>("uuid")?);
+    let job = job.fetch_optional(connection).await?;
+    // a sweep goes with its last job
+    job.map_or_else(|| Err(Table::Jobs.damaged("")), |job| Ok(Some(job)))
 }
 
 fn record(key: i64, what: &str) -> Record {
