@@ -147,7 +147,7 @@ fn a_curved_body_has_no_corners() {
     }
 }
 
-/// A node off the circle, and what else cannot be put on a curve, is refused by name.
+/// A node that is not on the circle is refused by name, like anything else that cannot be put on a curve.
 #[test]
 fn what_does_not_lie_on_its_curve_is_refused() {
     let refused = |curves: Value, around: usize, across: usize| {
@@ -164,7 +164,7 @@ fn what_does_not_lie_on_its_curve_is_refused() {
         (off.reason, &off.pointer[..]),
         (Reason::Conflict, "/mesh/curves/outer")
     );
-    assert!(off.got.contains("1.000e-2 off the circle"), "{}", off.got);
+    assert!(off.got.contains("1.000e-2 from the circle"), "{}", off.got);
     assert!(off.expected.contains("4.010e-4"), "{}", off.expected);
     let unknown = refused(json!({"other": {"kind": "spline"}}), 60, 8);
     assert_eq!(unknown.reason, Reason::UnknownBoundary);

@@ -118,7 +118,9 @@ fn refusals_name_unmerged_nodes() {
     let found = checked(&pulled(0, 0.0, &held)).unwrap_err();
     assert_eq!(found[0].reason.as_str(), "free_body");
     assert!(
-        found[0].hint.contains("5 such pairs in all: merge them"),
+        found[0]
+            .hint
+            .contains("(5 such pairs in total): merge them"),
         "{}",
         found[0].hint
     );
@@ -135,7 +137,9 @@ fn refusals_name_unmerged_nodes() {
     let found = checked(&value).unwrap_err();
     assert_eq!(found[0].reason.as_str(), "not_a_chain");
     assert!(
-        found[0].hint.contains("3 such pairs in all: merge them"),
+        found[0]
+            .hint
+            .contains("(3 such pairs in total): merge them"),
         "{}",
         found[0].hint
     );
