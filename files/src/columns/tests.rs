@@ -6,7 +6,7 @@ use solver::problem::Problem;
 use super::*;
 use crate::fields::tests::mixed;
 
-/// A problem of this kind on a grid, with these materials and with more fields of it.
+/// A problem of this kind on a grid, with the given materials and mesh.
 fn problem(kind: &str, materials: &str, mesh: &str) -> Problem {
     let text = format!(
         r#"{{"analysis": {{"kind": "{kind}"}}, "mesh": {mesh}, "materials": {materials},
@@ -30,7 +30,7 @@ fn bits(fields: &Fields) -> Vec<u8> {
     serde_json::to_vec(fields).unwrap()
 }
 
-/// Bytes for each number of a nodal column, if the fields come back as they were.
+/// The number of bytes for each number of a nodal column; checks that the fields are restored exactly.
 fn checked(fields: &Fields, law: &Law) -> usize {
     let encoded = encode(fields, law).unwrap();
     let decoded = decode(&encoded, 1 << 20).unwrap();

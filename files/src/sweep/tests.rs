@@ -462,7 +462,7 @@ fn a_member_of_a_grid_begins_from_one_that_differs_by_one_place_of_one_axis() {
     assert_eq!([1, 64, 65, 128].map(from), [0, 0, 64, 0].map(Some));
 }
 
-/// Millions of names in one pointer: it is refused before it is divided into them.
+/// A pointer of megabytes with millions of names is refused by its length before it is divided into them.
 #[test]
 fn a_pointer_of_megabytes_is_refused_by_its_length() {
     let swept = |path: &str| {
