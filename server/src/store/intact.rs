@@ -88,7 +88,7 @@ pub(super) async fn part_info(
     let record = || part_of(key, name);
     info_checksum(key, name, &columns).verify(checksum, record)?;
     let (bytes, digest, encoding, stored_digest) = columns;
-    let unknown = || record().damaged("it is stored in a way that this program does not know");
+    let unknown = || record().damaged("it is stored in a form that this program does not know");
     let info = PartInfo {
         bytes: bytes as u64,
         digest,

@@ -36,7 +36,7 @@
 //! | what a disk has changed: checksums of rows | `checksum` |
 //! | what a disk has changed: parts of results | `intact` |
 //! | what a disk has changed: what was found so far | `damage` |
-//! | what a disk has changed: whether the database still takes a job | `trial` |
+//! | what a disk has changed: whether the database still takes a job | `write_check` |
 //! | what a disk has changed: reading all keys in the background | `scrub` |
 //! | the folder and its lock | `folder` |
 //! | how far the store had come | `progress` |
@@ -61,12 +61,12 @@
 
 // Input and output types, and errors.
 mod checksum;
-mod complaint;
 mod encoding;
 mod entries;
 mod error;
 mod filter;
 mod parts;
+mod repeated_error;
 mod submission;
 
 // The folder and its files; what was found damaged, or intact.
@@ -117,7 +117,7 @@ mod forget;
 mod keys;
 mod retention;
 mod submit;
-mod trial;
+mod write_check;
 
 // Read: one job, its queue position, its result; many jobs.
 mod health;
@@ -150,7 +150,6 @@ use self::database::Rebuild;
 
 pub use self::{
     backup::{Backup, Manifest, back_up},
-    complaint::Complaint,
     database::Store,
     database::with_advice,
     delete::Deletion,
@@ -166,6 +165,7 @@ pub use self::{
     meshes::{Removal, StoredMesh},
     parts::{PIECE_BYTES, PIECES_PER_COMMIT, Part, Parts, ProfilePoints},
     progress::accept,
+    repeated_error::RepeatedError,
     restore::{Restored, restore},
     retention::{Retention, Retired, keep_within},
     rules::Ending,
