@@ -296,7 +296,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn what_a_spreadsheet_would_run_is_a_text_there() {
+    fn a_formula_is_written_as_a_text_for_spreadsheets() {
         let cells = |text: &str| {
             let values = Values::Text(vec![text.to_owned().into()]);
             let name = text.to_owned().into();

@@ -318,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_a_member_is_told_and_another_body_is_not_solved() {
+    fn an_invalid_member_is_reported_and_another_body_is_refused() {
         let go_on = &mut |_: Progress<'_>| ControlFlow::Continue(());
         let mut family = Family::new(&problem(0.3, 0.05), None, go_on).unwrap();
         let invalid = family.member(&problem(-1.0, 0.05), Start::Anew, go_on);

@@ -327,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn a_parabola_is_found_under_noise_and_exact_data_stay() {
+    fn a_parabola_is_recovered_under_noise_and_exact_data_are_kept() {
         let x: Vec<f64> = (0..=100).map(|i| 0.04 * f64::from(i)).collect();
         let exact: Vec<f64> = x.iter().map(|x| x * x / 16.0).collect();
         let noise = noise(101);

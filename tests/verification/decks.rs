@@ -446,7 +446,7 @@ fn a_set_of_nodes_may_be_that_of_elements() {
 }
 
 #[test]
-fn what_a_row_names_must_exist_and_have_something() {
+fn the_target_of_a_row_must_exist_and_not_be_empty() {
     for (model, step, got) in [
         ("", "*CLOAD\nX, 1, 2.\n", "`X`"),
         ("", "*CLOAD\n99, 1, 2.\n", "`99`"),

@@ -147,7 +147,7 @@ fn refusals_name_unmerged_nodes() {
 
 /// A file of a generator whose surfaces do not share their curve: the same warning.
 #[test]
-fn a_file_with_unmerged_nodes_is_told() {
+fn a_file_with_unmerged_nodes_is_reported() {
     let text = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n1 1 \"left\"\n$EndPhysicalNames\n$Nodes\n8\n\
         1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 1 0 0\n6 2 0 0\n7 2 1 0\n8 1 1 0\n$EndNodes\n$Elements\n3\n\
         1 1 2 1 1 4 1\n2 3 2 2 1 1 2 3 4\n3 3 2 2 1 5 6 7 8\n$EndElements\n";

@@ -165,7 +165,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn twins_of_plane_elements_are_read_and_others_are_told_apart() {
+    fn variants_of_plane_elements_are_read_and_others_are_classified() {
         let plane = |name: &str| match ElementType::new(name).shape {
             Shape::Plane(_, nodes) => nodes,
             other => panic!("{name}: {other:?}"),

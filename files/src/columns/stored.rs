@@ -31,7 +31,7 @@ const VERSION_1: [Stored; 7] = [
 ];
 
 #[test]
-fn what_was_stored_by_version_1_is_read_bit_for_bit() {
+fn fields_stored_by_version_1_are_read_bit_for_bit() {
     for (name, bytes, sum) in VERSION_1 {
         let read = decode(bytes, 1 << 20);
         assert!(

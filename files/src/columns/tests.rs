@@ -71,7 +71,7 @@ fn fields_come_back_whatever_the_prediction_is_worth() {
 }
 
 #[test]
-fn elements_of_several_materials_are_told_apart_by_their_stresses() {
+fn the_material_of_an_element_is_found_from_its_stresses() {
     let materials = r#"[{"youngs_modulus": 1000, "poissons_ratio": 0.3}, {"youngs_modulus": 10, "poissons_ratio": 0.2, "group": "soft"}]"#;
     let mesh = r#"{"grid": {"x": [0, 0.5, 1, 2], "y": [-2, -1, -0.5, 0]}, "groups": {"soft": {"y": [-2, -1]}}}"#;
     let problem = problem("plane_strain", materials, mesh);

@@ -136,7 +136,7 @@ mod tests {
     use crate::plot::tests::{problem, solution};
 
     #[test]
-    fn figures_of_a_study_are_told_apart_by_their_parameters() {
+    fn figures_of_a_study_show_their_parameters() {
         let mut problem = problem();
         let of = |problem: &Problem| Caption::of_problem(problem, "Contact").parameters;
         assert_eq!(of(&problem), ["μ = 0.3, ρ = 0.01 mm, ε = 1e−4 mm"]);
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_solution_says_so() {
+    fn a_figure_of_no_solution_says_so() {
         let problem = problem();
         let mut summary = solution(&problem).summary;
         let mark = |summary: &Summary, partial| {

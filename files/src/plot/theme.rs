@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn colours_are_told_apart_with_every_kind_of_colour_blindness() {
+    fn colours_are_distinguishable_with_every_kind_of_colour_blindness() {
         for theme in [Theme::Light, Theme::Dark] {
             let palette = theme.palette();
             for (kind, seen) in &SEEN {

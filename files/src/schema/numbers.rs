@@ -57,7 +57,7 @@ mod tests {
     use super::super::shape::shape;
 
     #[test]
-    fn lists_of_numbers_are_told_from_others() {
+    fn lists_of_numbers_are_distinguished_from_other_lists() {
         let count = |schema: &serde_json::Value, text: &str| {
             assert!(text.is_empty() || serde_json::from_str::<serde_json::Value>(text).is_ok());
             super::count(&shape(schema, schema).unwrap(), text)

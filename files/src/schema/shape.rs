@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn the_forms_of_a_load_are_told_by_the_names_that_only_they_require() {
+    fn the_forms_of_a_load_are_recognised_by_their_own_required_names() {
         let loads = PROBLEM.properties["loads"].items.as_ref().unwrap();
         let forms = loads.forms.as_ref().unwrap();
         assert_eq!(forms[0], ["pressure"]);

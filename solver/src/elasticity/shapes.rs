@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn what_differs_by_more_than_rounding_has_no_shape_in_common() {
+    fn elements_that_differ_by_more_than_rounding_share_no_shape() {
         let plane = section(Analysis::PlaneStrain {});
         let mut mesh = mesh(&lines(3, 1.0), &lines(1, 1.0));
         assert_eq!(numbers(&mesh, &plane), [Some(0); 3]);

@@ -157,7 +157,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn json_and_display_write_a_reason_alike() {
+    fn json_and_display_write_a_reason_in_the_same_way() {
         for reason in Reason::VARIANTS {
             let json = serde_json::to_string(reason).unwrap();
             assert_eq!(json, format!("\"{reason}\""));

@@ -530,7 +530,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn elements_with_one_centre_are_divided_all_the_same() {
+    fn elements_with_the_same_centre_are_divided_too() {
         let elements: Vec<Vec<u32>> = (0..1000).map(|e| vec![e, 1000]).collect();
         let positions = vec![[1.0, 2.0]; 1001];
         let cells = Cells {

@@ -97,7 +97,7 @@ mod tests {
 
     /// Elimination gives the same solution as the whole matrix, in one piece and in several blocks.
     #[test]
-    fn what_is_left_has_the_same_solution() {
+    fn the_reduced_system_has_the_same_solution() {
         for (n, count) in [(5, 2), (300, 130), (300, 0), (40, 40)] {
             let entry = |i: usize, j: usize| match i == j {
                 true => n as f64,

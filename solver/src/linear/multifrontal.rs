@@ -523,7 +523,7 @@ mod tests {
     /// The Schur complement of the whole equals the dense one, in meshes of one part and of many, with no node kept,
     /// with some, and with nearly all.
     #[test]
-    fn what_is_left_of_the_whole_is_the_dense_schur_complement() {
+    fn the_schur_complement_equals_the_dense_one() {
         let all: Vec<u32> = (0..30 * 3).collect();
         let cases: [(usize, usize, &[u32]); 5] = [
             (1, 1, &[2]),

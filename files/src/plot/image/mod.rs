@@ -41,7 +41,7 @@ pub fn write(svg: String, size: Size, image: Image) -> Result<Vec<u8>, String> {
     };
     if svg.len() > LARGEST {
         return Err(format!(
-            "it is too large to be converted ({} MB of SVG, at most {}): ask for .svg",
+            "the figure is too large to be converted ({} MB of SVG, at most {}): request .svg",
             svg.len().div_ceil(1 << 20),
             LARGEST >> 20
         ));
@@ -114,18 +114,18 @@ mod tests {
         assert!(pixels < 1.01 * pixels::MOST_PIXELS, "{pixels}");
         for image in [Image::Png, Image::Pdf] {
             let refused = write(height(200_000), Size::Page, image).unwrap_err();
-            assert!(refused.contains("ask for .svg"), "{refused}");
+            assert!(refused.contains("request .svg"), "{refused}");
         }
     }
 
     #[test]
-    fn what_is_too_large_is_refused_and_stays_svg() {
+    fn a_figure_that_is_too_large_is_refused_and_available_as_svg() {
         let mut svg = drawn(Size::Page);
         svg.push_str(&" ".repeat(LARGEST));
         assert!(
             write(svg.clone(), Size::Page, Image::Pdf)
                 .unwrap_err()
-                .contains("ask for .svg")
+                .contains("request .svg")
         );
         assert!(write(svg, Size::Page, Image::Svg).is_ok());
     }

@@ -418,7 +418,7 @@ stress  σ<tspan dy="4" font-size="14">xx</tspan><tspan dy="-4"> (MPa)
     }
 
     #[test]
-    fn what_is_not_known_is_an_error() {
+    fn an_unknown_element_is_an_error() {
         for (content, reason) in [
             ("<ellipse/>", "it contains <ellipse>"),
             (
