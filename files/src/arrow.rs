@@ -33,8 +33,8 @@ fn written(table: &Table) -> Result<Vec<u8>, ArrowError> {
     writer.into_inner()
 }
 
-/// Only numbers that may be missing are nullable. That depends on the column, not on its values: the files of two
-/// jobs have one schema.
+/// One column as an Arrow array; whether it is nullable depends on the column, not on its values, so that the files of
+/// two jobs have the same schema.
 fn array(values: &Values) -> (DataType, ArrayRef, bool) {
     match values {
         Values::Real(values) => {

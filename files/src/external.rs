@@ -1,4 +1,4 @@
-//! The mesh that a problem only names or quotes.
+//! The mesh that a problem only names or contains as text.
 
 use std::collections::BTreeSet;
 
@@ -8,8 +8,8 @@ use solver::solution::Warning;
 
 use crate::{abaqus, gmsh, source::ReadError};
 
-/// The mesh that a problem does not contain: `stored`, if its caller has it, or read from the text that the
-/// problem quotes. `None` if it needs none. Violations and warnings point to its place in the problem.
+/// The mesh that a problem does not have in readable form: `stored`, if the caller has it, or read from the text in the
+/// problem. `None` if it needs none. Violations and warnings point to its place in the problem.
 pub fn external_mesh(problem: &Problem, stored: Option<Mesh>) -> Option<External> {
     match &problem.mesh.source {
         MeshSource::Grid(_) | MeshSource::Inline(_) => None,

@@ -9,7 +9,7 @@ use solver::solution::Fields;
 /// One quantity at all nodes.
 pub(crate) struct Array {
     pub(crate) name: &'static str,
-    /// One name per component; none for a scalar.
+    /// The names of the components; none for a scalar.
     pub(crate) components: &'static [&'static str],
     pub(crate) data: Data,
 }
@@ -19,7 +19,7 @@ pub(crate) enum Data {
     Small(Vec<i8>),
 }
 
-/// The arrays are made one after the other: together they are larger than the fields.
+/// The arrays at nodes, made one after another: together they are larger than the fields.
 pub(crate) fn point_data(fields: &Fields) -> impl Iterator<Item = Array> {
     const ARRAYS: [fn(&Fields) -> Array; 5] = [
         |fields| {
@@ -129,7 +129,7 @@ pub fn add(npz: &mut Npz, prefix: &str, fields: &Fields) -> Result<(), String> {
 ///
 /// # Errors
 ///
-/// As for [`add`].
+/// The errors of [`add`].
 pub fn npz(fields: &Fields) -> Result<Vec<u8>, String> {
     let mut npz = Npz::new();
     add(&mut npz, "", fields)?;
@@ -165,8 +165,8 @@ pub fn memory(fields: &Fields) -> usize {
         + f.elements.capacity() * size_of::<Element>()
 }
 
-/// Checks that related arrays have equal length, and elements only existing nodes: other files crash the programs
-/// that read them.
+/// Checks that related arrays have equal lengths, and that elements have existing nodes only: invalid files crash the
+/// programs that read them.
 pub(crate) fn check(fields: &Fields) -> Result<(), String> {
     let f = fields;
     let nodes = f.x.len();

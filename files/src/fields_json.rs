@@ -1,22 +1,23 @@
-//! Fields as JSON, piece by piece: the whole text of a large solution is three times as long as its numbers.
+//! Writes fields as JSON in pieces, since the whole text of a large solution is three times as long as its numbers.
 
 use std::ops::Deref;
 
 use serde::Serialize;
 use solver::solution::Fields;
 
-/// Numbers that are written at once, and elements: their text is 256 KiB at most.
+/// The most numbers, and elements, that are written at once: their text is 256 KiB at most.
 const NUMBERS: usize = 8192;
 const ELEMENTS: usize = 2048;
 
-/// The text that `serde_json` writes of fields, in pieces. `F` is what has the fields: a reference, or a shared pointer.
+/// The text that `serde_json` would write for fields, in pieces. `F` holds the fields: a reference, or a shared
+/// pointer.
 pub struct FieldsJson<F> {
     fields: F,
     column: usize,
     value: usize,
 }
 
-/// The columns in the order of the text, each with what precedes its values.
+/// The columns in the order of the text, each with the text before its values.
 #[rustfmt::skip]
 const COLUMNS: [(&str, Column); 18] = [
     (r#"{"x":["#,                            |f, from| part(&f.x, from)),
@@ -39,13 +40,13 @@ const COLUMNS: [(&str, Column); 18] = [
     (r#"],"stress_zz":["#,                   |f, from| part(&f.gauss.stress_zz, from)),
 ];
 
-/// Values of a column, from this one on.
+/// The values of a column, starting from an index.
 type Column = fn(&Fields, usize) -> Values<'_>;
 
-/// What follows the last value.
+/// The text after the last value.
 const END: &str = "]}}";
 
-/// Some values of a column: how many, whether they are its last, and how they are written as a list.
+/// Some values of a column: their number, whether they are the column's last, and how they are written as a list.
 type Values<'a> = (usize, bool, Box<WriteList<'a>>);
 
 type WriteList<'a> = dyn FnOnce(&mut Vec<u8>) -> serde_json::Result<()> + 'a;
@@ -63,7 +64,7 @@ fn part<T: Serialize>(column: &[T], from: usize) -> Values<'_> {
 }
 
 impl<F: Deref<Target = Fields>> FieldsJson<F> {
-    /// From the beginning.
+    /// Starts at the beginning of the text.
     pub fn new(fields: F) -> Self {
         FieldsJson {
             fields,

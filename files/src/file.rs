@@ -23,7 +23,7 @@ pub enum MeshFormat {
     Json,
 }
 
-/// What some editors write before a text.
+/// The byte order mark that some editors write before a text.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Reads a mesh file of any format, with warnings of what was changed. The format is recognised by its first
@@ -54,7 +54,7 @@ pub fn read_mesh(mut reader: impl BufRead) -> Result<(MeshFormat, Mesh, Vec<Warn
     }
 }
 
-/// What a file is that is not a mesh, by its first bytes.
+/// A description of a file that is not a mesh, by its first bytes.
 fn recognised(start: &[u8]) -> &'static str {
     const KNOWN: [(&[u8], &str); 14] = [
         (b"\x1f\x8b", "a file compressed with gzip"),
@@ -80,7 +80,7 @@ fn recognised(start: &[u8]) -> &'static str {
     }
 }
 
-/// Characters of a parser's message that are repeated.
+/// The largest number of characters of a parser's message that are quoted.
 const LONGEST: usize = 300;
 
 fn json(reader: impl BufRead) -> Result<Mesh, ReadError> {
@@ -173,7 +173,8 @@ mod tests {
         assert_eq!(reason(&square.replace("\"top\"", "top")), ": malformed");
     }
 
-    /// Also behind the lists that are taken out of the text, and in one that is left in it from its middle.
+    /// A fault is placed where it is in the whole file, also after lists that were removed from the text, and in a list
+    /// that remains from its middle on.
     #[test]
     fn a_fault_is_placed_where_it_is_in_the_whole_file() {
         let square = "{\"nodes\": [[0,0],[1,0],\n[1,1],[0,1],[0.5,0],[1,0.5],[0.5,1],[0,0.5]],\n\

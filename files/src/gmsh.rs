@@ -27,13 +27,13 @@ const KINDS: [(i64, usize, Kind); 8] = [
     (15, 1, Kind::Point),
 ];
 
-/// Bytes of a physical name; Gmsh itself cuts at 128 characters.
+/// The largest number of bytes of a physical name; Gmsh itself cuts at 128 characters.
 const LONGEST_NAME: usize = 512;
 
-/// An element that is in no physical group.
+/// Marks an element that is in no physical group.
 const NO_GROUP: u32 = u32::MAX;
 
-/// Physical groups that an element may be in on average: the groups of a surface are written once for all of its
+/// The largest average number of physical groups of an element: the groups of a surface are written once for all of its
 /// elements, and may be many.
 const MOST_GROUPS: usize = 16;
 
@@ -78,7 +78,7 @@ struct File<R> {
     labels: Labels,
     plane: Plane,
     raw: RawMesh,
-    /// Memberships of elements in physical groups.
+    /// The number of memberships of elements in physical groups.
     members: usize,
     seen: Seen,
 }
@@ -253,7 +253,7 @@ impl<R: BufRead> File<R> {
         self.end("$EndMeshFormat")
     }
 
-    /// The end of a section; a binary one leaves a line end behind.
+    /// Reads the end of a section; after a binary section a line end remains.
     fn end(&mut self, end: &str) -> Result<(), ReadError> {
         let found = self.source.word(end)?;
         if found == end {
@@ -409,7 +409,8 @@ impl<R: BufRead> File<R> {
         self.raw.node_labels.reserve_exact(count);
     }
 
-    /// `parametric`: each place is followed by its entity, and by its coordinates in that.
+    /// Reads the nodes of version 2. `parametric`: each position is followed by its entity, and by its coordinates on
+    /// that.
     fn nodes_2(&mut self, parametric: bool) -> Result<(), ReadError> {
         let count: u64 = self.source.number("the number of nodes")?;
         self.reserve(count);
@@ -505,8 +506,8 @@ impl<R: BufRead> File<R> {
         Ok(())
     }
 
-    /// Version 2 writes an element once for each physical group that it is in: they become one. The same element twice in
-    /// one group, or in none, is a fault of the mesh.
+    /// Merges the copies of elements that version 2 writes, one for each physical group. The same element twice in one
+    /// group, or in none, is a fault of the mesh.
     fn merge_repeated(&mut self) {
         let elements = &self.raw.elements;
         let mut order: Vec<u32> = (0..elements.len() as u32).collect();
@@ -594,7 +595,7 @@ impl<R: BufRead> File<R> {
         Ok(())
     }
 
-    /// Number of nodes and kind of element, by Gmsh's number.
+    /// The number of nodes and the kind of an element, by Gmsh's number.
     fn kind(&self, number: i64) -> Result<(usize, Kind), ReadError> {
         let known = KINDS.iter().find(|kind| kind.0 == number);
         if let Some((_, size, kind)) = known {
@@ -665,7 +666,7 @@ impl<R: BufRead> File<R> {
         if self.members > most {
             return Err(self.source.fault(
                 Reason::TooMany,
-                &format!("elements in {} physical groups in all", self.members),
+                &format!("elements in {} physical groups in total", self.members),
                 "at most 16 groups for an element on average",
                 "Leave out the groups that are not used.",
             ));
@@ -689,7 +690,7 @@ impl<R: BufRead> File<R> {
         Ok(())
     }
 
-    /// A node of an element: version 2 has 4 bytes, version 4 has 8.
+    /// Reads a node of an element: version 2 has 4 bytes, version 4 has 8.
     fn size_or_int(&mut self) -> Result<u64, ReadError> {
         match self.version {
             Version::Two => Ok(self.int("a node number")? as u64),
@@ -702,7 +703,7 @@ impl<R: BufRead> File<R> {
 mod tests {
     use super::*;
 
-    /// One triangle with a physical tag; in MSH 2.2 at the element, in MSH 4.1 at its surface.
+    /// A mesh of one triangle with a physical tag, given in MSH 2.2 at the element, in MSH 4.1 at its surface.
     fn triangle(version: Version, tag: i64) -> String {
         match version {
             Version::Two => format!(

@@ -1,60 +1,61 @@
-//! The nodes and elements of an inline mesh, taken out of a JSON text while it is read.
+//! Removes the nodes and elements of an inline mesh from a JSON text while it is read.
 //!
-//! They are nearly all of a large problem. From the pieces of a reader they go straight into the columns of the mesh,
-//! and who reads the text behind [`Extract`] finds an empty list in their place: a problem without its mesh is small.
-//! A list that is not as expected is passed on from the first unexpected character, after as many items of the
-//! simplest kind as were taken, so that its faults are found where they are, by those who describe all others too.
+//! They are most of a large problem. They go from the pieces of a reader directly into the columns of the mesh, and
+//! whoever reads the text from [`Extract`] finds an empty list in their place: a problem without its mesh is small. A
+//! list that is not as expected is passed on from the first unexpected character, after as many simple items as were
+//! removed, so that its faults are found at their places by the code that describes all others too.
 
 use std::io::{self, Read};
 
 use solver::element::Element;
 use solver::problem::InlineMesh;
 
-/// Bytes that are asked for at once. An item that is longer is left to others.
+/// The number of bytes that are requested at once. A longer item is passed on.
 const PIECE: usize = 1 << 16;
 
-/// Items that are written at once where a list is passed on.
+/// The number of items that are written at once where a list is passed on.
 const AT_ONCE: usize = 1 << 10;
 
-/// Longest name that is told from others.
+/// The longest name that is compared with others.
 const LONGEST_NAME: usize = 8;
 
-/// A JSON text without the nodes and elements of the inline mesh at one place in it; other texts pass as they are.
+/// A reader of a JSON text that removes the nodes and elements of the inline mesh at one place in it; other texts pass
+/// unchanged.
 pub(crate) struct Extract<R> {
     input: Input<R>,
     /// The names that lead to the mesh, from the outermost object on.
     way: &'static [&'static str],
-    /// How many of them lead to where the text is now.
+    /// The number of these names that lead to the present place in the text.
     inside: usize,
-    /// Open brackets.
+    /// The number of open brackets.
     depth: usize,
     /// The last string, or the current one.
     name: Vec<u8>,
     string: Option<InString>,
-    /// What the value after a colon is.
+    /// The kind of list that a value after a colon is.
     awaited: Option<Awaited>,
-    /// The list that is being taken.
+    /// The list that is being removed.
     list: Option<List>,
-    /// Items that are yet to be written in place of those that were taken.
+    /// Items that must still be written in place of those that were removed.
     stand_ins: Option<StandIns>,
     /// Text that is to be passed on.
     out: Vec<u8>,
     sent: usize,
-    /// Where the text that is passed on ends.
+    /// The place where the text that was passed on ends.
     end: Place,
     nodes: Column<[f64; 2]>,
     elements: Column<Element>,
     places: Places,
 }
 
-/// What [`Extract`] has taken out of a text.
+/// The nodes and elements that [`Extract`] has removed from a text.
 pub(crate) struct Taken {
     nodes: Column<[f64; 2]>,
     elements: Column<Element>,
     pub(crate) places: Places,
 }
 
-/// Places of the original text, by those of the text that was passed on.
+/// Places in the original text for places in the text that was passed on.
 #[derive(Default)]
 pub(crate) struct Places(Vec<(Place, Place)>);
 
@@ -90,7 +91,7 @@ struct StandIns {
     first: bool,
 }
 
-/// The items of a list that were taken: all, or those before the first that is not as expected.
+/// The items of a list that were removed: all, or those before the first that is not as expected.
 struct Column<T> {
     items: Vec<T>,
     state: State,
@@ -103,16 +104,16 @@ enum State {
     Whole,
 }
 
-/// The pieces of a reader.
+/// The pieces that a reader gives.
 struct Input<R> {
     reader: R,
     piece: Vec<u8>,
-    /// The part of the piece that was not used yet.
+    /// The start of the part of the piece that was not used yet.
     start: usize,
     end: usize,
-    /// The reader has no more.
+    /// Whether the reader has no more.
     ended: bool,
-    /// Where in the text `start` is.
+    /// The place of `start` in the text.
     place: Place,
 }
 
@@ -146,7 +147,7 @@ impl<R: Read> Extract<R> {
         }
     }
 
-    /// What was taken so far.
+    /// The nodes and elements that were removed so far.
     pub(crate) fn taken(self) -> Taken {
         Taken {
             nodes: self.nodes,
@@ -182,7 +183,7 @@ impl<R: Read> Extract<R> {
         }
     }
 
-    /// Passes the text on, to its next list of nodes or elements.
+    /// Passes the text on, up to its next list of nodes or elements.
     fn pass(&mut self) {
         let piece = &self.input.piece[self.input.start..self.input.end];
         let mut used = 0;
@@ -232,7 +233,7 @@ impl<R: Read> Extract<R> {
         self.input.advance(used);
     }
 
-    /// What the last string names, before a colon.
+    /// The list that the last string names, before a colon.
     fn named(&self) -> Option<Awaited> {
         let directly = self.depth == self.inside + 1;
         match self.way.get(self.inside).filter(|_| directly) {
@@ -250,7 +251,7 @@ impl<R: Read> Extract<R> {
         }
     }
 
-    /// Takes a list, whose bracket is open, to its end or to what is not as expected.
+    /// Removes items of a list, whose bracket is open, up to its end or to an unexpected character.
     fn take(&mut self, list: List) -> io::Result<()> {
         let input = &mut self.input;
         let (state, count, stand_in) = match list {
@@ -283,7 +284,7 @@ impl<R: Read> Extract<R> {
     }
 }
 
-/// The text as it is passed on.
+/// Reads the text that is passed on.
 impl<R: Read> Read for Extract<R> {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
         if self.sent == self.out.len() {
@@ -368,7 +369,7 @@ impl<T> Column<T> {
         }
     }
 
-    /// Takes items until the list ends or is not as expected.
+    /// Removes items until the list ends or is not as expected.
     fn take<R: Read>(
         &mut self,
         input: &mut Input<R>,
@@ -423,7 +424,7 @@ impl<T> Column<T> {
 }
 
 impl<R: Read> Input<R> {
-    /// Reads more behind what was not used yet; false if there is no more, or no room.
+    /// Reads more after the unused part; false if there is no more, or no room.
     fn fill(&mut self) -> io::Result<bool> {
         self.piece.copy_within(self.start..self.end, 0);
         (self.start, self.end) = (0, self.end - self.start);
@@ -448,15 +449,16 @@ impl<R: Read> Input<R> {
     }
 }
 
-/// Why a text does not go on with an item.
+/// Why no further item could be read from a text.
 enum Not {
-    /// It ends before the item does.
+    /// The text ends before the item does.
     Complete,
-    /// It goes on with something else.
+    /// The text continues with something else.
     Expected,
 }
 
-/// The next item of a list with the comma before it; none at the end of the list. `at`: where it begins, then ends.
+/// Reads the next item of a list with the comma before it; none at the end of the list. `at`: the place where it
+/// begins, then that where it ends.
 fn next<T>(
     text: &[u8],
     at: &mut usize,
@@ -475,7 +477,7 @@ fn next<T>(
     item(text, at).map(Some)
 }
 
-/// A node: two numbers.
+/// Reads a node: two numbers.
 fn node(text: &[u8], at: &mut usize) -> Result<[f64; 2], Not> {
     expect(text, at, b'[')?;
     let x = real(text, at)?;
@@ -485,7 +487,7 @@ fn node(text: &[u8], at: &mut usize) -> Result<[f64; 2], Not> {
     Ok([x, y])
 }
 
-/// An element: eight or six whole numbers.
+/// Reads an element: eight or six whole numbers.
 fn element(text: &[u8], at: &mut usize) -> Result<Element, Not> {
     let (mut nodes, mut count) = ([0; 8], 0);
     expect(text, at, b'[')?;
@@ -522,7 +524,7 @@ fn expect(text: &[u8], at: &mut usize, expected: u8) -> Result<(), Not> {
     }
 }
 
-/// A number as RFC 8259 has it, within double precision.
+/// Reads a number as in RFC 8259, within double precision.
 fn real(text: &[u8], at: &mut usize) -> Result<f64, Not> {
     character(text, at)?;
     let start = *at;
@@ -556,7 +558,7 @@ fn real(text: &[u8], at: &mut usize) -> Result<f64, Not> {
         .ok_or(Not::Expected)
 }
 
-/// A whole number from 0, without fraction and exponent.
+/// Reads a whole number from 0, without fraction and exponent.
 fn whole(text: &[u8], at: &mut usize) -> Result<u32, Not> {
     character(text, at)?;
     let start = *at;
@@ -570,7 +572,7 @@ fn whole(text: &[u8], at: &mut usize) -> Result<u32, Not> {
     u32::try_from(value).map_err(|_| Not::Expected)
 }
 
-/// How many digits follow; the text goes on behind them.
+/// Skips digits; returns how many there were.
 fn digits(text: &[u8], at: &mut usize) -> Result<usize, Not> {
     let start = *at;
     while let Some(b'0'..=b'9') = text.get(*at) {
@@ -589,7 +591,7 @@ mod tests {
     use super::*;
     use solver::problem::{MeshSource, Problem};
 
-    /// A reader that gives a few bytes at once.
+    /// A reader that gives only a few bytes at a time.
     struct Drops<'a>(&'a [u8], usize);
 
     impl Read for Drops<'_> {
@@ -708,7 +710,8 @@ mod tests {
         }
     }
 
-    /// Where the list was left nothing is wrong: more space between two numbers than a piece has.
+    /// The items before a list was passed on keep their values, also if nothing is wrong there: for example with more
+    /// space between two numbers than a piece holds.
     #[test]
     fn the_items_before_where_a_list_was_left_keep_their_values() {
         let space = " ".repeat(2 * PIECE);
@@ -726,7 +729,8 @@ mod tests {
         assert_eq!(mesh.elements, [Element::Triangle([0, 1, 2, 3, 4, 5])]);
     }
 
-    /// With faults before, within and behind the lists, and in one that is passed on from its middle.
+    /// Faults are the same as in the whole text: before, within and after the lists, and in a list that is passed on
+    /// from its middle.
     #[test]
     fn faults_are_the_same_as_in_the_whole_text() {
         let good = "{\"title\": \"a\",\n \"mesh\": {\"inline\": {\"nodes\": [[0,0],[1,0],\n[1,1]], \"elements\": [[0,1,2,3,4,5],\n\

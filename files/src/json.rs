@@ -1,8 +1,8 @@
 //! Problems from JSON: strict, and with all structural faults reported at once.
 //!
-//! The nodes and elements of an inline mesh, nearly all of a large problem, are taken out while the text is read. The
+//! The nodes and elements of an inline mesh, nearly all of a large problem, are removed while the text is read. The
 //! rest is first checked against our JSON Schema, which gives all faults with their places, in memory that does not
-//! depend on what the text says; then serde reads it.
+//! depend on the content of the text; then serde reads it.
 
 use std::fmt;
 use std::io::Read;
@@ -18,7 +18,7 @@ use solver::problem::{MeshSource, Problem};
 /// The names that lead to an inline mesh.
 const INLINE: &[&str] = &["mesh", "inline"];
 
-/// Most brackets that may be open at once. A problem has ten.
+/// The largest number of brackets that may be open at once. A problem has ten.
 pub const MOST_NESTED: usize = 64;
 
 /// Reads a problem from JSON.
@@ -26,8 +26,8 @@ pub const MOST_NESTED: usize = 64;
 /// # Errors
 ///
 /// All violations of its structure (at most a hundred), with pointers relative to the problem: unknown and missing
-/// fields, wrong types, alternatives that are none or more than one. What the fields mean together is checked by the
-/// solver.
+/// fields, wrong types, no or several alternatives where exactly one is required. Combinations of fields are checked by
+/// the solver.
 pub fn parse(text: &str) -> Result<Problem, Vec<Violation>> {
     let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text);
     if text.contains("\"inline\"") {
@@ -37,8 +37,8 @@ pub fn parse(text: &str) -> Result<Problem, Vec<Violation>> {
     }
 }
 
-/// Reads a problem from a reader, in pieces: of an inline mesh only the columns are held, and never its text, unless it
-/// is faulty.
+/// Reads a problem from a reader, in pieces: the text of an inline mesh is never held as a whole, only its columns,
+/// unless it is faulty.
 ///
 /// # Errors
 ///
@@ -60,7 +60,7 @@ pub fn read(reader: impl Read) -> Result<Problem, ReadError> {
     Ok(problem)
 }
 
-/// Reads a text, whose places are those of the original text as `places` tells them.
+/// Reads a text. `places` gives the places in the original text.
 pub(crate) fn check(text: &str, places: &Places) -> Result<Problem, Vec<Violation>> {
     if text.trim().is_empty() {
         return Err(vec![Violation::new(
@@ -132,14 +132,14 @@ fn deepest(text: &str) -> Option<(usize, usize)> {
     None
 }
 
-/// The first error of the syntax, or of a number or string that has no value, with its line and column.
+/// The first syntax error, or number or string without a value, with its line and column.
 fn syntax_error(text: &str) -> Option<serde_json::Error> {
     let mut reader = serde_json::Deserializer::from_str(text);
     let read = reader.deserialize_any(Anything);
     read.and_then(|()| reader.end()).err()
 }
 
-/// Reads any value and keeps nothing; unlike serde's own `IgnoredAny` it also reads numbers and strings.
+/// Reads any value and keeps nothing; unlike serde's `IgnoredAny` it also checks numbers and strings.
 struct Anything;
 
 impl<'de> Visitor<'de> for Anything {

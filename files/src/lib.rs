@@ -1,5 +1,5 @@
-//! Problems and meshes from texts and files, results and figures as files: all input and output
-//! of `solver`. Bytes in, bytes out, never a path.
+//! Problems and meshes from texts and files, results and figures as files: all input and output of `solver`. Bytes in,
+//! bytes out, never a path.
 //!
 //! ```
 //! use std::ops::ControlFlow;
@@ -19,7 +19,7 @@
 //! let csv = files::table::Table::of_profile(&solution.profiles["top"]).csv()?;
 //! assert!(csv.starts_with("s,x,y,"));
 //!
-//! // what is wrong with a problem is told with its place and with what to do
+//! // every fault of a problem is reported with its place and advice
 //! let violations = files::parse(&text.replace("indentation", "identation")).unwrap_err();
 //! assert_eq!(violations[0].pointer, "/contacts/0/identation");
 //! # Ok::<(), Box<dyn std::error::Error>>(())

@@ -15,7 +15,7 @@ pub struct Npz {
     zip: ZipWriter<Cursor<Vec<u8>>>,
 }
 
-/// Numbers turned into bytes at a time.
+/// The number of values that are turned into bytes at a time.
 const CHUNK: usize = 1 << 16;
 
 impl Default for Npz {
@@ -147,7 +147,7 @@ impl Npz {
 ///
 /// # Errors
 ///
-/// As for [`Npz::table`].
+/// The errors of [`Npz::table`].
 pub fn file(table: &Table) -> Result<Vec<u8>, String> {
     let mut npz = Npz::new();
     npz.table("", table)?;
@@ -171,7 +171,7 @@ pub(crate) mod tests {
     use std::collections::BTreeMap;
     use std::io::Read;
 
-    /// Header and data of every array, by name.
+    /// The header and data of every array, by name.
     pub(crate) fn read(bytes: Vec<u8>) -> BTreeMap<String, (String, Vec<u8>)> {
         let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).unwrap();
         let mut arrays = BTreeMap::new();

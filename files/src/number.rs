@@ -2,11 +2,11 @@
 
 /// A number with a fixed size.
 pub trait Number: Copy {
-    /// Its name in a `.npy` header.
+    /// The type's name in a `.npy` header.
     const NUMPY: &'static str;
-    /// Its name in a VTK file.
+    /// The type's name in a VTK file.
     const VTK: &'static str;
-    /// Appends its bytes, least significant first.
+    /// Appends the number's bytes, least significant first.
     fn put(self, bytes: &mut Vec<u8>);
 }
 

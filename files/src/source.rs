@@ -5,14 +5,14 @@ use std::str::FromStr;
 
 use solver::error::{Reason, Violation};
 
-/// Longest line of a mesh file: a file that is not text must not fill the memory.
+/// The longest line of a mesh file, so that a file that is not text does not fill the memory.
 const LONGEST_LINE: usize = 1 << 20;
 
-/// What some editors write before a text.
+/// The byte order mark that some editors write before a text.
 pub const BYTE_ORDER_MARK: char = '\u{feff}';
 
-/// A text, which may have been written by a program of Windows or an old one: without a byte order mark, and in Latin-1
-/// line by line where it is not UTF-8.
+/// Decodes a text, also one written by a program for Windows or an old one: removes a byte order mark, and reads a line
+/// as Latin-1 if it is not UTF-8.
 pub fn text(bytes: Vec<u8>) -> String {
     let text = String::from_utf8(bytes).unwrap_or_else(|error| {
         let lines = error
@@ -26,7 +26,7 @@ pub fn text(bytes: Vec<u8>) -> String {
     }
 }
 
-/// A line as text: UTF-8, or else Latin-1, of which every byte is a character.
+/// A line as text: UTF-8, or else Latin-1, in which every byte is a character.
 fn decoded(bytes: Vec<u8>) -> String {
     String::from_utf8(bytes)
         .unwrap_or_else(|error| error.as_bytes().iter().map(|byte| *byte as char).collect())
@@ -57,16 +57,16 @@ impl ReadError {
     }
 }
 
-/// A reader that counts lines.
+/// A reader of words and bytes that counts lines.
 pub(crate) struct Source<R> {
     reader: R,
     /// The current line without its end.
     text: String,
-    /// The start of the next word in it.
+    /// The start of the next word in the line.
     at: usize,
-    /// Its number, from 1; in binary sections the number of the section's first line.
+    /// The number of the line, from 1; in a binary section that of the section's first line.
     pub(crate) line: u64,
-    /// The byte order differs from that of this machine.
+    /// Whether the byte order differs from that of this machine.
     pub(crate) swapped: bool,
 }
 
@@ -114,7 +114,7 @@ impl<R: BufRead> Source<R> {
         Ok(true)
     }
 
-    /// The bytes of the next line, up to the longest that there may be, and whether its end was found: a line feed, a
+    /// Reads the bytes of the next line, up to the longest allowed; returns whether its end was found: a line feed, a
     /// carriage return, or both in this order.
     fn line_of(&mut self, bytes: &mut Vec<u8>) -> io::Result<bool> {
         while bytes.len() < LONGEST_LINE {
@@ -141,7 +141,7 @@ impl<R: BufRead> Source<R> {
         Ok(false)
     }
 
-    /// The current line; its words are then consumed.
+    /// The rest of the current line, whose words then count as read.
     pub(crate) fn text(&mut self) -> &str {
         self.at = self.text.len();
         &self.text
@@ -215,7 +215,7 @@ pub(crate) struct Labels {
     dense: Vec<u32>,
     sparse: std::collections::BTreeMap<u64, u32>,
     count: u32,
-    /// The smallest and the largest.
+    /// The smallest and the largest number.
     ends: Option<(u64, u64)>,
 }
 
@@ -248,9 +248,9 @@ impl Labels {
         self.ends
     }
 
-    /// The places of all numbers first, first + step, … up to last, and how many numbers were looked at, at most
-    /// one more than `most`. A range may be very wide: only existing numbers are visited, and each wanted number at
-    /// most once.
+    /// The places of all numbers first, first + step, … up to last, and how many numbers were looked at, at most one
+    /// more than `most`. A range may be very wide: only existing numbers are visited, and each wanted number at most
+    /// once.
     pub(crate) fn range(&self, first: u64, last: u64, step: u64, most: u64) -> (Vec<u32>, u64) {
         let (mut found, mut visited) = (Vec::new(), 0);
         if first > last {
@@ -298,7 +298,7 @@ impl Labels {
     }
 }
 
-/// The plane that the nodes must lie in: z is the same for all.
+/// Checks that all nodes lie in one plane, where z is constant.
 pub(crate) struct Plane {
     lowest: (f64, u64),
     highest: (f64, u64),
@@ -328,7 +328,7 @@ impl Plane {
 
     /// A violation if the nodes do not lie in one plane z = const.
     pub(crate) fn fault(&self) -> Option<Violation> {
-        /// Rounding of a file with some nine digits.
+        /// The relative difference of z that is only rounding, in files with some nine digits.
         const FLAT: f64 = 1e-9;
         let ((low, at_low), (high, at_high)) = (self.lowest, self.highest);
         (high - low > FLAT * self.extent.max(high.abs())).then(|| {

@@ -1,7 +1,7 @@
 //! Principal stresses and the von Mises stress. Out of the plane there is only σ_zz, so that one principal
 //! stress is σ_zz and the other two are those of Mohr's circle in the plane.
 
-/// σ_xx, σ_yy, σ_xy, σ_zz of one point.
+/// The stresses σ_xx, σ_yy, σ_xy, σ_zz at one point.
 pub type Stress = [f64; 4];
 
 /// Principal stresses of the 3×3 tensor, largest (most tensile) first.

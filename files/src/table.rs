@@ -1,5 +1,5 @@
-//! Columns with names: a profile or a history, written as CSV or JSON Lines (`arrow` and `npz` have
-//! the binary formats). All formats use one table, and so have the same columns.
+//! Columns with names: a profile or a history, written as CSV or JSON Lines (`arrow` and `npz` write the binary
+//! formats). All formats use one table, and so have the same columns.
 
 use std::{borrow::Cow, fmt::Write};
 
@@ -8,32 +8,32 @@ use solver::solution::{ContactProfile, Iteration};
 /// Columns of equal length, in their order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
-    /// Names are unique.
+    /// The columns; their names are unique.
     pub columns: Vec<Column>,
 }
 
 /// One quantity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
-    /// Its name in the API; a nested field has both names, as in `contact_active`.
+    /// The quantity's name in the API; for a nested field both names, as in `contact_active`.
     pub name: Cow<'static, str>,
-    /// One entry per row.
+    /// The values, one for each row.
     pub values: Values,
 }
 
 /// The entries of a column.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Values {
-    /// NaN is a missing value: results contain no other NaN.
+    /// Real numbers; NaN is a missing value, since results contain no other NaN.
     Real(Vec<f64>),
-    /// Numbers and counts.
+    /// Whole numbers and counts.
     Whole(Vec<u32>),
-    /// Words of the API, or any other text.
+    /// Words of the API, or other texts.
     Text(Vec<Cow<'static, str>>),
 }
 
 impl Values {
-    /// Entries.
+    /// The number of entries.
     pub fn len(&self) -> usize {
         match self {
             Values::Real(values) => values.len(),
@@ -49,7 +49,7 @@ impl Values {
 }
 
 impl Table {
-    /// One row per node of Γ_C, in order of arc length.
+    /// A table with one row for each node of Γ_C, in order of arc length.
     #[rustfmt::skip]
     pub fn of_profile(profile: &ContactProfile) -> Table {
         // every field is named, so that a new column does not compile until it is added here
@@ -74,7 +74,7 @@ impl Table {
         ] }
     }
 
-    /// One row per iteration; a nested field of the JSON has both names.
+    /// A table with one row for each iteration; a nested field of the JSON has both names.
     #[rustfmt::skip]
     pub fn of_history<'a>(rows: impl IntoIterator<Item = &'a Iteration, IntoIter: Clone>) -> Table {
         let rows = rows.into_iter();
@@ -118,7 +118,7 @@ impl Table {
         }
     }
 
-    /// Bytes of all texts where each is as wide as the longest of its column, as NumPy has them.
+    /// The number of bytes of all texts if each is as wide as the longest of its column, as in NumPy.
     pub fn padded_bytes(&self) -> u64 {
         let of_column = |column: &Column| match &column.values {
             Values::Text(values) => {
@@ -135,7 +135,7 @@ impl Table {
     ///
     /// # Errors
     ///
-    /// As for [`Table::rows`].
+    /// The errors of [`Table::rows`].
     pub fn csv(&self) -> Result<String, String> {
         let mut text = self.header();
         for row in 0..self.rows()? {
@@ -167,7 +167,7 @@ impl Table {
     ///
     /// # Errors
     ///
-    /// As for [`Table::rows`].
+    /// The errors of [`Table::rows`].
     pub fn jsonl(&self) -> Result<String, String> {
         let mut text = String::new();
         let names: Vec<String> = self.columns.iter().map(|c| quoted(&c.name)).collect();
@@ -192,8 +192,8 @@ fn column(name: &'static str, values: Values) -> Column {
     Column { name, values }
 }
 
-/// A text as a cell of CSV: in quotes if it would be read as something else. What a spreadsheet would take for a formula, and
-/// run, begins with an apostrophe, which makes it a text there; numbers stay numbers.
+/// A text as a cell of CSV, in quotes if it would be read as something else. A text that a spreadsheet would take for a
+/// formula and run gets an apostrophe before it; numbers stay numbers.
 fn cell(text: &str) -> Cow<'_, str> {
     let mut text = Cow::Borrowed(text);
     if text.starts_with(FORMULAS) && !text.parse::<f64>().is_ok_and(f64::is_finite) {
@@ -206,8 +206,8 @@ fn cell(text: &str) -> Cow<'_, str> {
     }
 }
 
-/// How the text of a cell begins that spreadsheets take for a formula, some of them also after a tab or a new line, and with
-/// the wide characters of East Asian keyboards.
+/// The first characters of a cell that spreadsheets take for a formula, some of them also after a tab or a new line,
+/// including the wide characters of East Asian keyboards.
 const FORMULAS: [char; 10] = ['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－'];
 
 /// A text as JSON.
@@ -296,7 +296,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn what_a_spreadsheet_would_run_is_a_text_there() {
+    fn a_formula_is_written_as_a_text_for_spreadsheets() {
         let cells = |text: &str| {
             let values = Values::Text(vec![text.to_owned().into()]);
             let name = text.to_owned().into();

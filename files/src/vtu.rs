@@ -1,8 +1,7 @@
 //! The fields as VTU, the XML unstructured grid that ParaView, VisIt and PyVista open.
 //!
-//! By hand: the crate for it, vtkio, has had only release candidates since 0.6.3, and it writes one
-//! block too many where an array fills its compressed blocks exactly. The needed part of the format
-//! is one page.
+//! Written by hand: the crate for it, vtkio, has had only release candidates since 0.6.3, and it writes one block too
+//! many where an array fills its compressed blocks exactly. The needed part of the format is one page.
 
 use std::io::Write;
 
@@ -14,12 +13,12 @@ use crate::number::Number;
 use solver::element::Family;
 use solver::solution::Fields;
 
-/// VTK_QUADRATIC_TRIANGLE. Its nodes, and those below, stand in our own order.
+/// VTK's number of the quadratic triangle. VTK orders its nodes as we do, also those of the quadrilateral.
 const QUADRATIC_TRIANGLE: u8 = 22;
-/// VTK_QUADRATIC_QUAD.
+/// VTK's number of the quadratic quadrilateral.
 const QUADRATIC_QUAD: u8 = 23;
 
-/// Bytes compressed at a time; a multiple of every number's size.
+/// The number of bytes that are compressed at a time; a multiple of the size of every number type.
 const BLOCK: usize = 1 << 18;
 
 /// Writes the fields as VTU: nodes before deformation at z = 0, cells, values at both.
@@ -71,8 +70,8 @@ fn written(fields: &Fields) -> std::io::Result<Vec<u8>> {
     Ok(out)
 }
 
-/// One array: a header of 64-bit numbers (blocks, bytes of a block, bytes of the last one if it is
-/// not full, bytes of each when compressed), then the compressed blocks, each part in base64.
+/// Writes one array: a header of 64-bit numbers (the number of blocks, the bytes of a block, the bytes of the last one
+/// if it is not full, and the bytes of each when compressed), then the compressed blocks, each part in base64.
 fn data_array<T: Number>(
     out: &mut Vec<u8>,
     name: &str,

@@ -34,23 +34,23 @@ use crate::{
     verbs::Service,
 };
 
-/// The service, listening.
+/// The running service, which listens on its address.
 #[derive(Debug)]
 pub struct App {
     address: SocketAddr,
     store: Arc<Store>,
     queue: Arc<Queue>,
     health: HealthReporter,
-    /// Closes the listener and, one by one, the connections.
+    /// Closes the listener, then the connections one by one.
     closing: CancellationToken,
     server: JoinHandle<()>,
     grace: Duration,
     tls: Option<Arc<Tls>>,
-    /// Sends spans, if they are wanted.
+    /// Sends spans, if that is configured.
     exporting: Option<Exporting>,
 }
 
-/// Shows whether the service is alive.
+/// Tells whether the service is alive.
 #[derive(Clone, Debug)]
 pub struct Pulse {
     store: Arc<Store>,
@@ -58,7 +58,7 @@ pub struct Pulse {
 }
 
 impl Pulse {
-    /// Returns when the store has answered; false if it will not.
+    /// Returns when the store has answered; false if it will not answer.
     pub async fn store_answers(&self) -> bool {
         self.store.answers().await
     }
@@ -79,7 +79,7 @@ impl Pulse {
     }
 }
 
-/// How long the store may take to close, even if there is no grace.
+/// The time that the store has to close, even if there is no grace.
 const LEAST_FOR_STORE: Duration = Duration::from_millis(500);
 
 /// The service cannot listen at this address.
@@ -87,13 +87,13 @@ const LEAST_FOR_STORE: Duration = Duration::from_millis(500);
 #[error("cannot listen on {0}")]
 pub struct CannotListen(SocketAddr);
 
-/// The argument of the program by which it serves as a worker process.
+/// The argument of the program that makes it a worker process.
 pub const WORKER: &str = "worker";
 
-/// How the log of this process is written, and that of its worker processes, which goes to the same place.
+/// The format of this process's log, and of the logs of its worker processes, which go to the same place.
 static LOG_FORMAT: OnceLock<LogFormat> = OnceLock::new();
 
-/// This program, as a worker process.
+/// The command that starts this program as a worker process.
 fn worker_process() -> Command {
     // it leads to the running program even after an upgrade has replaced the file
     const LINUX: &str = "/proc/self/exe";
@@ -109,8 +109,8 @@ fn worker_process() -> Command {
     command
 }
 
-/// Requeues the jobs, and removes the uploads, that were interrupted when the service last ended. What is left of the
-/// jobs the queue requeues later.
+/// Requeues the jobs, and removes the uploads, that were interrupted when the service last ended. Jobs that cannot be
+/// requeued yet are requeued by the queue later.
 async fn clean_up(store: &Store) -> store::Result<()> {
     store.requeue_interrupted().await?;
     let pieces = store.discard_unattached().await?;
@@ -123,7 +123,7 @@ async fn clean_up(store: &Store) -> store::Result<()> {
     Ok(())
 }
 
-/// How long and how much is kept; 0 is without limit.
+/// How long jobs are kept, and how many; 0 means no limit.
 fn retention(config: &Config) -> Retention {
     let limits = &config.retention;
     let seconds = |days: f64| (days > 0.0).then_some(days * 86_400.0);
@@ -138,12 +138,12 @@ fn retention(config: &Config) -> Retention {
     }
 }
 
-/// The service would listen to other machines, and everyone there could do everything.
+/// The service would be reachable from other machines without any authentication.
 #[derive(Clone, Copy, Debug, thiserror::Error)]
 #[error(
-    "{0} can be reached from other machines, and there is no token: whoever reaches it could do everything. Create a token \
+    "{0} can be reached from other machines, and there is no token: anyone who reaches it could do everything. Create a token \
      first (`signorini token create --help`), or name a proxy that identifies users (--trusted-proxy), or listen on \
-     127.0.0.1; --allow-unauthenticated starts all the same"
+     127.0.0.1; --allow-unauthenticated starts it anyway"
 )]
 pub struct OpenToAll(SocketAddr);
 
@@ -158,7 +158,7 @@ fn refuse_open(config: &Config, store: &Store) -> Result<(), OpenToAll> {
 }
 
 impl App {
-    /// Starts everything. When this returns, the service answers at its address.
+    /// Starts all parts. When this returns, the service answers at its address.
     pub async fn start(config: &Config) -> anyhow::Result<App> {
         address::set_prefix(&config.web.path_prefix);
         let tls = config.tls.files()?.map(Tls::read).transpose()?;
@@ -167,7 +167,7 @@ impl App {
         match clean_up(&store).await {
             Ok(()) => {}
             Err(StoreError::Full) => warn!(
-                "the disk is full: jobs that were interrupted wait again as soon as that can be written"
+                "the disk is full: interrupted jobs are requeued as soon as that can be written"
             ),
             Err(error) => return Err(store::with_advice(error, &config.store.data).into()),
         }
@@ -226,7 +226,7 @@ impl App {
         })
     }
 
-    /// What shows whether it is alive.
+    /// A handle that tells whether the service is alive.
     pub fn pulse(&self) -> Pulse {
         Pulse {
             store: self.store.clone(),
@@ -240,7 +240,7 @@ impl App {
         format!("{scheme}://{}", self.address)
     }
 
-    /// The certificate that it shows, if it speaks TLS.
+    /// The certificate of the service, if it uses TLS.
     pub fn tls(&self) -> Option<Arc<Tls>> {
         self.tls.clone()
     }
@@ -256,7 +256,7 @@ impl App {
         match timeout_at(end, self.server).await {
             Ok(Ok(())) => {}
             Ok(Err(error)) => warn!(%error, "the listener ended with an error: {error}"),
-            Err(_) => warn!("connections still open after the grace time are cut"),
+            Err(_) => warn!("connections still open after the grace time are closed"),
         }
         // The recorder of an unresponsive solver may hold a statement; what it writes no longer counts. A disk may take long to
         // flush what is copied from the log: nobody waits for the rest of the grace time.

@@ -1,9 +1,9 @@
-//! Condensed bodies that are kept for later jobs on the same body: within a limit, and the least recently used is dropped
-//! first. Only data: `memory` decides when jobs need the room.
+//! Condensed bodies that are kept for later jobs on the same body, up to a limit; the least recently used is dropped
+//! first. This module only holds data: `memory` decides when jobs need the room.
 //!
-//! A body is found by a hash of all that it is made from, and a solution on it has the same bits as one on a new body. Jobs on
-//! meshes of their own (adaptive refinement, `verify`) and worker processes keep none; two jobs that begin at the same time
-//! each make theirs.
+//! A body is found by a hash of everything that it is made from, and a solution on it has the same bits as one on a new
+//! body. Jobs on meshes of their own (adaptive refinement, `verify`) and worker processes keep none. Two jobs that
+//! begin at the same time each make their own.
 
 use std::{collections::HashMap, sync::Arc};
 
@@ -11,26 +11,26 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use solver::Prepared;
 
-/// Most bodies that are kept, so that looking through all of them takes microseconds.
+/// The largest number of bodies that are kept, so that searching them takes microseconds.
 const MOST_BODIES: usize = 1000;
 
-/// The SHA-256 of all that a body is made from (`digest::of_body`).
+/// The SHA-256 of everything that a body is made from (`digest::of_body`).
 pub type Key = [u8; 32];
 
-/// Bodies that are kept.
+/// The bodies that are kept.
 #[derive(Debug)]
 pub struct Bodies {
-    /// Most bytes of all of them.
+    /// The largest size of all bodies together (bytes).
     limit: u64,
     kept: HashMap<Key, Kept>,
-    /// How often any was used: the time by which the least recent use is found.
+    /// The number of uses so far, which serves as the time of a use.
     uses: u64,
     counts: Counts,
 }
 
 #[derive(Debug)]
 struct Kept {
-    /// Its body, with the model that it was made for.
+    /// The body, with the model that it was made for.
     prepared: Arc<Prepared>,
     bytes: u64,
     /// The number of its last use.
@@ -38,7 +38,7 @@ struct Kept {
 }
 
 impl Kept {
-    /// No job uses it: dropping it frees its memory.
+    /// Whether no job uses it, so that dropping it frees its memory.
     fn is_idle(&self) -> bool {
         Arc::strong_count(&self.prepared) == 1 && Arc::strong_count(&self.prepared.body) == 1
     }
@@ -51,23 +51,23 @@ struct Counts {
     evictions: u64,
 }
 
-/// Condensed bodies that are kept, and how often that helped since the service started.
+/// Figures of the kept bodies since the service started.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct BodyCache {
-    /// Bodies that are kept now.
+    /// The number of bodies that are kept now.
     pub bodies: u64,
-    /// Bytes of them.
+    /// The size of these bodies (bytes).
     pub bytes: u64,
-    /// How often the body of a job was there.
+    /// The number of jobs whose body was found.
     pub hits: u64,
-    /// How often it was not, and had to be factored.
+    /// The number of jobs whose body was not found and had to be factored.
     pub misses: u64,
-    /// How often a body was dropped to make room, for others or for jobs.
+    /// The number of bodies that were dropped to make room, for others or for jobs.
     pub evictions: u64,
 }
 
 impl Bodies {
-    /// None yet, and at most so many bytes; 0 keeps none.
+    /// No bodies yet, and a limit on their size (bytes); 0 keeps none.
     pub fn new(limit: u64) -> Bodies {
         Bodies {
             limit,
@@ -77,18 +77,18 @@ impl Bodies {
         }
     }
 
-    /// Most bytes of all bodies.
+    /// The largest size of all bodies together (bytes).
     pub fn limit(&self) -> u64 {
         self.limit
     }
 
-    /// The body with this key and its bytes. The caller compares it, and counts a hit or a miss.
+    /// The body with this key and its size (bytes). The caller compares it, and counts a hit or a miss.
     pub fn find(&self, key: &Key) -> Option<(Arc<Prepared>, u64)> {
         let kept = self.kept.get(key)?;
         Some((kept.prepared.clone(), kept.bytes))
     }
 
-    /// A job uses the body with this key.
+    /// Counts that a job uses the body with this key.
     pub fn count_hit(&mut self, key: &Key) {
         self.counts.hits += 1;
         self.uses += 1;
@@ -97,13 +97,13 @@ impl Bodies {
         }
     }
 
-    /// The body of a job was not there.
+    /// Counts that the body of a job was not found.
     pub fn count_miss(&mut self) {
         self.counts.misses += 1;
     }
 
-    /// Keeps a body, unless it alone is larger than the limit; in place of one with the same key, which was made at the
-    /// same time. Returns what is no longer kept, to be freed where nobody waits for it.
+    /// Keeps a body, unless it alone is larger than the limit; it replaces one with the same key, which was made at the
+    /// same time. Returns the bodies that are dropped, to be freed where nobody waits for it.
     pub fn keep(&mut self, key: Key, prepared: Prepared, bytes: u64) -> Vec<Arc<Prepared>> {
         if bytes > self.limit {
             return vec![Arc::new(prepared)];
@@ -125,7 +125,8 @@ impl Bodies {
         dropped
     }
 
-    /// Drops bodies that no job uses until they have at most so many bytes. Returns them, as [`keep`](Self::keep) does.
+    /// Drops bodies that no job uses until the others have at most `most` bytes. Returns them, as [`keep`](Self::keep)
+    /// does.
     pub fn shrink_idle(&mut self, most: u64) -> Vec<Arc<Prepared>> {
         let mut dropped = vec![];
         while self.idle_bytes() > most {
@@ -137,7 +138,7 @@ impl Bodies {
         dropped
     }
 
-    /// How many there are, and how often that helped.
+    /// The present figures.
     pub fn figures(&self) -> BodyCache {
         let Counts {
             hits,
@@ -157,13 +158,13 @@ impl Bodies {
         self.kept.values().map(|kept| kept.bytes).sum()
     }
 
-    /// Bytes of those that no job uses; the others are a part of what the jobs have reserved.
+    /// The size of the bodies that no job uses (bytes); the others are part of the memory that jobs have reserved.
     fn idle_bytes(&self) -> u64 {
         let idle = self.kept.values().filter(|kept| kept.is_idle());
         idle.map(|kept| kept.bytes).sum()
     }
 
-    /// Drops the least recently used of some.
+    /// Drops the least recently used body of those for which `some` is true.
     fn evict(&mut self, some: impl Fn(&Kept) -> bool) -> Option<Arc<Prepared>> {
         let found = self.kept.iter().filter(|(_, kept)| some(kept));
         let key = *found.min_by_key(|(_, kept)| kept.used)?.0;
@@ -185,7 +186,7 @@ mod tests {
         prepared.unwrap()
     }
 
-    /// Whether bodies with these keys are there.
+    /// Whether bodies with these keys are kept.
     fn kept(bodies: &Bodies, keys: &[u8]) -> Vec<bool> {
         let found = keys.iter().map(|k| bodies.find(&[*k; 32]).is_some());
         found.collect()
@@ -222,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn of_two_that_were_made_at_the_same_time_one_is_kept() {
+    fn one_of_two_bodies_made_at_the_same_time_is_kept() {
         let mut bodies = Bodies::new(100);
         assert!(bodies.keep([1; 32], body(), 60).is_empty());
         assert_eq!(bodies.keep([1; 32], body(), 70).len(), 1);
@@ -234,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn only_bodies_that_no_job_uses_give_way_and_the_least_recently_used_first() {
+    fn only_unused_bodies_are_dropped_the_least_recently_used_first() {
         let mut bodies = Bodies::new(100);
         for k in 1..=4 {
             bodies.keep([k; 32], body(), 10);
@@ -254,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn there_are_not_too_many_small_ones() {
+    fn the_number_of_small_bodies_is_limited() {
         let mut bodies = Bodies::new(u64::MAX);
         let body = body();
         for k in 0..MOST_BODIES + 5 {

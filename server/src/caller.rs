@@ -1,4 +1,4 @@
-//! The caller of a request: its owner name, its scopes, and whose jobs it sees.
+//! The caller of a request: its owner name, its scopes, and the owners whose jobs it can see.
 
 use std::{collections::BTreeSet, net::IpAddr};
 
@@ -31,9 +31,9 @@ pub enum Scope {
     Read,
     /// Submit jobs, upload meshes.
     Submit,
-    /// Cancel and delete them.
+    /// Cancel and delete jobs, delete meshes.
     Cancel,
-    /// All of these on the jobs of every owner; pause the queue, manage tokens, give priorities above 0.
+    /// All of these for the jobs of every owner; also pause the queue, manage tokens, and give priorities above 0.
     Admin,
 }
 
@@ -44,16 +44,16 @@ pub struct Peer(pub IpAddr);
 /// Who may use an operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// Everyone, without identification.
+    /// Everyone, without authentication.
     Open,
-    /// Every caller who is identified.
+    /// Every caller who is authenticated.
     Identified,
     /// Callers with this scope, and those with the scope `admin`.
     Needs(Scope),
 }
 
 impl Access {
-    /// For people and programs: `open`, `identified`, or the scope.
+    /// The name for people and programs: `open`, `identified`, or the scope.
     pub fn name(self) -> &'static str {
         match self {
             Access::Open => "open",
@@ -68,11 +68,11 @@ impl Access {
 pub struct Caller {
     /// The owner of the jobs that this caller submits.
     owner: String,
-    /// What this caller may do.
+    /// The scopes of this caller.
     scopes: BTreeSet<Scope>,
-    /// The request that they make, as a part of a trace.
+    /// The trace that the request belongs to.
     trace: Option<Trace>,
-    /// Its name in the log.
+    /// The name of the request in the log.
     request: Option<RequestId>,
 }
 
@@ -81,7 +81,7 @@ pub struct Caller {
 pub struct RequestId(pub String);
 
 impl Caller {
-    /// A caller of that name, with these scopes.
+    /// A caller with this name and these scopes.
     pub fn new(owner: impl Into<String>, scopes: impl IntoIterator<Item = Scope>) -> Caller {
         Caller {
             owner: owner.into(),
@@ -96,12 +96,12 @@ impl Caller {
         Caller::new(LOCAL, Scope::VARIANTS.iter().copied())
     }
 
-    /// Someone who is not identified, and may use open operations only.
+    /// A caller who is not authenticated, and may use open operations only.
     pub fn anonymous() -> Caller {
         Caller::new("", [])
     }
 
-    /// The same caller, making this request.
+    /// The same caller with the trace and the name of a request.
     pub fn asking(self, trace: Option<Trace>, request: Option<RequestId>) -> Caller {
         Caller {
             trace,
@@ -110,12 +110,12 @@ impl Caller {
         }
     }
 
-    /// The name of the request that they make.
+    /// The name of the caller's request.
     pub fn request_id(&self) -> Option<&str> {
         self.request.as_ref().map(|RequestId(id)| id.as_str())
     }
 
-    /// The request that they make.
+    /// The trace of the caller's request.
     pub fn trace(&self) -> Option<&Trace> {
         self.trace.as_ref()
     }
@@ -135,7 +135,7 @@ impl Caller {
         &self.owner
     }
 
-    /// What this caller may do.
+    /// The scopes of this caller.
     pub fn scopes(&self) -> impl Iterator<Item = Scope> {
         self.scopes.iter().copied()
     }
@@ -152,10 +152,10 @@ impl Caller {
 /// The owner of what is submitted to a service without authentication.
 pub const LOCAL: &str = "local";
 
-/// Longest name of an owner.
+/// The largest length of an owner's name.
 pub const MAX_OWNER: usize = 64;
 
-/// Whether an owner may have this name: it stands in addresses, logs and headers.
+/// Whether a text is allowed as the name of an owner: it is used in URLs, logs and headers.
 pub fn is_owner(name: &str) -> bool {
     let allowed = |byte: u8| byte.is_ascii_alphanumeric() || b"._@+-".contains(&byte);
     (1..=MAX_OWNER).contains(&name.len()) && name.bytes().all(allowed)
@@ -171,7 +171,7 @@ pub enum Owners<'a> {
 }
 
 impl Owners<'_> {
-    /// Whether `owner` is one of them.
+    /// Whether `owner` is among them.
     pub fn include(self, owner: &str) -> bool {
         match self {
             Owners::All => true,

@@ -1,5 +1,5 @@
-//! Every kind of error there is: of requests, and of jobs. The one source of HTTP status and gRPC code, of the
-//! pages at `/v1/errors/{code}` and of `signorini explain`. Beside them the warnings of results.
+//! All kinds of errors, of requests and of jobs: the only source of HTTP status and gRPC code, of the pages at
+//! `/v1/errors/{code}` and of `signorini explain`. Also the warnings of results.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -9,12 +9,12 @@ use tonic::Code as Grpc;
 
 use crate::address::link;
 
-/// What clients may rely on about a kind of error.
+/// The stable facts about a kind of error.
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct Kind {
-    /// Its stable name.
+    /// The stable name of the kind.
     pub code: &'static str,
-    /// One line, the same every time.
+    /// The title: one line, the same every time.
     pub title: &'static str,
     /// The HTTP status; absent for a reason that only jobs end with.
     pub status: Option<u16>,
@@ -24,22 +24,22 @@ pub struct Kind {
     pub grpc: Option<Grpc>,
     /// Seconds after which the same request may succeed.
     pub retry_after_s: Option<u64>,
-    /// What it means, and what to do.
+    /// The meaning, and what to do.
     pub explanation: &'static str,
 }
 
-/// What clients may rely on about a warning.
+/// The stable facts about a warning.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct WarningKind {
-    /// Its stable name.
+    /// The stable name of the warning.
     pub code: &'static str,
-    /// What it means: one line, the same every time.
+    /// The meaning: one line, the same every time.
     pub title: String,
-    /// What to do.
+    /// What to do about it.
     pub explanation: &'static str,
 }
 
-/// What clients may rely on about this warning; its meaning is that of the schema of results.
+/// The stable facts about this warning; its meaning is that in the schema of results.
 pub fn warning(code: WarningCode) -> WarningKind {
     let schema = schemars::schema_for!(WarningCode).to_value();
     let code = code.as_str();
@@ -53,23 +53,23 @@ pub fn warning(code: WarningCode) -> WarningKind {
     WarningKind {
         code,
         title: meaning.replace('\n', " ").trim_end_matches('.').to_owned(),
-        explanation: "The result is there, and is to be read with this in mind. The `message` of the warning, in \
+        explanation: "The result is available, but consider this before you rely on it. The `message` of the warning, in \
                       `summary.warnings`, says where and how much, and what to do.",
     }
 }
 
-/// Where the service explains a kind of error.
+/// The address where the service explains a kind of error.
 pub fn explained_at(code: &str) -> String {
     link(&format!("/v1/errors/{code}"))
 }
 
 impl Kind {
-    /// The same request may succeed later.
+    /// Whether the same request may succeed later.
     pub fn retryable(&self) -> bool {
         self.retry_after_s.is_some()
     }
 
-    /// Its status over either protocol, and whether it is temporary: sentences for people.
+    /// The status over either protocol, and whether the error is temporary, in sentences for people.
     pub fn facts(&self) -> Vec<String> {
         let status = self
             .status
@@ -143,7 +143,7 @@ fn of_job(code: &'static str, title: &'static str, explanation: &'static str) ->
 /// Makes the enum of the kinds, and the facts about each, from one table.
 macro_rules! catalog {
     ($($code:ident: $of:ident($($fact:expr),*),)*) => {
-        /// The kinds, in the order of their HTTP statuses; then those that only jobs end with.
+        /// The kinds of errors in the order of their HTTP statuses, followed by those that only jobs end with.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, EnumString, VariantArray)]
         #[strum(serialize_all = "kebab-case")]
         #[allow(missing_docs)] // the table explains each
@@ -152,7 +152,7 @@ macro_rules! catalog {
         }
 
         impl Code {
-            /// What clients may rely on.
+            /// The stable facts about this kind.
             pub fn kind(self) -> Kind {
                 match self {
                     $(Code::$code => $of(self.into(), $($fact),*),)*
@@ -168,29 +168,29 @@ catalog! {
     MalformedJson: of_request("The body is not JSON", 400, Grpc::InvalidArgument, None,
         "The body could not be read as JSON, or is incomplete. `detail` gives line and column. Numbers must be finite: NaN and Infinity are not JSON."),
     UnknownParameter: of_request("Unknown parameter", 400, Grpc::InvalidArgument, None,
-        "The query has a parameter that this operation does not have; it would have been ignored. `detail` lists the parameters of the operation."),
+        "The query has a parameter that this operation does not have and would ignore. `detail` lists the parameters of the operation."),
     BadParameter: of_request("Invalid parameter value", 400, Grpc::InvalidArgument, None,
         "A query parameter, header or field has an invalid value. `detail` gives the expected values."),
     BadPageToken: of_request("Invalid page token", 400, Grpc::InvalidArgument, None,
         "A page token is valid only for the list that returned it, with the same filters and order. Start again without one."),
     MissingFilter: of_request("A filter is required", 400, Grpc::InvalidArgument, None,
-        "Canceling or deleting many jobs requires at least one filter, so that it is not done to all jobs by accident. To mean all jobs, write status=queued,running,succeeded,failed,canceled."),
+        "Canceling or deleting many jobs requires at least one filter, so that nobody cancels or deletes all jobs by accident. To select all jobs, write status=queued,running,succeeded,failed,canceled."),
     BadRequest: of_request("The request is malformed", 400, Grpc::InvalidArgument, None,
         "The request cannot be read: it is not HTTP, or has no Host header or several, or its message over gRPC is not what the contract defines. `detail` says what is wrong."),
     Unauthenticated: of_request("A valid token is required", 401, Grpc::Unauthenticated, None,
         "The request has no token, or one that is unknown, was revoked or has expired. Send it as `Authorization: Bearer TOKEN` (metadata `authorization` over gRPC); a browser that asks for a name and a password takes the token as the password. An administrator creates tokens: `signorini token create`."),
     Forbidden: of_request("Not allowed", 403, Grpc::PermissionDenied, None,
-        "The caller does not have the scope that the operation needs, or that a priority above 0 needs (admin), or the request comes from a page of another origin, or names a host that this service does not answer for. `detail` says which; an administrator gives scopes (`signorini token create --scope`, or --proxy-scopes for users whom a proxy names), and sets --allowed-host and --allowed-origin."),
+        "`detail` gives the cause, one of: the caller lacks the scope of the operation; a priority above 0 was requested without the scope admin; the request comes from a web page of another origin; the request names a host that this service does not answer for. An administrator gives scopes (`signorini token create --scope`, or --proxy-scopes for users whom a proxy names), and sets --allowed-host and --allowed-origin."),
     NotFound: of_request("Not found", 404, Grpc::NotFound, None,
         "There is no such path, job, mesh, boundary or load step. Ids must be written as they were returned: job_ and a UUID in lower case."),
     NoResult: of_request("The job has no result", 404, Grpc::NotFound, None,
-        "The job ended without a result: it failed before it had found a first state, or was canceled. See its `failure` and its events."),
+        "The job ended without a result: it failed before there was a first state, or was canceled. See its `failure` and its events."),
     MethodNotAllowed: of_request("Method not allowed", 405, Grpc::Unimplemented, None,
         "The path exists, but not with this method. The Allow header lists its methods."),
     NotAcceptable: of_request("Format not available", 406, Grpc::Unimplemented, None,
-        "None of the formats requested by `format` or `Accept` is available here. `detail` lists those that are."),
+        "None of the formats requested by `format` or `Accept` is available here. `detail` lists the available formats."),
     RequestTimeout: of_request("The request took too long to arrive", 408, Grpc::DeadlineExceeded, Some(1),
-        "The body arrived too slowly: nothing of it for a minute, or less than 4 KiB a second on average. Send it again."),
+        "The body arrived too slowly: nothing for a minute, or less than 4 KiB a second on average. Send it again."),
     JobActive: of_request("The job is queued or running", 409, Grpc::FailedPrecondition, None,
         "Only a job that has ended can be deleted or retried, and only a mesh that no queued or running job uses can be deleted. Cancel the job, or wait for its end."),
     ResultNotReady: of_request("The result is not ready", 409, Grpc::FailedPrecondition, Some(1),
@@ -198,13 +198,13 @@ catalog! {
     IdConflict: of_request("The id belongs to another job", 409, Grpc::AlreadyExists, None,
         "A job with this id was submitted with other content. An id belongs to one job; use a new one."),
     Deleted: of_request("The job or sweep was deleted", 410, Grpc::NotFound, None,
-        "The job or sweep was deleted within the last 7 days, with its events and its results. After that, or when 100,000 more jobs were deleted, its id is unknown."),
+        "The job or sweep was deleted within the last 7 days, with its events and its results. After that, or after 100,000 further deletions, its id is unknown."),
     StaleVersion: of_request("The job has changed", 412, Grpc::Aborted, None,
-        "The job no longer has the version given by If-Match. Fetch it again and decide anew."),
+        "The job no longer has the version given by If-Match. Fetch it again and repeat your decision."),
     PayloadTooLarge: of_request("The body or message is too large", 413, Grpc::OutOfRange, None,
         "The body, or a message over gRPC, is larger than this service accepts or sends. Upload a large mesh once (POST /v1/meshes or UploadMesh) and refer to it in the problem as mesh.stored."),
     ProblemTooLarge: of_request("The problem is too large", 413, Grpc::OutOfRange, None,
-        "According to the estimate that comes with this error, the job would need more memory than the budget allows. Use a coarser mesh or less refinement, or ask the operator for a larger budget. With solver.accuracy verify the mesh split in two is counted."),
+        "The job is estimated to need more memory than the budget allows; the estimate is part of this error. Use a coarser mesh or less refinement, or ask the operator for a larger budget. With solver.accuracy verify the estimate includes the refined mesh."),
     UriTooLong: of_request("The address is too long", 414, Grpc::Unimplemented, None,
         "The path and the query together are longer than this service accepts. Use fewer or shorter filters."),
     UnsupportedMedia: of_request("Unsupported media type", 415, Grpc::Unimplemented, None,
@@ -216,43 +216,43 @@ catalog! {
     IdempotencyKeyReuse: of_request("The key was used for another request", 422, Grpc::AlreadyExists, None,
         "This Idempotency-Key (request_id) was used before with another payload. A key belongs to one request; use a new one."),
     QuotaExceeded: of_request("The owner's share is used up", 429, Grpc::ResourceExhausted, Some(10),
-        "This owner already has as much as they may: waiting jobs, so that one owner cannot fill the queue for all, or bytes of jobs and meshes. `quota` (over gRPC a QuotaFailure) has the limit and what is used, as GET /v1/me (GetCaller) has. Wait until some jobs have run or cancel some; delete jobs, or the fields of some. The administrator sets --max-queued-per-owner and --max-bytes-per-owner."),
+        "This owner has reached a limit: the number of waiting jobs, so that one owner cannot fill the queue for all, or the bytes of jobs and meshes. `quota` (over gRPC a QuotaFailure) has the limit and the present use, like GET /v1/me (GetCaller). Wait until some jobs have run, or cancel some; or delete jobs, or only the fields of some. The administrator sets --max-queued-per-owner and --max-bytes-per-owner."),
     RateLimited: of_request("Too many requests at once", 429, Grpc::ResourceExhausted, Some(1),
-        "More requests, mostly lists and counts, arrive at the same time than can be answered soon: ask less often, or follow jobs by their events. Or this owner has submitted more jobs in a minute than the administrator allows (--max-submissions-per-owner-per-minute); then `quota` has the figures."),
+        "More requests, mostly lists and counts, arrive at the same time than can be answered soon: ask less often, or follow jobs by their events. Or this owner has submitted more jobs in a minute than the administrator allows (--max-submissions-per-owner-per-minute); then `quota` has the limit and the present use."),
     HeaderTooLarge: of_request("The headers are too large", 431, Grpc::Unimplemented, None,
         "The headers of the request are larger than this service accepts, or there are more than 100 of them."),
     Internal: of_request("Internal error", 500, Grpc::Internal, Some(1),
-        "Something unexpected happened in the service; the request is not the cause. The cause is in the service's log under the number of the incident; please report it."),
+        "An unexpected error occurred in the service; it is not the fault of the request. The service's log has the cause under the number of the incident; please report it."),
     CorruptData: of_request("A stored record is damaged", 500, Grpc::DataLoss, None,
-        "What was asked for was stored, but is not as it was written: its checksum is wrong, or a piece is missing, as after a failure of the disk. It is not served. Other jobs are not affected. The operator finds the part in the service's log under the number of the incident; signorini doctor lists all that is damaged and saves what is intact."),
+        "The requested record was stored, but has changed since: its checksum is wrong, or a piece is missing, as after a failure of the disk. It is not served. Other jobs are not affected. The operator finds the damaged part in the service's log under the number of the incident; signorini doctor lists all damage and saves everything that is intact."),
     QueueFull: of_request("The queue is full", 503, Grpc::Unavailable, Some(10),
-        "The queue holds as many jobs as it may. Reading, watching and canceling still work. Try again when some jobs have run."),
+        "The queue has reached its largest number of jobs. Reading, watching and canceling still work. Try again when some jobs have run."),
     Draining: of_request("The service is stopping", 503, Grpc::Unavailable, Some(5),
         "The service accepts no more jobs because it is about to stop or restart. Accepted jobs are kept. Try again."),
     Overloaded: of_request("Too many transfers at once", 503, Grpc::Unavailable, Some(2),
-        "Bodies or answers of other requests occupy the memory that this service has for them, all its connections are busy, or as many meshes are being uploaded as may be at once. Nothing was done. Try again."),
+        "One of the service's limits is reached: the memory for bodies and answers of requests, the number of connections, or the number of simultaneous uploads of meshes. The request had no effect. Try again."),
     StorageLost: of_request("The store was removed, replaced or damaged", 503, Grpc::Unavailable, Some(60),
-        "The database was removed, replaced, cut short or damaged, since it was opened or before. Nothing is accepted, since it would be lost; what can still be read is answered. The operator can stop the service, put the files back as they were or save what is intact with `signorini doctor`, and start it again."),
+        "The database was removed, replaced, cut short or damaged. Nothing new is accepted, since it would be lost; data that can still be read is served. The operator can stop the service, restore the files or save everything that is intact with `signorini doctor`, and start it again."),
     StorageFull: of_request("The disk is full or cannot be written", 507, Grpc::ResourceExhausted, Some(60),
-        "Nothing more can be stored: the disk is full, or a quota is reached, or it refuses to be written. Reading still works, and running jobs wait; the operator can free space."),
+        "Nothing more can be stored: the disk is full, its quota is reached, or it cannot be written. Reading still works, and running jobs wait; the operator can free space."),
     NotConverged: of_job("The iteration did not converge",
         "The residual is still above the tolerance: max_iterations was reached, or the iteration stopped making progress, or Newton's method failed. The last state and the whole history are kept as a partial result. Look at the convergence plot: refine the mesh, raise elastic_slip, apply the load in more increments, or choose algorithm auto."),
     ContactCycling: of_job("The iteration cycles between contact sets",
         "The iteration visits the same contact sets again and again. Refine the mesh there, raise elastic_slip, or choose algorithm auto; relaxation helps the thesis's own iteration."),
-    FalseConvergence: of_job("The iteration settled in a state that is not a solution",
-        "The method's own test was met, but the true residual is above the tolerance or the forces do not balance: the state is not a solution. Use algorithm auto, and check the supports if the forces do not balance."),
+    FalseConvergence: of_job("The iteration converged to a state that is not a solution",
+        "The method's own criterion was met, but the true residual is above the tolerance or the forces do not balance: the state is not a solution. Use algorithm auto, and check the supports if the forces do not balance."),
     SingularSystem: of_job("The stiffness matrix is singular",
         "The body can move without resistance because its supports and contacts do not hold it (`detail` then names the motion and a node), or the matrix is singular to working precision (`detail` then names a node and a direction)."),
     NonFinite: of_job("A number is not finite",
         "A NaN or an infinity arose during the solution; the numbers of the problem are too large or too small compared with each other."),
     TimedOut: of_job("The job exceeded its time limit",
-        "It was stopped after limits.timeout_s. What it had found is kept as a partial result. Retry it with a higher limit (a body {\"limits\": {\"timeout_s\": …}}), or make the problem smaller."),
+        "The job was stopped after limits.timeout_s. Its results so far are kept as a partial result. Retry it with a higher limit (a body {\"limits\": {\"timeout_s\": …}}), or make the problem smaller."),
     QueueExpired: of_job("The job waited too long in the queue",
-        "It was not started within limits.queue_ttl_s: all workers were busy, or the queue was paused. Retry it with a higher priority or a higher limit (a body {\"priority\": …, \"limits\": {\"queue_ttl_s\": …}})."),
+        "The job was not started within limits.queue_ttl_s: all workers were busy, or the queue was paused. Retry it with a higher priority or a higher limit (a body {\"priority\": …, \"limits\": {\"queue_ttl_s\": …}})."),
     ResourceExhausted: of_job("The job needs more memory than there is",
         "Memory ran out while the job was solved, although its estimate was within the budget. Use a coarser mesh."),
     WorkerLost: of_job("The worker was lost too often",
-        "The process died during several attempts at this job; attempts that ended because the service was stopped are not counted. Other jobs continue. If the job is the cause, please report it."),
+        "The process died during several attempts to solve this job; attempts that ended because the service was stopped are not counted. Other jobs continue. If this job is the cause, please report it."),
     UserCancel: of_job("The job was canceled",
         "A client canceled the job."),
 }

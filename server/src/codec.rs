@@ -1,7 +1,7 @@
-//! The messages of gRPC, read within a limit on what they become.
+//! The gRPC codec, which limits the memory that messages take when they are decoded.
 //!
 //! A limit on the bytes of a message is not enough: two bytes make an empty submessage, which takes a kilobyte when it
-//! is decoded. The parts are therefore counted first, by the contract, without decoding them. The build lets the
+//! is decoded. The parts are therefore counted first, by the contract, without decoding them. The build makes the
 //! generated services use this codec.
 
 use std::{collections::HashMap, marker::PhantomData, sync::LazyLock};
@@ -23,14 +23,15 @@ use tonic_prost::ProstEncoder;
 
 use crate::{error::ApiError, pb};
 
-/// Most bytes of a decoded message. A message of the largest size (1 MiB) that describes a real problem takes a few.
+/// The largest size of a decoded message (bytes). A message of the largest size (1 MiB) that describes a real problem
+/// takes a few MiB.
 const MOST_BYTES: usize = 32 << 20;
 
 /// The codec of the generated services and clients.
 #[derive(Debug, Default)]
 pub struct Codec<T, U>(PhantomData<(T, U)>);
 
-/// Decodes messages within the limit.
+/// A decoder of messages within the limit.
 #[derive(Debug, Default)]
 pub struct LimitedDecoder<U>(PhantomData<U>);
 
@@ -73,42 +74,40 @@ fn decode<U: Message + Default + Name>(bytes: Bytes) -> Result<U, ApiError> {
 }
 
 fn malformed(error: prost::DecodeError) -> ApiError {
-    ApiError::BadRequest(format!(
-        "the message is not what the contract defines: {error}"
-    ))
+    ApiError::BadRequest(format!("the message does not follow the contract: {error}"))
 }
 
 static CONTRACT: LazyLock<Contract> = LazyLock::new(Contract::read);
 
-/// What the messages of the contract take when they are decoded.
+/// The memory that the messages of the contract take when they are decoded.
 struct Contract {
     kinds: Vec<Kind>,
-    /// Messages by their full names.
+    /// The numbers of messages by their full names.
     numbers: HashMap<String, usize>,
 }
 
-/// A message of the contract.
+/// A type of message.
 struct Kind {
     name: String,
     fields: HashMap<u32, Field>,
-    /// Bytes of an empty one.
+    /// The size of an empty message (bytes).
     bytes: usize,
 }
 
-/// What a field holds.
+/// The kind of content of a field.
 #[derive(Clone, Copy)]
 enum Field {
     /// A message, or an entry of a map.
     Message(usize),
     /// Text or bytes.
     Text,
-    /// A number; also many in one.
+    /// A number, or many numbers packed into one field.
     Number,
 }
 
-/// Bytes of a `String`, a `Vec` or a map.
+/// The size of a `String`, a `Vec` or a map (bytes).
 const CONTAINER: usize = 24;
-/// Bytes of a number, or of nothing instead of one.
+/// The size of a number, or of an absent one (bytes).
 const NUMBER: usize = 16;
 
 impl Contract {
@@ -150,7 +149,7 @@ impl Contract {
         }
     }
 
-    /// Takes what the fields of a message add from `left`, and fails when nothing is left.
+    /// Subtracts the memory of a message's fields from `left`, and fails when nothing is left.
     fn count(&self, kind: usize, mut bytes: Bytes, left: &mut usize) -> Result<(), ApiError> {
         let Some(kind) = self.kinds.get(kind) else {
             return Ok(());
@@ -208,13 +207,13 @@ fn cut_off() -> ApiError {
 
 fn unknown_field(number: u32, message: &str) -> ApiError {
     ApiError::BadRequest(format!(
-        "the message {message} has a field {number}, which this service (version {}) does not know: its client was made with \
-         the contract of another version; that of this one is at /proto/signorini.proto",
+        "the message {message} has a field {number}, which this service (version {}) does not know: the client was built with \
+         the contract of another version; the contract of this version is at /proto/signorini.proto",
         env!("CARGO_PKG_VERSION")
     ))
 }
 
-/// A message and those that are defined inside it, with their full names.
+/// Collects a message and those that are defined inside it, with their full names.
 fn collect<'a>(
     scope: &str,
     message: &'a DescriptorProto,
@@ -227,7 +226,7 @@ fn collect<'a>(
     all.push((name, message));
 }
 
-/// Bytes of an empty message: its single messages lie inside it, repeated ones elsewhere.
+/// The size of an empty message (bytes): it contains its single messages, but not repeated ones.
 fn size(
     number: usize,
     all: &[(String, &DescriptorProto)],
@@ -282,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_message_is_refused_as_such() {
+    fn an_invalid_message_is_refused() {
         for bytes in [
             &[0xff; 20][..],
             &[0x0a, 0x7f],

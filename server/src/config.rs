@@ -45,8 +45,8 @@ pub struct Config {
     #[allow(missing_docs)]
     pub trust: ProxyTrust,
 
-    /// Listen on an address that other machines reach although there is no token and no trusted proxy: whoever reaches it
-    /// may do everything
+    /// Listen on an address that other machines can reach, although there is no token and no trusted proxy: anyone who
+    /// reaches it may do everything
     #[arg(long, env = "SIGNORINI_ALLOW_UNAUTHENTICATED")]
     pub allow_unauthenticated: bool,
 
@@ -56,7 +56,7 @@ pub struct Config {
     pub workers: u16,
 
     /// Where jobs are solved: on threads of the service, or in processes, one for each worker and kept from job to job.
-    /// What kills a process, such as a stack overflow, then costs only the job that it is solving
+    /// A crash such as a stack overflow then costs only the job that the process is solving
     #[arg(long, env = "SIGNORINI_ISOLATION", value_enum, default_value_t = Isolation::Thread)]
     pub isolation: Isolation,
 
@@ -84,8 +84,8 @@ pub struct Config {
           value_parser = clap::value_parser!(u16).range(1..))]
     pub max_running_per_owner: Option<u16>,
 
-    /// Bytes that one owner may keep, jobs and meshes together. Whoever has more can submit and upload nothing until they have
-    /// deleted some. It applies only where there are tokens or a trusted proxy [default: no limit]
+    /// Bytes that one owner may store, jobs and meshes together. An owner with more can submit and upload nothing until
+    /// they delete some. It applies only where there are tokens or a trusted proxy [default: no limit]
     #[arg(long, env = "SIGNORINI_MAX_BYTES_PER_OWNER", value_name = "BYTES")]
     pub max_bytes_per_owner: Option<u64>,
 
@@ -102,9 +102,9 @@ pub struct Config {
     #[allow(missing_docs)] // a doc comment here would become the help of the command
     pub memory: MemoryBudget,
 
-    /// Memory for condensed bodies that are kept for later jobs on the same body, a part of the memory that running jobs
-    /// share: bodies that no job uses give way to any job. 0 keeps none, and so does isolation `process` [default: a quarter
-    /// of that memory]
+    /// Memory for condensed bodies that are kept for later jobs on the same body. It is part of the memory that running
+    /// jobs share: jobs take precedence over bodies that no job uses. 0 keeps none, and so does isolation `process`
+    /// [default: a quarter of that memory]
     #[arg(long, env = "SIGNORINI_BODY_CACHE_BYTES", value_name = "BYTES")]
     pub body_cache_bytes: Option<u64>,
 
@@ -121,11 +121,11 @@ pub struct Config {
           value_parser = clap::value_parser!(u32).range(1..))]
     pub max_connections: u32,
 
-    /// Maximum size of all request bodies in memory at the same time, with what decodes those that are compressed
+    /// Maximum size of all request bodies in memory at the same time, including the memory for decompressing them
     #[arg(long, env = "SIGNORINI_MAX_RECEIVED_BYTES", default_value_t = 64 << 20, value_name = "BYTES")]
     pub max_received_bytes: usize,
 
-    /// Maximum size of all answers in memory at the same time, with what compresses them
+    /// Maximum size of all answers in memory at the same time, including the memory for compressing them
     #[arg(long, env = "SIGNORINI_MAX_SENT_BYTES", default_value_t = 128 << 20, value_name = "BYTES")]
     pub max_sent_bytes: usize,
 
@@ -143,7 +143,7 @@ pub struct Config {
     pub telemetry: Telemetry,
 }
 
-/// Where the store is: for the service, and for the commands that open a store themselves.
+/// The folder of the store, for the service and for the commands that open a store themselves.
 #[derive(Clone, Debug, Args)]
 pub struct StoreFolder {
     /// Folder of the store: jobs, results, meshes
@@ -157,7 +157,8 @@ pub struct StoreFolder {
 }
 
 impl Config {
-    /// Bytes of bodies that are kept. Worker processes keep none: each would hold bodies that the others cannot use.
+    /// The size of all bodies that are kept (bytes). Worker processes keep none: each would hold bodies that the others
+    /// cannot use.
     pub fn body_cache_bytes(&self) -> u64 {
         match self.isolation {
             Isolation::Thread => {
@@ -170,25 +171,25 @@ impl Config {
     }
 }
 
-/// How long and how much is kept of what has ended.
+/// Limits on how long jobs that have ended are kept, and how many.
 #[derive(Clone, Debug, Default, Args)]
 pub struct RetentionLimits {
     /// Days that a job is kept after its end, unless it is pinned. 0: no limit
     #[arg(long, env = "SIGNORINI_RETAIN_DAYS", default_value_t = 90.0, value_name = "DAYS", value_parser = days)]
     pub retain_days: f64,
 
-    /// Days that displacements and stresses, which are most of a result, are kept; summary, history and profiles stay. 0: they
-    /// are kept as long as their job
+    /// Days that displacements and stresses, which are most of a result, are kept; summary, history and profiles
+    /// remain. 0: as long as their job
     #[arg(long, env = "SIGNORINI_RETAIN_FIELDS_DAYS", default_value_t = 0.0, value_name = "DAYS", value_parser = days)]
     pub retain_fields_days: f64,
 
-    /// Most bytes that all jobs that have ended and are not pinned may take; beyond that the oldest ones of the owners who keep
+    /// Most bytes of all jobs that have ended and are not pinned; beyond that the oldest jobs of the owners who store
     /// most are removed. 0: no limit
     #[arg(long, env = "SIGNORINI_RETAIN_BYTES", default_value_t = 20 << 30, value_name = "BYTES")]
     pub retain_bytes: u64,
 
-    /// Most bytes that the jobs of one owner that have ended may take; beyond that their oldest that are not pinned are removed.
-    /// 0: no limit
+    /// Most bytes of the jobs of one owner that have ended; beyond that the owner's oldest jobs that are not pinned are
+    /// removed. 0: no limit
     #[arg(
         long,
         env = "SIGNORINI_RETAIN_BYTES_PER_OWNER",
@@ -197,7 +198,7 @@ pub struct RetentionLimits {
     )]
     pub retain_bytes_per_owner: u64,
 
-    /// Most jobs that have ended to keep; beyond that the oldest that are not pinned are removed. 0: no limit
+    /// Most jobs that have ended; beyond that the oldest jobs that are not pinned are removed. 0: no limit
     #[arg(
         long,
         env = "SIGNORINI_RETAIN_JOBS",
@@ -206,7 +207,8 @@ pub struct RetentionLimits {
     )]
     pub retain_jobs: u64,
 
-    /// Most jobs of one owner that have ended to keep; beyond that their oldest that are not pinned are removed. 0: no limit
+    /// Most jobs of one owner that have ended; beyond that the owner's oldest jobs that are not pinned are removed. 0:
+    /// no limit
     #[arg(
         long,
         env = "SIGNORINI_RETAIN_JOBS_PER_OWNER",
@@ -216,7 +218,7 @@ pub struct RetentionLimits {
     pub retain_jobs_per_owner: u64,
 }
 
-/// A number of days.
+/// Reads a number of days.
 fn days(text: &str) -> Result<f64, String> {
     const MOST: f64 = 36_500.0;
     match text.parse::<f64>() {
@@ -228,17 +230,17 @@ fn days(text: &str) -> Result<f64, String> {
 /// The certificate of the service.
 #[derive(Clone, Debug, Default, Args)]
 pub struct Tls {
-    /// File of a certificate, and those of its issuers behind it, as PEM: the service speaks TLS, and nothing else. SIGHUP
-    /// reads it and the key again
+    /// PEM file of a certificate, followed by those of its issuers: the service then accepts only TLS. SIGHUP reads it
+    /// and the key again
     #[arg(long = "tls-cert", env = "SIGNORINI_TLS_CERT", value_name = "FILE")]
     cert: Option<PathBuf>,
 
-    /// File of the certificate's private key, as PEM and not encrypted
+    /// PEM file of the certificate's private key, not encrypted
     #[arg(long = "tls-key", env = "SIGNORINI_TLS_KEY", value_name = "FILE")]
     key: Option<PathBuf>,
 }
 
-/// Where a certificate and its key are.
+/// The files of a certificate and its key.
 #[derive(Clone, Debug)]
 pub struct TlsFiles {
     /// The certificate, and those of its issuers.
@@ -247,7 +249,7 @@ pub struct TlsFiles {
     pub key: PathBuf,
 }
 
-/// Only one of the two files is named: the service would not know whether it is to speak TLS.
+/// Only one of the two files is given, so that it is unclear whether the service should use TLS.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{given} is set, and {missing} is not: TLS needs both the certificate and its key (on the command line, in the \
@@ -259,12 +261,12 @@ pub struct HalfOfTls {
 }
 
 impl Tls {
-    /// Whether the service speaks TLS.
+    /// Whether the service uses TLS.
     pub fn is_on(&self) -> bool {
         self.cert.is_some()
     }
 
-    /// Both files, or none. Not clap's `requires`, which does not see values from the file of settings.
+    /// Both files, or none. clap's `requires` is not used, since it does not see values from the file of settings.
     pub fn files(&self) -> Result<Option<TlsFiles>, HalfOfTls> {
         let half = |given, missing| Err(HalfOfTls { given, missing });
         match (&self.cert, &self.key) {
@@ -279,36 +281,36 @@ impl Tls {
     }
 }
 
-/// What the service tells about itself.
+/// Settings for the log and for spans.
 #[derive(Clone, Debug, Default, Args)]
 pub struct Telemetry {
-    /// What the log tells: a level (error, warn, info, debug, trace), and levels of parts of the program, as
+    /// What is logged: a level (error, warn, info, debug, trace), and levels for parts of the program, such as
     /// info,service::request=warn [default: RUST_LOG, or info]
     #[arg(long, env = "SIGNORINI_LOG", value_name = "FILTER", value_parser = log_filter)]
     pub log: Option<Targets>,
 
-    /// Lines of the log as text, or each as a JSON object
+    /// Format of the log: lines of text, or a JSON object on each line
     #[arg(long, env = "SIGNORINI_LOG_FORMAT", value_enum, default_value_t = LogFormat::Text)]
     pub log_format: LogFormat,
 
-    /// Send spans of requests and jobs to a collector at this address by OTLP over gRPC, as `http://127.0.0.1:4317` [default: no
-    /// spans are sent]
+    /// Send spans of requests and jobs to a collector at this address by OTLP over gRPC, such as
+    /// `http://127.0.0.1:4317` [default: no spans are sent]
     #[arg(long, env = "SIGNORINI_OTLP_ENDPOINT", value_name = "URL", value_parser = endpoint)]
     pub otlp_endpoint: Option<String>,
 }
 
-/// How the log is written.
+/// The format of the log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Display)]
 #[strum(serialize_all = "lowercase")]
 pub enum LogFormat {
-    /// For people
+    /// Text for people
     #[default]
     Text,
-    /// For programs
+    /// JSON for programs
     Json,
 }
 
-/// What a log tells, as a level and levels of targets.
+/// Reads a filter of the log: a level, and levels of targets.
 pub fn log_filter(text: &str) -> Result<Targets, String> {
     const EXPECTED: &str = "expected a level (off, error, warn, info, debug, trace), or levels of targets, such as \
                             info,service::request=warn";
@@ -323,12 +325,12 @@ pub fn log_filter(text: &str) -> Result<Targets, String> {
         .map_err(|error| format!("{EXPECTED} ({error})"))
 }
 
-/// What requests from browsers may name.
+/// Settings for requests from browsers.
 #[derive(Clone, Debug, Default, Args)]
 pub struct Web {
-    /// A host name by which clients reach this service, as lab.example or lab.example:8443; can be repeated, or a list with
-    /// commas. Addresses by number, localhost and the name of this machine are allowed anyway, others refused: a page on
-    /// another site could lead its own name here
+    /// A host name by which clients reach this service, such as lab.example or lab.example:8443; can be repeated, or a
+    /// list with commas. Numeric addresses, localhost and the name of this machine are always allowed, others are
+    /// refused: a page on another site could let its own name lead here
     #[arg(
         long = "allowed-host",
         env = "SIGNORINI_ALLOWED_HOSTS",
@@ -337,29 +339,29 @@ pub struct Web {
     )]
     pub allowed_hosts: Vec<String>,
 
-    /// Path below which clients reach this service, as /signorini, where a proxy shows it there: links begin with it. It is
-    /// served both below this path and without it, for proxies that remove it
+    /// Path below which clients reach this service, such as /signorini, where a proxy shows it there: links begin with
+    /// it. The service answers both below this path and without it, for proxies that remove it
     #[arg(long, env = "SIGNORINI_PATH_PREFIX", value_name = "PATH", default_value = "",
           hide_default_value = true, value_parser = path_prefix)]
     pub path_prefix: String,
 
-    /// An origin whose pages may use this service, as `https://dashboard.example`; can be repeated, or a list with commas.
-    /// Requests from pages of all others but this service's own are refused
+    /// An origin whose pages may use this service, such as `https://dashboard.example`; can be repeated, or a list with
+    /// commas. Requests from pages of other origins are refused, except the service's own
     #[arg(long = "allowed-origin", env = "SIGNORINI_ALLOWED_ORIGINS", value_name = "ORIGIN", value_delimiter = ',',
           value_parser = origin)]
     pub allowed_origins: Vec<String>,
 }
 
-/// A proxy that identifies users, and what they may do.
+/// A proxy that identifies users, and the scopes of these users.
 #[derive(Clone, Debug, Args)]
 pub struct ProxyTrust {
-    /// Address, or network as 10.0.0.0/8, of a proxy that identifies users: what it says in the user header is believed.
-    /// Requests from elsewhere need a token. Can be repeated, or a list with commas
+    /// Address of a proxy that identifies users, or a network such as 10.0.0.0/8: its user header is trusted. Requests
+    /// from elsewhere need a token. Can be repeated, or a list with commas
     #[arg(long = "trusted-proxy", env = "SIGNORINI_TRUSTED_PROXIES", value_name = "ADDRESS", value_delimiter = ',',
           value_parser = network)]
     proxies: Vec<IpNet>,
 
-    /// The header in which it names the user
+    /// The header in which the proxy names the user
     #[arg(
         long = "proxy-user-header",
         env = "SIGNORINI_PROXY_USER_HEADER",
@@ -368,12 +370,12 @@ pub struct ProxyTrust {
     )]
     pub user_header: HeaderName,
 
-    /// What users that it names may do
+    /// The scopes of users whom the proxy names
     #[arg(long = "proxy-scopes", env = "SIGNORINI_PROXY_SCOPES", value_name = "SCOPES", value_delimiter = ',',
           default_value = "read,submit,cancel", value_parser = scope)]
     scopes: Vec<Scope>,
 
-    /// A user that it names who is an administrator; can be repeated, or a list with commas
+    /// A user named by the proxy who is an administrator; can be repeated, or a list with commas
     #[arg(
         long = "proxy-admin",
         env = "SIGNORINI_PROXY_ADMINS",
@@ -384,7 +386,7 @@ pub struct ProxyTrust {
 }
 
 impl Default for ProxyTrust {
-    /// No proxy.
+    /// No trusted proxy.
     fn default() -> Self {
         ProxyTrust {
             proxies: vec![],
@@ -396,7 +398,7 @@ impl Default for ProxyTrust {
 }
 
 impl ProxyTrust {
-    /// These proxies, for tests.
+    /// Trust in these proxies, for tests.
     #[cfg(test)]
     pub fn of(proxies: &[&str]) -> ProxyTrust {
         let proxies = proxies.iter().filter_map(|text| network(text).ok());
@@ -419,7 +421,7 @@ impl ProxyTrust {
             .any(|network| network.contains(&address))
     }
 
-    /// A user that it names.
+    /// The caller for a user whom the proxy names.
     pub fn caller(&self, user: &str) -> Caller {
         let admin = self.admins.iter().any(|admin| admin == user);
         let scopes = self.scopes.iter().copied();
@@ -427,7 +429,7 @@ impl ProxyTrust {
     }
 }
 
-/// An address as a network of one, or a network.
+/// Reads a network, or an address as a network of one.
 fn network(text: &str) -> Result<IpNet, String> {
     let one = text.parse::<IpAddr>().map(IpNet::from);
     let found = one.or_else(|_| text.parse()).map(|found| match found {
@@ -437,7 +439,8 @@ fn network(text: &str) -> Result<IpNet, String> {
     found.map_err(|_| "expected an address or a network, such as 127.0.0.1 or 10.0.0.0/8".into())
 }
 
-/// Addresses of IPv4 as IPv6 writes them, ::ffff:10.0.0.0/104: requests from them are compared as IPv4.
+/// Converts an IPv4 network in the notation of IPv6, such as ::ffff:10.0.0.0/104, since requests from it are compared
+/// as IPv4.
 fn canonical(network: Ipv6Net) -> IpNet {
     const BEFORE_V4: u8 = 96;
     let within = network.addr().to_ipv4_mapped();
@@ -453,7 +456,7 @@ fn scope(text: &str) -> Result<Scope, String> {
         .map_err(|_| "expected read, submit, cancel or admin".into())
 }
 
-/// A path without a slash at its end; the root is empty.
+/// Reads a path without a slash at its end; the root is empty.
 fn path_prefix(text: &str) -> Result<String, String> {
     const MOST: usize = 200;
     let path = text.strip_suffix('/').unwrap_or(text);
@@ -468,7 +471,7 @@ fn path_prefix(text: &str) -> Result<String, String> {
     }
 }
 
-/// The address of a collector. Its credentials are a secret, and so no part of a setting, which is shown.
+/// Reads the address of a collector. Credentials in it are refused: they are secret, and settings are shown.
 fn endpoint(text: &str) -> Result<String, String> {
     const EXPECTED: &str = "expected an address as http://127.0.0.1:4317, without a user or a path; a collector on the same \
                             machine or network passes spans on over TLS";
@@ -483,7 +486,7 @@ fn endpoint(text: &str) -> Result<String, String> {
     good.then(|| text.to_owned()).ok_or_else(|| EXPECTED.into())
 }
 
-/// Scheme, host and port, as a browser writes them.
+/// Reads scheme, host and port as a browser writes them.
 fn origin(text: &str) -> Result<String, String> {
     let host = text
         .strip_prefix("https://")
@@ -499,7 +502,7 @@ fn origin(text: &str) -> Result<String, String> {
     }
 }
 
-/// An address and a port, by number or by name; of several addresses, the first.
+/// Reads an address and a port, by number or by name; of several addresses, the first is taken.
 pub fn address(text: &str) -> Result<SocketAddr, String> {
     const EXPECTED: &str =
         "expected an address and a port, such as 127.0.0.1:8080 or localhost:8080";
@@ -523,9 +526,9 @@ pub enum Isolation {
 /// The memory that running jobs share.
 #[derive(Clone, Copy, Debug, Default, Args)]
 pub struct MemoryBudget {
-    /// Memory that running jobs share: a job is refused if it is estimated to need more, waits until its estimate fits
-    /// beside those of the running jobs, and is ended if it uses more than its estimate and a margin (128 MiB divided by
-    /// the number of workers) [default: half of the machine's memory]
+    /// Memory that running jobs share. A job is refused if it is estimated to need more; it waits until its estimate
+    /// fits together with those of the running jobs; and it is ended if it uses more than its estimate plus a margin
+    /// (128 MiB divided by the number of workers) [default: half of the machine's memory]
     #[arg(long, env = "SIGNORINI_MEMORY_BUDGET_BYTES", value_name = "BYTES",
           value_parser = clap::value_parser!(u64).range(1 << 20..))]
     memory_budget_bytes: Option<u64>,
@@ -539,7 +542,7 @@ impl MemoryBudget {
     }
 }
 
-/// Memory of this machine, or of the container that the process runs in.
+/// The memory of this machine, or of the container that the process runs in.
 fn machine_memory() -> u64 {
     // If the memory is unknown, problems are not refused for it; 8 GiB is a common small machine.
     const UNKNOWN: u64 = 8 << 30;

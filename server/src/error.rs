@@ -1,5 +1,5 @@
-//! Why a request failed, with the details of the case; `catalog` has, for each kind, what clients may rely on. Here
-//! an error becomes the HTTP document, and the gRPC status with its details.
+//! Why a request failed, with the details of the case; `catalog` has the stable facts about each kind. Here an error
+//! becomes the HTTP document, and the gRPC status with its details.
 
 use std::fmt;
 
@@ -29,28 +29,28 @@ pub enum ApiError {
     /// A query parameter that this operation does not have.
     #[error("this operation has no parameter {name:?}; it has: {known}")]
     UnknownParameter {
-        /// What was sent.
+        /// The name that was sent.
         name: String,
-        /// The parameters that it has.
+        /// The parameters of the operation.
         known: String,
     },
     /// A query parameter or header with an invalid value.
     #[error("{name}: expected {expected}, got {got:?}")]
     BadParameter {
-        /// Its name.
+        /// The parameter or header.
         name: &'static str,
-        /// What was sent.
+        /// The value that was sent.
         got: String,
-        /// What was expected.
+        /// The value that was expected.
         expected: String,
     },
     /// A page token that does not belong to this list.
     #[error("the page token does not belong to this list; start again without one")]
     BadPageToken,
-    /// A change of many jobs, without a filter.
+    /// A change of many jobs without a filter.
     #[error("a filter is required: at least one of {0}")]
     MissingFilter(String),
-    /// It is not HTTP, or not a message of the contract.
+    /// The request is not HTTP, or not a message of the contract.
     #[error("{0}")]
     BadRequest(String),
     /// The body arrived too slowly.
@@ -62,27 +62,27 @@ pub enum ApiError {
     /// The headers are too large.
     #[error("the headers of the request are too large")]
     HeaderTooLarge,
-    /// Others occupy the memory for transfers, or the connections.
+    /// Other requests occupy the memory for transfers, or the connections.
     #[error("other requests occupy the memory for transfers, or all connections; try again")]
     Overloaded,
-    /// As many meshes are being uploaded as may be at once.
+    /// The largest number of simultaneous uploads of meshes is reached.
     #[error(
-        "{} at once, as many as may be; try again when one has ended",
+        "{} at the same time, which is the limit; try again when one has ended",
         uploads(owner, most)
     )]
     TooManyUploads {
-        /// By this owner; `None`: by all.
+        /// The owner who uploads them; `None`: all owners.
         owner: Option<String>,
-        /// So many.
+        /// The limit.
         most: usize,
     },
-    /// The caller is not identified.
+    /// The caller is not authenticated.
     #[error("{0}")]
     Unauthenticated(&'static str),
-    /// The caller, or where the request comes from, may not do this.
+    /// The caller, or the place that the request comes from, may not do this.
     #[error("{0}")]
     Forbidden(String),
-    /// It does not exist.
+    /// The requested thing does not exist.
     #[error("{0}")]
     NotFound(String),
     /// The job was deleted.
@@ -97,26 +97,26 @@ pub enum ApiError {
     /// The job ended without a result.
     #[error("the job ended without a result (status {0})")]
     NoResult(JobStatus),
-    /// The fields of a job were deleted by themselves.
+    /// The fields of a job were deleted separately.
     #[error(
-        "the fields of {0} were deleted, by themselves or by retention; its summary, history and profiles are still there"
+        "the fields of {0} were deleted, on request or by retention; its summary, history and profiles are still available"
     )]
     FieldsDeleted(JobId),
-    /// The path does not have this method.
-    #[error("this path does not have this method; the Allow header lists those it has")]
+    /// The path does not support this method.
+    #[error("this path does not support this method; the Allow header lists those it supports")]
     MethodNotAllowed,
     /// None of the requested formats is available.
     #[error("not available as {got}; available: {available}")]
     NotAcceptable {
-        /// What was requested.
+        /// The format that was requested.
         got: String,
-        /// The names of those that are available.
+        /// The names of the available formats.
         available: String,
     },
     /// A body in a format that is not understood.
     #[error("expected a body of type {expected}, got {got}")]
     UnsupportedMedia {
-        /// The type that is understood.
+        /// The type that was expected.
         expected: &'static str,
         /// The type that was declared.
         got: String,
@@ -135,16 +135,16 @@ pub enum ApiError {
         "this key was used for a request with other content; use a new key, or repeat that request unchanged"
     )]
     KeyReuse,
-    /// The job has another version now.
+    /// The job has a newer version.
     #[error("the job has version {0}")]
     StaleVersion(i64),
     /// A range that begins after the end.
     #[error("the data has {0} bytes")]
     RangeNotSatisfiable(u64),
-    /// Jobs that wait or run need the mesh.
+    /// Queued or running jobs use the mesh.
     #[error("queued or running jobs use this mesh; cancel them or wait for their end")]
     MeshInUse,
-    /// The job has not ended, and has no result yet.
+    /// The job has not ended and has no result yet.
     #[error("the job is {0}; its result is available when it has ended")]
     ResultNotReady(JobStatus),
     /// The body is too large.
@@ -158,7 +158,7 @@ pub enum ApiError {
         "the body becomes more than {ratio} times larger when its Content-Encoding is undone; send it without"
     )]
     EncodedTooLarge {
-        /// The limit.
+        /// The largest allowed ratio.
         ratio: usize,
     },
     /// The message has too many parts.
@@ -167,7 +167,7 @@ pub enum ApiError {
         size(*limit_bytes as u64)
     )]
     MessageTooLarge {
-        /// The limit.
+        /// The limit in bytes.
         limit_bytes: usize,
     },
     /// The answer does not fit into one message.
@@ -175,7 +175,7 @@ pub enum ApiError {
         "the response is larger than a message may be (1 MiB); REST has no such limit: {instead}"
     )]
     AnswerTooLarge {
-        /// Where it is available.
+        /// Where REST has it.
         instead: &'static str,
     },
     /// The job needs more memory than the budget allows.
@@ -184,32 +184,32 @@ pub enum ApiError {
         count(estimate.dofs), size(estimate.memory_bytes), size(*budget_bytes)
     )]
     ProblemTooLarge {
-        /// The memory that it would need.
+        /// The estimated memory.
         estimate: Estimate,
-        /// The memory that it may use.
+        /// The memory budget (bytes).
         budget_bytes: u64,
     },
     /// The problem, or what was submitted with it, is invalid.
     #[error("{}", summed_up(.0))]
     InvalidProblem(Vec<Violation>),
-    /// The owner has as many of something as they may.
+    /// The owner has reached a limit.
     #[error("{0}")]
     QuotaExceeded(Quota),
     /// Too many requests at once.
-    #[error("more requests arrive at once than can be answered soon")]
+    #[error("more requests arrive than can be answered in a short time")]
     RateLimited,
-    /// An error of the service itself; the cause is in the log under this number.
+    /// An unexpected error of the service; the log has the cause under this number.
     #[error("an unexpected error, logged as incident {incident}")]
     Internal {
-        /// Where to find it in the log.
+        /// The number of the incident in the log.
         incident: Uuid,
     },
     /// A stored record is damaged.
     #[error("{what}; logged as incident {incident}")]
     CorruptData {
-        /// Which one.
+        /// The damaged record.
         what: String,
-        /// Where to find it in the log.
+        /// The number of the incident in the log.
         incident: Uuid,
     },
     /// Too many jobs wait.
@@ -217,7 +217,7 @@ pub enum ApiError {
     QueueFull {
         /// The limit.
         limit: u32,
-        /// No job is started until the queue is resumed.
+        /// Whether the queue is paused, so that no job starts until it is resumed.
         paused: bool,
     },
     /// The service is about to stop.
@@ -225,8 +225,8 @@ pub enum ApiError {
     Draining,
     /// The database was removed, replaced or damaged.
     #[error(
-        "the database was removed, replaced or damaged: what is sent now may not be stored, and only what can still be read is \
-         answered; the operator should stop the service and run `signorini doctor`"
+        "the database was removed, replaced or damaged: nothing new can be stored safely, and only data that can still be read is \
+         served; the operator should stop the service and run `signorini doctor`"
     )]
     StorageLost,
     /// The disk is full.
@@ -241,35 +241,35 @@ fn uploads(owner: &Option<String>, most: &usize) -> String {
     }
 }
 
-/// What an owner has as much of as they may.
+/// A limit that an owner has reached.
 #[derive(Clone, Debug, Serialize)]
 pub struct Quota {
-    /// Whose.
+    /// The owner.
     pub owner: String,
-    /// Of what.
+    /// The limited quantity.
     pub of: QuotaOf,
-    /// As much as they may have.
+    /// The limit.
     pub limit: u64,
-    /// As much as they have.
+    /// The present use.
     pub used: u64,
-    /// What the request would add.
+    /// The amount that the request would add.
     pub asked: u64,
 }
 
-/// What an owner has a share of.
+/// A quantity that is limited for each owner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum QuotaOf {
     /// Jobs in the queue.
     Queued,
-    /// Bytes that are kept.
+    /// Stored bytes.
     StoredBytes,
     /// Jobs submitted in a minute.
     Submissions,
 }
 
 impl Quota {
-    /// Seconds after which the same request may succeed; none if it asks for more than there ever is.
+    /// Seconds after which the same request may succeed; none if it exceeds the limit by itself.
     fn retry_after_s(&self, code: Code) -> Option<u64> {
         match self.of {
             _ if self.asked > self.limit => None,
@@ -299,16 +299,16 @@ impl fmt::Display for Quota {
         match of {
             QuotaOf::Queued => write!(
                 f,
-                "{owner} has {used} jobs in the queue of at most {limit}, and this request would add {asked}{in_parts}"
+                "{owner} has {used} of at most {limit} jobs in the queue, and this request would add {asked}{in_parts}"
             ),
             QuotaOf::StoredBytes => write!(
                 f,
-                "{owner} keeps {} of at most {}, jobs and meshes{}: delete some of them, or the fields of some",
+                "{owner} has stored {} of at most {} in jobs and meshes{}: delete some of them, or the fields of some",
                 size(*used),
                 size(*limit),
                 match asked {
                     0 => String::new(),
-                    _ => format!(", and what arrives now would add {}", size(*asked)),
+                    _ => format!(", and this request would add {}", size(*asked)),
                 }
             ),
             QuotaOf::Submissions => write!(
@@ -327,7 +327,7 @@ impl ApiError {
         ApiError::Internal { incident }
     }
 
-    /// Its kind.
+    /// The kind of this error.
     pub fn code(&self) -> Code {
         match self {
             ApiError::MalformedJson(_) => Code::MalformedJson,
@@ -521,7 +521,7 @@ pub fn count(unknowns: u64) -> String {
     }
 }
 
-/// The count and the first ones, for clients that do not read the details.
+/// A summary of violations: their count and the first ones, for clients that do not read the details.
 fn summed_up(violations: &[Violation]) -> String {
     const SHOWN: usize = 3;
     let shown: Vec<String> = violations
@@ -566,7 +566,7 @@ mod tests {
         assert_eq!(details.error_info().unwrap().reason, "invalid-problem");
     }
 
-    /// Clients accept headers of a limited size: grpcio 8 KiB.
+    /// Many violations fit into the headers of an answer, whose size clients limit: grpcio to 8 KiB.
     #[test]
     fn many_violations_fit_into_the_headers_of_an_answer() {
         for length in [1, 20, 300] {

@@ -13,18 +13,18 @@ use crate::{
 /// One event of a job. `seq` counts from 1 without gaps, across attempts and restarts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Event {
-    /// Number of the event.
+    /// The number of the event.
     pub seq: i64,
     /// The attempt it belongs to; 0 before the first.
     pub attempt: i32,
-    /// When it happened.
+    /// The time of the event.
     pub t: Time,
-    /// What happened.
+    /// The content of the event.
     #[serde(flatten)]
     pub payload: Payload,
 }
 
-/// What happened.
+/// The content of an event.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema, IntoStaticStr)]
 #[serde(tag = "type", rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
@@ -33,22 +33,23 @@ pub enum Payload {
     Status {
         /// The new status.
         status: Status,
-        /// Why it was requeued.
+        /// The reason why the job was requeued.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         reason: Option<String>,
     },
-    /// A phase of the solution began.
+    /// A phase of the solution has begun.
     Stage {
         /// The phase.
         stage: Phase,
     },
-    /// Adaptive refinement began to solve on a mesh, or returned to the one before. Its iterations are reported once it is known to be the last.
+    /// Adaptive refinement has begun to solve on a mesh, or returned to the one before. Iterations are reported once
+    /// the mesh is known to be the last.
     Mesh {
-        /// Number of the mesh, from 1.
+        /// The number of the mesh, from 1.
         number: u32,
-        /// Its elements.
+        /// The number of its elements.
         elements: u64,
-        /// Largest relative error on the mesh before; absent for the first, and where it is not known.
+        /// The largest relative error on the mesh before; absent for the first mesh, and where it is unknown.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         error: Option<f64>,
     },
@@ -58,7 +59,7 @@ pub enum Payload {
     Warning(Warning),
     /// The job has ended. A job has exactly one such event, and it is the last.
     Done {
-        /// The terminal job.
+        /// The job in its final state.
         job: Box<Job>,
     },
 }
@@ -75,7 +76,7 @@ pub struct TimedIteration {
 }
 
 impl Payload {
-    /// The word in `type`.
+    /// The value of `type`.
     pub fn kind(&self) -> &'static str {
         self.into()
     }
@@ -88,7 +89,7 @@ impl Payload {
         }
     }
 
-    /// A job was requeued, and why.
+    /// The event that a job was requeued, with the reason.
     pub fn requeued(reason: Requeue) -> Self {
         Payload::Status {
             status: Status::Queued,

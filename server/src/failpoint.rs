@@ -1,5 +1,5 @@
-//! Points at which a test makes a job fail, with a panic or an error: the boundaries between the stages of its life.
-//! In other builds there is nothing at them.
+//! Points between the stages of a job's life at which a test can make it fail, by a panic or an error. In other builds
+//! they do nothing.
 
 use solver::solution::Phase;
 
@@ -13,19 +13,19 @@ pub(crate) use points::{Failing, set, was_missed};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(test, derive(strum::VariantArray))]
 pub(crate) enum Point {
-    /// It is accepted, but that is not committed.
+    /// The job is accepted, but that is not committed.
     Accepted,
-    /// That is committed, but not answered.
+    /// Its acceptance is committed, but not answered.
     Answered,
-    /// It is claimed, but that is not committed.
+    /// The job is claimed, but that is not committed.
     Claimed,
-    /// That is committed, but no worker has it.
+    /// The claim is committed, but no worker has the job.
     Given,
-    /// A worker has it.
+    /// A worker has the job.
     Begun,
-    /// Its mesh is read, if it refers to one.
+    /// The job's mesh is read, if it refers to one.
     MeshRead,
-    /// Its problem is read, which has one load level.
+    /// The job's problem is read; it has one load level.
     Parsed,
     /// A phase of the solver begins.
     Meshing,
@@ -36,26 +36,26 @@ pub(crate) enum Point {
     Iterating,
     Recovering,
     Verifying,
-    /// It has events that are not stored.
+    /// The job has events that are not stored.
     EventsReported,
-    /// They are stored, but not announced.
+    /// The events are stored, but not announced.
     EventsStored,
-    /// It has a partial result that is not stored.
+    /// The job has a partial result that is not stored.
     PartialReported,
-    /// It has a result, of which nothing is stored.
+    /// The job has a result of which nothing is stored.
     Solved,
-    /// All but the last pieces of it are stored.
+    /// All but the last pieces of the result are stored.
     AlmostStored,
-    /// It has ended, but that is not committed.
+    /// The job has ended, but that is not committed.
     Ended,
-    /// That is committed, but not announced.
+    /// The end is committed, but not announced.
     Unannounced,
-    /// Its worker is done with it.
+    /// The worker has finished with the job.
     Done,
 }
 
 impl Point {
-    /// The beginning of a phase; none for the one before the solver.
+    /// The point at the beginning of a phase; none for the phase before the solver.
     pub(crate) fn beginning_of(phase: Phase) -> Option<Point> {
         Some(match phase {
             Phase::Parse => return None,
@@ -71,7 +71,7 @@ impl Point {
     }
 }
 
-/// Lets a job fail at a point where the caller cannot return an error.
+/// Makes a job fail at a point where the caller cannot return an error.
 #[inline]
 pub(crate) fn pass(point: Point, job: JobId) {
     fails(point, job);
@@ -81,7 +81,7 @@ pub(crate) fn pass(point: Point, job: JobId) {
 mod points {
     use super::{JobId, Point};
 
-    /// Whether the caller is to return an error for this job.
+    /// Whether the caller should return an error for this job.
     #[inline]
     pub(crate) fn fails(_: Point, _: JobId) -> bool {
         false
@@ -94,14 +94,14 @@ mod points {
 
     use super::{JobId, Point};
 
-    /// How a job fails at a point.
+    /// The way in which a job fails at a point.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub(crate) enum Failing {
         Panic,
         Error,
     }
 
-    /// What is to fail, each once. Tests run beside each other, and so each names its job.
+    /// The failures that are set, each for one use. Tests run in parallel, so each names its job.
     static SET: Mutex<Vec<(Point, JobId, Failing)>> = Mutex::new(vec![]);
 
     fn remove(point: Point, job: JobId) -> Option<Failing> {
@@ -110,18 +110,18 @@ mod points {
         Some(set.swap_remove(place).2)
     }
 
-    /// Lets this job fail once, when it comes to this point.
+    /// Makes this job fail once, when it comes to this point.
     pub(crate) fn set(point: Point, job: JobId, failing: Failing) {
         let mut set = SET.lock().unwrap_or_else(PoisonError::into_inner);
         set.push((point, job, failing));
     }
 
-    /// Whether it has not come there; it does not fail there any more.
+    /// Whether the job has not reached the point; removes the failure.
     pub(crate) fn was_missed(point: Point, job: JobId) -> bool {
         remove(point, job).is_some()
     }
 
-    /// Whether the caller is to return an error for this job; or panics.
+    /// Whether the caller should return an error for this job; panics if that is set.
     pub(crate) fn fails(point: Point, job: JobId) -> bool {
         match remove(point, job) {
             #[allow(clippy::panic)]

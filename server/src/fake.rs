@@ -1,4 +1,4 @@
-//! A problem and a solver for the unit tests of this crate: plausible and quick, and it stops when asked.
+//! A problem and a solver for the unit tests of this crate: plausible and quick; the solver stops when asked.
 
 use std::{ops::ControlFlow, sync::LazyLock};
 
@@ -44,7 +44,7 @@ pub(crate) fn solution() -> Solution {
     solution
 }
 
-/// Row `k` of a history.
+/// The row `k` of a history.
 pub(crate) fn iteration(k: u32) -> Iteration {
     Iteration {
         k,
@@ -74,7 +74,7 @@ pub(crate) fn iteration(k: u32) -> Iteration {
     }
 }
 
-/// The same row, computed after `k` half seconds.
+/// The row `k` of a history, computed after `k` half seconds.
 pub(crate) fn timed(k: u32) -> TimedIteration {
     TimedIteration {
         row: iteration(k),
@@ -91,7 +91,7 @@ pub(crate) fn solve(
     iterate(observe)
 }
 
-/// The same, for any problem.
+/// Reports the iterations and returns the solution, for any problem.
 pub(crate) fn iterate(observe: &mut Observer<'_>) -> Result<Solution, SolveError> {
     let mut solution = solution();
     for phase in [Phase::Mesh, Phase::Factor, Phase::Iterate] {
@@ -127,7 +127,7 @@ pub(crate) fn solve_until_stopped(
     Ok(solution)
 }
 
-/// Panics, as no solver should.
+/// Panics, which the real solver never does on purpose.
 pub(crate) fn solve_with_a_panic(
     _: &Problem,
     _: Option<External>,

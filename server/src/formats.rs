@@ -1,5 +1,5 @@
-//! The formats of a result: one list, and one way to write each format, for the data routes and for
-//! `signorini solve -o`.
+//! The formats of a result: one list, and one way to write each format, for the data routes and for `signorini solve
+//! -o`.
 
 use std::borrow::Cow;
 
@@ -25,9 +25,9 @@ use crate::{
 pub enum Format {
     /// JSON, as in the API.
     Json,
-    /// CSV: a line of names, then a line per row.
+    /// CSV: a line of names, then a line for each row.
     Csv,
-    /// A JSON object per row.
+    /// JSON Lines: an object for each row.
     Jsonl,
     /// An Arrow IPC file.
     Arrow,
@@ -35,11 +35,11 @@ pub enum Format {
     Npz,
     /// VTK's XML unstructured grid.
     Vtu,
-    /// A figure of vectors.
+    /// A figure as SVG.
     Svg,
-    /// A figure of pixels.
+    /// A figure as PNG.
     Png,
-    /// A figure on a page of its own.
+    /// A figure as PDF.
     Pdf,
 }
 
@@ -58,7 +58,7 @@ impl Format {
     /// The formats of figures, the default first.
     pub const OF_FIGURES: &[Format] = &[Format::Svg, Format::Png, Format::Pdf];
 
-    /// What a figure is written as; `None` for data.
+    /// The kind of image; `None` for data.
     pub fn image(self) -> Option<Image> {
         match self {
             Format::Svg => Some(Image::Svg),
@@ -68,12 +68,12 @@ impl Format {
         }
     }
 
-    /// The value of `format`, and the extension of a file.
+    /// The value of the parameter `format`, and the extension of a file.
     pub fn name(self) -> &'static str {
         self.into()
     }
 
-    /// The media type, as in `Accept`; the registered one if there is one.
+    /// The media type for `Accept`; the registered one if there is one.
     pub fn media_type(self) -> &'static str {
         match self {
             Format::Json => "application/json",
@@ -88,7 +88,7 @@ impl Format {
         }
     }
 
-    /// As in `Content-Type`.
+    /// The value of `Content-Type`.
     pub fn content_type(self) -> String {
         match self {
             Format::Csv => format!("{}; charset=utf-8", self.media_type()),
@@ -96,24 +96,24 @@ impl Format {
         }
     }
 
-    /// The endings of files in these formats: `.csv, .jsonl`.
+    /// The extensions of files in these formats, such as `.csv, .jsonl`.
     pub fn endings(formats: &[Format]) -> String {
         let endings: Vec<String> = formats.iter().map(|f| format!(".{}", f.name())).collect();
         endings.join(", ")
     }
 }
 
-/// A profile in that format. `Err` is the reason why it could not be written.
+/// A profile in this format. The error is the reason why it cannot be written.
 pub fn profile(profile: &ContactProfile, format: Format) -> Result<Vec<u8>, String> {
     rows(profile, Table::of_profile, format)
 }
 
-/// A history in that format.
+/// A history in this format.
 pub fn history(history: &[TimedIteration], format: Format) -> Result<Vec<u8>, String> {
     rows(history, history_table, format)
 }
 
-/// The solver's columns, and the times.
+/// The table of a history: the solver's columns, and the times.
 fn history_table(history: &[TimedIteration]) -> Table {
     let mut table = Table::of_history(history.iter().map(|timed| &timed.row));
     table.columns.push(Column {
@@ -134,11 +134,12 @@ fn rows<T: Serialize + ?Sized>(
     }
 }
 
-/// Most bytes of texts as NumPy has them, each as wide as the longest of its column: who reads them needs as many.
+/// The largest size of texts in NumPy's form (bytes), in which each is as wide as the longest of its column: a reader
+/// needs this memory.
 pub const MOST_PADDED_BYTES: u64 = 256 << 20;
 
-/// The rows of a sweep in that format; `paths` are what its members differ in. The table has a column for each number
-/// of a row; nested ones have both names, as in `residuals_kkt`, and the parameters their pointers.
+/// The rows of a sweep in this format; `paths`: the values in which members differ. The table has a column for each
+/// number of a row; nested numbers have both names, as in `residuals_kkt`, and the parameters their pointers.
 pub fn members(paths: &[String], rows: &[MemberRow], format: Format) -> Result<Vec<u8>, String> {
     match format {
         Format::Json => serde_json::to_vec(rows).map_err(|error| error.to_string()),
@@ -146,7 +147,7 @@ pub fn members(paths: &[String], rows: &[MemberRow], format: Format) -> Result<V
     }
 }
 
-/// A table in one of the formats of tables but JSON.
+/// A table in one of the formats of tables except JSON.
 pub fn write_table(table: &Table, format: Format) -> Result<Vec<u8>, String> {
     match format {
         Format::Csv => table.csv().map(String::into_bytes),
@@ -162,7 +163,7 @@ pub fn write_table(table: &Table, format: Format) -> Result<Vec<u8>, String> {
     }
 }
 
-/// Why a table is not written as npz.
+/// The reason why a table cannot be written as npz.
 pub fn too_wide(bytes: u64) -> String {
     format!(
         "npz, where each text is as wide as the longest of its column: that would be {}",
@@ -214,7 +215,7 @@ pub fn members_table(paths: &[String], rows: &[MemberRow]) -> Table {
     Table { columns }
 }
 
-/// The values of one parameter: numbers, or texts if one of them is something else.
+/// The column of one parameter: numbers, or texts if one of its values is not a number.
 fn parameter(path: &str, rows: &[MemberRow]) -> Column {
     let values = rows.iter().map(|row| row.parameters.get(path));
     let number = |value: &ParameterValue| value.json().parse::<f64>().ok();
@@ -250,7 +251,7 @@ fn is_number(json: &str) -> bool {
     json.starts_with(|c: char| c == '-' || c.is_ascii_digit())
 }
 
-/// Fields in that format.
+/// Fields in this format.
 pub fn fields(fields: &Fields, format: Format) -> Result<Vec<u8>, String> {
     match format {
         Format::Json => serde_json::to_vec(fields).map_err(|error| error.to_string()),
@@ -262,8 +263,8 @@ pub fn fields(fields: &Fields, format: Format) -> Result<Vec<u8>, String> {
     }
 }
 
-/// Fields, history and profiles in one archive: `fields/points`, `history/k`,
-/// `profiles/top/normal_stress`, and of each load step `steps/0/profiles/top/normal_stress`.
+/// Fields, history and profiles in one archive: `fields/points`, `history/k`, `profiles/top/normal_stress`, and for
+/// each load step `steps/0/profiles/top/normal_stress`.
 pub fn everything_as_npz(document: &Document) -> Result<Vec<u8>, String> {
     let mut npz = Npz::new();
     files::fields::add(&mut npz, "fields/", &document.fields)?;

@@ -33,7 +33,7 @@ pub struct Job {
     /// The key of the job that it is coalesced into: it is not solved itself, but ends with the result of that job.
     #[serde(skip)]
     pub coalesced_into: Option<i64>,
-    /// Whether an earlier result may answer it.
+    /// Whether an earlier result may be used for it.
     #[serde(skip)]
     pub cache: Cache,
     /// The public id.
@@ -42,17 +42,17 @@ pub struct Job {
     pub status: Status,
     /// Why it failed or was canceled.
     pub reason: Option<Reason>,
-    /// A client asked it to stop while it was running.
+    /// Whether a client asked it to stop while it was running.
     pub cancel_requested: bool,
-    /// Counts status changes and edits, not progress.
+    /// The number of changes of status and edits; progress does not count.
     pub version: i64,
     /// A name for people.
     pub name: Option<String>,
     /// Labels for programs.
     pub labels: BTreeMap<String, String>,
-    /// Who submitted it.
+    /// The owner who submitted it.
     pub owner: String,
-    /// −10 … 10, higher first.
+    /// The priority, −10 … 10; higher runs first.
     pub priority: i32,
     /// Number of the current or last attempt to solve it, 0 before the first.
     pub attempt: i32,
@@ -66,17 +66,17 @@ pub struct Job {
     /// The job that this one retries.
     #[serde(default)]
     pub parent: Option<JobId>,
-    /// The sweep whose members it solves; its own problem and result are those of the first of them.
+    /// The sweep whose members it solves; its own problem and result are those of the first of these members.
     #[serde(default)]
     pub sweep: Option<SweepId>,
-    /// Never deleted because of its age.
+    /// Whether it is never deleted because of its age.
     #[serde(default)]
     pub pinned: bool,
-    /// When it was accepted.
+    /// The time when it was accepted.
     pub created_at: Time,
-    /// When its last attempt began.
+    /// The time when its last attempt began.
     pub started_at: Option<Time>,
-    /// When it became terminal.
+    /// The time when it ended.
     pub finished_at: Option<Time>,
     /// Seconds from acceptance to the start of the last attempt.
     pub queue_wait_s: Option<f64>,
@@ -91,22 +91,22 @@ pub struct Job {
     pub limits: Limits,
     /// What went wrong.
     pub failure: Option<Failure>,
-    /// Whether there is a result to fetch.
+    /// Whether a result is available.
     pub result_available: ResultAvailable,
-    /// Bytes that it keeps in the store, once it has ended: its result, problem and events before the last. What it shares
-    /// with others is counted for one of them.
+    /// Bytes that it takes in the store once it has ended: its result, problem and events before the last. Data that it
+    /// shares with other jobs are counted for one of them.
     #[serde(default)]
     pub stored_bytes: Option<u64>,
-    /// Up to five warnings about its result, the worst first; all of them are in the summary of the result. A job that ended
-    /// under an earlier version has them only there.
+    /// Up to five warnings about its result, the worst first; the summary of the result has all of them. A job that
+    /// ended under an earlier version has them only there.
     #[serde(default)]
     pub warnings: Vec<Warning>,
-    /// Addresses of what belongs to it.
+    /// Addresses of related resources.
     pub links: BTreeMap<String, String>,
 }
 
 impl Job {
-    /// It waits for a worker, and is not coalesced into another job.
+    /// Whether it waits for a worker, and is not coalesced into another job.
     pub fn waits_for_a_worker(&self) -> bool {
         self.status == Status::Queued && self.coalesced_into.is_none()
     }
@@ -257,12 +257,12 @@ pub enum Status {
 }
 
 impl Status {
-    /// A job of this status has ended, and never changes it again.
+    /// Whether a job of this status has ended, which never changes again.
     pub fn is_terminal(self) -> bool {
         matches!(self, Status::Succeeded | Status::Failed | Status::Canceled)
     }
 
-    /// The changes that are allowed:
+    /// The allowed changes of the status:
     ///
     /// ```text
     /// queued ──► running ──► succeeded | failed | canceled
@@ -296,34 +296,35 @@ impl Status {
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Reason {
-    /// The residual stayed above the tolerance: `max_iterations` reached, no more progress, or Newton's method failed.
+    /// The residual stayed above the tolerance: `max_iterations` was reached, there was no more progress, or Newton's
+    /// method failed.
     NotConverged,
-    /// The contact set repeats itself.
+    /// The contact states repeat in a cycle.
     ContactCycling,
-    /// The method's own test was met, but the true residual is above the tolerance or the forces do not balance.
+    /// The method's own criterion was met, but the true residual is above the tolerance or the forces do not balance.
     FalseConvergence,
     /// The stiffness matrix is singular, or nothing holds the body.
     SingularSystem,
     /// A number became infinite or not a number.
     NonFinite,
-    /// It ran longer than `limits.timeout_s`.
+    /// The job ran longer than `limits.timeout_s`.
     TimedOut,
-    /// It waited longer than `limits.queue_ttl_s`.
+    /// The job waited longer than `limits.queue_ttl_s`.
     QueueExpired,
-    /// It needs more memory than is available.
+    /// The job needs more memory than is available.
     ResourceExhausted,
     /// The process died during several attempts.
     WorkerLost,
-    /// The first member of a sweep is wrong in a way that shows only on its mesh.
+    /// The first member of a sweep is invalid in a way that only its mesh shows.
     InvalidProblem,
     /// An error of the service itself.
     Internal,
-    /// A client canceled it.
+    /// A client canceled the job.
     UserCancel,
 }
 
 impl Reason {
-    /// The reason lies in the problem: solved again, it would end in the same way.
+    /// Whether the reason lies in the problem, so that solving it again would end in the same way.
     pub fn belongs_to_the_problem(self) -> bool {
         match self {
             Reason::NotConverged
@@ -381,11 +382,10 @@ impl From<Reason> for Code {
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum ResultAvailable {
-    /// Nothing.
+    /// No result.
     #[default]
     None,
-    /// The last state of a job that did not converge or was canceled, or the finished load steps of one that
-    /// runs.
+    /// The last state of a job that did not converge or was canceled, or the finished load steps of a running job.
     Partial,
     /// A converged result.
     Final,
@@ -395,10 +395,10 @@ pub enum ResultAvailable {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Limits {
-    /// Seconds that an attempt may take; then the job fails with `timed_out`. The solver has two more seconds to
-    /// return its last state, which is kept.
+    /// Seconds that an attempt may take; then the job fails with `timed_out`. The solver has two more seconds to return
+    /// its last state, which is kept.
     pub timeout_s: f64,
-    /// Seconds that it may wait for a worker; then it fails with `queue_expired`.
+    /// Seconds that the job may wait for a worker; then it fails with `queue_expired`.
     pub queue_ttl_s: f64,
 }
 
@@ -429,24 +429,24 @@ impl Default for Limits {
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Cache {
-    /// It is answered at once if there is a result of the same input, and coalesced into a job of the same input if
-    /// one waits or runs.
+    /// The result of an earlier job with the same input is used if there is one; the job is coalesced into a queued or
+    /// running job of the same input.
     #[default]
     Use,
-    /// It is solved anew, and its result may answer later jobs.
+    /// The job is solved again, and its result may be used for later jobs.
     Refresh,
-    /// It is solved anew, and its result answers no other job.
+    /// The job is solved again, and its result is not used for other jobs.
     Off,
 }
 
 /// The position of a queued job.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct QueuePosition {
-    /// From 1; 0 for a job that is coalesced into one that runs.
+    /// The position from 1; 0 for a job that is coalesced into a running one.
     pub position: i64,
-    /// Jobs before this one.
+    /// The number of jobs before this one.
     pub ahead: i64,
-    /// Why it waits.
+    /// The reason for waiting.
     pub reason: Waiting,
 }
 
@@ -475,46 +475,46 @@ pub enum Waiting {
     Paused,
     /// The disk has no room for results; jobs start again when there is some.
     LowDisk,
-    /// Its owner has as many running jobs as they may.
+    /// Its owner has reached the limit of running jobs.
     OwnerLimit,
-    /// It is coalesced into a job with the same input that waits or runs, and will end with its result.
+    /// It is coalesced into a queued or running job with the same input, and will end with that job's result.
     Coalesced,
 }
 
 /// The progress of a job.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Progress {
-    /// The phase that began last: mesh, assemble, …, recover, and verify. `low_disk`: the disk is full, and what the job finds
-    /// is stored once there is space; until then it stays running, also if it is solved.
+    /// The phase that began last: mesh, assemble, …, recover, and verify. `low_disk`: the disk is full, and the job's
+    /// results are stored once there is space; until then the job stays running, even if it is solved.
     pub stage: String,
     /// Iterations so far.
     pub iteration: u32,
     /// The larger of the two residuals of the last iteration (dimensionless).
     pub residual: Option<f64>,
-    /// The tolerance that both must reach.
+    /// The tolerance that both residuals must reach.
     pub tolerance: Option<f64>,
     /// Nodes that entered or left contact in the last iteration.
     pub contact_changes: Option<u32>,
-    /// Factor by which an iteration reduces the residual.
+    /// The factor by which an iteration reduces the residual.
     pub rate: Option<f64>,
-    /// Estimated seconds to the end, extrapolated from the rate.
+    /// The estimated seconds to the end, extrapolated from the rate.
     pub eta_s: Option<f64>,
-    /// Number of the mesh that adaptive refinement is on, from 1; absent without it.
+    /// The number of the present mesh of adaptive refinement, from 1; absent without it.
     pub mesh: Option<u32>,
-    /// Elements of that mesh.
+    /// The number of elements of that mesh.
     pub mesh_elements: Option<u64>,
-    /// Largest relative error on the mesh before.
+    /// The largest relative error on the mesh before.
     pub mesh_error: Option<f64>,
 }
 
 /// Why a job failed, in the form of a problem document.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Failure {
-    /// Address of the explanation.
+    /// The address of the explanation.
     pub r#type: String,
-    /// One line, the same for every failure of its kind.
+    /// The title: one line, the same for every failure of its kind.
     pub title: String,
-    /// The kind, stable for programs.
+    /// The kind, a stable name for programs.
     pub code: String,
     /// What happened in this case.
     pub detail: String,
@@ -533,7 +533,7 @@ impl Failure {
     }
 }
 
-/// What became of iterations that have ended without a solution.
+/// The text about iterations that ended without a solution.
 pub fn without_solution(outcome: Outcome, iterations: u32, residuals: &Residuals) -> String {
     let Residuals {
         kkt,
@@ -556,13 +556,13 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// What a job of that status may become.
+    /// The statuses that a job of that status may change to.
     fn becomes(from: Status) -> Vec<Status> {
         let all = Status::VARIANTS.iter().copied();
         all.filter(|to| from.may_become(*to)).collect()
     }
 
-    /// From where a job may come to that status.
+    /// The statuses from which a job may change to that status.
     fn comes_from(to: Status) -> Vec<Status> {
         let all = Status::VARIANTS.iter().copied();
         all.filter(|from| from.may_become(to)).collect()
@@ -585,7 +585,7 @@ mod tests {
         assert_eq!(comes_from(Status::Succeeded), [Status::Running]);
     }
 
-    /// In the store as in JSON, and read back from both.
+    /// Checks that values have the same words in the store and in JSON, and are read back from both.
     fn has_words<T>()
     where
         T: VariantArray + Copy + PartialEq + std::fmt::Debug,

@@ -1,23 +1,23 @@
-//! The service: contact problems as jobs, over REST and gRPC. A room uses only rooms of its own
-//! group and of the groups above it; ARCHITECTURE.md has the finer order.
+//! The service: contact problems as jobs, over REST and gRPC. A room uses only rooms of its own group and of the groups
+//! above it; ARCHITECTURE.md has the finer order.
 //!
 //! # Where to look
 //!
-//! The map of the service by subject. `rest`, `verbs`, `store`, `queue`, `listener` and `cli` have a map of their own in their `mod.rs`. The
-//! same file name in several rooms is the same subject: `sweeps` is the routes in `rest`, the operations in `verbs`, the tables in
-//! `store`.
+//! The map of the service by subject. `rest`, `verbs`, `store`, `queue`, `listener` and `cli` have a map of their own
+//! in their `mod.rs`. The same file name in several rooms is the same subject: `sweeps` is the routes in `rest`, the
+//! operations in `verbs`, the tables in `store`.
 //!
 //! | subject | where |
 //! |---|---|
 //! | routes, bodies and headers of requests | `rest` |
-//! | operations, whatever the protocol | `verbs` |
+//! | operations, the same for both protocols | `verbs` |
 //! | everything stored, and all SQL | `store` |
 //! | how jobs start, are recorded and end | `queue` |
 //! | one solution with its times | `run` |
 //! | sweeps: operations | `verbs/sweeps.rs` |
 //! | sweeps: tables | `store/sweeps.rs` |
-//! | sweeps: members solved one after the other | `run/members.rs` |
-//! | conversions between messages of gRPC and our types: which mirror each other | `server/build/mirrors.rs` |
+//! | sweeps: solving the members | `run/members.rs` |
+//! | conversions between messages of gRPC and our types: the list of types | `server/build/mirrors.rs` |
 //! | conversions between messages of gRPC and our types: the generator | `server/build/conversions.rs` |
 //! | conversions between messages of gRPC and our types: those written by hand | `convert` |
 //! | kinds of errors, with status, gRPC code and explanation | `catalog.rs` |
@@ -27,7 +27,7 @@
 //! | tokens | `token.rs`, `verbs/tokens.rs`, `store/tokens.rs`, `cli/token.rs` |
 //! | connections and TLS | `listener` |
 //! | bytes of requests and answers in memory | `transfer.rs` |
-//! | how fast clients have to send and read | `pace.rs` |
+//! | how fast clients must send and read | `pace.rs` |
 //! | size of gRPC messages | `codec.rs` |
 //! | the memory budget | `memory.rs` |
 //! | the estimate of a problem | `solver/src/model/estimate.rs` |
@@ -115,7 +115,7 @@ pub mod pb {
 #[cfg(test)]
 mod fake;
 
-/// As in the program: tests see what a job holds.
+/// The counting allocator, as in the program, so that tests see what a job allocates.
 #[cfg(test)]
 #[global_allocator]
 static ALLOCATOR: allocator::Counting = allocator::Counting;

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-/// Counts what each job holds (`service::memory`).
+/// Counts the memory that each job holds (`service::memory`).
 #[global_allocator]
 static ALLOCATOR: allocator::Counting = allocator::Counting;
 

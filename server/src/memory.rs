@@ -1,5 +1,5 @@
-//! The memory budget: what running jobs are estimated to need is reserved in it, and a job that takes far more than
-//! that is ended. What they leave of it is for bodies that are kept for later jobs: those give way to any job.
+//! The memory budget: each running job reserves its estimated memory, and a job that uses far more is ended. The rest
+//! of the budget is for bodies that are kept for later jobs; jobs take precedence over them.
 //!
 //! The next job in order is claimed when its estimate fits, and no later job before it.
 
@@ -17,8 +17,8 @@ use solver::{Prepared, body::ElasticBody, model::Model};
 
 use crate::bodies::{Bodies, BodyCache, Key};
 
-/// What all jobs together may use beyond the budget (bytes), since an estimate is one; unless they are so many that each
-/// has the least margin.
+/// The memory that all jobs together may use beyond the budget (bytes), since estimates are not exact; more if there
+/// are so many jobs that each has the smallest margin.
 const MARGINS: u64 = 128 << 20;
 const LEAST_MARGIN: u64 = 4 << 20;
 
@@ -26,23 +26,23 @@ const LEAST_MARGIN: u64 = 4 << 20;
 #[derive(Debug)]
 pub struct Budget {
     bytes: u64,
-    /// What a job may use beyond its estimate.
+    /// The memory that a job may use beyond its estimate.
     margin: u64,
     state: Mutex<State>,
-    /// The next job of the queue waits for memory.
+    /// Whether the next job of the queue waits for memory.
     short: AtomicBool,
 }
 
 #[derive(Debug)]
 struct State {
-    /// Reserved by the jobs whose solvers are at work. Bodies that they use are a part of it.
+    /// The memory reserved by jobs whose solvers are running, including the bodies that they use.
     reserved: u64,
-    /// Those that no job uses fit beside what is reserved.
+    /// The kept bodies; those that no job uses fit into the rest of the budget.
     bodies: Bodies,
 }
 
 impl Budget {
-    /// A budget of so many bytes, for so many jobs at the same time; at most `of_bodies` of it are for bodies that are kept.
+    /// A budget of `bytes` for `jobs` simultaneous jobs; at most `of_bodies` of it are for kept bodies.
     pub fn new(bytes: u64, jobs: u16, of_bodies: u64) -> Arc<Budget> {
         Arc::new(Budget {
             bytes,
@@ -55,19 +55,19 @@ impl Budget {
         })
     }
 
-    /// Its size.
+    /// The size of the budget (bytes).
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// What the running jobs have reserved of it.
+    /// The memory that running jobs have reserved (bytes).
     pub fn reserved(&self) -> u64 {
         self.state().reserved
     }
 
-    /// Reserves what a job is estimated to need; none if it does not fit beside the running ones. A job of unknown
-    /// need, or of more than the budget (which was larger when it was accepted), takes all of it: it runs alone. Kept
-    /// bodies that no job uses are dropped for it, if it fits then.
+    /// Reserves the estimated memory of a job; none if it does not fit together with the running ones. A job of unknown
+    /// need, or of more than the budget (which was larger when it was accepted), takes all of it and runs alone. Kept
+    /// bodies that no job uses are dropped if the job fits then.
     pub fn reserve(self: &Arc<Budget>, needed: Option<u64>) -> Option<Reservation> {
         let bytes = needed.unwrap_or(u64::MAX).min(self.bytes);
         let mut state = self.state();
@@ -83,7 +83,7 @@ impl Budget {
         })
     }
 
-    /// The body of a model, if it is kept, and its bytes.
+    /// The body of a model, if it is kept, and its size (bytes).
     pub fn kept_body(&self, key: &Key, model: &Model) -> Option<(Arc<ElasticBody>, u64)> {
         let found = self.state().bodies.find(key);
         // not while the lock is held: meshes are compared. A wrong body gives wrong results that look right
@@ -97,28 +97,28 @@ impl Budget {
         same.map(|(kept, bytes)| (kept.body.clone(), bytes))
     }
 
-    /// Keeps a body of so many bytes, if there is room; returns those that are dropped for it.
+    /// Keeps a body of this size, if there is room; returns the bodies that are dropped for it.
     pub fn keep(&self, key: Key, prepared: Prepared, bytes: u64) -> Vec<Arc<Prepared>> {
         self.state().bodies.keep(key, prepared, bytes)
     }
 
-    /// Drops all kept bodies that no job uses: the machine has less memory than the budget says.
+    /// Drops all kept bodies that no job uses, because the machine has less memory than the budget says.
     pub fn drop_bodies(&self) {
         let dropped = self.state().bodies.shrink_idle(0);
         drop(dropped);
     }
 
-    /// Most bytes of kept bodies.
+    /// The largest size of all kept bodies (bytes).
     pub fn of_bodies(&self) -> u64 {
         self.state().bodies.limit()
     }
 
-    /// The kept bodies, and how often they were used.
+    /// The figures of the kept bodies.
     pub fn body_cache(&self) -> BodyCache {
         self.state().bodies.figures()
     }
 
-    /// Whether the next job of the queue waits for memory and not for a worker.
+    /// Whether the next job of the queue waits for memory rather than for a worker.
     pub fn is_short(&self) -> bool {
         self.short.load(Ordering::Relaxed)
     }
@@ -129,31 +129,31 @@ impl Budget {
     }
 }
 
-/// A part of the budget, given back when it is dropped.
+/// A reserved part of the budget, returned when it is dropped.
 #[derive(Debug)]
 pub struct Reservation {
     budget: Arc<Budget>,
     bytes: u64,
-    /// Bodies that had to give way.
+    /// Bodies that were dropped for this reservation.
     dropped: Vec<Arc<Prepared>>,
 }
 
-/// What one job may use.
+/// The resources that one job may use.
 #[derive(Clone, Copy, Debug)]
 pub struct Allowance<'a> {
-    /// Bytes.
+    /// The memory (bytes).
     pub share: u64,
-    /// Where bodies are kept; none if they are not.
+    /// The kept bodies; none if no bodies are kept.
     pub bodies: Option<&'a Budget>,
 }
 
 impl Reservation {
-    /// Frees what had to give way. To be called before the job begins, on a thread that may take its time.
+    /// Frees the bodies that were dropped. Call this before the job begins, on a thread that may block.
     pub fn free_dropped(&mut self) {
         self.dropped.clear();
     }
 
-    /// What the job may use.
+    /// The resources that the job may use.
     pub fn allowance(&self) -> Allowance<'_> {
         Allowance {
             share: self.share(),
@@ -161,8 +161,8 @@ impl Reservation {
         }
     }
 
-    /// What the job may use: its estimate, which is meant to be an upper bound, and a margin for what that does not
-    /// foresee. All jobs together use no more than the budget and 128 MiB, or 4 MiB for each.
+    /// The memory that the job may use: its estimate, which is meant to be an upper bound, plus a margin. All jobs
+    /// together use no more than the budget and 128 MiB, or 4 MiB for each.
     pub fn share(&self) -> u64 {
         self.bytes.saturating_add(self.budget.margin)
     }
@@ -181,44 +181,45 @@ impl Drop for Reservation {
     }
 }
 
-/// A job has outgrown its share.
+/// The error of a job that needs more than its share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Outgrown {
-    /// What it had in use (bytes).
+    /// The memory in use (bytes).
     pub used: u64,
-    /// What it needed beyond that (bytes).
+    /// The additional memory that was needed (bytes).
     pub needed: u64,
-    /// What it might use (bytes).
+    /// The memory that the job was allowed to use (bytes).
     pub share: u64,
 }
 
-/// Watches what the job of this thread uses.
+/// Measures the memory that the job on this thread uses.
 #[derive(Debug)]
 pub struct Meter {
-    /// The thread's count when the job began; what it handed over since is added, what it was lent subtracted.
+    /// The thread's count when the job began, plus memory passed to other threads since, minus memory taken over from
+    /// them.
     start: Cell<i64>,
     share: u64,
 }
 
 impl Meter {
-    /// A job of this share begins on this thread.
+    /// Starts measuring a job with this share on this thread.
     pub fn new(share: u64) -> Meter {
         let start = Cell::new(allocator::held());
         Meter { start, share }
     }
 
-    /// Bytes that the job uses.
+    /// The memory that the job uses (bytes).
     pub fn used(&self) -> u64 {
         u64::try_from(allocator::held().saturating_sub(self.start.get())).unwrap_or(0)
     }
 
-    /// The job uses so many bytes that another thread has taken.
+    /// Adds memory of the job that another thread has allocated (bytes).
     pub fn lend(&self, bytes: u64) {
         let bytes = i64::try_from(bytes).unwrap_or(i64::MAX);
         self.start.set(self.start.get().saturating_sub(bytes));
     }
 
-    /// Whether the job may go on, which is about to take `needed` more bytes.
+    /// Whether the job may continue, which is about to allocate `needed` more bytes.
     pub fn check(&self, needed: u64) -> ControlFlow<Outgrown> {
         let used = self.used();
         match used.saturating_add(needed) > self.share {
@@ -231,7 +232,7 @@ impl Meter {
         }
     }
 
-    /// Does work whose memory is handed over to another thread, and no longer that of the job.
+    /// Runs work whose memory is passed to another thread and no longer counts for the job.
     pub fn hand_over<T>(&self, work: impl FnOnce() -> T) -> T {
         let before = allocator::held();
         let done = work();
@@ -285,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn kept_bodies_give_way_to_jobs_and_to_no_more_than_they_need() {
+    fn kept_bodies_are_dropped_for_jobs_only_as_far_as_needed() {
         let budget = Budget::new(100 * MIB, 2, 50 * MIB);
         for k in 1..=3 {
             budget.keep([k; 32], body(), 15 * MIB);

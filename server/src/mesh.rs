@@ -18,42 +18,43 @@ use crate::time::Time;
 /// A stored mesh, without its nodes and elements.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MeshInfo {
-    /// `sha256:…` of the file; a problem refers to it as `mesh.stored`.
+    /// The hash `sha256:…` of the file; a problem refers to it as `mesh.stored`.
     pub hash: String,
     /// The format of the file.
     pub format: MeshFormat,
-    /// Size of the file.
+    /// The size of the file (bytes).
     pub bytes: u64,
-    /// Nodes, midsides included.
+    /// The number of nodes, including midsides.
     pub nodes: u64,
-    /// 8-node elements.
+    /// The number of 8-node elements.
     pub quadrilaterals: u64,
-    /// 6-node elements.
+    /// The number of 6-node elements.
     pub triangles: u64,
-    /// Displacement unknowns, before supports.
+    /// The number of displacement unknowns, before supports.
     pub dofs: u64,
-    /// Ranges of x and y (length).
+    /// The ranges of x and y (length).
     pub extent: [[f64; 2]; 2],
-    /// Named boundaries.
+    /// The named boundaries.
     pub boundaries: BTreeMap<String, BoundaryInfo>,
-    /// Elements of each named group.
+    /// The number of elements of each named group.
     pub groups: BTreeMap<String, u64>,
-    /// Nodes of each named set.
+    /// The number of nodes of each named set.
     pub node_sets: BTreeMap<String, u64>,
-    /// Shape of the elements.
+    /// The quality of the elements.
     pub quality: Quality,
-    /// Changes that were made when it was read.
+    /// Warnings about changes made when it was read.
     pub warnings: Vec<Warning>,
-    /// When it was stored.
+    /// The time when it was stored.
     pub created_at: Time,
 }
 
-/// Writes the stored form of a mesh: the mesh, and after it which of its midsides were added, and how many nodes its sets lost.
+/// Writes the stored form of a mesh: the mesh, followed by the list of added midsides and the number of nodes that its
+/// sets lost.
 pub fn write_stored<W: std::io::Write>(mesh: &Mesh, to: W) -> postcard::Result<W> {
     postcard::to_io(&(mesh, mesh.added_midsides, &mesh.nodes_left_out), to)
 }
 
-/// A mesh from its stored form; those of earlier versions end with the mesh, or with its midsides.
+/// Reads a mesh from its stored form; that of earlier versions ends after the mesh, or after its midsides.
 pub fn read_stored(bytes: &[u8]) -> postcard::Result<Mesh> {
     let (mut mesh, rest): (Mesh, &[u8]) = postcard::take_from_bytes(bytes)?;
     if !rest.is_empty() {
@@ -69,16 +70,16 @@ pub fn read_stored(bytes: &[u8]) -> postcard::Result<Mesh> {
 /// A named boundary of a stored mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BoundaryInfo {
-    /// Number of element sides.
+    /// The number of element sides.
     pub edges: u64,
-    /// Their length, along curved sides.
+    /// The length of the boundary, along curved sides.
     pub length: f64,
 }
 
-/// How close the elements are to being folded.
+/// How close the elements are to being inverted.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Quality {
-    /// Least ratio of the smallest to the largest det J within an element: 1 is best, 0 is folded.
+    /// Smallest ratio of the smallest to the largest det J within an element: 1 is best, 0 is inverted.
     pub least_jacobian_ratio: f64,
     /// The number of the element with this ratio, from 0.
     pub worst_element: u64,
@@ -128,7 +129,8 @@ impl MeshInfo {
         }
     }
 
-    /// Whether an earlier version has stored the mesh without the number of its added midsides, which are in its sets.
+    /// Whether an earlier version has stored the mesh without the number of its added midsides, which are then in its
+    /// sets.
     pub fn lacks_added_midsides(&self, mesh: &Mesh) -> bool {
         let raised = |warning: &Warning| warning.code == WarningCode::RaisedToSecondOrder;
         mesh.added_midsides.is_none() && self.warnings.iter().any(raised)
@@ -173,7 +175,7 @@ mod tests {
         assert_eq!((read.nodes, read.node_sets), (mesh.nodes, mesh.node_sets));
     }
 
-    /// One square whose upper side bulges: a parabola over 2 with rise 1.
+    /// A square whose upper side bulges, a parabola over 2 with rise 1, has the length of the arc.
     #[test]
     fn a_curved_boundary_has_the_length_of_its_arc() {
         let nodes = vec![

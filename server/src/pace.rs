@@ -1,15 +1,16 @@
-//! How fast a client has to send a body or read an answer: who takes for ever holds memory and a connection for ever.
+//! The minimum speed at which a client must send a body or read an answer: an endlessly slow client would hold memory
+//! and a connection for ever.
 
 use std::time::Duration;
 
 use tokio::time::Instant;
 
-/// How long a client may send or read nothing.
+/// The longest time in which a client may send or read nothing.
 pub const LONGEST_PAUSE: Duration = Duration::from_secs(60);
-/// What a client has to send or read on average (bytes per second), beside one longest pause.
+/// The average rate at which a client must send or read (bytes per second), apart from one longest pause.
 pub const LEAST_RATE: u64 = 4 << 10;
 
-/// The progress of one body or answer. Only the time that the client takes counts, and not that of the service.
+/// The progress of one body or answer. Only the client's time counts, not that of the service.
 #[derive(Debug, Default)]
 pub struct Pace {
     waiting_since: Option<Instant>,
@@ -18,19 +19,19 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// It is the client's turn.
+    /// Starts counting the client's time.
     pub fn wait(&mut self) {
         self.waiting_since.get_or_insert_with(Instant::now);
     }
 
-    /// The client has sent or read so many bytes.
+    /// Records that the client has sent or read some bytes.
     pub fn advance(&mut self, bytes: usize) {
         self.waited += self.pause();
         self.waiting_since = None;
         self.bytes = self.bytes.saturating_add(bytes as u64);
     }
 
-    /// Whether the client takes too long.
+    /// Whether the client is too slow.
     pub fn is_too_slow(&self) -> bool {
         let allowed = LONGEST_PAUSE + Duration::from_secs(self.bytes / LEAST_RATE);
         let pause = self.pause();
@@ -49,7 +50,7 @@ mod tests {
 
     use super::*;
 
-    /// Whether a client that takes so many seconds for every piece of so many bytes is soon too slow.
+    /// Whether a client that takes this time for every piece of this size is soon too slow.
     async fn is_too_slow(seconds: u64, bytes: usize) -> bool {
         let mut pace = Pace::default();
         for _ in 0..200 {

@@ -1,4 +1,4 @@
-//! How many jobs each owner submits in a minute.
+//! Limits how many jobs each owner submits in a minute.
 
 use std::{
     collections::HashMap,
@@ -6,20 +6,20 @@ use std::{
     time::Instant,
 };
 
-/// Owners that are remembered; beyond that those who have used nothing lately are forgotten.
+/// The largest number of owners that are remembered; beyond that those who have submitted nothing lately are forgotten.
 const MOST_OWNERS: usize = 10_000;
 
-/// A limit on what each owner submits: as much as the limit at once, and the rest evenly over time.
+/// The limit for each owner: the whole number of a minute at once, then evenly over time.
 #[derive(Debug)]
 pub struct Rates {
-    /// Jobs in a minute; `None` without limit.
+    /// The number of jobs in a minute; `None` without limit.
     pub per_minute: Option<u32>,
-    /// By owner: what is left, and when that was so.
+    /// By owner: the number of jobs left, and the time of that.
     left: Mutex<HashMap<String, (f64, Instant)>>,
 }
 
 impl Rates {
-    /// Nothing used yet.
+    /// No jobs submitted yet.
     pub fn new(per_minute: Option<u32>) -> Rates {
         Rates {
             per_minute,
@@ -27,12 +27,12 @@ impl Rates {
         }
     }
 
-    /// Takes a number of jobs from what the owner has left; `Err`: how many they have left, too few.
+    /// Uses up a number of jobs; `Err`: how many are left, if too few.
     pub fn take(&self, owner: &str, jobs: u64) -> Result<(), u64> {
         self.take_at(owner, jobs, Instant::now())
     }
 
-    /// Gives back what was taken for jobs that were not stored.
+    /// Returns jobs that were used up but not stored.
     pub fn give_back(&self, owner: &str, jobs: u64) {
         let Some(per_minute) = self.per_minute else {
             return;
@@ -68,7 +68,7 @@ impl Rates {
     }
 }
 
-/// What an owner has left now.
+/// The number of jobs that an owner has left now.
 fn refilled(known: Option<(f64, Instant)>, per_minute: u32, now: Instant) -> f64 {
     let most = f64::from(per_minute);
     known.map_or(most, |(left, then)| {
@@ -84,7 +84,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_used_comes_back_evenly_and_of_each_owner_by_itself() {
+    fn a_limit_recovers_evenly_and_separately_for_each_owner() {
         let (rates, start) = (Rates::new(Some(60)), Instant::now());
         let at = |owner, jobs, seconds| {
             rates.take_at(owner, jobs, start + Duration::from_millis(seconds))

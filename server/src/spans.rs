@@ -1,8 +1,9 @@
-//! Spans of requests and jobs, sent to a collector by OTLP. Nothing waits for it: what it does not take in time is dropped,
-//! and counted.
+//! Sends spans of requests and jobs to a collector by OTLP. Nothing waits for the collector: spans that it does not
+//! receive in time are dropped and counted.
 //!
-//! Spans are told when they have ended, with their times, so that the layer of the SDK that follows the code is not needed;
-//! nor is its queue, which does not tell how many spans it has dropped. Conversion and transport are those of its authors.
+//! Spans are reported when they have ended, with their times, so that the SDK's layer that follows the code is not
+//! needed. Its queue is not used either, since it does not say how many spans it has dropped. Conversion and transport
+//! are those of the SDK.
 
 use std::{
     borrow::Cow,
@@ -25,46 +26,46 @@ use tracing::{info, warn};
 
 use crate::{metrics::METRICS, time::Time, trace::Trace};
 
-/// Spans that wait; one has some 500 bytes.
+/// The largest number of spans that wait; each has some 500 bytes.
 const MOST_WAITING: usize = 4096;
-/// Spans of one message.
+/// The largest number of spans in one message.
 const MOST_TOGETHER: usize = 512;
-/// How long spans wait for others.
+/// How long spans wait for others to be sent with.
 const LINGER: Duration = Duration::from_millis(200);
-/// How long the collector may take for a message.
+/// How long the collector may take to receive a message.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// How long the service waits for it when it stops.
+/// How long the service waits for the collector when it stops.
 const FAREWELL: Duration = Duration::from_secs(1);
 
-/// Spans that have ended go here; empty if no collector is named.
+/// The queue of spans that have ended; empty if no collector is configured.
 static WAITING: OnceLock<mpsc::Sender<SpanData>> = OnceLock::new();
 
 /// Work that has ended.
 #[derive(Debug)]
 pub struct Span {
-    /// Its place in a trace.
+    /// The place in a trace.
     pub trace: Trace,
-    /// What was done: one of a few names.
+    /// The kind of work: one of a few names.
     pub name: Cow<'static, str>,
-    /// Whether it answers a request, or is within the service.
+    /// Whether it answers a request, rather than being internal work.
     pub answers: bool,
-    /// When it began.
+    /// The time when it began.
     pub begun: Time,
-    /// When it ended.
+    /// The time when it ended.
     pub ended: Time,
-    /// What else is known of it.
+    /// Further facts.
     pub attributes: Vec<KeyValue>,
-    /// Why it has failed.
+    /// Why it has failed; absent if it has not.
     pub error: Option<String>,
 }
 
-/// Whether spans are wanted.
+/// Whether spans are sent.
 pub fn are_wanted() -> bool {
     WAITING.get().is_some()
 }
 
 impl Span {
-    /// Tells it, unless its trace is not to be recorded.
+    /// Reports the span, unless its trace is not recorded.
     pub fn tell(self) {
         let Some(waiting) = WAITING.get() else { return };
         let Trace { own, parent } = self.trace;
@@ -109,8 +110,8 @@ pub struct Exporting {
     task: JoinHandle<()>,
 }
 
-/// Sends spans to the collector at this address from now on. An error means that the address cannot be used; whether the
-/// collector answers is seen later.
+/// Starts sending spans to the collector at this address. The error means that the address cannot be used; whether the
+/// collector answers is not known yet.
 pub fn start(endpoint: &str) -> Result<Exporting, ExporterBuildError> {
     let otlp = Otlp::builder().with_tonic().with_endpoint(endpoint);
     let mut otlp = otlp.with_timeout(PATIENCE).build()?;
@@ -130,16 +131,16 @@ pub fn start(endpoint: &str) -> Result<Exporting, ExporterBuildError> {
 }
 
 impl Exporting {
-    /// Sends what waits, if the collector takes it soon.
+    /// Sends the remaining spans, if the collector receives them soon.
     pub async fn stop(self) {
         self.stopping.cancel();
         if timeout(FAREWELL, self.task).await.is_err() {
-            warn!("the collector of spans did not take the last ones in time");
+            warn!("the collector did not receive the last spans in time");
         }
     }
 }
 
-/// Sends spans until the service stops, and then those that still wait.
+/// Sends spans until the service stops, and then the remaining ones.
 async fn send(
     mut waiting: mpsc::Receiver<SpanData>,
     otlp: Arc<impl SpanExporter>,
@@ -175,9 +176,9 @@ async fn send(
         // told once, and not with each message
         match (works, &failure) {
             (true, Some(failure)) => {
-                warn!("the collector of spans does not take them, and they are dropped: {failure}");
+                warn!("spans are dropped, because the collector does not receive them: {failure}");
             }
-            (false, None) => info!("the collector of spans takes them again"),
+            (false, None) => info!("the collector receives spans again"),
             _ => {}
         }
         works = failure.is_none();

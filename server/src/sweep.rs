@@ -1,4 +1,4 @@
-//! A sweep: many problems that differ in a few values, and the numbers of each. No I/O.
+//! A sweep: many problems that differ in a few values, and the results of each. No I/O.
 
 use std::{borrow::Cow, collections::BTreeMap};
 
@@ -25,97 +25,98 @@ pub struct Sweep {
     pub key: i64,
     /// The public id.
     pub id: SweepId,
-    /// Running once a job has started; when all have ended: canceled if one was, succeeded if at least one member
-    /// succeeded, else failed. `members` has the details.
+    /// The status: running once a job has started; when all have ended: canceled if one was canceled, succeeded if at
+    /// least one member succeeded, else failed. `members` has the details.
     pub status: Status,
-    /// Changes whenever the sweep does.
+    /// A version that changes whenever the sweep does.
     pub version: String,
     /// A name for people.
     pub name: Option<String>,
     /// Labels for programs.
     pub labels: BTreeMap<String, String>,
-    /// Who submitted it.
+    /// The owner who submitted it.
     pub owner: String,
-    /// When it was accepted.
+    /// The time when it was accepted.
     pub created_at: Time,
-    /// When its last job ended.
+    /// The time when its last job ended.
     pub finished_at: Option<Time>,
-    /// What members differ in: JSON Pointers into the problem.
+    /// The values in which members differ: JSON Pointers into the problem.
     pub paths: Vec<String>,
-    /// How many members there are, by their status.
+    /// The numbers of members by status.
     pub members: MemberCounts,
-    /// How many jobs solve them: one for all members on the same body. `GET /v1/jobs?sweep=…` lists them.
+    /// The number of jobs that solve the members: one for all members on the same body. `GET /v1/jobs?sweep=…` lists
+    /// them.
     pub jobs: u32,
-    /// Addresses of what belongs to it.
+    /// Addresses of related resources.
     pub links: BTreeMap<String, String>,
 }
 
-/// How many members a sweep has, by their status.
+/// The numbers of members of a sweep by status.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct MemberCounts {
-    /// All of them.
+    /// All members.
     pub total: u32,
-    /// Their job waits.
+    /// Members whose job waits.
     pub queued: u32,
-    /// Their job is at work, on these one after the other.
+    /// Members whose job is running; it solves them one after another.
     pub running: u32,
-    /// Converged.
+    /// Members that converged.
     pub succeeded: u32,
-    /// Not converged, invalid, or not reached when their job failed.
+    /// Members that did not converge, are invalid, or were not reached when their job failed.
     pub failed: u32,
-    /// Not reached when their job was canceled.
+    /// Members that were not reached when their job was canceled.
     pub canceled: u32,
 }
 
-/// A member of a sweep: a row of its results.
+/// A member of a sweep, with its results: a row of the table.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MemberRow {
-    /// From 0, in the order of the definition.
+    /// The number from 0, in the order of the definition.
     pub number: u32,
-    /// Its values by JSON Pointer, without those that are the base's.
+    /// The member's values by JSON Pointer, without those that equal the base's.
     #[serde(default)]
     pub parameters: BTreeMap<String, ParameterValue>,
-    /// Its status.
+    /// The member's status.
     pub status: Status,
     /// Why it failed or was canceled.
     pub reason: Option<Reason>,
-    /// What happened, in words, if it failed.
+    /// A description of the failure in words, if it failed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub detail: Option<String>,
-    /// The first violations of a member that is invalid; pointers are those of its problem.
+    /// The first violations of an invalid member; pointers refer to its problem.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub violations: Vec<Violation>,
-    /// ∫p ≥ 0 over all contacts (force); the numbers are absent until the member is solved.
+    /// Normal force ∫p ≥ 0 over all contacts (force); the results are absent until the member is solved.
     pub normal_force: Option<f64>,
-    /// ∫σ_t over all contacts (force).
+    /// Tangential force ∫σ_t over all contacts (force).
     pub tangential_force: Option<f64>,
-    /// ∫|σ_t| over all contacts (force).
+    /// Friction force ∫|σ_t| over all contacts (force).
     pub friction_force: Option<f64>,
     /// Length of all contacts together.
     pub contact_width: Option<f64>,
-    /// The part of it that sticks.
+    /// Length of the contact that sticks.
     pub stick_width: Option<f64>,
-    /// The part of it that slips.
+    /// Length of the contact that slips.
     pub slip_width: Option<f64>,
     /// The largest pressure, as a stress (≤ 0); 0 without contact.
     pub peak_normal_stress: Option<f64>,
     /// The largest |σ_t|, with its sign; 0 without friction.
     pub peak_tangential_stress: Option<f64>,
-    /// Rows of its history; 0 if it was not solved.
+    /// Number of rows of its history; 0 if it was not solved.
     pub iterations: u32,
     /// Dimensionless residuals of its final state.
     pub residuals: Option<Residuals>,
-    /// What to consider before relying on the numbers: each kind once.
+    /// The kinds of warnings to consider before relying on the results, each once.
     pub warnings: Vec<WarningCode>,
 }
 
-/// A value that a member of a sweep has, as JSON.
+/// A value of a member of a sweep, as JSON.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct ParameterValue(Box<RawValue>);
 
 impl ParameterValue {
-    /// The text.
+    /// The value as JSON text.
     pub fn json(&self) -> &str {
         self.0.get()
     }
@@ -147,17 +148,17 @@ impl JsonSchema for ParameterValue {
     }
 }
 
-/// Most violations of a member that are kept.
+/// The largest number of violations of a member that are kept.
 const MOST_VIOLATIONS: usize = 5;
 
 impl MemberRow {
-    /// With its values, from the plan of its sweep.
+    /// Sets the member's values from the plan of its sweep.
     pub fn with_values(&mut self, plan: &Plan) {
         let values = plan.parameters(self.number as usize).into_iter();
         self.parameters = values.map(|(path, value)| (path, value.into())).collect();
     }
 
-    /// With each kind of warning once, however many contacts have it.
+    /// The row with each kind of warning once, however many contacts have it.
     pub fn tidied(mut self) -> MemberRow {
         let mut kinds: Vec<WarningCode> = vec![];
         for code in std::mem::take(&mut self.warnings) {
@@ -226,7 +227,7 @@ impl MemberRow {
         }
     }
 
-    /// A member whose problem is wrong.
+    /// A member whose problem is invalid.
     pub fn invalid(number: usize, mut violations: Vec<Violation>) -> MemberRow {
         let detail = match violations.len() {
             1 => "the problem has a violation".to_owned(),
@@ -239,7 +240,7 @@ impl MemberRow {
         }
     }
 
-    /// A member that has no row of its own (yet), by its job: that it waits, runs, or has ended without it.
+    /// A member without a row (yet), by the state of its job: waiting, running, or ended without it.
     pub fn unsolved(number: usize, status: Status, reason: Option<Reason>) -> MemberRow {
         MemberRow {
             number: number_of(number),
@@ -254,7 +255,7 @@ impl MemberRow {
     }
 }
 
-/// The numbers of members are small.
+/// A member's number as u32, which is large enough.
 fn number_of(number: usize) -> u32 {
     u32::try_from(number).unwrap_or(u32::MAX)
 }
@@ -262,34 +263,34 @@ fn number_of(number: usize) -> u32 {
 /// An event of a sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct SweepEvent {
-    /// Number of the event: it counts from 1 without gaps, across restarts.
+    /// The number of the event: it counts from 1 without gaps, across restarts.
     pub seq: i64,
-    /// When it happened.
+    /// The time of the event.
     pub t: Time,
-    /// What happened.
+    /// The content of the event.
     #[serde(flatten)]
     pub payload: SweepPayload,
 }
 
-/// What happened to a sweep.
+/// The content of an event of a sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema, strum::IntoStaticStr)]
 #[serde(tag = "type", rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum SweepPayload {
     /// A member was solved, or could not be.
     Member {
-        /// Its row.
+        /// The member's row.
         member: Box<MemberRow>,
     },
-    /// All jobs of the sweep have ended: the last event. Members that no event named were not reached.
+    /// All jobs of the sweep have ended: the last event. Members without an event were not reached.
     Done {
-        /// The sweep.
+        /// The sweep in its final state.
         sweep: Box<Sweep>,
     },
 }
 
-/// The time limit of a job that solves so many members, if the client gives none: that of a job, and six seconds for each
-/// further member, at most a week.
+/// The time limits of a job that solves this many members, if the client gives none: those of a single job, and six
+/// more seconds for each further member, at most a week.
 pub fn limits_for(members: usize) -> Limits {
     const EACH_S: f64 = 6.0;
     const MOST_S: f64 = 7.0 * 86_400.0;

@@ -6,13 +6,12 @@ use jiff::Timestamp;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// When this process first looked at the clock: the time, in microseconds since 1970, and the time since the machine was
-/// started.
+/// The start of this process's time: microseconds since 1970 by the clock, and the time since the machine was started.
 static START: LazyLock<(i64, Duration)> = LazyLock::new(|| (wall_clock(), since_boot()));
 
 #[cfg(test)]
 thread_local! {
-    /// The time that this thread is made to believe in, in microseconds since 1970.
+    /// The simulated time of this thread, in microseconds since 1970.
     static SIMULATED: std::cell::Cell<Option<i64>> = const { std::cell::Cell::new(None) };
 }
 
@@ -21,9 +20,9 @@ thread_local! {
 pub struct Time(i64);
 
 impl Time {
-    /// This moment. The clock of the machine is read once; from then on time goes by what nobody can set, and which also
-    /// counts while the machine sleeps: durations and time limits are right, and times in order, whatever happens to
-    /// the clock. It is believed again at the next start.
+    /// This moment. The machine's clock is read once; from then on time is measured by a counter that nobody can set
+    /// and that also runs while the machine sleeps, so that durations, time limits and the order of times are right
+    /// whatever happens to the clock. The clock is read again at the next start.
     pub fn now() -> Self {
         #[cfg(test)]
         if let Some(micros) = SIMULATED.get() {
@@ -33,14 +32,14 @@ impl Time {
         Time(wall.saturating_add(micros(since_boot().saturating_sub(boot))))
     }
 
-    /// From now on it is this time on this thread, until it is set again.
+    /// Sets the simulated time of this thread.
     #[cfg(test)]
     pub(crate) fn simulate(self) {
         SIMULATED.set(Some(self.0));
     }
 
-    /// What the clock of the machine says now, also if it was set since the start: for tokens, which expire at a time that
-    /// others have been told.
+    /// The present time of the machine's clock, also if it was set since the start: for tokens, which expire at a time
+    /// that others know.
     pub fn of_the_machine() -> Self {
         #[cfg(test)]
         if let Some(micros) = SIMULATED.get() {
@@ -49,23 +48,23 @@ impl Time {
         Time(wall_clock())
     }
 
-    /// How far the clock of the machine is ahead of [`Time::now`], in seconds, because it was set since.
+    /// How far the machine's clock is ahead of [`Time::now`], in seconds, because it was set since the start.
     pub fn clock_was_set_by_s() -> f64 {
         wall_clock().saturating_sub(Time::now().0) as f64 / 1e6
     }
 
-    /// From microseconds since 1970.
+    /// A time from microseconds since 1970.
     pub const fn from_micros(micros: i64) -> Self {
         Time(micros)
     }
 
-    /// Reads RFC 3339.
+    /// Reads a time in RFC 3339.
     pub fn parse(text: &str) -> Option<Self> {
         let time: Timestamp = text.parse().ok()?;
         Some(Time(time.as_microsecond()))
     }
 
-    /// Microseconds since 1970.
+    /// The microseconds since 1970.
     pub fn micros(self) -> i64 {
         self.0
     }
@@ -75,7 +74,7 @@ impl Time {
         Time(self.0.saturating_add((seconds * 1e6) as i64))
     }
 
-    /// Seconds from here to `later`. A clock set back in between gives 0, not a negative duration.
+    /// The seconds from this time to `later`. If the clock was set back in between, it is 0, not negative.
     pub fn seconds_until(self, later: Time) -> f64 {
         later.0.saturating_sub(self.0).max(0) as f64 / 1e6
     }
@@ -85,7 +84,7 @@ fn wall_clock() -> i64 {
     Timestamp::now().as_microsecond()
 }
 
-/// `std::time::Instant` stands still while the machine sleeps.
+/// The time since the machine was started, used because `std::time::Instant` stands still while the machine sleeps.
 fn since_boot() -> Duration {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::Boottime);
     Duration::new(

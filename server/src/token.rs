@@ -1,7 +1,8 @@
-//! Tokens: what a client sends to be identified.
+//! Tokens, by which clients are identified.
 //!
-//! A token is `sgn_<id>_<secret>`. The id, which is not secret, finds the record; of the secret only the SHA-256 is kept,
-//! and compared in constant time. It has 256 random bits, so that neither guessing nor a stolen record leads to it.
+//! A token is `sgn_<id>_<secret>`. The id, which is not secret, finds the record; only the SHA-256 of the secret is
+//! stored, and compared in constant time. The secret has 256 random bits, so that neither guessing nor a stolen record
+//! reveals it.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -19,41 +20,41 @@ use crate::{
     time::Time,
 };
 
-/// What every token begins with: a scanner for leaked secrets, and a person, knows it by that.
+/// The prefix of every token, by which people and scanners for leaked secrets recognise it.
 const PREFIX: &str = "sgn_";
 
-/// Bytes of an id, written in hexadecimal digits.
+/// The number of bytes of an id, written in hexadecimal digits.
 const ID_BYTES: usize = 6;
 
-/// Bytes of a secret.
+/// The number of bytes of a secret.
 const SECRET_BYTES: usize = 32;
 
 /// A token, without its secret.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Token {
-    /// The part that is not secret: the token begins with `sgn_` and this.
+    /// The id, which is not secret: the token begins with `sgn_` and this.
     pub id: String,
-    /// For people: where it is used.
+    /// A name for people, such as where the token is used.
     pub name: String,
     /// The owner of the jobs that it submits.
     pub owner: String,
-    /// What it allows.
+    /// The scopes of the token.
     pub scopes: BTreeSet<Scope>,
-    /// When it was made.
+    /// The time when it was created.
     pub created_at: Time,
-    /// From then on it is refused; null: never.
+    /// The time from which it is refused; null: never.
     pub expires_at: Option<Time>,
-    /// Since then it is refused.
+    /// The time since which it is refused; null: not revoked.
     pub revoked_at: Option<Time>,
 }
 
 impl Token {
-    /// Whether it is accepted at this time.
+    /// Whether the token is accepted at this time.
     pub fn is_valid(&self, now: Time) -> bool {
         self.revoked_at.is_none() && self.expires_at.is_none_or(|end| now < end)
     }
 
-    /// The caller that it identifies.
+    /// The caller that the token identifies.
     pub fn caller(&self) -> Caller {
         Caller::new(self.owner.clone(), self.scopes.iter().copied())
     }
@@ -62,7 +63,7 @@ impl Token {
 /// Tokens by their ids, each with the hash of its secret.
 pub type Tokens = BTreeMap<String, (Token, SecretHash)>;
 
-/// What is kept of a secret.
+/// The hash of a secret, which is stored instead of it.
 #[derive(Clone, Copy)]
 pub struct SecretHash(pub [u8; 32]);
 
@@ -73,7 +74,7 @@ impl SecretHash {
 }
 
 impl PartialEq for SecretHash {
-    /// In a time that does not depend on how much of it is right.
+    /// Compares in a time that does not depend on how many bytes are right.
     fn eq(&self, other: &SecretHash) -> bool {
         self.0.ct_eq(&other.0).into()
     }
@@ -85,12 +86,12 @@ impl fmt::Debug for SecretHash {
     }
 }
 
-/// A token as it is sent: its id, and the hash of its secret.
+/// A token as a client sends it: its id, and the hash of its secret.
 #[derive(Clone, Debug)]
 pub struct Presented {
     /// The id.
     pub id: String,
-    /// Of the secret.
+    /// The hash of the secret.
     pub hash: SecretHash,
 }
 
@@ -110,7 +111,7 @@ impl Presented {
     }
 }
 
-/// A new token's whole text, which is shown once, and nowhere else. It cannot be printed by accident.
+/// The whole text of a new token, which is shown once, and nowhere else. It cannot be printed by accident.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Secret(String);
 
@@ -122,7 +123,7 @@ impl Secret {
         Ok((Secret(format!("{PREFIX}{id}_{secret}")), hash))
     }
 
-    /// The text, for its owner alone.
+    /// The text, for the owner alone.
     pub fn reveal(self) -> String {
         self.0
     }
@@ -166,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_a_token_is_none() {
+    fn a_text_that_is_no_token_is_not_read() {
         let (secret, _) = Secret::new("0123456789ab").unwrap();
         let text = secret.reveal();
         assert!(Presented::parse(&text).is_some());

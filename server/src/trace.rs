@@ -1,4 +1,4 @@
-//! The trace that a request belongs to, as W3C Trace Context names it: that of its `traceparent`, or one of its own.
+//! The trace of a request by W3C Trace Context: that of its `traceparent` header, or a new one.
 
 use std::collections::HashMap;
 
@@ -13,27 +13,27 @@ use opentelemetry_sdk::{
     trace::{IdGenerator, RandomIdGenerator},
 };
 
-/// The header, and what is read of it at most.
+/// The header, and the largest number of its bytes that are read.
 const HEADER: &str = "traceparent";
 const LONGEST: usize = 128;
 
-/// A piece of work in a trace, and the one that it is a part of.
+/// A piece of work in a trace, and the work that it is part of.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trace {
-    /// Its ids, and whether it is to be recorded.
+    /// The ids of this work, and whether it is recorded.
     pub own: SpanContext,
-    /// The one that it is a part of.
+    /// The ids of the work that it is part of.
     pub parent: SpanContext,
 }
 
 impl Trace {
-    /// A trace of its own.
+    /// A new trace.
     pub fn new() -> Trace {
         let trace = RandomIdGenerator::default().new_trace_id();
         Trace::within(SpanContext::NONE, trace, TraceFlags::SAMPLED)
     }
 
-    /// That of a request. `tracestate` is for services that call others; this one calls none.
+    /// The trace of a request. `tracestate` is ignored: it is for services that call others, and this one calls none.
     pub fn of_request(headers: &HeaderMap) -> Trace {
         let mut sent = headers.get_all(HEADER).iter();
         let (first, more) = (sent.next(), sent.next().is_some());
@@ -53,7 +53,7 @@ impl Trace {
         }
     }
 
-    /// A part of this work.
+    /// A new piece of work that is part of this one.
     pub fn part(&self) -> Trace {
         Trace::part_of(&self.own)
     }
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_traceparent_begins_a_trace_of_its_own() {
+    fn an_invalid_traceparent_begins_a_new_trace() {
         let text = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01";
         for wrong in [
             &[][..],

@@ -1,7 +1,7 @@
-//! Bytes of requests and of answers in memory: how many at the same time, over all connections.
+//! Limits the bytes of requests and answers in memory, over all connections.
 //!
-//! One request is limited by its own size; this is the limit on all of them together. What finds no room is refused
-//! with `overloaded`, and not kept waiting, since waiting requests need memory, too. Small ones have room of their own, so
+//! Each request is limited by its own size; this is the limit on all of them together. Data without room are refused
+//! with `overloaded` instead of waiting, since waiting requests need memory, too. Small ones have room of their own, so
 //! that a job can be read, canceled and submitted while others transfer large files.
 
 use std::{
@@ -24,13 +24,13 @@ use crate::{
     pace::{LONGEST_PAUSE, Pace},
 };
 
-/// The first bytes of each request are small.
+/// The number of first bytes of each request that count as small.
 const SMALL_RECEIVED: usize = 16 << 10;
-/// Answers of at most this size are small.
+/// The largest size of a small answer.
 const SMALL_SENT: usize = 64 << 10;
-/// The room for small requests, and that for small answers: some thousand at the same time.
+/// The room for small requests, and the room for small answers: for some thousand at the same time.
 const SMALL_BYTES: usize = 64 << 20;
-/// Limits are counted in units of this many bytes, since a semaphore has a limited number of permits.
+/// The unit of limits in bytes, since a semaphore has a limited number of permits.
 const UNIT: usize = 1 << 10;
 
 /// A limit on bytes over all requests.
@@ -46,12 +46,12 @@ struct Room {
     units: u32,
 }
 
-/// A part of a limit, given back when it is dropped.
+/// A part of a limit, returned when it is dropped.
 #[derive(Debug)]
 pub struct Share(OwnedSemaphorePermit);
 
 impl Share {
-    /// Gives back what is more than so many bytes.
+    /// Returns the part of the share beyond this many bytes.
     pub fn shrink_to(&mut self, bytes: usize) {
         let more = self.0.num_permits().saturating_sub(bytes.div_ceil(UNIT));
         drop(self.0.split(more));
@@ -59,7 +59,7 @@ impl Share {
 }
 
 impl Limit {
-    /// A limit of so many bytes, beside the room for small ones.
+    /// A limit of this many bytes, apart from the room for small ones.
     pub fn new(bytes: usize) -> Limit {
         Limit {
             large: Room::new(bytes),
@@ -67,12 +67,12 @@ impl Limit {
         }
     }
 
-    /// A share of so many bytes, if they are free. One that is larger than the limit takes all of it.
+    /// A share of this many bytes, if they are free. A share larger than the limit takes all of it.
     pub fn take(&self, bytes: usize) -> Result<Share, ApiError> {
         self.large.take(self.large.units(bytes))
     }
 
-    /// Waits for a share; for callers that hold no memory meanwhile.
+    /// Waits for a share; for callers that hold no memory while they wait.
     pub async fn wait_for(&self, bytes: usize) -> Result<Share, ApiError> {
         self.large.wait_for(self.large.units(bytes)).await
     }
@@ -107,7 +107,7 @@ impl Room {
         u32::try_from(bytes.div_ceil(UNIT)).map_or(self.units, |units| units.min(self.units))
     }
 
-    /// Enlarges a share to so many bytes.
+    /// Enlarges a share to this many bytes.
     fn enlarge(&self, share: &mut Option<Share>, bytes: usize) -> Result<(), ApiError> {
         let held = share.as_ref().map_or(0, |share| share.0.num_permits());
         let more = (self.units(bytes) as usize).saturating_sub(held);
@@ -123,7 +123,7 @@ impl Room {
     }
 }
 
-/// What was received of one request and is still in memory. The clones of one request count together.
+/// Counts the data of one request that were received and are still in memory. The clones of one request count together.
 #[derive(Clone, Debug)]
 pub struct Received {
     limit: Limit,
@@ -138,7 +138,7 @@ struct Counted {
 }
 
 impl Received {
-    /// Nothing yet.
+    /// Nothing received yet.
     pub fn new(limit: &Limit) -> Received {
         Received {
             limit: limit.clone(),
@@ -146,12 +146,12 @@ impl Received {
         }
     }
 
-    /// What it counts for.
+    /// The limit that the data count for.
     pub fn limit(&self) -> &Limit {
         &self.limit
     }
 
-    /// Counts some more bytes.
+    /// Counts more bytes.
     pub fn count(&self, bytes: usize) -> Result<(), ApiError> {
         let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
         counted.bytes = counted.bytes.saturating_add(bytes);
@@ -161,13 +161,13 @@ impl Received {
         self.limit.large.enlarge(&mut counted.large, large)
     }
 
-    /// Gives the share back, when nothing of the request is needed any more.
+    /// Returns the share, when nothing of the request is needed any more.
     pub fn release(&self) {
         *self.counted.lock().unwrap_or_else(PoisonError::into_inner) = Counted::default();
     }
 }
 
-/// Why reading a body ended. Over gRPC its source is the status, which is where tonic finds it.
+/// Why reading a body ended. Over gRPC its source is the status, where tonic finds it.
 #[derive(Debug)]
 pub struct BodyError {
     /// The error, for REST.
@@ -196,7 +196,7 @@ impl Error for BodyError {
     }
 }
 
-/// The error of this file that ended a body, or else the error itself.
+/// The error of this module that ended a body, or else the error itself.
 pub fn cause(mut error: axum::Error) -> Result<ApiError, axum::Error> {
     loop {
         // each layer around a body wraps its errors once more
@@ -213,8 +213,8 @@ pub fn cause(mut error: axum::Error) -> Result<ApiError, axum::Error> {
     }
 }
 
-/// The body of a request, which fails when it arrives too slowly, and whose bytes are counted as they arrive if they
-/// are kept in memory.
+/// The body of a request, which fails if it arrives too slowly; its bytes are counted as they arrive if they are kept
+/// in memory.
 pub fn arriving(body: Body, received: Option<Received>) -> Body {
     if body.is_end_stream() {
         return body;
@@ -238,7 +238,7 @@ struct Arriving {
 }
 
 impl Arriving {
-    /// Some more bytes have arrived.
+    /// Counts bytes that have arrived.
     fn check(&mut self, bytes: usize) -> Result<(), ApiError> {
         self.pace.advance(bytes);
         if self.pace.is_too_slow() {
@@ -278,17 +278,17 @@ impl HttpBody for Arriving {
     }
 }
 
-/// The bytes of content in a frame.
+/// The number of content bytes in a frame.
 fn length(frame: Option<&Result<Frame<Bytes>, axum::Error>>) -> usize {
     let data = frame.and_then(|frame| frame.as_ref().ok()?.data_ref());
     data.map_or(0, Bytes::len)
 }
 
-/// In the extensions of a response: its body has its share already.
+/// A mark in the extensions of a response whose body has its share already.
 #[derive(Clone, Copy, Debug)]
 pub struct HasShare;
 
-/// Bytes with the share that was taken before they were made.
+/// Bytes with a share that was taken before they were made.
 pub fn with_own_share(bytes: Vec<u8>, mut share: Share) -> Bytes {
     share.shrink_to(bytes.len());
     Bytes::from_owner(Owner {
@@ -297,18 +297,18 @@ pub fn with_own_share(bytes: Vec<u8>, mut share: Share) -> Bytes {
     })
 }
 
-/// What happens to an answer for which there is no room.
+/// The treatment of an answer for which there is no room.
 #[derive(Clone, Copy, Debug)]
 pub enum NoRoom {
-    /// It is refused: the client may ask again.
+    /// The answer is refused: the client may ask again.
     Refuse,
-    /// It waits: what it answers was done, and should not be done again.
+    /// The answer waits: its request was carried out and should not be repeated.
     Wait,
 }
 
-/// The body of an answer whose bytes have their share of the limit until they are sent. Of a stream, that is what is
-/// ready at once, such as the whole of an answer over gRPC, which does not tell its length; what produces large streams
-/// takes shares for their pieces.
+/// The body of an answer whose bytes have their share of the limit until they are sent. For a stream these are the
+/// bytes that are ready at once, such as a whole gRPC answer, whose length is unknown; producers of large streams take
+/// shares for their pieces themselves.
 pub async fn with_share(mut body: Body, limit: &Limit, no_room: NoRoom) -> Result<Body, ApiError> {
     let exact = body.size_hint().exact();
     let mut first = None;
@@ -337,13 +337,13 @@ pub async fn with_share(mut body: Body, limit: &Limit, no_room: NoRoom) -> Resul
 }
 
 struct Shared {
-    /// What a stream had ready; the share is for this alone.
+    /// The first piece that a stream had ready; the share is for this alone.
     first: Option<Result<Frame<Bytes>, axum::Error>>,
     body: Body,
     share: Option<Arc<Share>>,
 }
 
-/// Bytes with their share of a limit, which they keep as long as any part of them is in memory.
+/// Bytes with their share of a limit, which is held as long as any part of them is in memory.
 struct Owner {
     bytes: Bytes,
     _share: Arc<Share>,
@@ -417,7 +417,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_larger_than_the_budget_takes_all_of_it() {
+    fn a_request_larger_than_the_budget_takes_all_of_it() {
         let limit = Limit::new(10 << 10);
         let share = limit.take(usize::MAX).unwrap();
         assert!(limit.take(1).is_err());
@@ -426,7 +426,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_more_than_needed_is_given_back_at_once() {
+    fn a_share_that_is_more_than_needed_is_returned_at_once() {
         let limit = Limit::new(10 << 10);
         let mut share = limit.take(8 << 10).unwrap();
         share.shrink_to(20 << 10);
@@ -461,7 +461,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn what_a_stream_has_ready_is_counted_and_small_answers_have_room_of_their_own() {
+    async fn ready_bytes_of_a_stream_are_counted_and_small_answers_have_room_of_their_own() {
         let limit = Limit::new(200 << 10);
         let ready = || {
             let frame = Ok::<_, axum::Error>(Bytes::from(vec![7; 150 << 10]));

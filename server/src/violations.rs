@@ -1,8 +1,8 @@
-//! Violations of a request: their places in it, and how it is quoted in them.
+//! Violations of a request: prefixes of their places, and quoting.
 
 use solver::error::Violation;
 
-/// The place of the problem in a request; pointers start there.
+/// The place of the problem in a request, where pointers start.
 pub const PROBLEM: &str = "/problem";
 
 /// Violations with pointers that start at `prefix`, the place of their subject in the request.
@@ -16,8 +16,8 @@ pub fn prefixed(prefix: &str, violations: Vec<Violation>) -> Vec<Violation> {
         .collect()
 }
 
-/// A name from a request as messages quote it: a long one by its beginning and its length, since it may be as long
-/// as the request.
+/// A name from a request as quoted in messages: a long one by its beginning and its length, since it may be as long as
+/// the request.
 pub fn quoted(text: &str) -> String {
     files::quoted(text)
 }

@@ -13,7 +13,7 @@ use crate::elasticity::{
 };
 use crate::error::SolveError;
 use crate::linear::{
-    Breaks, Cells, Dense, Dissection, ElementMatrix, Factor, FactorError, Fronts, Stopped,
+    Cells, Dense, Dissection, ElementMatrix, Factor, FactorError, Fronts, Interrupt, Stopped,
 };
 use crate::mesh::Mesh;
 use crate::model::{Alone, Held, Level, Model};
@@ -21,32 +21,33 @@ use crate::solution::{Observer, Phase, Progress};
 
 /// A body, assembled, supported and condensed onto its contact boundaries.
 pub struct ElasticBody {
-    /// Ŝ, on the contact unknowns in the order of `contact_dofs`.
+    /// The condensed stiffness Ŝ, on the contact unknowns in the order of `contact_dofs`.
     pub stiffness: Dense,
-    /// f̂ of the loads.
+    /// The condensed load f̂ of the loads.
     load_of_loads: Vec<f64>,
-    /// f̂ of the prescribed displacements.
+    /// The condensed load f̂ of the prescribed displacements.
     load_of_supports: Vec<f64>,
-    /// Normal and tangential displacement of every contact node, all contacts in a row; free ones
-    /// count from 0 in Ŝ. Where the node's axes are oblique: u_n and its other component; at a common end of two contacts
-    /// that is of one alone, those of that one.
+    /// The normal and tangential displacement of every contact node, all contacts in a row; free ones are numbered from
+    /// 0 as in Ŝ. Where the node's axes are oblique: u_n and its other component. At a common end of two contacts that
+    /// belongs to one alone: the displacements along the axes of that one.
     pub contact_dofs: Vec<[Dof; 2]>,
-    /// Where the axes of a contact node are oblique: the coefficients of these two in u_t.
+    /// Where the axes of a contact node are oblique: the coefficients of its two displacements in u_t.
     pub tangents: Vec<Option<[f64; 2]>>,
     /// External forces at every node along x and y, without those of contact.
     pub nodal_loads: Vec<[f64; 2]>,
-    /// Which displacements are unknown.
+    /// Which displacements are unknown, with their numbers.
     pub map: DofMap,
-    /// L⁻¹ f of the unknowns away from contact, f the forces of the loads, and of the prescribed displacements.
+    /// L⁻¹ f of the unknowns away from contact: for the forces f of the loads, and for those of the prescribed
+    /// displacements.
     reduced: [Vec<f64>; 2],
     factor: Factor,
-    /// Normal unknowns of contact nodes on the axis, each with that of the midside node beside it.
+    /// The normal unknowns of contact nodes on the axis, each with the unknown of the midside node beside it.
     axis_ends: Vec<[usize; 2]>,
-    /// Of the elements of its models.
+    /// Tables of the elements of the models that have this body.
     tables: ElementTables,
 }
 
-/// What a body is made from: models that are equal in this have one body. The rest of a model that
+/// The part of a model that determines its body: models that are equal in this have the same body. Anything else that
 /// [`ElasticBody::new`] reads follows from it.
 #[derive(PartialEq, Serialize)]
 pub struct Source<'a> {
@@ -62,7 +63,7 @@ pub struct Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    /// That of a model.
+    /// The part of this model that determines its body.
     pub fn of(model: &'a Model) -> Self {
         let boundaries = model.contacts.iter().map(|contact| &contact.boundary);
         Source {
@@ -80,9 +81,10 @@ impl<'a> Source<'a> {
     }
 }
 
-/// The unknown of the midside node beside a contact's end on the axis is u_n − a u_n⁰, with u_n⁰ of that end, which has
-/// no area of its own: ∫ h₀ r dr = 0. With a = 1/8 the end's unknown moves h₀ + h₁/8, of which the area is that of h₁
-/// over 8, and the pressure there, its reaction over that area, is exact for p = p₀ + β r² (formulation 3.5).
+/// The unknown of the midside node beside a contact's end on the axis is u_n − a u_n⁰, with u_n⁰ the displacement of
+/// that end, which has no area of its own: ∫ h₀ r dr = 0. With a = 1/8 the end's unknown moves h₀ + h₁/8, of which the
+/// area is that of h₁ over 8, and the pressure there, its reaction over that area, is exact for p = p₀ + β r²
+/// (formulation 3.5).
 pub const AXIS_SHARE: f64 = 0.125;
 
 impl ElasticBody {
@@ -126,7 +128,7 @@ impl ElasticBody {
             fronts,
             &|e, matrix: &mut ElementMatrix| element_stiffness.put(e, matrix),
             threads,
-            &mut Breaks::new(&mut || observe(Progress::Pulse)),
+            &mut Interrupt::new(&mut || observe(Progress::Pulse)),
         );
         let (factor, mut stiffness) = factored.map_err(|error| solve_error(error, &map))?;
 
@@ -193,12 +195,12 @@ impl ElasticBody {
         })
     }
 
-    /// The elements of a model that this is the body of.
+    /// The elements of a model that has this body.
     pub fn elements<'a>(&'a self, model: &'a Model) -> Elements<'a> {
         self.tables.elements(&model.mesh, &model.section)
     }
 
-    /// The forces on contact nodes along n and t, from those on the contact unknowns.
+    /// Converts forces on the contact unknowns to forces on contact nodes along n and t.
     pub fn nodal_forces(&self, contact_force: &[f64]) -> Vec<f64> {
         let mut forces = contact_force.to_vec();
         for &[end, beside] in &self.axis_ends {
@@ -207,7 +209,7 @@ impl ElasticBody {
         forces
     }
 
-    /// The displacements of contact nodes along n and t, from the contact unknowns.
+    /// Converts contact unknowns to displacements of contact nodes along n and t.
     pub fn nodal_displacements(&self, contact_displacement: &[f64]) -> Vec<f64> {
         let mut displacements = contact_displacement.to_vec();
         for &[end, beside] in &self.axis_ends {
@@ -216,12 +218,12 @@ impl ElasticBody {
         displacements
     }
 
-    /// Whether the body of one model is the body of another: all that [`ElasticBody::new`] reads is equal.
+    /// Whether two models have the same body: all that [`ElasticBody::new`] reads is equal.
     pub fn same(a: &Model, b: &Model) -> bool {
         Source::of(a) == Source::of(b)
     }
 
-    /// f̂ at a load level.
+    /// The condensed load f̂ at a load level.
     pub fn load(&self, level: &Level) -> Vec<f64> {
         let parts = self.load_of_loads.iter().zip(&self.load_of_supports);
         parts
@@ -229,13 +231,14 @@ impl ElasticBody {
             .collect()
     }
 
-    /// Entries of the factor and of the lower triangle of Ŝ: what is kept of the stiffness.
+    /// The number of entries of the factor and of the lower triangle of Ŝ: the stored part of the stiffness.
     pub fn factor_entries(&self) -> usize {
         let kept = self.stiffness.size();
         self.factor.entries() + kept * (kept + 1) / 2
     }
 
-    /// How many threads may work on the fields of this body: a second one is asked for if that is worth it.
+    /// How many threads may work on the fields of this body: the observer is asked for a second one if that is worth
+    /// it.
     pub fn threads(&self, observe: &mut Observer<'_>) -> usize {
         match self.factor.has_large_fields() && observe(Progress::SecondThread).is_continue() {
             true => 2,
@@ -248,7 +251,7 @@ impl ElasticBody {
         self.displacements_on(1, contact_displacement, level)
     }
 
-    /// The same on so many threads.
+    /// As [`ElasticBody::displacements`], on `threads` threads.
     pub fn displacements_on(
         &self,
         threads: usize,
@@ -264,8 +267,8 @@ impl ElasticBody {
         self.map.displacements(|i| u[i][0], level.supports)
     }
 
-    /// Displacements along x and y of every node under the given displacements of the contact unknowns alone, of
-    /// so many such fields at most; on so many threads.
+    /// Displacements along x and y of every node under the given displacements of the contact unknowns alone, for at
+    /// most `FIELDS` such fields, on `threads` threads.
     pub fn displacements_without_loads<const FIELDS: usize>(
         &self,
         contact_displacements: &[Vec<f64>],
@@ -287,8 +290,8 @@ fn all_finite(values: &[f64]) -> bool {
     values.iter().all(|value| value.is_finite())
 }
 
-/// Normal unknowns of contact nodes on the axis, each with that of the midside node beside it, if both are free; none of
-/// those that stay open.
+/// The normal unknowns of contact nodes on the axis, each with that of the midside node beside it, if both are free;
+/// without the nodes that stay open.
 fn axis_ends(model: &Model, contact_dofs: &[[Dof; 2]]) -> Vec<[usize; 2]> {
     let (mut first, mut ends) = (0, Vec::new());
     for contact in &model.contacts {
@@ -399,7 +402,7 @@ fn number(model: &Model, elements: Elements<'_>) -> Result<(DofMap, Fronts), Sol
     Ok((map, fronts))
 }
 
-/// Nodal forces along x and y as forces on the unknowns.
+/// Converts nodal forces along x and y to forces on the unknowns.
 fn on_unknowns(map: &DofMap, forces: &[[f64; 2]]) -> Vec<f64> {
     let mut on_unknowns = vec![0.0; map.unknowns];
     for (node, force) in forces.iter().enumerate() {

@@ -15,37 +15,37 @@ use crate::solution::{
 use crate::steps::{self, Numbers, Shared};
 pub use crate::steps::{End, Start};
 
-/// Problems on one body, solved one after the other, each from the end of another one where that helps.
+/// Problems on one body, solved one after another; each starts from the end of another one where that helps.
 pub struct Family {
     model: VariableModel,
     body: Arc<ElasticBody>,
-    /// What was said of the mesh when it was made; problems on it repeat it.
+    /// Warnings about the mesh, repeated for each problem on it.
     mesh_warnings: Vec<Warning>,
     shared: Shared,
 }
 
-/// The numbers of one member.
+/// The numerical results of one problem of a family.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Member {
     /// How it ended.
     pub outcome: Outcome,
-    /// ∫p ≥ 0 over all contacts (force).
+    /// The normal force ∫p ≥ 0 over all contacts (force).
     pub normal_force: f64,
-    /// ∫σ_t over all contacts (force).
+    /// The tangential force ∫σ_t over all contacts (force).
     pub tangential_force: f64,
-    /// ∫|σ_t| over all contacts (force).
+    /// The friction force ∫|σ_t| over all contacts (force).
     pub friction_force: f64,
     /// Length of all contacts together, along the boundaries.
     pub contact_width: f64,
-    /// The part of it with |u_t − d| < ε.
+    /// The length of contact that sticks, |u_t − d| < ε.
     pub stick_width: f64,
-    /// The rest of it.
+    /// The length of contact that slips.
     pub slip_width: f64,
     /// The largest pressure of all contacts, as a stress (≤ 0); 0 without contact.
     pub peak_normal_stress: f64,
     /// The largest |σ_t| of all contacts, with its sign; 0 without friction.
     pub peak_tangential_stress: f64,
-    /// Rows of the history.
+    /// The number of rows of the history.
     pub iterations: u32,
     /// Dimensionless residuals of the final state.
     pub residuals: Residuals,
@@ -61,7 +61,7 @@ impl Family {
     ///
     /// # Errors
     ///
-    /// As for [`prepare`].
+    /// The errors of [`prepare`].
     pub fn new(
         problem: &Problem,
         external: Option<External>,
@@ -70,7 +70,7 @@ impl Family {
         Ok(Family::of(prepare(problem, external, observe)?, problem))
     }
 
-    /// The problems on the body of one that is prepared.
+    /// The family of problems on the body of a prepared problem.
     pub fn of(prepared: Prepared, problem: &Problem) -> Family {
         let Prepared { model, body } = prepared;
         let of_mesh = |warning: &&Warning| warning.pointer.starts_with("/mesh");
@@ -83,8 +83,8 @@ impl Family {
         }
     }
 
-    /// Solves a problem on this body (`problem.mesh` is not read: it is the family's), and returns its end, too, from
-    /// which others may begin.
+    /// Solves a problem on this body (`problem.mesh` is not read: it is the family's), and also returns its end, from
+    /// which other problems may start.
     ///
     /// The numbers are those of the problem's own solution within its tolerance. Their last bits depend on `start`, and
     /// on nothing else that was solved before.
@@ -131,13 +131,13 @@ impl Family {
         Ok((Member::of_numbers(&numbers), end))
     }
 
-    /// Solves a problem on this body with all its displacements, whose balance of forces tells whether the body is
-    /// sound: this is for the first of the problems that share it. The numbers are those of the problem's own solution,
-    /// bit for bit.
+    /// Solves a problem on this body with all its displacements, whose balance of forces shows whether the body is
+    /// sound. Use it for the first of the problems that share the body. The numbers are those of the problem's own
+    /// solution, bit for bit.
     ///
     /// # Errors
     ///
-    /// As for [`Family::member`].
+    /// The errors of [`Family::member`].
     pub fn whole_member(
         &self,
         problem: &Problem,
@@ -158,7 +158,7 @@ impl Family {
     ///
     /// # Errors
     ///
-    /// As for [`Family::member`].
+    /// The errors of [`Family::member`].
     pub fn solution(
         &self,
         problem: &Problem,
@@ -195,7 +195,7 @@ impl Family {
 }
 
 impl Member {
-    /// The numbers of a whole solution, by its summary.
+    /// The results of a whole solution, from its summary.
     pub fn of(summary: &Summary) -> Member {
         Member {
             outcome: summary.outcome,
@@ -318,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_a_member_is_told_and_another_body_is_not_solved() {
+    fn an_invalid_member_is_reported_and_another_body_is_refused() {
         let go_on = &mut |_: Progress<'_>| ControlFlow::Continue(());
         let mut family = Family::new(&problem(0.3, 0.05), None, go_on).unwrap();
         let invalid = family.member(&problem(-1.0, 0.05), Start::Anew, go_on);
@@ -331,7 +331,7 @@ mod tests {
         assert_eq!(refused.err(), Some(SolveError::OtherBody));
     }
 
-    /// A quarter of a cylinder's contact, with the numbers of the sweep of 1,000 members that is measured.
+    /// A quarter of a cylinder in contact, with the numbers of the measured sweep of 1,000 members.
     fn pressed(radius: f64, coefficient: f64, slip: f64, indentation: f64) -> Problem {
         let x: Vec<f64> = (0..=20)
             .map(|i| 0.08 * f64::from(i))
@@ -348,8 +348,9 @@ mod tests {
         .unwrap()
     }
 
-    /// Its own solution is one from a fresh start on the same body, which is that of `solve` bit for bit. Widths are
-    /// compared as parts of the contact's, since a narrow part is known as well as a wide one.
+    /// Every member of a sweep has the numbers of its own solution: a fresh start on the same body, which equals
+    /// `solve` bit for bit. Widths are compared as parts of the contact's width, since a narrow part is as accurate as
+    /// a wide one.
     #[test]
     fn every_member_of_a_sweep_has_the_numbers_of_its_own_solution() {
         let go_on = &mut |_: Progress<'_>| ControlFlow::Continue(());
@@ -425,7 +426,8 @@ mod tests {
         assert!(steps < 12_000 && sweeps > 4_000, "{steps} {sweeps}");
     }
 
-    /// Whatever was solved before on the body, with other radii, deeper, or without friction.
+    /// The bits of a member depend on its start only, whatever was solved before on the body: with other radii, deeper,
+    /// or without friction.
     #[test]
     fn the_bits_of_a_member_depend_on_where_it_begins_and_on_nothing_else() {
         let go_on = &mut |_: Progress<'_>| ControlFlow::Continue(());

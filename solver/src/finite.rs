@@ -13,7 +13,7 @@ pub fn is_finite<T: Serialize + ?Sized>(value: &T) -> bool {
     value.serialize(&mut walk).is_ok()
 }
 
-/// JSON Pointers to the numbers of a value that are not finite, the first `most` of them; and how many more there are.
+/// JSON Pointers to the numbers of a value that are not finite, at most `most` of them, and the number of those beyond.
 pub fn not_finite<T: Serialize + ?Sized>(value: &T, most: usize) -> (Vec<String>, usize) {
     let mut walk = Walk::new(Limit::List(most));
     // nothing here fails: only the other limit ends a walk with an error
@@ -21,23 +21,23 @@ pub fn not_finite<T: Serialize + ?Sized>(value: &T, most: usize) -> (Vec<String>
     (walk.found, walk.more)
 }
 
-/// How far a walk goes.
+/// When a search ends.
 enum Limit {
-    /// To the first number that is not finite; that ends it with an error.
+    /// At the first number that is not finite, by an error.
     StopAtFirst,
-    /// Through the whole value, with a list of the first so many.
+    /// After the whole value, listing this many numbers at most.
     List(usize),
 }
 
 /// A serializer that writes nothing and checks every number.
 struct Walk {
-    /// The way from the whole value to the current one.
+    /// The path from the whole value to the current part.
     path: Vec<Step>,
     found: Vec<String>,
-    /// Numbers beyond those of the list.
+    /// The number of non-finite numbers beyond those listed.
     more: usize,
     limit: Limit,
-    /// The next string is the key of an entry.
+    /// Whether the next string is the key of an entry.
     in_key: bool,
 }
 
@@ -78,7 +78,7 @@ impl Walk {
         Ok(())
     }
 
-    /// A part of the value, one step further.
+    /// Serializes a part of the value, one step further down.
     fn part<T: Serialize + ?Sized>(&mut self, step: Step, part: &T) -> fmt::Result {
         self.path.push(step);
         part.serialize(&mut *self)?;
@@ -87,10 +87,10 @@ impl Walk {
     }
 }
 
-/// The parts of a list, one after the other.
+/// A list that is being serialized, element by element.
 struct List<'a> {
     walk: &'a mut Walk,
-    /// The list is the data of an enum variant, below its name.
+    /// Whether the list is the data of an enum variant, below its name.
     named: bool,
 }
 
@@ -119,7 +119,7 @@ impl<'a> List<'a> {
     }
 }
 
-/// Values that are not numbers need no check.
+/// Serializer methods for values that are not numbers and need no check.
 macro_rules! passed {
     ($($method:ident: $type:ty),*) => { $(
         fn $method(self, _: $type) -> fmt::Result {
@@ -236,7 +236,7 @@ impl<'a> Serializer for &'a mut Walk {
     }
 }
 
-/// The fields of a variant, below its name.
+/// The fields of a variant that is being serialized, below its name.
 struct Variant<'a>(&'a mut Walk);
 
 macro_rules! lists {

@@ -1,11 +1,11 @@
-//! Frictional contact in linear elasticity by finite elements, with the nonlocal, nonlinear law of
-//! Oden and Pires (A.C. Bolt, MSc thesis, University of Cape Town, 1983). Comments cite the thesis by its
-//! numbers, and docs/formulation.md as "formulation 4.3".
+//! Frictional contact in linear elasticity by finite elements, with the nonlocal, nonlinear law of Oden and Pires (A.C.
+//! Bolt, MSc thesis, University of Cape Town, 1983). Comments cite the thesis by its numbers, and docs/formulation.md
+//! as "formulation 4.3".
 //!
 //! A library of pure functions: no clock, file or network; the same problem gives the same bits. A large body is
-//! factored on two threads if the observer lets it ([`solution::Progress::SecondThread`]), with the same bits as on one.
-//! Reading and writing of any format is left to the crate `files`. The modules are
-//! listed from the ground up; each uses only those above it.
+//! factored on two threads if the observer lets it ([`solution::Progress::SecondThread`]), with the same bits as on
+//! one. Reading and writing of any format is left to the crate `files`. The modules are listed from the ground up; each
+//! uses only those above it.
 //!
 //! ```
 //! use std::ops::ControlFlow;
@@ -33,8 +33,8 @@
 //!
 //! # Where to look
 //!
-//! The map by sections of the thesis, and of what goes beyond it. A room with many files has a map of its own in its `mod.rs`;
-//! docs/theory.md leads from each equation to its function.
+//! The map by sections of the thesis, and of what goes beyond it. A room with many files has a map of its own in its
+//! `mod.rs`; docs/theory.md leads from each equation to its function.
 //!
 //! | subject | where |
 //! |---|---|
@@ -49,7 +49,7 @@
 //! | 3.1 the iteration exactly as printed, with 3.3, 3.4.1 and 3.4.2 | `algorithm/thesis` |
 //! | the iterations that replace it (formulation 4) | `algorithm` |
 //! | 3.3 normals and tangents | `contact` |
-//! | 3.5 the criterion R_F and the history of an iteration | `algorithm/track.rs` |
+//! | 3.5 the criterion R_F and the history of an iteration | `algorithm/recorder.rs` |
 //! | 4 the examples | `examples` |
 //! | the examples on meshes of the thesis's size | `tests/data/thesis`, `tests/verification/examples.rs` |
 //! | 5 a law that depends on the load path | `friction`, `steps.rs` |
@@ -58,10 +58,10 @@
 //! | summary, profiles and fields of a result: their fields | `solution` |
 //! | summary, profiles and fields of a result: how they are computed | `algorithm/report.rs`, `algorithm/profile` |
 //! | stated errors by estimation, and the verdict | `accuracy` |
-//! | errors by a second solution on the mesh split in two | `verify.rs` |
+//! | errors by a second solution on the refined mesh | `verify.rs` |
 //! | adaptive refinement | `adapt`, `origins.rs` |
 //! | names of the first mesh on a refined one | `mesh/lineage.rs`, `mesh/first.rs`, `model/nodes.rs` |
-//! | many problems on one body, each solved from a neighbour | `family.rs`, `model/variable.rs`, `algorithm/settle.rs` |
+//! | many problems on one body, each solved from a neighbour | `family.rs`, `model/variable.rs`, `algorithm/neighbour.rs` |
 //! | memory and time that a problem needs | `model/estimate.rs` |
 
 // The phases of a solution.
@@ -125,7 +125,7 @@ use problem::{Problem, Refine};
 use solution::{Observer, Phase, Progress, Solution, Warning};
 use verify::Verification;
 
-/// Solves a problem: the whole flow on one screen.
+/// Solves a problem.
 ///
 /// `observe` is called with every phase and iteration, and again and again in long work, and may stop the solution: the
 /// result is then the last state as `Outcome::Canceled`. A method that does not converge is an
@@ -146,7 +146,7 @@ pub fn solve(problem: &Problem, observe: &mut Observer<'_>) -> Result<Solution, 
 ///
 /// # Errors
 ///
-/// As for [`solve`]; violations of the external mesh are among those of the problem.
+/// The errors of [`solve`]; violations of the external mesh are among those of the problem.
 pub fn solve_on(
     problem: &Problem,
     external: Option<External>,
@@ -155,11 +155,11 @@ pub fn solve_on(
     solve_with_mesh(problem, external, observe).map(|(solution, _)| solution)
 }
 
-/// Solves a problem like [`solve_on`], and returns the mesh that the solution is on: the refined one.
+/// Solves a problem like [`solve_on`], and also returns the refined mesh, on which the solution is.
 ///
 /// # Errors
 ///
-/// As for [`solve`].
+/// The errors of [`solve`].
 pub fn solve_with_mesh(
     problem: &Problem,
     external: Option<External>,
@@ -189,12 +189,12 @@ pub fn solve_with_mesh(
     Ok((solution, mesh))
 }
 
-/// What is known of a valid problem without solving it.
+/// The result of checking a valid problem without solving it.
 #[derive(Clone, Debug)]
 pub struct Checked {
-    /// Its warnings.
+    /// The warnings about the problem.
     pub warnings: Vec<Warning>,
-    /// What it will take to solve it.
+    /// The estimated cost of solving it.
     pub estimate: Estimate,
 }
 
@@ -223,7 +223,7 @@ mod tests {
     use super::*;
     use solution::Outcome;
 
-    /// A strip one element wide that touches with its long side: most of the work is dense.
+    /// The problem of a strip one element wide whose long side is in contact: most of the work is dense.
     fn wall(lines: u32, algorithm: &str) -> Problem {
         let y: Vec<u32> = (0..lines).collect();
         let problem = serde_json::json!({
@@ -242,7 +242,8 @@ mod tests {
         serde_json::from_value(problem).unwrap()
     }
 
-    /// Wherever it is told to stop, it does so: it begins nothing large, and asks only a few times more.
+    /// A solution stops at any call of the observer: after that it starts nothing large, and calls only a few times
+    /// more.
     #[test]
     fn a_solution_stops_at_any_question() {
         for algorithm in ["auto", "fixed_point", "newton", "thesis"] {
@@ -292,7 +293,7 @@ mod tests {
         }
     }
 
-    /// What it announces before it takes it: the factor with Ŝ, then the matrices of the iterations.
+    /// Large matrices are announced before they are allocated: the factor with Ŝ, then the matrices of the iterations.
     #[test]
     fn large_matrices_are_announced() {
         let mut needs = Vec::new();

@@ -1,36 +1,36 @@
-//! Where the errors of quantities come from: the elements that adaptive refinement divides.
+//! The elements where the errors of quantities come from, which adaptive refinement divides.
 
 use std::collections::BTreeSet;
 
 use crate::model::Model;
 
-/// A quantity with an error above this many times the tolerance counts no more than one with so much.
+/// A quantity with an error above this many times the tolerance counts as one with exactly this error.
 const MOST_EXCESS: f64 = 100.0;
 
-/// The part of every element in the errors above a tolerance.
+/// The contribution of every element to the errors above a tolerance.
 pub struct Origins {
-    /// Largest relative error that nothing has to be done about.
+    /// The largest relative error that needs no refinement.
     tolerance: f64,
-    /// The parts: of each quantity they add up to its relative error in tolerances. All 0 if no error is above the
-    /// tolerance, or none is known.
+    /// The contribution of each element: for each quantity they add up to its relative error divided by the tolerance.
+    /// All 0 if no error is above the tolerance, or none is known.
     pub elements: Vec<f64>,
-    /// Elements at which nothing is known before there are more nodes.
+    /// Elements where errors are unknown until there are more nodes.
     pub unresolved: BTreeSet<usize>,
     /// The element at every edge of each contact.
     at_edge: Vec<Vec<u32>>,
 }
 
-/// What each element, and each edge of a contact, adds to the error of a quantity, in one unit.
+/// The contribution of each element, and of each edge of a contact, to the error of a quantity, in one unit.
 #[derive(Default)]
 pub struct Added {
-    /// By element; empty if nothing is known by element.
+    /// The contribution by element; empty if it is not known by element.
     pub elements: Vec<f64>,
-    /// By edge of the contact.
+    /// The contribution by edge of the contact.
     pub edges: Vec<(usize, f64)>,
 }
 
 impl Added {
-    /// A `total` that comes from several edges in proportion to their `parts`.
+    /// Adds a `total` that comes from several edges in proportion to their `parts`.
     pub fn spread(&mut self, total: f64, parts: &[(usize, f64)]) {
         let sum: f64 = parts.iter().map(|(_, part)| part).sum();
         if sum > 0.0 {
@@ -41,7 +41,7 @@ impl Added {
 }
 
 impl Origins {
-    /// Nothing known yet of a model.
+    /// Starts without any contribution for a model.
     pub fn new(model: &Model, tolerance: f64) -> Self {
         let mut with_side = vec![0; model.mesh.nodes.len()];
         for (element, e) in model.mesh.elements.iter().zip(0..) {
@@ -62,13 +62,14 @@ impl Origins {
         }
     }
 
-    /// Forgets what was added.
+    /// Removes all contributions.
     pub fn forget(&mut self) {
         self.elements.fill(0.0);
         self.unresolved.clear();
     }
 
-    /// Adds a place of a contact at which the obstacle between the nodes is not resolved: no error is known before there are nodes.
+    /// Adds a place of a contact where the obstacle between the nodes is not resolved: errors are unknown until there
+    /// are nodes.
     pub fn add_place(&mut self, model: &Model, patch: usize, s: f64) {
         let boundary = &model.contacts[patch].boundary;
         let covers = |edge: &usize| boundary.edge_arc(*edge)[1] >= s;
@@ -77,7 +78,7 @@ impl Origins {
         self.unresolved.insert(self.at_edge[patch][edge] as usize);
     }
 
-    /// Adds what is known of a quantity of a contact with this relative error.
+    /// Adds the contributions to the error of a quantity of a contact that has this relative error.
     pub fn add(&mut self, patch: usize, relative: f64, added: &Added) {
         let edges = added.edges.iter().map(|(_, part)| part);
         let total: f64 = added.elements.iter().chain(edges).sum();

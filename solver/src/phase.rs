@@ -1,4 +1,4 @@
-//! The phases of a solution, which `error` and `solution` both use.
+//! The phases of a solution, in a module that `error` and `solution` both use.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -26,19 +26,19 @@ pub enum Phase {
     Parse,
     /// Meshing and checking.
     Mesh,
-    /// Loads on the nodes.
+    /// Computing the loads on the nodes.
     Assemble,
-    /// The order of elimination, and the structure of the factor.
+    /// Computing the order of elimination and the structure of the factor.
     Order,
-    /// Stiffnesses of the elements, and the factor.
+    /// Computing element stiffnesses and the factor.
     Factor,
-    /// Load reduced to the contact boundary.
+    /// Reducing the load to the contact boundary.
     Condense,
-    /// Contact and friction.
+    /// Iterating contact and friction.
     Iterate,
-    /// Back-substitution, stresses, profiles.
+    /// Back-substitution; computing stresses and profiles.
     Recover,
-    /// Solving once more on the mesh split in two, with `"accuracy": "verify"` only.
+    /// Solving once more on the refined mesh, with `"accuracy": "verify"` only.
     Verify,
 }
 

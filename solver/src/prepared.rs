@@ -1,4 +1,4 @@
-//! A problem up to its iterations.
+//! A problem that is ready for its iterations.
 
 use std::sync::Arc;
 
@@ -10,11 +10,11 @@ use crate::problem::Problem;
 use crate::solution::{Observer, Phase, Progress, Solution};
 use crate::steps;
 
-/// A problem up to its iterations: checked, and its body factored and condensed onto its contacts.
+/// A problem that is ready for its iterations: checked, and its body factored and condensed onto its contacts.
 ///
 /// This is most of the work, and problems that differ only in friction, indentation, drag, load steps or tolerances
-/// share it. (An obstacle of another shape may face other nodes, or turn their normals.) Errors are estimated here, whatever
-/// `solver.accuracy` is: [`solve`](crate::solve) verifies them.
+/// share it. (An obstacle of another shape may face other nodes, or turn their normals.) Errors are always estimated
+/// here, whatever `solver.accuracy` is; [`solve`](crate::solve) verifies them.
 #[derive(Clone)]
 pub struct Prepared {
     /// The checked problem.
@@ -24,7 +24,7 @@ pub struct Prepared {
 }
 
 /// Checks a problem on its own mesh, and factors and condenses its body; `external` is the mesh that it only names or
-/// quotes.
+/// contains as text.
 ///
 /// # Errors
 ///
@@ -59,7 +59,7 @@ pub fn checked(
 ///
 /// # Errors
 ///
-/// As for [`prepare`].
+/// The errors of [`prepare`].
 pub fn prepare_on_mesh(
     problem: &Problem,
     mesh: Mesh,
@@ -102,7 +102,7 @@ impl Prepared {
     ///
     /// # Errors
     ///
-    /// As for [`Prepared::solve`].
+    /// The errors of [`Prepared::solve`].
     pub fn solve_other(
         &self,
         model: &Model,

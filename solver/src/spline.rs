@@ -1,13 +1,13 @@
-//! Curves through points, and near points that were measured.
+//! Curves through points, and smooth curves near measured points.
 
 /// A cubic spline: slope and curvature have no jumps. Its ends are not-a-knot, so that it reproduces every cubic. With
 /// natural ends its curvature would be 0 there, and so would the pressure of a contact that begins at the first point,
-/// as every half model does.
+/// as in every half model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spline {
     x: Vec<f64>,
     y: Vec<f64>,
-    /// Slope at every point.
+    /// The slope at every point.
     slope: Vec<f64>,
     /// Slopes up to this are rounding: a symmetric curve is flat in its middle.
     flat: f64,
@@ -17,7 +17,7 @@ pub struct Spline {
 const FLAT: f64 = 1e-12;
 
 impl Spline {
-    /// Through at least two points with strictly increasing x: a line through two, a parabola through three.
+    /// The spline through at least two points with strictly increasing x: a line through two, a parabola through three.
     pub fn new(x: Vec<f64>, y: Vec<f64>) -> Self {
         let steps: Vec<f64> = x.windows(2).map(|x| x[1] - x[0]).collect();
         let chords: Vec<f64> = y
@@ -49,7 +49,7 @@ impl Spline {
         self.on_piece(self.piece(at), at)
     }
 
-    /// Number of pieces between points.
+    /// The number of pieces between points.
     pub fn pieces(&self) -> usize {
         self.x.len() - 1
     }
@@ -63,7 +63,7 @@ impl Spline {
         (self.x.partition_point(|x| *x <= at).max(1) - 1).min(self.pieces() - 1)
     }
 
-    /// Value and slope of the cubic of one piece, by Hermite's formula.
+    /// Value and slope of one piece's cubic, by Hermite's formula.
     pub fn on_piece(&self, k: usize, at: f64) -> [f64; 2] {
         let step = self.x[k + 1] - self.x[k];
         let part = (at - self.x[k]) / step;
@@ -79,8 +79,8 @@ impl Spline {
     }
 }
 
-/// Slopes at the points of the spline whose first two pieces are one cubic, and whose last two, by Gaussian elimination
-/// of its tridiagonal equations; every pivot is positive.
+/// The slopes at the points of a not-a-knot spline (its first two pieces are one cubic, and so are its last two), by
+/// Gaussian elimination of tridiagonal equations; every pivot is positive.
 fn not_a_knot(steps: &[f64], chords: &[f64]) -> Vec<f64> {
     let last = steps.len();
     // the equation of an end by its step, the next one and their chords: [own, neighbour, right-hand side]
@@ -113,10 +113,11 @@ fn not_a_knot(steps: &[f64], chords: &[f64]) -> Vec<f64> {
     slope
 }
 
-/// Values near `y` at the same places: among all with Σ((y − f)/deviation)² ≤ number of points, those with the least
-/// ∫f‴² (Reinsch's criterion, with the third derivative and by differences). The pressure follows the curvature of a
-/// profile: the usual penalty on the curvature itself would flatten it, most at the ends, while a parabola costs
-/// nothing here and is found exactly under the noise. Where a parabola is near enough, it is the result.
+/// Smoothed values near `y` at the same places: of all with Σ((y − f)/deviation)² ≤ number of points, those with the
+/// smallest ∫f‴² (Reinsch's criterion, with the third derivative and by differences). The pressure follows the
+/// curvature of a profile: the usual penalty on the curvature itself would flatten it, most at the ends, while a
+/// parabola has no penalty here and is recovered exactly under noise. Where a parabola is within the deviation, it is
+/// the result.
 pub fn smoothed(x: &[f64], y: &[f64], deviation: f64) -> Vec<f64> {
     let count = x.len();
     let parabola = parabola(x, y);
@@ -146,13 +147,14 @@ pub fn smoothed(x: &[f64], y: &[f64], deviation: f64) -> Vec<f64> {
     parabola.iter().zip(f).map(|(p, f)| p + f).collect()
 }
 
-/// Bounds of log₂ √λ, in units of the mean spacing: far beyond what 100,000 points can tell from none and from all.
+/// The bounds of log₂ √λ, in units of the mean spacing: far beyond the values at which 100,000 points are not smoothed
+/// at all, or to a parabola.
 const SMOOTHEST: f64 = 120.0;
 
-/// Halvings of that interval: λ to 10⁻⁸.
+/// The number of halvings of that interval, which give λ to 10⁻⁸.
 const HALVINGS: u32 = 36;
 
-/// Values of the least-squares parabola, by polynomials that are orthogonal over the places.
+/// The values of the least-squares parabola, by polynomials that are orthogonal over the places.
 fn parabola(x: &[f64], y: &[f64]) -> Vec<f64> {
     let sum = |of: &dyn Fn(usize) -> f64| (0..x.len()).map(of).sum::<f64>();
     let count = x.len() as f64;
@@ -179,7 +181,7 @@ fn parabola(x: &[f64], y: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// The third derivative over each four points in a row, times the root of the length that it stands for.
+/// The third derivative over each four consecutive points, times the root of the length that it represents.
 fn third_differences(x: &[f64]) -> Vec<[f64; 4]> {
     let row = |x: &[f64]| {
         let root = ((x[3] - x[0]) / 3.0).sqrt();
@@ -192,7 +194,8 @@ fn third_differences(x: &[f64]) -> Vec<[f64; 4]> {
     x.windows(4).map(row).collect()
 }
 
-/// f with the least Σ(y − f)² + weight² Σ(row · f)², by rotations: the normal equations would lose twice as many digits.
+/// The f with the smallest Σ(y − f)² + weight² Σ(row · f)², by rotations: the normal equations would lose twice as many
+/// digits.
 fn penalized(rows: &[[f64; 4]], y: &[f64], weight: f64) -> Vec<f64> {
     let mut triangle = [[0.0; 5]; 4];
     let mut done: Vec<[f64; 5]> = Vec::with_capacity(y.len());
@@ -265,7 +268,8 @@ mod tests {
         assert!((parabola.at(3.0)[1] - 6.0).abs() < 1e-15);
     }
 
-    /// Fourth order: with twice the points 1/16 of the error, up to the ends.
+    /// A spline converges with the fourth power of the spacing: twice the points have 1/16 of the error, up to the
+    /// ends.
     #[test]
     fn a_spline_converges_with_the_fourth_power_of_the_spacing() {
         let worst = |count: usize| {
@@ -280,7 +284,7 @@ mod tests {
         assert!((13.0..19.0).contains(&ratio), "{ratio}");
     }
 
-    /// Noise of standard deviation 1 without a source of chance: a multiplicative sequence, two of them summed.
+    /// Noise of standard deviation 1 without randomness: two multiplicative sequences added.
     fn noise(count: usize) -> Vec<f64> {
         let uniform = |i: usize, seed: u64| {
             let mut z = (i as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ seed;
@@ -323,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn a_parabola_is_found_under_noise_and_exact_data_stay() {
+    fn a_parabola_is_recovered_under_noise_and_exact_data_are_kept() {
         let x: Vec<f64> = (0..=100).map(|i| 0.04 * f64::from(i)).collect();
         let exact: Vec<f64> = x.iter().map(|x| x * x / 16.0).collect();
         let noise = noise(101);

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::accuracy::{self, Increments};
 use crate::algorithm::{
     self, Averages, EndForces, Extent, Finished, Place, Quantity, Region, Reported, Rounding,
-    System, report, run_near, settle_near,
+    System, follow_neighbour, report, run_reduced,
 };
 use crate::body::ElasticBody;
 use crate::error::SolveError;
@@ -22,8 +22,8 @@ use crate::solution::{
 /// An increment that does not converge is halved this often before the step ends there.
 const MOST_HALVINGS: u32 = 6;
 
-/// Solves all steps; the end of the last one is the solution. After a step that does not converge no other follows.
-/// `origins`: where the errors of its results come from is noted there.
+/// Solves all steps; the end of the last one is the solution. After a step that does not converge no other is solved.
+/// `origins`: receives where the errors of the results come from.
 pub fn run(
     model: &Model,
     body: &ElasticBody,
@@ -58,7 +58,7 @@ pub fn run(
     Ok(solved)
 }
 
-/// Solves all steps on one body; the history is given back.
+/// Solves all steps on one body and returns the load history.
 type SolveOn<'s, T> = dyn for<'a> FnMut(
         LoadHistory<'a>,
         &ElasticBody,
@@ -66,15 +66,15 @@ type SolveOn<'s, T> = dyn for<'a> FnMut(
     ) -> Result<(T, LoadHistory<'a>), SolveError>
     + 's;
 
-/// Whether the solution has to show which contact a common end of two is of, or whether an end on the axis stays open.
+/// Whether only the solution can show which contact owns a common end of two, or whether an end on the axis stays open.
 fn has_uncertain_ends(model: &Model) -> bool {
     !model.common_nodes().is_empty() || model.hollow_at_axis()
 }
 
-/// Solves with the common ends of contacts as the model has them, and again while the solution shows that they are of other
-/// contacts: each is tried as one contact's or the other's, and in the end as that of both. Where the node on the axis is
-/// open and the midside node presses, once more with that node left open; if it touches then, or that does not converge, the
-/// solution before stands.
+/// Solves with common ends of contacts as the model assigns them, and again while the solution shows another
+/// assignment: each end is tried with one contact, then the other, and finally with both. Where the node on the axis is
+/// open and the midside node is pressed, it solves once more with that node left open; if the node touches then, or the
+/// iterations do not converge, the solution before is used.
 fn with_corners<T>(
     (model, body): (&Model, &ElasticBody),
     converged: impl Fn(&T) -> bool,
@@ -241,48 +241,48 @@ fn run_steps<'a>(
     Ok((solution, load_history))
 }
 
-/// What problems on one body share.
+/// Data that problems on one body share.
 #[derive(Default)]
 pub struct Shared {
     averages: Averages,
     region: Region,
 }
 
-/// The end of a problem without load steps, from which those begin whose numbers differ a little.
+/// The end of a problem without load steps, from which problems with slightly different numbers can start.
 #[derive(Clone)]
 pub struct End {
     finished: Finished,
-    /// v of the end before it, if it came next after that.
+    /// The displacements v of the end before it, if that was the neighbour it started from.
     before: Option<Vec<f64>>,
     extent: Extent,
 }
 
-/// Where a problem without load steps begins.
+/// The start of a problem without load steps.
 #[derive(Clone, Copy)]
 pub enum Start<'a> {
-    /// As on its own.
+    /// The problem's own start.
     Anew,
-    /// From the end of a neighbour.
+    /// The end of a neighbour.
     Near(&'a End),
-    /// The same, where that neighbour was solved just before: its factors may serve, and if it was the next after another
-    /// one itself, the way goes on from both. Whether it is this or [`Start::Near`] decides about the last bits.
+    /// The end of a neighbour that was solved just before: its factors may be reused, and if it started from a
+    /// neighbour itself, both are extrapolated. Whether this or [`Start::Near`] is used decides about the last bits.
     Next(&'a End),
 }
 
-/// The numbers of the end of all steps: what is known without the displacements of the whole body.
+/// The results at the end of all steps that need no displacements inside the body.
 pub struct Numbers {
     /// The end of the last step.
     pub finished: Finished,
-    /// By the names of the contacts.
+    /// The scalars by the names of the contacts.
     pub contacts: BTreeMap<String, ContactSummary>,
-    /// Rows of the history, or steps from the neighbour.
+    /// The number of rows of the history, or of steps from the neighbour.
     pub iterations: u32,
     /// What to consider before relying on the numbers.
     pub warnings: Vec<Warning>,
 }
 
-/// The same path to its end, for its numbers alone; and its end, if others can begin from it. Where a problem does not
-/// converge well from its start, it is solved as [`run`] does.
+/// Solves all steps for the numbers at the end only; also returns the end, if others can start from it. If a problem
+/// does not converge well from its start, it is solved as [`run`] does.
 pub fn run_to_numbers(
     model: &Model,
     body: &ElasticBody,
@@ -319,7 +319,7 @@ pub fn run_to_numbers(
             return None;
         }
         let before = end.before.as_deref().filter(|_| next);
-        settle_near(system, &model.controls, (last, before), region, observe)
+        follow_neighbour(system, &model.controls, (last, before), region, observe)
     });
     let (finished, iterations) = match near {
         Some(near) => near,
@@ -358,8 +358,8 @@ pub fn run_to_numbers(
     Ok((numbers, left))
 }
 
-/// Adds to the end of the path what was told of an earlier step alone and the end rests on: kinematics that were not small,
-/// increments that were too few, and another solution.
+/// Repeats at the end of the path those warnings about earlier steps that concern the end too: kinematics that are not
+/// small, too few increments, and a second solution.
 fn tell_of_earlier_steps(solution: &mut Solution) {
     let Some((_, earlier)) = solution.steps.split_last() else {
         return;
@@ -388,8 +388,8 @@ fn tell_of_earlier_steps(solution: &mut Solution) {
     }
 }
 
-/// The same path to its end, of which nothing is assessed, and which is not compared with another: for a solution that is
-/// compared itself.
+/// Solves all steps to the end without assessing it or comparing it with another: for a solution that is itself used in
+/// a comparison.
 pub fn run_to_compare(
     model: &Model,
     body: &ElasticBody,
@@ -413,7 +413,7 @@ pub fn run_to_compare(
     )
 }
 
-/// The load steps; a problem without steps is one step.
+/// The load steps; a problem without steps has one.
 fn steps_of(model: &Model) -> Cow<'_, [Step]> {
     match &model.steps[..] {
         [] => Cow::Owned(vec![Step::whole()]),
@@ -421,18 +421,19 @@ fn steps_of(model: &Model) -> Cow<'_, [Step]> {
     }
 }
 
-/// What the same path in other increments comes to.
+/// The result of the same path in other increments.
 #[derive(Default)]
 struct Again {
-    /// The quantities of its end; none if it did not converge.
+    /// The quantities at its end; none if it did not converge.
     quantities: Vec<Quantity>,
-    /// At the end of every step.
+    /// The forces at the end of every step.
     forces: Vec<EndForces>,
     rounding: Option<Rounding>,
 }
 
-/// The same path in these steps, without reporting to the observer. The first history is then as it was: what a finer path
-/// finds at the common ends of contacts changes no result, which is the same whether its errors are asked for or not.
+/// Solves the same path in these steps, without reporting to the observer. It restores the load history afterwards: the
+/// finer path must not change any result through the common ends of contacts, so that results do not depend on whether
+/// errors are requested.
 fn again_in<'a>(
     first: LoadHistory<'a>,
     steps: &[Step],
@@ -459,7 +460,7 @@ fn again_in<'a>(
     (LoadHistory { system, ..first }, again)
 }
 
-/// Notes how much twice the increments change the forces. The history is then as it was.
+/// Records how much twice the increments change the forces. The load history is restored afterwards.
 fn note_doubled<'a>(
     model: &Model,
     first: LoadHistory<'a>,
@@ -483,13 +484,13 @@ fn note_doubled<'a>(
     first
 }
 
-/// Whether a next increment can start from this end: the thesis's own iteration settles in false states and
-/// continues from them.
+/// Whether a next increment can start from this end: the thesis's own iteration may converge to false states and
+/// continue from them.
 fn can_continue(outcome: Outcome) -> bool {
     matches!(outcome, Outcome::Converged | Outcome::FalseConvergence)
 }
 
-/// State while the load steps are solved.
+/// The state while the load steps are solved.
 struct LoadHistory<'a> {
     model: &'a Model,
     system: System<'a>,
@@ -497,17 +498,17 @@ struct LoadHistory<'a> {
     region: Region,
     /// The end of the last increment.
     last: Option<Finished>,
-    /// Its level.
+    /// The load level of that end.
     level: Level,
-    /// Whether the anchors have moved since then.
+    /// Whether the anchors have moved since that end.
     anchors_moved: bool,
     rows: Vec<Iteration>,
     row_count: u32,
     increments: u32,
     cut_backs: u32,
-    /// Common ends of contacts that were taken to be of one alone, and that both touch in some increment.
+    /// Common ends of contacts that were assigned to one alone, and where both touch in some increment.
     of_both: BTreeSet<u32>,
-    /// Of the increment so far that rounding leaves the largest residual of.
+    /// The rounding of that increment so far where it leaves the largest residual.
     rounding: Option<Rounding>,
 }
 
@@ -529,7 +530,7 @@ impl<'a> LoadHistory<'a> {
         }
     }
 
-    /// Solves all steps for the numbers of their end.
+    /// Solves all steps for the numbers at their end.
     fn numbers(&mut self, observe: &mut Observer<'_>) -> Result<Numbers, SolveError> {
         let finished = self.follow(&steps_of(self.model), observe);
         let Some(finished) = finished.filter(|end| end.outcome != Outcome::Canceled) else {
@@ -545,7 +546,7 @@ impl<'a> LoadHistory<'a> {
         })
     }
 
-    /// Solves one step after the other until one does not converge: the last end.
+    /// Solves one step after another until one does not converge; returns the last end.
     fn follow(&mut self, steps: &[Step], observe: &mut Observer<'_>) -> Option<Finished> {
         let mut last = None;
         for (number, step) in steps.iter().enumerate() {
@@ -559,7 +560,7 @@ impl<'a> LoadHistory<'a> {
         last
     }
 
-    /// Solves one step: its end, and its rows.
+    /// Solves one step; returns its end, and its rows of the history.
     fn step(
         &mut self,
         number: u32,
@@ -648,7 +649,7 @@ impl<'a> LoadHistory<'a> {
         };
         let controls = &self.model.controls;
         let last = self.last.as_ref();
-        let finished = run_near(
+        let finished = run_reduced(
             &self.system,
             controls,
             place,
@@ -676,11 +677,11 @@ impl<'a> LoadHistory<'a> {
     }
 }
 
-/// From the level before a step to its end.
+/// The path from the level before a step to the step's end.
 struct StepPath<'a> {
     from: Level,
     step: &'a Step,
-    /// Power of the first obstacle's profile, where it has one.
+    /// The exponent of the first obstacle's profile, where it has one.
     power: Option<f64>,
 }
 

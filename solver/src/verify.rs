@@ -1,6 +1,6 @@
-//! `solver.accuracy: "verify"`: the problem once more on its mesh split in two, with all load steps, and on the mesh that it
-//! was split from, if there is one. What they differ by says how far the solution can be trusted; the solution itself stays
-//! as it is, whatever becomes of the others.
+//! Verification by `solver.accuracy: "verify"`: solves the problem once more on its mesh with every element split in
+//! two, with all load steps, and on the mesh one refinement coarser, if there is one. The differences show how far the
+//! solution can be trusted. They never change the solution itself.
 
 use std::ops::ControlFlow;
 
@@ -14,16 +14,17 @@ use crate::problem::{Problem, Refine};
 use crate::solution::{Accuracy, Observer, Outcome, Phase, Progress, Solution};
 use crate::steps;
 
-/// What the verification of a solution needs beside its problem and its mesh.
+/// The data that verifying a solution needs in addition to its problem and its mesh.
 pub struct Verification {
     /// The problem's own mesh, if it is not in the problem.
     external: Option<External>,
-    /// Most elements of the finer mesh, where the caller does not choose how many there are.
+    /// The most elements of the refined mesh; none where the caller chooses the size.
     most: Option<MostElements>,
 }
 
 impl Verification {
-    /// For a problem that asks for it. `external`: the mesh that it only names or quotes.
+    /// The verification of a problem that requests it. `external`: the mesh that the problem only names or contains as
+    /// text.
     pub fn of(problem: &Problem, external: &Option<External>) -> Option<Verification> {
         problem.solver.verifies().then(|| Verification {
             // only a mesh that is refined is needed again
@@ -35,14 +36,14 @@ impl Verification {
         })
     }
 
-    /// For adaptive refinement, which begins with this model: its last mesh may have as many elements as it likes, and a
-    /// finer one no more than the estimate of the memory assumes.
+    /// Limits the refined mesh for adaptive refinement that starts from this model: its last mesh may have any number
+    /// of elements, but the refined one only as many as the estimate of the memory assumes.
     pub fn limited(mut self, first: &Model) -> Verification {
         self.most = Some(MostElements::of(first));
         self
     }
 
-    /// Verifies the errors that are stated for a solution on this mesh. A stop leaves the estimates.
+    /// Verifies the errors that are stated for a solution on this mesh. If it is stopped, the estimates remain.
     pub fn verify(
         self,
         problem: &Problem,
@@ -66,7 +67,7 @@ impl Verification {
         accuracy::limit_by(&summary.warnings, estimated);
     }
 
-    /// The errors by comparison; or why there are none, in words.
+    /// The errors by comparison, or the reason why there are none.
     fn compared(
         self,
         problem: &Problem,
@@ -74,17 +75,17 @@ impl Verification {
         estimated: &Accuracy,
         observe: &mut Observer<'_>,
     ) -> Result<Accuracy, String> {
-        let mut watched = Watched {
+        let mut observer = QuietObserver {
             observe,
             stopped: None,
         };
-        if watched.observe(Progress::Phase(Phase::Verify)).is_break() {
-            return Err(watched.why_not(&SolveError::Stopped));
+        if observer.observe(Progress::Phase(Phase::Verify)).is_break() {
+            return Err(observer.why_not(&SolveError::Stopped));
         }
         let model = self.finer(problem, mesh)?;
-        let finer = solved(&model, &mut watched);
+        let finer = solved(&model, &mut observer);
         drop(model);
-        let finer = finer.map_err(|error| watched.why_not(&error))??;
+        let finer = finer.map_err(|error| observer.why_not(&error))??;
         let coarser = match problem.mesh.refine {
             Refine::Times(times @ 1..) => {
                 let mut problem = problem.clone();
@@ -93,23 +94,23 @@ impl Verification {
                 // without it there are no orders, and the rest stands
                 model
                     .ok()
-                    .and_then(|model| solved(&model, &mut watched).ok()?.ok())
+                    .and_then(|model| solved(&model, &mut observer).ok()?.ok())
             }
             _ => None,
         };
         let mut verified = accuracy::verified(estimated, &finer, coarser.as_deref());
         if coarser.is_none() && matches!(problem.mesh.refine, Refine::Times(1..)) {
-            let reason = "Orders of convergence are not known: there is no solution on the mesh of one `refine` less.";
+            let reason = "Orders of convergence are unknown: there is no solution on the mesh with one `refine` less.";
             verified.reasons.push(reason.to_owned());
         }
         Ok(verified)
     }
 
-    /// The problem on the finer mesh.
+    /// The problem on the refined mesh.
     fn finer(&self, problem: &Problem, mesh: &Mesh) -> Result<Model, String> {
         let too_many = |found: usize, most: usize, of: &str| match found > most {
             true => Err(format!(
-                "the mesh split in two would have {found} elements{of}, more than {most}"
+                "the refined mesh (every element split in two) would have {found} elements{of}, more than {most}"
             )),
             false => Ok(()),
         };
@@ -119,11 +120,11 @@ impl Verification {
         let model = Model::on_mesh(problem, ExternalMesh::from(refine(mesh)));
         let model = model.map_err(|violations| {
             let first = violations.first().map_or(String::new(), |v| v.to_string());
-            format!("the mesh split in two is refused: {first}")
+            format!("the refined mesh (every element split in two) is invalid: {first}")
         })?;
         if !model.mesh.inverted_elements(false).is_empty() {
             return Err(
-                "an element is so curved or crooked that its parts would be folded".to_owned(),
+                "an element is so curved or distorted that its parts would be inverted".to_owned(),
             );
         }
         if let Some(most) = &self.most {
@@ -135,17 +136,17 @@ impl Verification {
     }
 }
 
-/// The quantities of a problem on another mesh; `Err` inside: it was solved, but to no end.
+/// The quantities of a problem on another mesh; `Err` inside: the iterations did not converge.
 fn solved(
     model: &Model,
-    watched: &mut Watched<'_, '_>,
+    observer: &mut QuietObserver<'_, '_>,
 ) -> Result<Result<Vec<OnOtherMesh>, String>, SolveError> {
-    let observe: &mut Observer<'_> = &mut |progress| watched.observe(progress);
+    let observe: &mut Observer<'_> = &mut |progress| observer.observe(progress);
     let body = ElasticBody::new(model, observe)?;
     let reported = steps::run_to_compare(model, &body, observe)?;
     if reported.summary.outcome != Outcome::Converged {
         return Ok(Err(
-            "on the mesh split in two the iterations did not converge".to_owned(),
+            "the iterations did not converge on the refined mesh".to_owned()
         ));
     }
     let name = |patch: usize| &model.contacts[patch].name;
@@ -157,21 +158,21 @@ fn solved(
         .collect()))
 }
 
-/// An observer that is asked whether to go on, and not shown how; with what it said no to.
-struct Watched<'a, 'b> {
+/// An observer that is asked whether to continue but shown no iterations, and a record of what it refused.
+struct QuietObserver<'a, 'b> {
     observe: &'a mut Observer<'b>,
     stopped: Option<Stop>,
 }
 
-/// What the observer said no to.
+/// A refusal of the observer.
 enum Stop {
-    /// So many bytes more.
+    /// It refused this many more bytes.
     Memory(u64),
-    /// Going on.
+    /// It refused to continue.
     Going,
 }
 
-impl Watched<'_, '_> {
+impl QuietObserver<'_, '_> {
     fn observe(&mut self, progress: Progress<'_>) -> ControlFlow<()> {
         // these ask for more than going on: a no is an answer, and does not stop the solution
         if matches!(progress, Progress::SecondThread | Progress::Room { .. }) {
@@ -190,19 +191,20 @@ impl Watched<'_, '_> {
         answer
     }
 
-    /// Why there is no solution on the finer mesh.
+    /// The reason why there is no solution on the refined mesh.
     fn why_not(&self, error: &SolveError) -> String {
         match (&self.stopped, error) {
             (Some(Stop::Memory(bytes)), _) | (None, SolveError::ResourceExhausted { bytes }) => {
                 format!(
-                    "the mesh split in two needs more memory than there is, {:.0} MiB for one matrix alone",
+                    "verification on the refined mesh needs more memory than there is, {:.0} MiB for one matrix alone",
                     *bytes as f64 / f64::from(1 << 20)
                 )
             }
             (Some(Stop::Going), _) | (None, SolveError::Stopped) => {
-                "solving on the mesh split in two was stopped before its end, on request or at a limit of time or memory".to_owned()
+                "verification on the refined mesh was stopped (canceled, or out of time or memory)"
+                    .to_owned()
             }
-            (None, error) => format!("on the mesh split in two {error}"),
+            (None, error) => format!("on the refined mesh {error}"),
         }
     }
 }
@@ -222,18 +224,18 @@ mod tests {
                 _ => ControlFlow::Continue(()),
             }
         };
-        let mut watched = Watched {
+        let mut observer = QuietObserver {
             observe: &mut refuse,
             stopped: None,
         };
-        assert!(watched.observe(Progress::SecondThread).is_break());
-        assert!(watched.observe(Progress::Room { bytes: 1 }).is_break());
-        assert!(watched.observe(Progress::Needs { bytes: 1 }).is_continue());
-        assert!(watched.stopped.is_none());
+        assert!(observer.observe(Progress::SecondThread).is_break());
+        assert!(observer.observe(Progress::Room { bytes: 1 }).is_break());
+        assert!(observer.observe(Progress::Needs { bytes: 1 }).is_continue());
+        assert!(observer.stopped.is_none());
         assert_eq!(asked, 3);
     }
 
-    /// After adaptive refinement no mesh is solved on that its memory was not estimated for.
+    /// After adaptive refinement, a mesh for which no memory was estimated is not solved on.
     #[test]
     fn a_mesh_that_would_be_too_large_is_not_solved_on() {
         let problem: Problem = serde_json::from_value(serde_json::json!({

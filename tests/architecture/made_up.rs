@@ -156,7 +156,7 @@ fn a_front_door_with_code_of_its_own_is_a_file_like_others() {
 }
 
 #[test]
-fn what_only_some_may_name_is_found_elsewhere() {
+fn names_of_one_owner_are_not_visible_to_others() {
     for (file, text, rule) in [
         (
             "solver/src/top.rs",

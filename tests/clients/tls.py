@@ -103,7 +103,7 @@ def read_again(server, authority, used):
     # one file after the other: in between they do not match
     os.replace(renewed.cert, used.cert)
     told = reload(server, "the pair does not match")
-    check("is not that of the first certificate" in told and "stays in use" in told, "a pair that does not match: " + told)
+    check("is not that of the first certificate" in told and "remains in use" in told, "a pair that does not match: " + told)
     equal(serial(server), first, "the certificate after a pair that does not match")
     os.replace(renewed.key, used.key)
     check("was read again" in reload(server, "renewed"), "the log after a reload")
@@ -118,7 +118,7 @@ def read_again(server, authority, used):
         for source, kind in ((bad.cert, "cert"), (bad.key, "key")):
             os.replace(source, getattr(used, kind))
         told = reload(server, says)
-        check(says in told and "stays in use" in told, "a certificate at the wrong time: " + told)
+        check(says in told and "remains in use" in told, "a certificate at the wrong time: " + told)
     used.key.unlink()
     check("cannot be read" in reload(server, "no key"), "a missing key")
     equal(serial(server), second, "the certificate after bad ones")
@@ -141,10 +141,10 @@ def refused(authority, folder):
         (good.cert, None, "--tls-key"),
         (None, good.key, "--tls-cert"),
         (good.cert, other.key, "is not that of the first certificate"),
-        (good.key, good.cert, "there is no certificate in"),
-        (good.cert, good.cert, "there is no private key in"),
+        (good.key, good.cert, "found no certificate in"),
+        (good.cert, good.cert, "found no private key in"),
         (good.cert, encrypted, "openssl pkey"),
-        (empty, good.key, "there is no certificate in"),
+        (empty, good.key, "found no certificate in"),
         (folder / "none.pem", good.key, "cannot be read"),
         (folder, good.key, "cannot be read"),
         (big, good.key, "more than 1 MiB"),

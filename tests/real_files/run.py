@@ -204,7 +204,7 @@ def as_mesh(program, path):
         given = STORE / "mesh.inp"
         given.write_bytes(re.split(rb"(?im)^\s*\*\s*STEP\b", text)[0])
     _, lines = run(program, given)
-    counts = re.search(r": a mesh and no problem: (\d+) nodes, (\d+) elements", lines[0]) if lines else None
+    counts = re.search(r" is a mesh, not a problem: (\d+) nodes, (\d+) elements", lines[0]) if lines else None
     return (int(counts[1]), int(counts[2])) if counts else words(lines)
 
 

@@ -161,7 +161,7 @@ def refusals(server, folder, backup):
     server.stop()
     before = (server.data / "signorini.db").stat().st_size
     told = run("restore", backup, "--data", server.data, "--replace").stdout
-    aside = pathlib.Path(told.splitlines()[0].removeprefix("the store that was there is in "))
+    aside = pathlib.Path(told.splitlines()[0].removeprefix("the previous store is in "))
     equal((aside / "signorini.db").stat().st_size, before, "the store that was put aside")
     server.start()
     server.stop()

@@ -226,7 +226,7 @@ def damaged_table(server, folder):
         lines = server.log.read_text().splitlines()
         equal(len([line for line in lines if "ERROR" in line and "signorini doctor" in line and "nothing more of" not in line]), 2,
               "lines that tell of the damage, and that nothing is stored")
-        check(any("nothing more of job %s can be stored" % job in line for line in lines), "its job is named: %r" % lines)
+        check(any("job %s cannot be stored any more" % job in line for line in lines), "its job is named: %r" % lines)
         time.sleep(2.2)
         equal(server.log.read_text().splitlines(), lines, "the log of a store that stores nothing")
         server.stop()

@@ -216,7 +216,7 @@ async fn a_merge_patch_changes_single_labels() {
 
 /// Operations: StreamResult, GetJob
 #[tokio::test]
-async fn large_answers_are_compressed_for_those_who_take_it() {
+async fn large_answers_are_compressed_for_clients_that_accept_it() {
     let server = server().await;
     let job = server.solve(&json!({ "problem": block(20, 20) })).await;
     let id = job["id"].as_str().unwrap();

@@ -594,7 +594,7 @@ async fn each_owner_has_their_own_jobs_meshes_and_keys() {
 }
 
 #[tokio::test]
-async fn what_a_token_is_to_be_is_checked_and_the_first_one_is_an_administrators() {
+async fn a_new_token_is_checked_and_the_first_one_must_be_for_an_administrator() {
     let server = server().await;
     let refused = async |body: Value| -> Vec<String> {
         let response = server.post("/v1/tokens").json(&body).send().await.unwrap();

@@ -138,7 +138,7 @@ async fn a_sweep_finds_the_body_of_an_earlier_job_and_leaves_its_own() {
 
 /// Operations: GetServerInfo, ValidateProblem
 #[tokio::test]
-async fn a_kept_body_gives_way_to_a_job_that_needs_its_memory() {
+async fn a_kept_body_is_dropped_for_a_job_that_needs_its_memory() {
     let mut small = with_coefficient(0.2);
     small["mesh"]["refine"] = json!(3);
     let mut large = small.clone();

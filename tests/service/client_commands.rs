@@ -381,7 +381,7 @@ async fn a_token_is_sent_and_one_that_is_refused_has_its_exit_code() {
 }
 
 #[tokio::test]
-async fn valid_problems_are_told_with_their_cost() {
+async fn valid_problems_are_reported_with_their_cost() {
     let server = server().await;
     let file = examples("rectangular_punch.json");
     let (shown, _) = ends(&server.url, &["validate", file.to_str().unwrap()], 0).await;

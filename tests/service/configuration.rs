@@ -62,7 +62,7 @@ fn a_flag_precedes_a_variable_which_precedes_the_file_which_precedes_the_default
 }
 
 #[test]
-fn what_config_show_prints_can_be_read_again() {
+fn the_output_of_config_show_can_be_read_as_settings() {
     let folder = tempfile::tempdir().unwrap();
     let strange = folder.path().join("a \"quoted\"\nname\u{7f}");
     let options = [
@@ -149,9 +149,7 @@ fn all_invalid_settings_are_reported_together_and_nothing_starts() {
             "signorini: SIGNORINI_WORKERS: found \"0\", expected an integer (0 is not in 1..=256)"
                 .to_owned(),
             "signorini: SIGNORINI_LOG: found \"loud\", expected a level".to_owned(),
-            format!(
-                "signorini: {file}:1: \"wokers\": there is no such setting; did you mean workers?"
-            ),
+            format!("signorini: {file}:1: \"wokers\" is not a setting; did you mean workers?"),
             format!("signorini: {file}:2: max_queued: found \"many\", expected an integer"),
             format!("signorini: {file}:4: isolation: found \"proces\", expected thread or process"),
         ];
@@ -233,7 +231,7 @@ fn a_variable_that_is_misspelt_is_named() {
     let output = serve.output().unwrap();
     assert_eq!(output.status.code(), Some(3));
     let log = String::from_utf8(output.stderr).unwrap();
-    let told = "SIGNORINI_WOKERS is no setting, and is ignored; did you mean SIGNORINI_WORKERS?";
+    let told = "SIGNORINI_WOKERS is not a setting and is ignored; did you mean SIGNORINI_WORKERS?";
     assert!(
         log.contains(told) && !log.contains("SIGNORINI_TOKEN"),
         "{log}"

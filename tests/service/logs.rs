@@ -257,7 +257,7 @@ async fn nothing_that_a_client_sends_adds_a_line_or_a_long_one() {
 
 /// Anyone could fill the disk with requests that need no token, as well as with those that are refused.
 #[tokio::test]
-async fn callers_who_are_not_identified_have_some_lines_in_each_second() {
+async fn unidentified_callers_have_a_limited_number_of_log_lines() {
     const REQUESTS: usize = 400;
     let server = Server::start(SIGNORINI, &[]).await;
     let body = json!({"name": "test", "owner": "root", "scopes": ["admin"]});
@@ -319,7 +319,7 @@ async fn the_owner_of_a_refused_request_is_in_its_line() {
 }
 
 #[tokio::test]
-async fn the_filter_is_that_of_rust_log_if_there_is_no_other() {
+async fn the_filter_is_taken_from_rust_log_by_default() {
     let folder = tempfile::tempdir().unwrap();
     let start = |variables: &[(&str, &str)]| {
         let mut command = std::process::Command::new(SIGNORINI);

@@ -106,7 +106,7 @@ async fn owners_take_turns() {
 }
 
 #[tokio::test]
-async fn an_owner_may_have_so_many_jobs_in_the_queue_and_is_told() {
+async fn an_owner_has_a_limit_of_queued_jobs_and_the_error_names_it() {
     let server = shared(&["--max-queued-per-owner", "3"]).await;
     queue(&server, "pause").await;
     let (status, refused) = batch(&server, "ada", 4).await;
@@ -353,7 +353,7 @@ async fn a_mesh_that_is_there_can_be_uploaded_again_whatever_is_left() {
 
 /// Operations: DeleteFields, ListOwners, GetCaller, GetServerInfo
 #[tokio::test]
-async fn what_each_owner_keeps_is_told_and_limited_and_fields_can_be_deleted_alone() {
+async fn stored_bytes_of_an_owner_are_reported_and_limited_and_fields_can_be_deleted_alone() {
     let server = shared(&["--max-bytes-per-owner", "300000"]).await;
     let (_, first) = batch(&server, "ada", 1).await;
     let job = ended(&server, "ada", &first["jobs"][0]).await;
@@ -505,7 +505,7 @@ async fn owners_who_keep_nothing_yet_are_listed_with_their_jobs() {
 
 /// Operations: DeleteJob
 #[tokio::test]
-async fn what_is_too_old_is_removed_by_itself() {
+async fn jobs_that_are_too_old_are_removed_automatically() {
     // some two seconds, in days
     let server = Server::start(SIGNORINI, &["--retain-days", "0.00002"]).await;
     let id = server.submit(&example_json("sheet")).await;

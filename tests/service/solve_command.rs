@@ -308,7 +308,7 @@ fn a_mesh_that_is_named_by_its_hash_is_read_from_its_file() {
         (vec![], "give its file by --mesh"),
         (
             vec!["--mesh".to_owned(), file("other.json")],
-            "it has the hash",
+            "this file has the hash",
         ),
         (vec!["--mesh".to_owned(), file("none.json")], "No such file"),
     ] {

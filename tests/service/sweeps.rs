@@ -199,7 +199,7 @@ async fn a_sweep_has_the_numbers_of_separate_jobs() {
 
 /// Operations: CreateSweep, GetSweep, ListSweeps, ListSweepMembers, WatchSweep, CancelSweep, DeleteSweep, CreateMemberJob
 #[tokio::test]
-async fn a_sweep_over_grpc_is_that_of_rest() {
+async fn a_sweep_over_grpc_equals_the_one_over_rest() {
     let server = server().await;
     let mut grpc = connect(&server).await;
     use pb::sweep_axis::Values;
@@ -460,7 +460,7 @@ async fn one_members_failure_is_a_row_and_not_the_end() {
 
 /// Operations: CreateSweep
 #[tokio::test]
-async fn everything_that_is_wrong_is_told_before_anything_is_stored() {
+async fn everything_invalid_is_reported_before_anything_is_stored() {
     let server = server().await;
     let refused = async |body: Value| {
         let (status, refused) = answer(server.post("/v1/sweeps").json(&body)).await;

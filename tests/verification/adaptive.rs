@@ -121,7 +121,7 @@ fn at_a_sharp_edge_the_peak_without_a_limit_is_named() {
     };
     assert_eq!(
         *message,
-        "`peak_normal_stress` of contact `top` has no limit: it grows at an edge, a tip or a kink of the obstacle with every finer mesh, and no tolerance applies to it. Forces have a limit, and so has the averaged pressure."
+        "`peak_normal_stress` of contact `top` has no limit: it grows with every finer mesh at an edge, a tip or a kink of the obstacle, so the tolerance does not apply to it. Forces converge, and so does the averaged pressure."
     );
     assert_eq!(
         messages(&solve(&to(0.02, example("cylinder"))).summary),

@@ -156,7 +156,7 @@ fn a_later_mesh_that_does_not_converge_leaves_the_one_before() {
         "{:?}",
         seen.meshes
     );
-    let why = "has no solution (its iteration does not converge)";
+    let why = "has no solution (its iterations do not converge)";
     assert!(
         reason(&seen.solution).contains(why),
         "{}",
@@ -169,7 +169,7 @@ fn a_later_mesh_that_does_not_converge_leaves_the_one_before() {
 fn a_first_mesh_without_a_solution_is_named() {
     for (signed, why) in [
         (false, "the stiffness is nearly singular"),
-        (true, "its contact and slip repeat themselves"),
+        (true, "its contact and slip states repeat in a cycle"),
     ] {
         let mut thesis = cylinder();
         thesis.solver.algorithm = Algorithm::Thesis;

@@ -67,7 +67,7 @@ fn left_at_the_edges(kernel: &str, radius: f64) -> f64 {
 /// With a radius of .4 of the half-width a sixth of the friction is lost at the two edges of a punch; the warning gives the
 /// size. With the other normalization all of it is there, to what three points an edge integrate.
 #[test]
-fn friction_lost_at_the_edges_is_told_and_can_be_kept() {
+fn friction_lost_at_the_edges_is_reported_and_can_be_conserved() {
     for kernel in ["bump", "parabola"] {
         let (ratio, solution) = sliding("unit_integral", kernel, 0.2);
         // friction itself and the finite block change the pressure a little

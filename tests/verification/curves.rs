@@ -147,9 +147,9 @@ fn a_curved_body_has_no_corners() {
     }
 }
 
-/// A node off the circle, and what else cannot be put on a curve, is refused by name.
+/// A node that is not on the circle is refused by name, like anything else that cannot be put on a curve.
 #[test]
-fn what_does_not_lie_on_its_curve_is_refused() {
+fn a_boundary_that_is_not_on_its_curve_is_refused() {
     let refused = |curves: Value, around: usize, across: usize| {
         let mut sector = facets(around);
         sector.across = across;
@@ -164,7 +164,7 @@ fn what_does_not_lie_on_its_curve_is_refused() {
         (off.reason, &off.pointer[..]),
         (Reason::Conflict, "/mesh/curves/outer")
     );
-    assert!(off.got.contains("1.000e-2 off the circle"), "{}", off.got);
+    assert!(off.got.contains("1.000e-2 from the circle"), "{}", off.got);
     assert!(off.expected.contains("4.010e-4"), "{}", off.expected);
     let unknown = refused(json!({"other": {"kind": "spline"}}), 60, 8);
     assert_eq!(unknown.reason, Reason::UnknownBoundary);
@@ -201,7 +201,7 @@ fn what_does_not_lie_on_its_curve_is_refused() {
 /// A bore of straight facets around a pin: its corners point into the body, where the pin does not reach. They are told; on the
 /// circle there are none. And an obstacle that follows the body's surface at a distance has the body's corners: none counts.
 #[test]
-fn corners_that_point_into_the_body_are_told() {
+fn reentrant_corners_are_reported() {
     let pin: Vec<[f64; 2]> = (0..=120)
         .map(|k| (k as f64 - 150.0).to_radians())
         .map(|angle| [3.9 * angle.cos(), 3.9 * angle.sin() - 0.1])

@@ -446,7 +446,7 @@ fn a_set_of_nodes_may_be_that_of_elements() {
 }
 
 #[test]
-fn what_a_row_names_must_exist_and_have_something() {
+fn the_target_of_a_row_must_exist_and_not_be_empty() {
     for (model, step, got) in [
         ("", "*CLOAD\nX, 1, 2.\n", "`X`"),
         ("", "*CLOAD\n99, 1, 2.\n", "`99`"),
@@ -592,7 +592,7 @@ fn messages_say_what_to_do() {
         (
             "",
             "*CLOAD\n, 1, 2.\n",
-            "what it acts on is blank",
+            "the target of the load is blank",
             "A blank value is 0",
         ),
         ("", "*CLOAD\nR, 6, 2.\n", "the component `6`", "Moments"),
@@ -727,7 +727,7 @@ fn other_elements_are_left_out_of_a_mesh_and_refused_in_a_problem() {
         "*CLOAD\nR, 1, 2.\n",
     ));
     assert!(
-        found.len() == 1 && found[0].contains("`R2D2` that no *RIGID BODY has"),
+        found.len() == 1 && found[0].contains("`R2D2` that belong to no *RIGID BODY"),
         "{found:?}"
     );
     let mass = format!("*ELEMENT, TYPE=MASS, ELSET=Point\n7, 5\n*MASS, ELSET=Point\n3.\n{HELD}");

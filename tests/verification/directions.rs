@@ -238,7 +238,7 @@ fn a_curve_before_a_curved_side_is_as_if_it_were_drawn_there() {
 
 /// Pushed along the body, an obstacle that only touches it goes into it; the linear gaps say nothing of that.
 #[test]
-fn an_obstacle_that_only_the_displacement_brings_to_the_body_is_told() {
+fn an_obstacle_that_only_the_displacement_brings_to_the_body_is_reported() {
     let contact = json!({"obstacle": polyline(arc([0.0, -0.1], 0.899)), "normal": "obstacle",
         "direction": [1, 0], "indentation": 0.3});
     let solution = solve(&body("hole", &contact));

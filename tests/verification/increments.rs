@@ -152,7 +152,7 @@ fn under_a_flat_punch_nothing_is_left_open() {
 
 /// What an earlier step ends with is told beside it, and at the end.
 #[test]
-fn increments_of_earlier_steps_are_told() {
+fn too_few_increments_of_earlier_steps_are_reported() {
     let solution = solve(&pressed(
         parabola(),
         json!([{"name": "press", "increments": 1}, {"name": "let go", "indentation": 0, "increments": 4}]),

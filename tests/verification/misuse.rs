@@ -52,7 +52,7 @@ fn dragged(obstacle: &Value, drag: f64, scale: f64) -> Summary {
 /// Gaps are those of the places before deformation. Dragged by three lengths of the contact, the obstacle would press on
 /// other material: it is told, with slip and length, once, in any unit of length; a drag of a third of it is not.
 #[test]
-fn a_drag_beyond_the_contact_is_told() {
+fn a_drag_beyond_the_contact_is_reported() {
     for scale in [1.0, 1e-6, 1e6] {
         let obstacle = json!({"kind": "parabola", "radius": 8.0 * scale});
         let still = dragged(&obstacle, 0.0, scale);
@@ -131,7 +131,7 @@ fn sliding_along_a_plane_and_in_the_examples_is_sound() {
 
 /// Half a body under a drag has another half that would be dragged the opposite way; so has one that turns about an axis.
 #[test]
-fn a_drag_of_half_a_body_is_told() {
+fn a_drag_of_half_a_body_is_reported() {
     let warnings = |analysis: &str, left: Value, from: f64, drag: f64, steps: Value| {
         let mut p = json!({
             "analysis": {"kind": analysis},
@@ -270,7 +270,7 @@ fn a_body_pushed_beyond_its_friction_is_said_to_slide_away() {
 /// Where the pressure does not follow from equilibrium, the state that the iterations leave tells: pressed by a support, or
 /// a shaft in a hub. A wall ahead ends the motion: nothing is claimed then, and the body rests there.
 #[test]
-fn what_holds_is_looked_at_where_equilibrium_does_not_tell() {
+fn friction_is_checked_where_equilibrium_does_not_decide() {
     let coulomb = json!({"coefficient": 0.3, "nonlocal_radius": 0.2, "elastic_slip": 1e-4});
     let pressed = json!([{"boundary": "top", "uy": -0.01}]);
     let slides = pushed(100.0, coulomb.clone(), pressed.clone()).summary;

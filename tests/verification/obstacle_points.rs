@@ -271,7 +271,7 @@ fn missed(problem: &Problem) -> Vec<Missed> {
 
 /// A ridge of height 0.01 on a flat face, between the nodes 0.05 apart: the body did not feel it, and nothing said so.
 #[test]
-fn a_ridge_between_nodes_is_told() {
+fn a_ridge_between_nodes_is_reported() {
     let ridge =
         json!({"kind": "table", "x": [-1, 0.31, 0.312, 0.314, 1], "gap": [0, 0, -0.01, 0, 0]});
     let hidden = block(&lines(0.05, &[]), ridge.clone(), 0.02);
@@ -302,7 +302,7 @@ fn a_ridge_between_nodes_is_told() {
 
 /// Wedges between two nodes: a steep one touches no node, one of the same depth in a finer mesh two of them.
 #[test]
-fn a_wedge_between_nodes_is_told() {
+fn a_wedge_between_nodes_is_reported() {
     for (normal, kind) in [("body", "wedge"), ("obstacle", "wedge"), ("body", "cone")] {
         let wedge = json!({"kind": kind, "angle": 80, "center": 0.0137});
         let mut problem = block(&lines(0.05, &[]), wedge, 0.005);
@@ -386,7 +386,7 @@ fn ripples(kind: &str, interpolation: &str, height: f64) -> Value {
 /// An obstacle of which the nodes see the crests alone is as smooth for them as the parabola through these: it recedes between
 /// them, which is told whatever it is given by, and no error is stated. Nodes in its hollows see it.
 #[test]
-fn an_obstacle_that_recedes_between_nodes_is_told() {
+fn an_obstacle_that_recedes_between_nodes_is_reported() {
     let smooth = solve(&block(
         &lines(0.05, &[]),
         ripples("table", "cubic", 0.0),

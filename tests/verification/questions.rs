@@ -86,7 +86,7 @@ fn no_stage_is_long_without_a_question() {
 
 /// The last state of a stopped solution is reported if that is little work, and given up soon if it is much.
 #[test]
-fn what_a_stopped_solution_has_left_is_not_waited_for() {
+fn results_of_a_stopped_solution_are_not_waited_for() {
     for (value, whole) in [
         (many_contacts(3), true),
         (wide_averages(12, "estimate"), true),

@@ -266,7 +266,7 @@ fn steps_press_and_drag() {
 
 /// Several sets may hold a node: what a later step prescribes for it replaces what an earlier one did, whatever the sets.
 #[test]
-fn what_a_later_step_prescribes_counts_for_the_nodes() {
+fn prescriptions_of_a_later_step_apply_to_the_nodes() {
     let first = "*STEP\n*STATIC\n*BOUNDARY\n9000, 1, 1\n9000, 2, 2, -0.05\nBODYHIGH, 1, 1, 0.01\n*END STEP\n";
     let high = "*NSET, NSET=BODYHIGH\n3, 5\n*NSET, NSET=TWIN\n3, 5\n";
     let deck = |second: &str| {
@@ -421,7 +421,7 @@ fn a_pin_in_a_hole_is_a_spline_that_moves() {
 
 /// Pushed so far that its gaps are others than its first normals say, the pin is told, and the verdict is not good.
 #[test]
-fn a_pin_that_is_pushed_far_is_told() {
+fn a_pin_that_is_pushed_far_is_reported() {
     let hole = sector([2.0, 1.0], [-20.0, -160.0]);
     let pin = "*SURFACE, TYPE=SEGMENTS, NAME=TOOL\nSTART, 0.98, -0.02\nCIRCL, 0., -1., 0., -0.02\nCIRCL, -0.98, -0.02, 0., -0.02\n";
     let deck = hole + &touching(pin, "");
@@ -515,7 +515,7 @@ fn fillets_are_a_spline() {
 
 /// What cannot be translated is refused in words, with what is written instead.
 #[test]
-fn what_is_no_contact_with_a_rigid_obstacle_is_refused() {
+fn a_contact_that_is_not_with_a_rigid_obstacle_is_refused() {
     let good = block(0.0)
         + &touching(ROLLER, "*FRICTION, ELASTIC SLIP=1e-4\n0.3,\n")
         + &pressed([0.0, -0.05]);

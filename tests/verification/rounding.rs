@@ -261,7 +261,7 @@ fn rounding_is_told(problem: &Problem) -> bool {
 /// Where rounding may leave more than the smallest error that is ever stated, nothing has converged, in any units; it is
 /// said why.
 #[test]
-fn what_rounding_decides_has_not_converged() {
+fn a_state_that_rounding_decides_has_not_converged() {
     for incremental in [false, true] {
         for units in UNITS {
             let dragged = Dragged {
@@ -292,7 +292,7 @@ fn what_rounding_decides_has_not_converged() {
 
 /// Without friction it is the elastic forces that rounding leaves something of: a body carried far beside its strains.
 #[test]
-fn a_body_that_is_carried_far_is_told_of() {
+fn a_body_that_is_carried_far_is_reported() {
     let mut near: Option<f64> = None;
     for units in UNITS {
         let mut whole = LIMITED.json(units);

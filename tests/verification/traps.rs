@@ -72,7 +72,7 @@ fn a_body_that_its_cohesion_lifts_off_has_no_equilibrium() {
 
 /// Refined twice, example 1 still has its peak of σ_t 7.6 % too high (formulation 5.3: 249.6), and nothing said so.
 #[test]
-fn a_peak_that_the_mesh_does_not_resolve_is_told() {
+fn a_peak_that_the_mesh_does_not_resolve_is_reported() {
     for (refine, verdict) in [(0, Verdict::Poor), (2, Verdict::Fair)] {
         let mut problem = example("rectangular_punch");
         problem.mesh.refine = Refine::Times(refine);

@@ -118,7 +118,9 @@ fn refusals_name_unmerged_nodes() {
     let found = checked(&pulled(0, 0.0, &held)).unwrap_err();
     assert_eq!(found[0].reason.as_str(), "free_body");
     assert!(
-        found[0].hint.contains("5 such pairs in all: merge them"),
+        found[0]
+            .hint
+            .contains("(5 such pairs in total): merge them"),
         "{}",
         found[0].hint
     );
@@ -135,7 +137,9 @@ fn refusals_name_unmerged_nodes() {
     let found = checked(&value).unwrap_err();
     assert_eq!(found[0].reason.as_str(), "not_a_chain");
     assert!(
-        found[0].hint.contains("3 such pairs in all: merge them"),
+        found[0]
+            .hint
+            .contains("(3 such pairs in total): merge them"),
         "{}",
         found[0].hint
     );
@@ -143,7 +147,7 @@ fn refusals_name_unmerged_nodes() {
 
 /// A file of a generator whose surfaces do not share their curve: the same warning.
 #[test]
-fn a_file_with_unmerged_nodes_is_told() {
+fn a_file_with_unmerged_nodes_is_reported() {
     let text = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n1 1 \"left\"\n$EndPhysicalNames\n$Nodes\n8\n\
         1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 1 0 0\n6 2 0 0\n7 2 1 0\n8 1 1 0\n$EndNodes\n$Elements\n3\n\
         1 1 2 1 1 4 1\n2 3 2 2 1 1 2 3 4\n3 3 2 2 1 5 6 7 8\n$EndElements\n";

@@ -223,7 +223,7 @@ fn the_pressure_where_materials_meet_has_no_limit() {
 /// Without friction a smooth obstacle is a line of symmetry, across which a straight interface goes on: no singularity. Nor
 /// is there one of equal materials, or outside of the contact.
 #[test]
-fn materials_that_meet_without_a_singularity_are_not_told() {
+fn materials_that_meet_without_a_singularity_give_no_warning() {
     for (what, second, coefficient, to) in [
         ("no friction", 5000.0, 0.0, 0.0),
         ("equal materials", 1000.0, 0.2, 0.0),
@@ -272,7 +272,7 @@ fn many_small_kinks_do_not_add_up() {
 
 /// A ring cannot widen; along its axis it moves as it likes, also pressed onto a shaft.
 #[test]
-fn a_ring_that_is_dragged_away_from_the_axis_is_told() {
+fn a_ring_that_is_dragged_away_from_the_axis_is_reported() {
     let told = |boundary: &str, indentation: f64, drag: f64| {
         let value = json!({
             "analysis": {"kind": "axisymmetric"},

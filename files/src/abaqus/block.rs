@@ -11,14 +11,14 @@ use solver::element::{Element, Family};
 use solver::error::Reason;
 use solver::mesh::NO_NODE;
 
-/// What rows of loads act on.
+/// The targets of rows of loads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Rows {
-    /// `*DLOAD`: sides of elements.
+    /// Sides of elements, `*DLOAD`.
     Sides,
-    /// `*DSLOAD`.
+    /// Surfaces, `*DSLOAD`.
     Surfaces,
-    /// `*CLOAD`.
+    /// Nodes, `*CLOAD`.
     Nodes,
 }
 
@@ -29,11 +29,11 @@ pub(super) enum Block {
     Nodes(Option<Name>),
     Elements {
         shape: Shape,
-        /// Lines of a rigid surface.
+        /// Whether the lines belong to a rigid surface.
         is_rigid: bool,
         set: Option<Name>,
         pending: Vec<u64>,
-        /// The last line of an element of unknown size ended in a comma.
+        /// Whether the last line of an element of unknown size ended in a comma.
         continued: bool,
     },
     NodeSet {
@@ -59,17 +59,17 @@ pub(super) enum Block {
     /// Rows of `*BOUNDARY`, and the name of their amplitude.
     Boundary(Option<Name>),
     Load(Rows, Option<Name>),
-    /// Where an instance of a part is.
+    /// The two lines of `*INSTANCE` that move and turn a part.
     Instance(Vec<Vec<f64>>),
     /// A keyword that allows no data lines here.
     NoData(&'static str),
 }
 
-/// Values of an amplitude that are kept: more than a curve of loads has.
+/// The largest number of values of an amplitude that are kept: more than any curve of loads has.
 const MOST_VALUES: usize = 1 << 16;
 
 impl Deck {
-    /// One line of a block.
+    /// Reads one data line of a block.
     pub(super) fn data(&mut self, block: &mut Block, line: u64, text: &str) {
         if !matches!(block, Block::Skip | Block::Title) && self.has_long_name(line, text) {
             return self.forget(block);
@@ -217,7 +217,7 @@ impl Deck {
                         line,
                         Reason::Malformed,
                         format!("`{text:.40}`"),
-                        "at most two lines after *INSTANCE: how far it is moved, and how it is turned",
+                        "at most two lines after *INSTANCE: its translation, and its rotation",
                         "Remove the line, or add the keyword that it belongs to.",
                     );
                 }
@@ -225,7 +225,7 @@ impl Deck {
         }
     }
 
-    /// The end of a block, which must be complete.
+    /// Ends a block, which must be complete.
     pub(super) fn end(&mut self, block: Block, line: u64) {
         match block {
             Block::Elements {
@@ -254,7 +254,7 @@ impl Deck {
                         at,
                         "*ELASTIC a second time for one material",
                         "it once",
-                        "Give the other a material of its own.",
+                        "Give the second one a material of its own.",
                     ),
                     None => self.doubt(
                         at,
@@ -269,7 +269,7 @@ impl Deck {
         }
     }
 
-    /// Keeps where the instance is: nodes that it adds to those of its part are moved with them.
+    /// Stores the position of the instance: the nodes that it adds to those of its part are moved with them.
     fn place(&mut self, lines: Vec<Vec<f64>>, line: u64) {
         let at = |row: usize, k: usize| {
             lines
@@ -308,7 +308,7 @@ impl Deck {
         self.placement = Some((moved, turned));
     }
 
-    /// All numbers of a line; those that are left out are 0.
+    /// All numbers of a line; fields that are left out are 0.
     fn numbers(&mut self, line: u64, text: &str) -> Vec<f64> {
         let mut values = Vec::new();
         for word in fields(text) {
@@ -331,7 +331,7 @@ impl Deck {
         values
     }
 
-    /// A line of a block cannot be read: what it would have added is unknown.
+    /// Records that a line of a block cannot be read, so that the names or numbers it would have added are unknown.
     fn forget(&mut self, block: &Block) {
         match block {
             Block::Nodes(_) => self.here.incomplete.nodes = true,
@@ -374,7 +374,7 @@ impl Deck {
                     Reason::RepeatedNode,
                     format!("node {label} a second time"),
                     "each node once, or the same coordinates again",
-                    "Give one of both another number, in the elements and sets that name it too.",
+                    "Give one of the two another number, also in the elements and sets that name it.",
                 );
                 return;
             }
@@ -388,7 +388,7 @@ impl Deck {
         }
     }
 
-    /// A line of elements of the plane, which may go on on the next.
+    /// Reads a line of plane elements, which may continue on the next line.
     fn plane_elements(
         &mut self,
         kind: (Family, usize),
@@ -460,7 +460,7 @@ impl Deck {
                 Reason::RepeatedElement,
                 format!("element {label} a second time"),
                 "each element once",
-                "Give one of both another number, in the sets that name it too.",
+                "Give one of the two another number, also in the sets that name it.",
             );
             return;
         }
@@ -474,7 +474,7 @@ impl Deck {
         self.here.element_labels.push(label);
     }
 
-    /// Gives an element its number; false if another has it.
+    /// Gives an element its number; false if another element has it.
     fn number(&mut self, label: u64, place: Numbered, set: &Option<Name>, line: u64) -> bool {
         if !self.here.element_places.add(label) {
             return false;
@@ -487,7 +487,7 @@ impl Deck {
         true
     }
 
-    /// A line element; one that cannot be read is of no use to the mesh.
+    /// Reads a line element; the mesh ignores one that cannot be read.
     fn line_element(&mut self, count: usize, set: &Option<Name>, line: u64, text: &str) {
         let words = fields(text);
         let Some(label) = words.first().and_then(|word| word.parse().ok()) else {
@@ -511,7 +511,7 @@ impl Deck {
         }
     }
 
-    /// An element of no use to the mesh, which may be named nevertheless.
+    /// Reads an element that a plane mesh ignores, but that sets may name.
     fn other_element(
         &mut self,
         count: Option<usize>,
@@ -536,7 +536,8 @@ impl Deck {
         }
     }
 
-    /// A line of a surface: an element or set, and the number of a side; without it, all sides on the body's surface.
+    /// Reads a line of a surface: an element or set, and the number of a side; without it, all sides on the body's
+    /// surface.
     fn side(&mut self, name: &Name, line: u64, text: &str) {
         let words = fields(text);
         let side = match words.get(1) {
@@ -590,8 +591,8 @@ impl Deck {
         range.map(|range| vec![Target::Range(range.into())])
     }
 
-    /// A row of `*BOUNDARY`: node or set; first component; last, which is the first where it is left out; value, 0 where
-    /// it is left out. Or a name in place of the components.
+    /// Reads a row of `*BOUNDARY`: node or set; first component; last component (the first if left out); value (0 if
+    /// left out). A name may replace the components.
     fn boundary(&mut self, amplitude: &Option<Name>, line: u64, text: &str) {
         let words = fields(text);
         let word = |k: usize| words.get(k).copied().unwrap_or_default();
@@ -658,7 +659,7 @@ impl Deck {
         }
     }
 
-    /// A row of loads: what it acts on, which load or component, and its size, 0 where it is left out.
+    /// Reads a row of loads: its target, which load or component, and its size (0 if left out).
     fn load(&mut self, rows: Rows, amplitude: &Option<Name>, line: u64, text: &str) {
         let words = fields(text);
         let word = |k: usize| words.get(k).copied().unwrap_or_default();
@@ -716,10 +717,10 @@ impl Deck {
     }
 }
 
-/// Why a row of loads is none; `second`: what its second field is.
+/// Why a row of loads is invalid; `second`: the meaning of its second field.
 fn unlike_load(words: &[&str], second: &str) -> String {
     match words {
-        [] | ["", ..] => "what it acts on is blank".to_owned(),
+        [] | ["", ..] => "the target of the load is blank".to_owned(),
         [_] | [_, "", ..] => format!("the {second} is blank, which has no default"),
         [_, _, value, rest @ ..]
             if !value.is_empty() && number(value).is_none() && rest.is_empty() =>
@@ -735,7 +736,7 @@ fn unlike_load(words: &[&str], second: &str) -> String {
     }
 }
 
-/// Components by name: those of the plane that it holds, or some that a plane body holds by itself.
+/// The components that a name of `*BOUNDARY` holds: those in the plane, or ones that a plane body holds by itself.
 pub(super) fn named_components(name: &str) -> Option<(u64, u64)> {
     match name {
         "PINNED" | "ENCASTRE" | "ZASYMM" => Some((1, 2)),
@@ -746,7 +747,7 @@ pub(super) fn named_components(name: &str) -> Option<(u64, u64)> {
     }
 }
 
-/// S1 … S4, P1 … P4.
+/// The number of a side written as S1 … S4 or P1 … P4.
 fn side_number(word: &str, letters: &[char]) -> Option<usize> {
     let rest = word.strip_prefix(|c: char| letters.contains(&c.to_ascii_uppercase()))?;
     rest.parse().ok().filter(|side| (1..=4).contains(side))

@@ -1,4 +1,4 @@
-//! From the parts of a deck to one mesh, with the names of what its rows act on.
+//! Combines the parts of a deck into one mesh, with names for the targets of its rows.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,8 +18,8 @@ use crate::source::Plane;
 use solver::error::{Findings, Reason, Violation};
 use solver::mesh::{NO_NODE, RawMesh};
 
-/// How often all sets together may name a node or an element on average, beside what the deck writes out: sets that
-/// contain sets are short in the deck, and may be very long when written out.
+/// The limit of how often all sets together may name each node or element on average, apart from what the deck writes
+/// out: sets that contain sets are short in the deck, and may be very long when written out.
 const MOST_TIMES: u64 = 16;
 
 /// A row of a deck, with the name that its target has in the mesh.
@@ -28,14 +28,14 @@ pub(super) struct Row<T> {
     pub(super) name: String,
 }
 
-/// A deck as a mesh, and what is left of it for a problem.
+/// A deck as a mesh, with the data that a problem needs in addition.
 pub(super) struct Built {
-    /// Materials and steps.
+    /// The materials and steps.
     pub(super) deck: Deck,
     pub(super) raw: RawMesh,
-    /// Violations of the mesh.
+    /// The violations of the mesh.
     pub(super) faults: Findings,
-    /// What a problem cannot have.
+    /// The parts of the deck that a problem cannot have.
     pub(super) doubts: Findings,
     pub(super) incomplete: Incomplete,
     pub(super) types: Vec<Typed>,
@@ -43,7 +43,7 @@ pub(super) struct Built {
     pub(super) prescribed: Vec<Row<Prescribed>>,
     pub(super) pressures: Vec<Row<Pressure>>,
     pub(super) forces: Vec<Row<Force>>,
-    /// Which nodes belong to plane elements.
+    /// Whether each node belongs to a plane element.
     pub(super) used: Vec<bool>,
     pub(super) tools: Tools,
     /// For each contact pair the names of its surfaces in the mesh.
@@ -51,7 +51,7 @@ pub(super) struct Built {
 }
 
 impl Deck {
-    /// The mesh with all its names, and its violations.
+    /// Builds the mesh with all its names, and its violations.
     pub(super) fn build(mut self) -> Built {
         let mut merged = Merged::default();
         let scopes = merged.add_all(&mut self);
@@ -117,7 +117,7 @@ struct Rows {
     analytical: Vec<(usize, Name, Analytical)>,
 }
 
-/// All parts in one.
+/// All parts of the deck merged into one.
 #[derive(Default)]
 struct Merged {
     raw: RawMesh,
@@ -130,20 +130,20 @@ struct Merged {
     rigid_lines: Vec<RigidLines>,
     rows: Rows,
     incomplete: Incomplete,
-    /// Members of sets and surfaces, as they are written.
+    /// The number of members of sets and surfaces as they are written.
     written: u64,
     faults: Findings,
     doubts: Findings,
 }
 
-/// The sets of a deck: nodes, and elements by their place among all that have a number.
+/// The sets of a deck: of nodes, and of elements (by their place among all that have a number).
 struct Sets {
     elements: BTreeMap<Key, Vec<u32>>,
     room: Room,
 }
 
 impl Merged {
-    /// The assembly and all instances.
+    /// Adds the assembly and all instances.
     fn add_all(&mut self, deck: &mut Deck) -> Vec<Scope> {
         let mut instances = std::mem::take(&mut deck.instances);
         if instances.is_empty() && !deck.parts.is_empty() {
@@ -160,7 +160,7 @@ impl Merged {
                     Reason::Malformed,
                     format!("the parts {} without *INSTANCE", names.join(", ")),
                     "*ASSEMBLY with *INSTANCE, NAME=…, PART=…",
-                    "Say which parts the body has, and where they are.",
+                    "List the parts of the body by *INSTANCE, with their positions.",
                 ));
             } else {
                 // a single part may stand for itself
@@ -274,7 +274,7 @@ impl Merged {
         }
     }
 
-    /// The rigid bodies; their elements are taken out of the mesh.
+    /// Finds the rigid bodies and removes their elements from the mesh.
     fn take_tools(&mut self, names: &Names<'_>, sets: &Sets) -> Tools {
         let search = Search {
             names,
@@ -291,7 +291,7 @@ impl Merged {
                 self.doubts.add(on_line(
                     lines.line,
                     Reason::Unsupported,
-                    format!("{} that no *RIGID BODY has", lines.what),
+                    format!("{} that belong to no *RIGID BODY", lines.what),
                     "rigid lines as the surface of a *RIGID BODY, ELSET=…, REF NODE=…",
                     REMOVE_ELEMENTS,
                 ));
@@ -328,7 +328,7 @@ impl Merged {
         tools
     }
 
-    /// The names in the mesh of the surfaces of contact pairs; one that is not known is as it is written.
+    /// The names in the mesh of the surfaces of contact pairs; an unknown name is kept as it is written.
     fn named_pairs(&self, names: &Names<'_>) -> Vec<[String; 2]> {
         let has = |scope: usize, name: &Name| {
             let rigid = |(s, n, _): &(usize, Name, Analytical)| *s == scope && n == name;
@@ -346,7 +346,7 @@ impl Merged {
             .collect()
     }
 
-    /// Which nodes belong to plane elements.
+    /// Whether each node belongs to a plane element.
     fn used(&self) -> Vec<bool> {
         let mut used = vec![false; self.raw.nodes.len()];
         for element in &self.raw.elements {
@@ -372,7 +372,7 @@ impl Merged {
         self.faults.extend(plane.fault());
     }
 
-    /// All sets; those of nodes get their names in the mesh.
+    /// All sets; sets of nodes also get their names in the mesh.
     fn sets(&mut self, names: &Names<'_>) -> Sets {
         let mesh = (self.raw.nodes.len() + self.numbered.len()) as u64;
         let mut room = Room::new((1 << 16) + 2 * self.written + MOST_TIMES * mesh);
@@ -398,7 +398,7 @@ impl Merged {
         Sets { elements, room }
     }
 
-    /// The sets of elements under their names in the mesh: groups, and boundaries where they contain lines.
+    /// Adds the sets of elements under their names in the mesh: as groups, and as boundaries where they contain lines.
     fn groups(&mut self, names: &Names<'_>, elements: BTreeMap<Key, Vec<u32>>) {
         for (name, set) in exported(names, elements, &mut self.faults) {
             let plane = |element: &u32| match self.numbered[*element as usize] {
@@ -433,8 +433,8 @@ impl Merged {
         all.copied().filter(|node| *node != NO_NODE)
     }
 
-    /// The ends of a line element: of three nodes the two that are farthest apart, since programs differ in where they
-    /// write the middle.
+    /// The ends of a line element: of three nodes the two that are farthest apart, since programs write the middle node
+    /// in different places.
     fn ends(&self, element: u32) -> Option<[u32; 2]> {
         let Numbered::Line(place) = self.numbered[element as usize] else {
             return None;
@@ -451,7 +451,7 @@ impl Merged {
         pairs.into_iter().max_by(|p, q| far(*p).total_cmp(&far(*q)))
     }
 
-    /// Values become those at the end of the step.
+    /// Multiplies values by their amplitude at the end of the step.
     fn apply_amplitudes(&mut self, deck: &Deck) {
         let rows = &mut self.rows;
         let prescribed = rows.prescribed.iter_mut();
@@ -498,7 +498,7 @@ impl Merged {
         found
     }
 
-    /// Rows for nodes, in the order of the deck; a node by itself becomes a set of one.
+    /// Converts rows for nodes, in the order of the deck; a single node becomes a set of one.
     fn named_nodes<T>(
         &mut self,
         names: &Names<'_>,
@@ -555,7 +555,7 @@ impl Merged {
         );
     }
 
-    /// The surfaces of the deck, and the sides that it loads; returns the rows of loads.
+    /// Adds the surfaces of the deck and the sides that it loads; returns the rows of loads.
     fn surfaces(&mut self, names: &Names<'_>, sets: &mut Sets) -> Vec<Row<Pressure>> {
         let mut building = Building {
             names,
@@ -662,16 +662,16 @@ impl Merged {
     }
 }
 
-/// Sides of elements by name.
+/// Builds boundaries from the sides of elements, by name.
 struct Building<'a> {
     names: &'a Names<'a>,
     sets: &'a mut Sets,
-    /// Sides of two elements, once they are needed.
+    /// The sides that two elements share, found when first needed.
     twice: Option<Vec<(u32, u32)>>,
 }
 
 impl Building<'_> {
-    /// The corners of sides; none if some are no sides of plane elements.
+    /// The corners of sides; none if some targets have no sides of plane elements.
     fn lines(
         &mut self,
         merged: &mut Merged,
@@ -745,7 +745,7 @@ impl Building<'_> {
     }
 }
 
-/// Corners of the sides that two elements share, in order.
+/// The corners of the sides that two elements share, in order.
 pub(super) fn sides_of_two(raw: &RawMesh) -> Vec<(u32, u32)> {
     let mut sides: Vec<(u32, u32)> = raw
         .elements
@@ -767,8 +767,8 @@ pub(super) fn key([a, b]: [u32; 2]) -> (u32, u32) {
     (a.min(b), a.max(b))
 }
 
-/// Sets under their names in the mesh. One of an instance has two: with that of the instance, and without it where no
-/// other set has that name.
+/// Sets under their names in the mesh. A set of an instance has two names: one with that of the instance, and one
+/// without it if no other set has that name.
 fn exported(
     names: &Names<'_>,
     sets: BTreeMap<Key, Vec<u32>>,
@@ -788,7 +788,7 @@ fn exported(
             faults.add(on_line(
                 names.line_in_assembly(&full),
                 Reason::DuplicateName,
-                format!("the set `{full:.120}` of the assembly, and of an instance one that the assembly names so"),
+                format!("the set `{full:.120}` of the assembly, and a set of an instance with the same full name"),
                 "sets of the assembly that are not named INSTANCE.SET like those of instances",
                 "Rename the set of the assembly, also in the keywords that name it.",
             ));
@@ -803,7 +803,7 @@ fn exported(
     exported
 }
 
-/// A target as it is written.
+/// A target as it is written in the deck.
 fn word(target: &Target) -> String {
     match target {
         Target::Label(label) => label.to_string(),
@@ -812,7 +812,7 @@ fn word(target: &Target) -> String {
     }
 }
 
-/// Adds a list to another, without a copy where that is empty.
+/// Appends a list to another, without a copy if that is empty.
 fn join<T>(all: &mut Vec<T>, mut more: Vec<T>) {
     if all.is_empty() {
         *all = more;

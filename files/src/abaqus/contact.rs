@@ -1,4 +1,4 @@
-//! Contact between a surface of the body and a rigid surface of a deck, as contacts with obstacles.
+//! Translates contact between a surface of the body and a rigid surface of a deck into contacts with obstacles.
 
 use std::collections::BTreeMap;
 
@@ -15,26 +15,26 @@ use solver::problem::{
 };
 use solver::solution::{Warning, WarningCode};
 
-/// Elastic slip, in lengths of a side: Abaqus's own default.
+/// The elastic slip, in lengths of a side: Abaqus's default.
 const SLIP_TOLERANCE: f64 = 0.005;
 
-/// Sine of the angles that count as none: what the digits of a file leave.
+/// The sine of the largest angle that counts as zero, since coordinates in files are rounded.
 const STRAIGHT: f64 = 1e-6;
 
-/// Of the body's size: gaps that the digits of a file leave.
+/// The largest gap that counts as closed, since coordinates in files are rounded: a part of the body's size.
 const CLOSED: f64 = 1e-6;
 
-/// Nodes of a boundary that are looked at.
+/// The largest number of nodes of a boundary that are examined.
 const MOST_LOOKS: usize = 1000;
 
-/// The contacts of a deck, its steps, and what is done differently here.
+/// The contacts of a deck, its steps, and warnings about differences from the deck.
 pub(super) struct Translated {
     pub(super) contacts: Vec<Contact>,
     pub(super) steps: Vec<Step>,
     pub(super) warnings: Vec<Warning>,
 }
 
-/// What contacts are made from.
+/// The parts of a deck that contacts are made from.
 pub(super) struct Source<'a> {
     pub(super) said: &'a DeckContact,
     /// For each contact pair the names of its surfaces in the mesh.
@@ -43,11 +43,11 @@ pub(super) struct Source<'a> {
     pub(super) mesh: &'a Mesh,
     pub(super) materials: &'a [Material],
     pub(super) axisymmetric: bool,
-    /// Motion of each rigid body, `None` if it is not known.
+    /// The motion of each rigid body; `None` if it is unknown.
     pub(super) motions: &'a [Option<Motion>],
 }
 
-/// What cannot be a contact here.
+/// Violations: parts of the deck that cannot be a contact here.
 #[derive(Default)]
 pub(super) struct Refused {
     pub(super) violations: Vec<Violation>,
@@ -63,12 +63,13 @@ impl Refused {
 /// One contact, and its motion at the end of each step.
 struct Made {
     contact: Contact,
-    /// Indentation and tangential displacement at the end of each step.
+    /// The indentation and tangential displacement at the end of each step.
     moved: Vec<[f64; 2]>,
 }
 
 impl Source<'_> {
-    /// All contacts; `steps`: the factors of loads and supports at the end of each, `increments` as `*STATIC` begins.
+    /// Translates all contacts. `steps`: the factors of loads and supports at the end of each step; `increments`: the
+    /// number that `*STATIC` starts with.
     pub(super) fn contacts(&self, refused: &mut Refused, others: &[[f64; 2]]) -> Translated {
         let mut found = Translated {
             contacts: Vec::new(),
@@ -91,7 +92,7 @@ impl Source<'_> {
             refused.doubt(
                 line,
                 "rigid bodies that several steps move in different proportions",
-                "one factor for all in each step",
+                "motions in the same proportion in every step",
                 WRITTEN_INSTEAD,
             );
             return found;
@@ -111,7 +112,7 @@ impl Source<'_> {
                 let written = self.said.steps.get(k).and_then(|step| step.1);
                 if let Some(more) = written.filter(|n| friction && *n > MOST_INCREMENTS) {
                     found.warnings.push(differs(format!(
-                        "Step {} begins with {more:.0} increments, and is solved in {MOST_INCREMENTS:.0}. Divide it into several steps if more are needed.",
+                        "Step {} begins with {more:.0} increments, but is solved in {MOST_INCREMENTS:.0}. Divide it into several steps if more are needed.",
                         k + 1
                     )));
                 }
@@ -129,7 +130,7 @@ impl Source<'_> {
         found
     }
 
-    /// Reports pairs with sides of the body that an earlier pair has too; whether there are any.
+    /// Reports pairs with sides of the body that an earlier pair has too; returns whether there are any.
     fn report_shared_sides(&self, refused: &mut Refused) -> bool {
         let mut owners: BTreeMap<Edge, (u64, &str)> = BTreeMap::new();
         let before = refused.violations.len();
@@ -224,7 +225,7 @@ impl Source<'_> {
         let Some(pieces) = chain(pieces) else {
             refused.doubt(
                 line,
-                format!("the rigid surface `{tool:.60}`, which is no single line"),
+                format!("the rigid surface `{tool:.60}`, which is not one continuous line"),
                 "lines that follow one another, all with the body on the same side",
                 WRITTEN_INSTEAD,
             );
@@ -241,7 +242,7 @@ impl Source<'_> {
                 line,
                 got,
                 &format!("at most {MOST_POINTS}"),
-                "Leave out what the body cannot touch.",
+                "Remove the parts that the body cannot touch.",
             );
             return None;
         }
@@ -321,7 +322,7 @@ impl Source<'_> {
         })
     }
 
-    /// Coulomb's law, which depends on the path; `None`: without friction.
+    /// Coulomb's law, which depends on the load path; `None`: without friction.
     fn friction(
         &self,
         said: &DeckFriction,
@@ -371,7 +372,8 @@ impl Source<'_> {
         })
     }
 
-    /// Contact is hard here: says how far a softer one is from that, or refuses it.
+    /// Checks the contact stiffness: contact is hard here. Warns of how far a softer contact differs from that, or
+    /// refuses it.
     fn behavior(
         &self,
         behavior: &Behavior,
@@ -393,14 +395,14 @@ impl Source<'_> {
                 let least = modulus / self.mean_side(edges);
                 match slope {
                     Some(slope) if slope >= least => warnings.push(differs(format!(
-                        "*SURFACE BEHAVIOR on line {line}: contact is hard here; the deck's lets the surfaces overlap by p/{slope:e} at a pressure p, {:.1e} for a thousandth of Young's modulus.",
+                        "*SURFACE BEHAVIOR on line {line}: contact is hard here; in the deck the surfaces overlap by p/{slope:e} at a pressure p, {:.1e} for a thousandth of Young's modulus.",
                         1e-3 * modulus / slope
                     ))),
                     _ => refused.doubt(
                         line,
                         format!("a pressure of {} per length of overclosure", slope.unwrap_or(0.0)),
                         &format!("hard contact, or a slope of at least {least:e} (Young's modulus per side of an element), which is nearly hard"),
-                        "A layer as soft as that is no contact with a rigid obstacle: mesh it.",
+                        "Such a soft layer is no contact with a rigid obstacle: include the layer in the mesh.",
                     ),
                 }
             }
@@ -408,7 +410,7 @@ impl Source<'_> {
                 let most = moved.iter().map(|m| m[0].abs()).fold(0.0, f64::max);
                 match clearance {
                     Some(clearance) if clearance > 0.0 && clearance <= 0.01 * most => warnings.push(differs(format!(
-                        "*SURFACE BEHAVIOR on line {line}: contact is hard here; the deck's begins at a clearance of {clearance:e}."
+                        "*SURFACE BEHAVIOR on line {line}: contact is hard here; in the deck pressure begins at a clearance of {clearance:e}."
                     ))),
                     _ => refused.doubt(
                         line,
@@ -421,7 +423,7 @@ impl Source<'_> {
         }
     }
 
-    /// Mean length of the sides of a contact.
+    /// The mean length of the sides of a contact.
     fn mean_side(&self, edges: &[Edge]) -> f64 {
         let side = |edge: &Edge| {
             let [a, b, _] = self.mesh.edge_nodes(edge);
@@ -435,9 +437,10 @@ impl Source<'_> {
     }
 }
 
-/// The increments of a step with friction, which depends on the path: as many as the deck begins with, and no fewer than these.
+/// The smallest number of increments of a step with friction, which depends on the load path; if the deck starts with
+/// more, that number is used.
 const FEWEST_INCREMENTS: f64 = 10.0;
-/// And no more than these.
+/// The largest number of increments of a step with friction.
 const MOST_INCREMENTS: f64 = 1000.0;
 
 fn increments(written: Option<f64>) -> u32 {
@@ -464,29 +467,29 @@ pub(super) fn differs(message: String) -> Warning {
     }
 }
 
-/// A rigid surface before a boundary of the body.
+/// A rigid surface in front of a boundary of the body.
 struct Placed<'a> {
     mesh: &'a Mesh,
     edges: &'a [Edge],
     outline: Outline,
-    /// Of the body (length).
+    /// The size of the body (length).
     size: f64,
 }
 
-/// A rigid surface and its motion, as an obstacle.
+/// A rigid surface and its motion, translated to an obstacle.
 struct Shape {
     obstacle: Obstacle,
     direction: Option<Point>,
-    /// Indentation and tangential displacement at the end of each step.
+    /// The indentation and tangential displacement at the end of each step.
     moved: Vec<[f64; 2]>,
     message: Option<String>,
 }
 
-/// Why a rigid surface cannot be an obstacle: what was found, and what is expected.
+/// Why a rigid surface cannot be an obstacle: the value found, and the expected one.
 type Unlike = (String, &'static str);
 
 impl Placed<'_> {
-    /// Corner nodes of the boundary with the normal of a side at each, not too many.
+    /// Corner nodes of the boundary with the normal of a side at each, up to a limit.
     fn looks(&self) -> impl Iterator<Item = (Point, Point)> + '_ {
         let stride = self.edges.len().div_ceil(MOST_LOOKS).max(1);
         self.edges.iter().step_by(stride).flat_map(|edge| {
@@ -500,8 +503,8 @@ impl Placed<'_> {
         met(&self.outline.points, place, n, 0.1 * self.size)
     }
 
-    /// Whether the outer side of the rigid surface faces the body where it is nearest. One that faces no node is left to
-    /// the checks of the obstacle.
+    /// Whether the outer side of the rigid surface faces the body where they are nearest. A surface that faces no node
+    /// is reported by the checks of the obstacle instead.
     fn faces(&self) -> bool {
         let hits = self.looks().filter_map(|look| {
             let (distance, m) = self.met(look)?;
@@ -525,7 +528,7 @@ impl Placed<'_> {
         })
     }
 
-    /// The normal of a straight boundary.
+    /// The normal of a straight boundary; none if it is curved.
     fn straight(&self) -> Option<Point> {
         let mut normals = self
             .edges
@@ -536,7 +539,7 @@ impl Placed<'_> {
         same.then_some(n)
     }
 
-    /// The normal of a straight rigid surface, towards the body.
+    /// The normal of a straight rigid surface, towards the body; none if it is curved.
     fn flat(&self) -> Option<Point> {
         if self.outline.joined != Joined::Lines {
             return None;
@@ -552,7 +555,7 @@ impl Placed<'_> {
         points.windows(2).all(same).then_some([-along[1], along[0]])
     }
 
-    /// The obstacle, and how it moves.
+    /// Translates the rigid surface and its motion to an obstacle.
     fn shape(
         &self,
         motion: &Motion,
@@ -573,8 +576,8 @@ impl Placed<'_> {
         }
     }
 
-    /// A straight boundary: what the rigid surface moves along n is its indentation, and what it moves along t is its
-    /// tangential displacement, by which it is placed as well.
+    /// Translates a rigid surface at a straight boundary: its motion along n is the indentation, and its motion along t
+    /// the tangential displacement, by which its position is shifted too.
     fn before_a_straight_side(&self, n: Point, ends: &[Point], others: &[[f64; 2]]) -> Shape {
         let t = [n[1], -n[0]];
         let mut moved: Vec<[f64; 2]> = ends.iter().map(|u| [-dot(*u, n), dot(*u, t)]).collect();
@@ -592,7 +595,7 @@ impl Placed<'_> {
             .map(|p| [p[0] + shift[0], p[1] + shift[1]])
             .collect();
         let mut message = (shift != [0.0; 2] && others.len() > 1).then(|| {
-            format!("the rigid surface is placed where the last step leaves it along the body, {last:e} from where it was; earlier steps have it there as well.")
+            format!("the rigid surface is placed along the body where it is at the end of the last step, {last:e} from its start, for all steps.")
         });
         let foot = self.mesh.nodes[self.edges[0][0] as usize];
         // profiles begin at zero distance: the rest is part of the indentation, if nothing else moves meanwhile
@@ -638,7 +641,7 @@ impl Placed<'_> {
         }
     }
 
-    /// A circle by its profile along the boundary; it ends where its arc ends.
+    /// A circle by its profile along the boundary; it ends where the arc of the deck ends.
     fn circle(&self, center: Point, radius: f64, t: Point, points: &[Point]) -> Obstacle {
         let run = runs(self.edges);
         let start = run
@@ -665,7 +668,7 @@ impl Placed<'_> {
         }
     }
 
-    /// A straight rigid surface before a curved boundary, by the rigid surface's own normal, which is the same
+    /// Translates a straight rigid surface at a curved boundary, by the rigid surface's own normal, which is the same
     /// everywhere: `q`, towards the body.
     fn straight_before_a_curve(&self, q: Point, ends: &[Point]) -> Shape {
         // of the contact: n = −q
@@ -685,7 +688,7 @@ impl Placed<'_> {
         }
     }
 
-    /// A curved rigid surface before a curved boundary, which moves in one direction.
+    /// Translates a curved rigid surface at a curved boundary, which moves in one direction.
     fn curve_before_a_curve(&self, ends: &[Point]) -> Result<Shape, Unlike> {
         let most =
             ends.iter().copied().fold(
@@ -737,7 +740,7 @@ fn span(values: impl Iterator<Item = f64>) -> [f64; 2] {
     })
 }
 
-/// A straight line without ends, through the first and the last of points.
+/// A straight line without ends, through the first and the last of some points.
 fn line(points: &[Point]) -> Obstacle {
     let step = minus(points[points.len() - 1], points[0]);
     Obstacle::Line {
@@ -749,7 +752,7 @@ fn line(points: &[Point]) -> Obstacle {
     }
 }
 
-/// Points as an obstacle, and how far it is from the curves that they were taken from.
+/// Points as an obstacle, with the distance from the curves that they were taken from, in words.
 fn polyline(points: Vec<Point>, joined: Joined) -> (Obstacle, Option<String>) {
     let (interpolation, off) = match joined {
         Joined::Lines => (Interpolation::Linear, 0.0),
@@ -762,7 +765,7 @@ fn polyline(points: Vec<Point>, joined: Joined) -> (Obstacle, Option<String>) {
         Interpolation::Cubic => "a spline",
     };
     let message = (off > 0.0).then(|| {
-        format!("the curves of the rigid surface are {how} through {} points of them, within {off:.1e}.", points.len())
+        format!("the curves of the rigid surface are replaced by {how} through {} of their points, within {off:.1e}.", points.len())
     });
     let obstacle = Obstacle::Polyline {
         points,

@@ -1,14 +1,14 @@
-//! The parts of a deck that are about contact: rigid bodies, pairs of surfaces, and how they interact.
+//! Data of a deck about contact: rigid bodies, pairs of surfaces, and their interactions.
 
 use std::collections::BTreeMap;
 
 use super::tool::{Piece, Point};
 use super::written::{Name, Target};
 
-/// Where a contact that a deck cannot state here is written instead.
+/// The advice for a contact that a deck cannot state here.
 pub(super) const WRITTEN_INSTEAD: &str = "Write the contact in a problem as JSON (`contacts`: obstacle, indentation, friction) with this deck as its mesh: \"mesh\": {\"abaqus\": \"…\"}, or upload the deck and name it by its hash.";
 
-/// The parts of a deck that are about contact, beside those of its parts.
+/// All data of a deck about contact, apart from that in its parts.
 #[derive(Clone, Default)]
 pub(super) struct DeckContact {
     pub(super) pairs: Vec<Pair>,
@@ -20,7 +20,7 @@ pub(super) struct DeckContact {
 }
 
 impl DeckContact {
-    /// Keeps how many increments `*STATIC` begins with.
+    /// Records how many increments `*STATIC` starts with.
     pub(super) fn note_increments(&mut self, initial: Option<f64>, period: Option<f64>) {
         let initial = initial.filter(|initial| *initial > 0.0);
         if let (Some(step), Some(initial)) = (self.steps.last_mut(), initial) {
@@ -28,14 +28,14 @@ impl DeckContact {
         }
     }
 
-    /// The step, from 0, that a line belongs to; what stands before the first step belongs to it.
+    /// The step, from 0, that a line belongs to; lines before the first step belong to that.
     pub(super) fn step_of(&self, line: u64) -> usize {
         let begun = self.steps.partition_point(|step| step.0 < line);
         begun.saturating_sub(1)
     }
 }
 
-/// `*SURFACE, TYPE=SEGMENTS`.
+/// An analytical surface, `*SURFACE, TYPE=SEGMENTS`.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Analytical {
     pub(super) pieces: Vec<Piece>,
@@ -43,7 +43,7 @@ pub(super) struct Analytical {
 }
 
 impl Analytical {
-    /// Moves all its points.
+    /// Moves all points of the surface.
     pub(super) fn place(&mut self, to: impl Fn(Point) -> Point) {
         for piece in &mut self.pieces {
             *piece = piece.placed(&to);
@@ -60,49 +60,49 @@ pub(super) struct Pair {
     pub(super) adjust: Option<Adjust>,
 }
 
-/// `ADJUST`: nodes are moved onto the other surface before the first step.
+/// The parameter `ADJUST` of a contact pair, which moves nodes onto the other surface before the first step.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Adjust {
-    /// Those nearer than a length.
+    /// Moves the nodes within this distance.
     Within(f64),
-    /// Those of a set.
+    /// Moves the nodes of a set.
     Set,
 }
 
-/// `*SURFACE INTERACTION`.
+/// The definition of an interaction, `*SURFACE INTERACTION`.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Interaction {
     pub(super) friction: Option<DeckFriction>,
     pub(super) behavior: Behavior,
 }
 
-/// `*FRICTION`.
+/// The friction of an interaction, `*FRICTION`.
 #[derive(Clone, Debug, Default)]
 pub(super) struct DeckFriction {
     pub(super) line: u64,
     pub(super) coefficient: Option<f64>,
-    /// CalculiX: shear stress per length of slip.
+    /// CalculiX's stick slope: shear stress per length of slip.
     pub(super) stick_slope: Option<f64>,
     pub(super) elastic_slip: Option<f64>,
-    /// In lengths of a side.
+    /// The slip tolerance, in lengths of a side.
     pub(super) slip_tolerance: Option<f64>,
     pub(super) most_stress: Option<f64>,
-    /// Without elastic slip.
+    /// Whether friction is by Lagrange multipliers, without elastic slip.
     pub(super) lagrange: bool,
 }
 
-/// `*SURFACE BEHAVIOR`.
+/// The normal behavior of an interaction, `*SURFACE BEHAVIOR`.
 #[derive(Clone, Debug, Default)]
 pub(super) enum Behavior {
     #[default]
     Hard,
-    /// Pressure per length of overclosure.
+    /// A linear law: pressure per length of overclosure.
     Linear { line: u64, slope: Option<f64> },
-    /// The clearance at which the pressure begins.
+    /// An exponential law, with the clearance at which the pressure begins.
     Exponential { line: u64, clearance: Option<f64> },
 }
 
-/// A row of `*BOUNDARY`: components (6: the rotation) are held at a value.
+/// A row of `*BOUNDARY`: components that are held at a value; 6 is the rotation.
 #[derive(Clone, Debug)]
 pub(super) struct Held {
     pub(super) line: u64,
@@ -112,7 +112,7 @@ pub(super) struct Held {
     pub(super) amplitude: Option<Name>,
 }
 
-/// The keyword that data about contact belong to.
+/// The keyword that the following data about contact belong to.
 pub(super) enum ContactBlock {
     Segments(Name),
     Pairs {
@@ -123,18 +123,18 @@ pub(super) enum ContactBlock {
     Behavior,
 }
 
-/// `*RIGID BODY`.
+/// The definition of a rigid body, `*RIGID BODY`.
 #[derive(Clone, Debug)]
 pub(super) struct RigidBody {
     pub(super) line: u64,
     pub(super) made_of: MadeOf,
     /// The node that moves it.
     pub(super) reference: Target,
-    /// CalculiX: the node whose displacements are its rotations.
+    /// CalculiX's node whose displacements are the rotations of the body.
     pub(super) rotation: Option<Target>,
 }
 
-/// What a rigid body is made of.
+/// The elements, nodes or surface of a rigid body.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum MadeOf {
     /// An analytical surface.

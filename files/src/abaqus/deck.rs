@@ -10,23 +10,23 @@ use super::written::{
 };
 use solver::error::Reason;
 
-/// Where in a deck a line is.
+/// The scope of a line: a part, an instance or the assembly.
 #[derive(Clone, Debug, Default)]
 pub(super) enum Inside {
-    /// In the assembly, or in no part at all.
+    /// The assembly, or a deck without parts.
     #[default]
     Assembly,
     Part(Name),
     Instance(Name),
 }
 
-/// How far an instance is moved, and then turned: about which point, by which angle (radians).
+/// The position of an instance: a translation, then a rotation (centre and angle in radians).
 pub(super) type Placement = ([f64; 3], Option<([f64; 2], f64)>);
 
 /// The supported parts of a deck, and the violations.
 #[derive(Default)]
 pub(super) struct Deck {
-    /// The part, instance or assembly that lines now belong to.
+    /// The part, instance or assembly that the present lines belong to.
     pub(super) here: Part,
     pub(super) inside: Inside,
     /// The assembly, while lines belong to a part or instance.
@@ -34,25 +34,25 @@ pub(super) struct Deck {
     pub(super) assembly_name: Option<Name>,
     pub(super) parts: BTreeMap<Name, Part>,
     pub(super) instances: Vec<(Name, Part)>,
-    /// Sizes of all parts together, and of all instances.
+    /// The size of all parts and instances together.
     pub(super) written: u64,
     pub(super) instantiated: u64,
-    /// Names of sets and surfaces so far.
+    /// The number of names of sets and surfaces so far.
     pub(super) names: usize,
     /// The spelling of each name, by the name in capitals.
     spelling: HashMap<String, Name>,
-    /// The material that properties belong to.
+    /// The material that the present properties belong to.
     pub(super) material: Option<Name>,
     pub(super) materials: BTreeMap<Name, MaterialDefinition>,
     pub(super) orientations: BTreeMap<Name, Orientation>,
     pub(super) amplitudes: BTreeMap<Name, Amplitude>,
     pub(super) temperatures: Temperatures,
     pub(super) steps: usize,
-    /// Where the instance that lines belong to is.
+    /// The position of the present instance.
     pub(super) placement: Option<Placement>,
     /// The length of the step's time.
     pub(super) period: Option<f64>,
-    /// The step has had a `*BOUNDARY`.
+    /// Whether the step has had a `*BOUNDARY`.
     pub(super) supported_in_step: bool,
     /// Keywords with `OP=NEW` in steps after the first.
     pub(super) replacements: Vec<Replacement>,
@@ -81,7 +81,7 @@ impl Deck {
             .add(|| on_line(line, reason, got.into(), expected, hint));
     }
 
-    /// The name as it was first written.
+    /// The name in the spelling in which it first occurred.
     pub(super) fn spelled(&mut self, name: &str) -> Name {
         let capitals = name.to_uppercase();
         match self.spelling.get(&capitals) {
@@ -92,13 +92,13 @@ impl Deck {
         }
     }
 
-    /// The material that properties now belong to.
+    /// The material that the present properties belong to.
     pub(super) fn material(&mut self) -> Option<&mut MaterialDefinition> {
         let name = self.material.as_ref()?;
         self.materials.get_mut(name)
     }
 
-    /// The name as it was first written, if the deck has it.
+    /// The name in the spelling in which it first occurred, if the deck has it.
     pub(super) fn known(&self, name: &str) -> Option<&Name> {
         self.spelling.get(&name.to_uppercase())
     }
@@ -125,13 +125,13 @@ impl Deck {
         members(set, of)
     }
 
-    /// Gives a set of nodes those of a set of elements.
+    /// Adds the nodes of a set of elements to a set of nodes.
     pub(super) fn nodes_of(&mut self, name: &Name, of: &Option<Name>, elements: Name, line: u64) {
         let set = new_or_known(&mut self.here.node_sets, &mut self.names, name, line);
         set.of_elements.push((of.clone(), elements));
     }
 
-    /// The nodes of a surface of nodes: its name is none of a set.
+    /// The nodes of a surface of nodes, whose name is separate from those of sets.
     pub(super) fn node_surface(&mut self, name: &Name, line: u64) -> &mut Vec<Target> {
         let surfaces = &mut self.here.node_surfaces;
         &mut new_or_known(surfaces, &mut self.names, name, line).members
@@ -151,7 +151,7 @@ impl Deck {
         &mut known.or_insert_with(new).sides
     }
 
-    /// Whether a name or number of a line is too long; reports it.
+    /// Whether a name or number of a line is too long, which is reported.
     pub(super) fn has_long_name(&mut self, line: u64, text: &str) -> bool {
         let long = |word: &str| word.trim().len() > LONGEST_NAME;
         let Some(word) = text.split([',', '=']).find(|word| long(word)) else {
@@ -163,7 +163,7 @@ impl Deck {
         true
     }
 
-    /// The factor of an amplitude at the end of the step, or what is wrong with it.
+    /// The factor of an amplitude at the end of the step, or the reason why it has none.
     pub(super) fn factor(&self, name: &Name) -> Result<f64, String> {
         let Some(amplitude) = self.amplitudes.get(name) else {
             return Err(format!("the unknown amplitude `{name:.60}`"));
@@ -219,7 +219,7 @@ fn new_or_known<'a>(
     sets.entry(name.clone()).or_insert_with(new)
 }
 
-/// The members of a set that are numbered and named as its part is, or as an instance.
+/// The members of a set, with numbers and names of its own part or of an instance.
 fn members<'a>(set: &'a mut Set, instance: &Option<Name>) -> &'a mut Vec<Target> {
     let Some(instance) = instance else {
         return &mut set.members;

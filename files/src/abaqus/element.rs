@@ -1,8 +1,8 @@
-//! Types of elements: those that make up a plane body, and what others are to its mesh and to a problem.
+//! Types of elements: those that make up a plane body, and the meaning of others for its mesh and for a problem.
 
 use solver::element::Family;
 
-/// The theory of a type of element.
+/// The two-dimensional theory of a type of element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Theory {
     PlaneStrain,
@@ -10,20 +10,20 @@ pub(super) enum Theory {
     Axisymmetric,
 }
 
-/// The mechanics of a type, where a problem of ours can have it.
+/// The mechanics of a type, if a problem can have it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Mechanics {
     pub(super) theory: Theory,
     pub(super) family: Family,
-    /// Integrated with the smaller rule.
+    /// Whether integration is reduced.
     pub(super) reduced: bool,
 }
 
-/// The mechanics of the elements of a keyword, the first with them.
+/// The first elements with mechanics in a deck.
 #[derive(Clone, Debug)]
 pub(super) struct Typed {
     pub(super) mechanics: Mechanics,
-    /// The line of the keyword, and the type that it names.
+    /// The line of their keyword, and the type that it names.
     pub(super) line: u64,
     pub(super) name: String,
 }
@@ -34,14 +34,14 @@ impl Mechanics {
     }
 }
 
-/// What the elements of a type are to a plane mesh.
+/// The meaning of a type of element for a plane mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shape {
-    /// A triangle or quadrilateral with this number of nodes, of which a ninth is in the centre.
+    /// A triangle or quadrilateral with this number of nodes; a ninth is in the centre.
     Plane(Family, usize),
     /// A line with 2 or 3 nodes, which may name a part of the boundary.
     Line(usize),
-    /// Something else, with its number of nodes if the name tells it.
+    /// Another element, with its number of nodes if the name shows it.
     Other(Option<usize>),
 }
 
@@ -51,11 +51,11 @@ pub(super) struct ElementType {
     pub(super) shape: Shape,
     /// Present for solids of plane strain, plane stress and revolution.
     pub(super) mechanics: Option<Mechanics>,
-    /// Without effect on a linear static step.
+    /// Whether the type has no effect on a linear static step.
     pub(super) idle: bool,
 }
 
-/// Types of the plane, with the beginning of their names: solids; the same with a generalised third direction, for heat
+/// Types of the plane, with the beginning of their names: solids; variants with a generalised third direction, for heat
 /// and for sound; shells, membranes and surfaces, which programs write for plane meshes too.
 const PLANE: [&str; 14] = [
     "CPEG", "CGAX", "DC2D", "DCAX", "AC2D", "ACAX", "SFM3D", "STRI", "M3D", "CPE", "CPS", "CAX",
@@ -165,7 +165,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn twins_of_plane_elements_are_read_and_others_are_told_apart() {
+    fn variants_of_plane_elements_are_read_and_others_are_classified() {
         let plane = |name: &str| match ElementType::new(name).shape {
             Shape::Plane(_, nodes) => nodes,
             other => panic!("{name}: {other:?}"),

@@ -1,4 +1,4 @@
-//! Reads what a deck says of contact: rigid surfaces and bodies, pairs of surfaces, and how they interact.
+//! Reads the data of a deck about contact: rigid surfaces and bodies, pairs of surfaces, and their interactions.
 
 use super::block::{Block, named_components};
 use super::contact_parts::{
@@ -10,11 +10,11 @@ use super::keyword::Keyword;
 use super::tool::Piece;
 use super::written::{Name, Target, fields, number};
 
-/// Pairs, rigid bodies, and pieces of an analytical surface.
+/// The largest number of pairs, of rigid bodies, and of pieces of an analytical surface.
 const MOST: usize = 1000;
 
 impl Deck {
-    /// The block of a keyword that is about contact; `None`: it is not.
+    /// The block of a keyword about contact; `None` for other keywords.
     pub(super) fn begin_contact(&mut self, keyword: &Keyword, line: u64) -> Option<Block> {
         let value = |name: &str| keyword.get(name).map(str::to_owned);
         let block = match &keyword.name[..] {
@@ -92,7 +92,7 @@ impl Deck {
         Some(Block::Contact(block))
     }
 
-    /// `*MODEL CHANGE`, which takes elements or contact pairs out of the body between steps, or adds them.
+    /// Refuses `*MODEL CHANGE`, which removes elements or contact pairs between steps, or adds them.
     fn model_change(&mut self, keyword: &Keyword, line: u64) {
         let is_pair = keyword.is("TYPE", "CONTACT PAIR");
         let what = if is_pair { "CONTACT PAIR" } else { "ELEMENT" };
@@ -168,7 +168,7 @@ impl Deck {
     }
 
     fn contact_pairs(&mut self, keyword: &Keyword, line: u64) -> Block {
-        /// What has no effect on small sliding against a rigid surface, which is smooth and needs no stiffness.
+        /// Parameters without effect for small sliding against a rigid surface, which is smooth and needs no stiffness.
         const HARMLESS: [&str; 16] = [
             "TYPE",
             "SMALL SLIDING",
@@ -245,7 +245,7 @@ impl Deck {
         }
     }
 
-    /// The number of a parameter, which is positive.
+    /// The value of a parameter that must be a positive number.
     fn parameter(&mut self, keyword: &Keyword, name: &str, line: u64) -> Option<f64> {
         let written = keyword.get(name)?.to_owned();
         let value = number(&written).filter(|value| *value > 0.0);
@@ -321,7 +321,7 @@ impl Deck {
         self.contact.interactions.get_mut(&name)
     }
 
-    /// A line of data about contact.
+    /// Reads a line of data about contact.
     pub(super) fn contact_data(&mut self, block: &mut ContactBlock, line: u64, text: &str) {
         let words: Vec<&str> = text.split(',').map(str::trim).collect();
         match block {
@@ -399,7 +399,7 @@ impl Deck {
         }
     }
 
-    /// A line of an analytical surface.
+    /// Reads a line of an analytical surface.
     fn segment(&mut self, name: Name, words: &[&str], line: u64, text: &str) {
         let numbers: Vec<Option<f64>> = words.iter().skip(1).map(|word| number(word)).collect();
         let point = |k: usize| Some([(*numbers.get(2 * k)?)?, (*numbers.get(2 * k + 1)?)?]);
@@ -434,12 +434,12 @@ impl Deck {
                 line,
                 format!("`{text:.60}`"),
                 "START, x, y; LINE, x, y of its end; CIRCL, x, y of its end, x, y of its centre (less than half a circle, both ends equally far from it); PARAB, x, y of its middle, x, y of its end",
-                "Begin by START; each line goes on where the one before ends, and no number may be blank.",
+                "Begin with START; each line continues where the one before ends, and no number may be blank.",
             ),
         }
     }
 
-    /// A row of `*BOUNDARY`, kept for reference nodes.
+    /// Records a row of `*BOUNDARY`, which reference nodes need.
     pub(super) fn note_row(&mut self, amplitude: &Option<Name>, line: u64, text: &str) {
         let words = fields(text);
         let word = |k: usize| words.get(k).copied().unwrap_or_default();

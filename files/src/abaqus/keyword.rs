@@ -11,19 +11,19 @@ use super::written::{
 };
 use solver::error::Reason;
 
-/// Parts of a deck, and instances of them.
+/// The largest number of parts, and of instances.
 const MOST_PARTS: usize = 1 << 8;
 
-/// How often instances may repeat what the parts contain.
+/// How many times instances may repeat the content of all parts.
 const MOST_TIMES: u64 = 8;
 
-/// A keyword line in parts.
+/// A keyword line, divided into its name and parameters.
 pub(super) struct Keyword {
     pub(super) name: String,
     pub(super) parameters: Vec<(String, Option<String>)>,
 }
 
-/// CalculiX reads keywords without their blanks, too.
+/// The name of a keyword with its blanks, which CalculiX allows to leave out.
 fn spaced(name: String) -> String {
     let mut known = READ.iter().chain(IDLE);
     let known = known.find(|known| known.replace(' ', "") == name);
@@ -78,17 +78,17 @@ impl Keyword {
     }
 }
 
-/// What a problem can have of elements, and what to do about others.
+/// The elements that a problem can have, for messages, and advice about others.
 const SOLIDS: &str = "CPE, CPS or CAX with 3, 4, 6 or 8 nodes (and R, I, H, M or T)";
 pub(super) const REMOVE_ELEMENTS: &str = "Remove them from the problem, or use the deck as a mesh: there they are left out or name boundaries.";
 
-/// Rigid lines in the plane, and of a body of revolution: without stiffness of their own.
+/// Whether a type is a rigid line, in the plane or of a body of revolution.
 fn is_rigid_line(kind: &str) -> bool {
     kind == "R2D2" || kind == "RAX2"
 }
 
 impl Deck {
-    /// The block that a keyword begins.
+    /// Begins the block of a keyword.
     pub(super) fn begin(&mut self, keyword: &Keyword, line: u64) -> Block {
         if self.names > MOST_NAMES {
             if !std::mem::replace(&mut self.here.incomplete.names, true) {
@@ -288,7 +288,7 @@ impl Deck {
         }
     }
 
-    /// A keyword of which nothing is known, or that is not where it belongs: told in the end, each once.
+    /// Records a keyword that is unknown or at a wrong place; each is reported once at the end.
     fn unknown_keyword(&mut self, name: &str, line: u64) -> Block {
         let known = &mut self.here.unknown_keywords;
         match known.iter().position(|known| known.name == name) {
@@ -303,7 +303,7 @@ impl Deck {
         Block::Skip
     }
 
-    /// Keeps a keyword that replaces what earlier steps prescribe.
+    /// Records a keyword that replaces prescriptions of earlier steps.
     fn note_replacement(&mut self, keyword: &Keyword, what: Replaces, line: u64) {
         if self.steps > 1 && keyword.is("OP", "NEW") {
             self.replacements.push(Replacement {
@@ -330,7 +330,8 @@ impl Deck {
         Block::Skip
     }
 
-    /// The amplitude that a keyword of loads or supports names; other parameters than that and OP change its meaning.
+    /// The amplitude that a keyword of loads or supports names; reports parameters other than that and OP, which would
+    /// change its meaning.
     fn amplitude(&mut self, keyword: &Keyword, line: u64) -> Option<Name> {
         for (name, value) in &keyword.parameters {
             let known = match &name[..] {
@@ -524,7 +525,7 @@ impl Deck {
                         Reason::DuplicateName,
                         got,
                         "each instance once",
-                        "Rename one of both, also where INSTANCE.NAME names its sets.",
+                        "Rename one of the two, also where INSTANCE.NAME refers to its sets.",
                     );
                 }
                 self.instances.push((name, part));
@@ -554,7 +555,7 @@ impl Deck {
         Block::Skip
     }
 
-    /// A copy of the part that an instance is of.
+    /// A copy of the part that an instance names.
     fn instantiated(&mut self, keyword: &Keyword, line: u64) -> Part {
         let Some(name) = self.named(keyword, "PART") else {
             self.here.incomplete = Incomplete::ALL;

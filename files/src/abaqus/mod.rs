@@ -1,12 +1,10 @@
-//! Decks of Abaqus and CalculiX (`.inp`): nodes, elements, sets and surfaces, and the supported
-//! parts of the analysis.
+//! Decks of Abaqus and CalculiX (`.inp`): nodes, elements, sets and surfaces, and the supported parts of the analysis.
 //!
-//! Written by hand: there is no crate for the format. A keyword begins with `*`, a comment with `**`,
-//! data lines follow their keyword; names are compared without regard to case, as both programs do,
-//! and kept as they were first written.
+//! Written by hand: there is no crate for the format. A keyword begins with `*`, a comment with `**`, data lines follow
+//! their keyword; names are compared without regard to case, as both programs do, and kept as they were first written.
 //!
 //! As a mesh a deck needs elements of a plane and nothing else: other elements are left out or, if they are lines, name
-//! boundaries; what only its analysis needs is not looked at. As a problem everything counts that changes the solution.
+//! boundaries, and its analysis is not read. As a problem, everything that changes the solution must be understood.
 //!
 //! # Where to look
 //!
@@ -14,17 +12,17 @@
 //! |---|---|
 //! | lines, keywords and data | `read`, `keyword`, `block` |
 //! | which keywords are supported | `supported` |
-//! | rows, sets, sections and materials that were read | `written` |
-//! | what was read about contact | `contact_parts` |
-//! | everything that was read | `deck` |
+//! | rows, sets, sections and materials as read | `written` |
+//! | data about contact as read | `contact_parts` |
+//! | all data of a deck | `deck` |
 //! | types of elements | `element` |
 //! | parts, instances and the assembly | `part`, `scope` |
-//! | what names and numbers mean | `names` |
+//! | resolving names and numbers | `names` |
 //! | one mesh from all parts | `build` |
 //! | a deck as a problem | `problem` |
 //! | supports of a deck | `supports` |
 //! | temperatures of a deck | `temperature` |
-//! | contact: what the deck says | `interaction` |
+//! | contact: reading its keywords | `interaction` |
 //! | contact: rigid bodies, their shapes, their motion | `rigid`, `tool`, `steps` |
 //! | contact: the contacts made of them | `contact` |
 //! | OP=NEW in later steps | `replaced` |
@@ -70,8 +68,8 @@ pub fn read(reader: impl BufRead) -> Result<(Mesh, Vec<Warning>), ReadError> {
     read_for(reader, |_| false)
 }
 
-/// The same for a problem. `holds`: whether it has a support on a set of nodes; where that is what is left of a set
-/// since rows of `*BOUNDARY` overlap, a warning says so.
+/// Reads the mesh of a deck that a problem contains. `holds`: whether the problem has a support on a given set of
+/// nodes; if overlapping rows of `*BOUNDARY` have reduced that set, a warning says so.
 pub(crate) fn read_for(
     reader: impl BufRead,
     holds: impl Fn(&str) -> bool,

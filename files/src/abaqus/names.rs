@@ -1,9 +1,9 @@
 //! Resolves the names and numbers of a deck to places in a mesh.
 //!
-//! A part, each instance of it and the assembly have numbers and names of their own. In the assembly and in steps
-//! `INSTANCE.SET` and `INSTANCE.7` are those of an instance; a name alone is one of the assembly, or else of the only
+//! A part, each instance of it and the assembly have numbers and names of their own. In the assembly and in steps,
+//! `INSTANCE.SET` and `INSTANCE.7` refer to an instance; a name alone refers to the assembly, or else to the only
 //! instance that has it. The mesh has the same names: `SET` of the assembly, `INSTANCE.SET`, and `SET` where only one
-//! instance has that, and the assembly nothing of that name.
+//! instance has it and the assembly has nothing of that name.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,7 +15,7 @@ use solver::error::{Findings, Reason};
 /// A set by the place of its scope and its name.
 pub(super) type Key = (usize, Name);
 
-/// What a target is.
+/// The set or number that a target refers to.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Meant {
     Set(Key),
@@ -37,7 +37,7 @@ impl Names<'_> {
         }
     }
 
-    /// The name in the mesh of what a target is.
+    /// The name of a target in the mesh.
     pub(super) fn of(&self, meant: &Meant) -> String {
         match meant {
             Meant::Set((scope, name)) => self.full(*scope, name),
@@ -45,7 +45,7 @@ impl Names<'_> {
         }
     }
 
-    /// The set or number that a target of a scope is.
+    /// The set or number that a target of a scope refers to.
     pub(super) fn meant(&self, kind: Kind, scope: usize, target: &Target) -> Option<Meant> {
         let has = |scope: usize, label: u64| self.scopes[scope].place(kind, label).is_some();
         match target {
@@ -68,7 +68,7 @@ impl Names<'_> {
         }
     }
 
-    /// The scope of a name, and the name there. `has`: whether a scope has a name.
+    /// The scope of a name, and the name in it. `has`: whether a scope has a name.
     pub(super) fn named(
         &self,
         scope: usize,
@@ -99,7 +99,7 @@ impl Names<'_> {
         Some((found, word.clone()))
     }
 
-    /// This scope if it has something; in the assembly otherwise the only instance that has it.
+    /// This scope if it has the name; in the assembly otherwise the only instance that has it.
     fn in_scopes(&self, scope: usize, has: impl Fn(usize) -> bool) -> Option<usize> {
         if has(scope) {
             return Some(scope);
@@ -116,7 +116,7 @@ impl Names<'_> {
         }
     }
 
-    /// The instance of `INSTANCE.NAME` in the assembly, and the name.
+    /// The instance of `INSTANCE.NAME` in the assembly, and the name in it.
     fn dotted<'w>(&self, scope: usize, word: &'w str) -> Option<(usize, &'w str)> {
         if scope != 0 {
             return None;
@@ -129,7 +129,7 @@ impl Names<'_> {
             .find_map(|(start, rest)| Some((self.instance(start)?, rest)))
     }
 
-    /// What follows the name of the assembly.
+    /// The rest of a word after the name of the assembly.
     fn in_assembly<'w>(&self, word: &'w str) -> Option<&'w str> {
         let assembly = self.deck.assembly_name.as_deref()?;
         let (start, rest) = word.split_once('.')?;
@@ -151,7 +151,7 @@ impl Names<'_> {
         found.next().map_or(1, |set| set.line)
     }
 
-    /// What to do about a target that is nothing.
+    /// The advice for a target that does not exist.
     pub(super) fn remedy(&self, kind: Kind, scope: usize, target: &Target) -> String {
         match target {
             Target::Label(_) => self.scopes[scope].hint_of_numbers(kind),
@@ -159,7 +159,7 @@ impl Names<'_> {
         }
     }
 
-    /// The names that a target might be instead: a number is no name.
+    /// The names that a target might have meant; none for a number.
     pub(super) fn known(&self, kind: Kind, target: &Target) -> Vec<String> {
         match target {
             Target::Label(_) => Vec::new(),
@@ -180,7 +180,7 @@ impl Names<'_> {
         names.take(MOST_LISTED).collect()
     }
 
-    /// All sets of a kind as places in the mesh. `elements`: those of sets of elements, and the nodes of each element.
+    /// All sets of a kind as places in the mesh. `elements`: the sets of elements, and the nodes of each element.
     pub(super) fn resolve(
         &self,
         kind: Kind,
@@ -217,17 +217,17 @@ impl Names<'_> {
     }
 }
 
-/// The members of a set while they are looked up. Sets may contain sets; one that contains itself is visited once.
+/// The members of a set while they are looked up. Sets may contain sets; a set that contains itself is visited once.
 struct Members<'a> {
     names: &'a Names<'a>,
     kind: Kind,
     name: String,
     line: u64,
     found: Vec<u32>,
-    /// Lists that are being gone through, their scopes, and how many sets they are inside of.
+    /// The lists that are being visited, with their scopes and nesting depths.
     open: Vec<(usize, std::slice::Iter<'a, Target>, usize)>,
     seen: BTreeSet<Key>,
-    /// Sets of elements whose nodes were found.
+    /// The sets of elements whose nodes were added.
     seen_elements: BTreeSet<Key>,
 }
 
@@ -374,7 +374,7 @@ impl<'a> Members<'a> {
     }
 }
 
-/// How many members of sets may still be visited.
+/// The number of members of sets that may still be visited.
 pub(super) struct Room {
     most: u64,
     left: u64,
@@ -385,7 +385,7 @@ impl Room {
         Room { most, left: most }
     }
 
-    /// Takes some of it; reports, once, that there is not enough.
+    /// Uses some of it; reports once if there is not enough.
     pub(super) fn take(
         &mut self,
         count: u64,
@@ -418,10 +418,10 @@ impl Room {
     }
 }
 
-/// Names that a hint lists.
+/// The largest number of names that a hint lists.
 const MOST_LISTED: usize = 20;
 
-/// Reports a name or number that nothing has; `known`: the names that there are; `remedy`: what to do.
+/// Reports an unknown name or number. `known`: the existing names; `remedy`: advice.
 pub(super) fn unknown(
     faults: &mut Findings,
     line: u64,

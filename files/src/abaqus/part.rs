@@ -1,4 +1,4 @@
-//! A part of a deck, with numbers and names of its own, and where an instance of it is.
+//! A part of a deck, with its own numbers and names, and its positions as instances.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -11,45 +11,45 @@ use crate::source::Labels;
 use solver::element::Element;
 use solver::error::{Findings, Violation};
 
-/// What an element is, by its place among all of its part.
+/// The kind of an element, with its place among those of its part.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Numbered {
-    /// Its place among the plane elements.
+    /// A plane element, by its place among these.
     Plane(u32),
-    /// Its place among the lines.
+    /// A line, by its place among these.
     Line(u32),
-    /// Of no use to a plane mesh.
+    /// An element that a plane mesh ignores.
     Other,
 }
 
-/// A block of rigid lines: a problem has them as the surface of a rigid body only.
+/// A block of rigid lines, which a problem can have only as the surface of a rigid body.
 #[derive(Clone)]
 pub(super) struct RigidLines {
-    /// The line of its keyword, and what it is.
+    /// The line of the block's keyword, and the words for messages.
     pub(super) line: u64,
     pub(super) what: String,
-    /// The places of its elements among all of its part.
+    /// The places of its elements among all elements of its part.
     pub(super) places: Range<u32>,
 }
 
-/// What a part defines, or an instance of it, or the assembly: in a deck without parts all of it.
+/// The content of a part, of an instance of it, or of the assembly; in a deck without parts all of it.
 #[derive(Clone, Default)]
 pub(super) struct Part {
     pub(super) nodes: Vec<[f64; 2]>,
-    /// The third coordinates.
+    /// The third coordinates of the nodes.
     pub(super) heights: Vec<f64>,
     pub(super) node_labels: Vec<u64>,
     pub(super) node_places: Labels,
     pub(super) elements: Vec<Element>,
     pub(super) element_labels: Vec<u64>,
-    /// The nodes of line elements, of which the last may be missing.
+    /// The nodes of line elements; the last may be missing.
     pub(super) lines: Vec<[u32; 3]>,
     /// All elements with a number.
     pub(super) numbered: Vec<Numbered>,
     pub(super) element_places: Labels,
-    /// Quadrilaterals with a node in their centre.
+    /// The number of quadrilaterals with a node in their centre.
     pub(super) with_centre: usize,
-    /// The first type of element that is of no use to a plane mesh, and its line.
+    /// The first type of element that a plane mesh ignores, and its line.
     pub(super) unused_type: Option<(u64, String)>,
     /// Rigid lines, block by block.
     pub(super) rigid_lines: Vec<RigidLines>,
@@ -67,17 +67,17 @@ pub(super) struct Part {
     pub(super) analytical: BTreeMap<Name, Analytical>,
     /// Every row of `*BOUNDARY`, with all its components.
     pub(super) held: Vec<Held>,
-    /// What of it is not all known, since a line could not be read.
+    /// Which of its data are incomplete because a line could not be read.
     pub(super) incomplete: Incomplete,
-    /// Keywords in it of which nothing is known.
+    /// Its unknown keywords.
     pub(super) unknown_keywords: Vec<UnknownKeyword>,
-    /// Violations of its mesh.
+    /// The violations of its mesh.
     pub(super) faults: Found,
-    /// What a problem cannot have.
+    /// The parts of it that a problem cannot have.
     pub(super) doubts: Found,
 }
 
-/// Violations that go with a part: those of a part that is not used are of no interest.
+/// Violations in a part; they are reported only if the part is used.
 #[derive(Clone, Default)]
 pub(super) struct Found {
     listed: Vec<Violation>,
@@ -85,7 +85,7 @@ pub(super) struct Found {
 }
 
 impl Found {
-    /// Violations that are kept, of one part.
+    /// The largest number of violations that are kept for one part.
     const MOST: usize = 100;
 
     pub(super) fn add(&mut self, violation: impl FnOnce() -> Violation) {
@@ -111,7 +111,7 @@ impl Part {
         (self.nodes.len() + self.numbered.len() + members + sides + names) as u64
     }
 
-    /// Moves it, then turns it by an angle (radians) about a point of the plane.
+    /// Moves the part, then turns it by an angle (radians) about a point of the plane.
     pub(super) fn put(&mut self, moved: [f64; 3], turned: Option<([f64; 2], f64)>) {
         for node in &mut self.nodes {
             *node = [node[0] + moved[0], node[1] + moved[1]];
@@ -138,7 +138,7 @@ impl Part {
     }
 }
 
-/// Sine and cosine, exact for quarters of a turn: what was straight along an axis stays so.
+/// The sine and cosine of an angle, exact for quarter turns, so that sides along an axis stay straight.
 fn exact(angle: f64) -> (f64, f64) {
     let quarters = angle / std::f64::consts::FRAC_PI_2;
     if (quarters - quarters.round()).abs() > 1e-12 {

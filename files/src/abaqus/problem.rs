@@ -1,4 +1,4 @@
-//! A deck as a whole problem: a part that is not supported is a violation with its line.
+//! Reads a deck as a whole problem: a part that is not supported is a violation with its line.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -33,18 +33,17 @@ pub fn has_step(text: &str) -> bool {
 ///
 /// # Errors
 ///
-/// All violations of the deck, each with its line: what would change the solution and is not understood is refused,
-/// never left out.
+/// All violations of the deck, each with its line: a part that would change the solution and is not understood is
+/// refused, never left out.
 pub fn problem(text: &str) -> Result<Problem, Vec<Violation>> {
     problem_with_warnings(text).map(|(problem, _)| problem)
 }
 
-/// Reads the problem that a deck states like [`problem`], with a warning for each thing that is done differently than
-/// the deck says.
+/// Reads the problem that a deck states like [`problem`], with a warning for each deviation from the deck.
 ///
 /// # Errors
 ///
-/// As for [`problem`].
+/// The errors of [`problem`].
 pub fn problem_with_warnings(text: &str) -> Result<(Problem, Vec<Warning>), Vec<Violation>> {
     let deck = read(text.as_bytes()).map_err(ReadError::into_violations)?;
     let mut built = deck.build();
@@ -105,7 +104,7 @@ pub fn problem_with_warnings(text: &str) -> Result<(Problem, Vec<Warning>), Vec<
     }
     if thickness != 1.0 {
         warnings.push(contact::differs(format!(
-            "In plane strain forces are per unit of thickness here: those of the deck, {thickness} thick, are {thickness} times as large."
+            "In plane strain forces are per unit of thickness here: those of the deck, for a thickness of {thickness}, are {thickness} times as large."
         )));
     }
     if !violations.is_empty() {
@@ -132,14 +131,15 @@ pub fn problem_with_warnings(text: &str) -> Result<(Problem, Vec<Warning>), Vec<
     Ok((problem, warnings))
 }
 
-/// A deck without a step is a mesh: what a problem could not have of it is of no interest.
+/// The violation that a deck has no step and is only a mesh; parts that only a problem could not have are not reported
+/// then.
 fn without_step(mut faults: Findings) -> Vec<Violation> {
     faults.add(Violation::new(
         "",
         Reason::NotUnderstood,
         "a deck without *STEP",
         "one *STEP",
-        "A deck without a step is a mesh: upload it, or quote it in a problem as JSON, \"mesh\": {\"abaqus\": \"…\"}.",
+        "A deck without a step is a mesh: upload it, or include it in a problem as JSON, \"mesh\": {\"abaqus\": \"…\"}.",
     ));
     faults.into_violations()
 }
@@ -151,7 +151,7 @@ impl Built {
             .add(on_line(line, reason, got.into(), expected, hint));
     }
 
-    /// Why a set of nodes cannot be loaded: what it is, what is expected, and what to do.
+    /// Why a set of nodes cannot be loaded: the value found, the expected one, and the advice.
     fn not_meshed(&self, set: &str) -> (String, &'static str, &'static str) {
         const MESHED: &str = "nodes of plane elements";
         let nodes = self.raw.node_sets.get(set).map_or(&[][..], |nodes| nodes);
@@ -188,7 +188,7 @@ impl Built {
         )
     }
 
-    /// The factors of loads and supports at the end of each step, of steps that are understood.
+    /// The factors of loads and supports at the end of each step, for steps that are understood.
     fn factors_of_steps(&mut self) -> Vec<[f64; 2]> {
         let steps = self.deck.steps;
         if steps == 1 || steps > 1 && !self.pairs.is_empty() {
@@ -255,9 +255,8 @@ fn analysis(built: &mut Built) -> Analysis {
     }
 }
 
-/// The rule of the quadrilaterals; where there are none that of the triangles, which Abaqus and CalculiX
-/// integrate with three points. In a mixed mesh triangles get the larger rule, which is at least as accurate but
-/// not the same.
+/// The number of Gauss points for the quadrilaterals, or else for the triangles, which Abaqus and CalculiX integrate
+/// with three points. In a mixed mesh triangles get the larger rule, which is at least as accurate but not the same.
 fn quadrature(built: &mut Built) -> u32 {
     let is_quad = |kind: &&Typed| !kind.mechanics.is_triangle();
     let quads: Vec<Typed> = built.types.iter().filter(is_quad).cloned().collect();
@@ -360,7 +359,7 @@ fn materials(built: &mut Built) -> Vec<Material> {
                     elastic.line,
                     got,
                     expected,
-                    "Write the constants of one temperature in that order; other forms of elasticity have to be converted.",
+                    "Write the constants of one temperature in that order; other forms of elasticity must be converted.",
                 );
             }
         }
@@ -370,7 +369,7 @@ fn materials(built: &mut Built) -> Vec<Material> {
     materials
 }
 
-/// The angle of a material's first direction (degrees): only where directions differ does it matter.
+/// The angle of a material's first direction (degrees); it matters only for materials whose directions differ.
 fn angle(built: &mut Built, section: &Section) -> f64 {
     let Some(name) = &section.orientation else {
         return 0.0;
@@ -446,7 +445,7 @@ fn elasticity(elastic: &Elastic) -> Option<Elasticity> {
     }
 }
 
-/// What constants are, that are not understood, and what they might be.
+/// The value found and the expected one for constants that are not understood.
 fn constants(elastic: &Elastic) -> (String, &'static str) {
     let known = ["ISO", "ISOTROPIC", "ENGINEERING CONSTANTS"].contains(&&elastic.kind[..]);
     if !known {
@@ -463,7 +462,7 @@ fn constants(elastic: &Elastic) -> (String, &'static str) {
     )
 }
 
-/// The elements on both sides of those of some sides that lie inside the body, by their numbers.
+/// The numbers of the elements on both sides of those sides that lie inside the body, in words.
 fn elements_at(raw: &RawMesh, sides: &[[u32; 2]], inner: &[(u32, u32)]) -> String {
     let inside = sides.iter().map(|ends| key(*ends));
     let inside: BTreeSet<(u32, u32)> = inside
@@ -477,8 +476,8 @@ fn elements_at(raw: &RawMesh, sides: &[[u32; 2]], inner: &[(u32, u32)]) -> Strin
     numbered("element", places.map(|place| raw.element_labels[place]))
 }
 
-/// `thickness`: of a body in plane strain, whose forces are per unit of thickness here. On a body of revolution a force
-/// acts on the whole ring, in Abaqus and CalculiX as here.
+/// Translates the loads. `thickness`: that of a body in plane strain, whose forces are per unit of thickness here. On a
+/// body of revolution a force acts on the whole ring, both in Abaqus or CalculiX and here.
 fn loads(built: &mut Built, thickness: f64) -> Vec<Load> {
     let mut loads = Vec::new();
     let pressures = std::mem::take(&mut built.pressures);

@@ -1,5 +1,6 @@
-//! `OP=NEW` in a step after the first: it ends all supports, forces or pressures of the steps before that its own step does
-//! not state again. Where all of them are stated again it changes nothing; what ends is refused by name.
+//! Checks `OP=NEW` in steps after the first: it ends all supports, forces or pressures of earlier steps that its own
+//! step does not repeat. If the step repeats all of them it has no effect; otherwise those that end are refused by
+//! name.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,20 +8,20 @@ use super::build::Built;
 use super::contact_parts::WRITTEN_INSTEAD;
 use super::written::{Replacement, Replaces};
 
-/// A component of the displacement, or of the force, and what it is prescribed for.
+/// The component of a prescribed displacement or force, and its target.
 pub(super) type Key = (u64, String);
 
-/// A row of a step: its step, key, line and value.
+/// A row of a step: step, key, line and value.
 type Stated = (usize, Key, u64, f64);
 
-/// Rows that hold at a time, with their lines and values.
+/// The rows that are valid at a time, with their lines and values.
 type InForce = BTreeMap<Key, (u64, f64)>;
 
-/// Names that a violation lists.
+/// The largest number of names that a violation lists.
 const MOST_NAMED: usize = 5;
 
 impl Built {
-    /// Reports what steps end; each keyword once.
+    /// Reports keywords whose steps end earlier prescriptions, each once.
     pub(super) fn check_replaced(&mut self) {
         for what in [Replaces::Supports, Replaces::Forces, Replaces::Pressures] {
             let replacements = self.deck.replacements.iter();
@@ -37,8 +38,8 @@ impl Built {
                 self.doubt(
                     line,
                     got,
-                    "a step that states again what OP=NEW replaces, or one without OP=NEW, which keeps it",
-                    &format!("State those again in this step: what ends between steps is not followed here. {WRITTEN_INSTEAD}"),
+                    "a step that repeats everything that OP=NEW replaces, or one without OP=NEW",
+                    &format!("Repeat those in this step: prescriptions that end between steps are not supported here. {WRITTEN_INSTEAD}"),
                 );
             }
         }
@@ -100,7 +101,7 @@ impl Built {
         }
     }
 
-    /// The first keyword that ends something: its line, and what it ends.
+    /// The first keyword that ends a prescription: its line, and the keys that end.
     fn first_end(
         &self,
         rows: &[Stated],
@@ -138,7 +139,8 @@ impl Built {
         None
     }
 
-    /// What holds before a step and not in it. A force of 0 is none; a node may be held by a row for another set.
+    /// The prescriptions that are valid before a step and not in it. A force of 0 does not count; a node may be held by
+    /// a row for another set.
     fn ended<'a>(&self, before: &'a InForce, now: &InForce, what: Replaces) -> Vec<(&'a Key, u64)> {
         let supports = what == Replaces::Supports;
         let mut ended: Vec<(&Key, u64)> = before
@@ -170,7 +172,7 @@ impl Built {
     }
 }
 
-/// `displacement 1 of L (line 3) and 2 others`.
+/// A list in words such as `displacement 1 of L (line 3) and 2 others`.
 fn listed(ended: &[(&Key, u64)], what: Replaces) -> String {
     let names: Vec<String> = ended
         .iter()

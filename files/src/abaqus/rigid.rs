@@ -1,4 +1,4 @@
-//! Rigid bodies of a deck: which elements they hold, the surfaces on them, and the rows that move them.
+//! Rigid bodies of a deck: their elements, the surfaces on them, and the rows that move them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,14 +15,14 @@ use solver::solution::{Warning, WarningCode};
 #[derive(Default)]
 pub(super) struct Tools {
     pub(super) bodies: Vec<Body>,
-    /// By the name of the surface in the mesh: the number of the rigid body, and the pieces of the surface, with the body
-    /// that it touches on their left.
+    /// By the name of the surface in the mesh: the number of the rigid body, and the pieces of the surface, with the
+    /// elastic body on their left.
     pub(super) by_surface: BTreeMap<String, (usize, Vec<Piece>)>,
-    /// Places of plane elements of rigid bodies: they are no part of the elastic body.
+    /// The places of plane elements of rigid bodies, which are not part of the elastic body.
     pub(super) elements: BTreeSet<u32>,
-    /// Their numbers, as a warning says them.
+    /// The numbers of these elements, in the words of a warning.
     pub(super) left_out: String,
-    /// Places of all elements of rigid bodies among all elements.
+    /// The places of all elements of rigid bodies among all elements.
     pub(super) members: BTreeSet<u32>,
     /// Rows of `*BOUNDARY` for reference nodes, in the order of the deck.
     pub(super) rows: Vec<Moving>,
@@ -34,44 +34,44 @@ pub(super) struct Body {
     /// The node that moves it, and the one whose displacements are its rotations; none: not a single node.
     pub(super) reference: Option<u32>,
     pub(super) rotation: Option<u32>,
-    /// It shares nodes with the elastic body.
+    /// Whether it shares nodes with the elastic body.
     pub(super) attached: bool,
 }
 
 /// A row of `*BOUNDARY` for reference nodes.
 pub(super) struct Moving {
     pub(super) row: Held,
-    /// The numbers of the bodies, and whether it is the node of their rotation.
+    /// The numbers of the bodies, and whether the node is that of their rotation.
     pub(super) on: Vec<(usize, bool)>,
-    /// It holds no other nodes.
+    /// Whether the row holds no other nodes.
     pub(super) alone: bool,
 }
 
-/// Most points of an obstacle.
+/// The largest number of points of an obstacle.
 pub(super) const MOST_POINTS: usize = 10_000;
 
 impl Tools {
-    /// Says what is left out.
+    /// The warning that names the elements left out.
     pub(super) fn warning(&self) -> Option<Warning> {
         let count = self.elements.len();
         (count > 0).then(|| Warning {
             code: WarningCode::RigidElementsLeftOut,
             pointer: String::new(),
             message: format!(
-                "{count} elements of a *RIGID BODY are no part of the elastic body and are left out: {}.",
+                "{count} elements of a *RIGID BODY are not part of the elastic body and are left out: {}.",
                 self.left_out
             ),
         })
     }
 }
 
-/// What rigid bodies are found in.
+/// The data in which rigid bodies are searched.
 pub(super) struct Search<'a> {
     pub(super) names: &'a Names<'a>,
     pub(super) raw: &'a RawMesh,
     pub(super) lines: &'a [[u32; 3]],
     pub(super) numbered: &'a [Numbered],
-    /// Elements of sets, by their places in `numbered`.
+    /// The elements of sets, by their places in `numbered`.
     pub(super) elements: &'a BTreeMap<Key, Vec<u32>>,
 }
 
@@ -187,7 +187,7 @@ impl Search<'_> {
         nodes.into_iter().filter(|node| *node != NO_NODE).collect()
     }
 
-    /// Elements of which all nodes belong to one rigid body.
+    /// The elements whose nodes all belong to one rigid body.
     fn held_by_nodes(&self, inside: &BTreeMap<u32, usize>) -> Vec<(u32, usize)> {
         if inside.is_empty() {
             return Vec::new();
@@ -201,7 +201,7 @@ impl Search<'_> {
         (0..self.numbered.len() as u32).filter_map(body).collect()
     }
 
-    /// Rigid bodies that share nodes with plane elements that are not theirs.
+    /// The rigid bodies that share nodes with plane elements that do not belong to them.
     fn attached(
         &self,
         owner: &BTreeMap<u32, usize>,
@@ -222,7 +222,7 @@ impl Search<'_> {
         all.chain(by_nodes.map(|(_, number)| *number)).collect()
     }
 
-    /// The sides of a surface, if all are those of one rigid body.
+    /// The sides of a surface, if all belong to one rigid body.
     fn rigid_sides(
         &self,
         scope: usize,
@@ -244,7 +244,7 @@ impl Search<'_> {
         body.map(|body| (body, pieces))
     }
 
-    /// A side of an element, with the element on its right; or a rigid line.
+    /// A side of an element, with the element on its right, or a rigid line.
     fn side_of(&self, place: u32, side: Sides) -> Option<Piece> {
         let at = |node: u32| self.raw.nodes.get(node as usize).copied();
         let (element, side) = match (self.numbered[place as usize], side) {
@@ -282,7 +282,7 @@ impl Search<'_> {
         Some(if area > 0.0 { piece.reversed() } else { piece })
     }
 
-    /// The rows for reference nodes.
+    /// The rows that move reference nodes.
     fn rows(&self, bodies: &[Body], mut held: Vec<(usize, Held)>) -> Vec<Moving> {
         let mut single: BTreeMap<u32, (usize, bool)> = BTreeMap::new();
         for (number, body) in bodies.iter().enumerate() {

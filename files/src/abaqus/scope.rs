@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::written::{Incomplete, Name, Set, Surface};
 use crate::source::Labels;
 
-/// Kinds of things with numbers, in sets.
+/// The kinds of numbered things that sets contain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Kind {
     Nodes,
@@ -29,7 +29,7 @@ impl Kind {
         }
     }
 
-    /// What to do about a name or number of this kind that nothing has.
+    /// The advice for an unknown name or number of this kind.
     pub(super) fn remedy(self) -> &'static str {
         match self {
             Kind::Elements => {
@@ -39,7 +39,7 @@ impl Kind {
         }
     }
 
-    /// The kind of sets that are named in one: surfaces of nodes name sets of nodes.
+    /// The kind of sets that a set of this kind may name: surfaces of nodes name sets of nodes.
     pub(super) fn named(self) -> Kind {
         match self {
             Kind::Elements => Kind::Elements,
@@ -57,7 +57,7 @@ impl Kind {
 
 /// The assembly or an instance: its names, and the places of its nodes and elements in the mesh.
 pub(super) struct Scope {
-    /// None of the assembly.
+    /// The instance's name; none for the assembly.
     pub(super) name: Option<Name>,
     pub(super) incomplete: Incomplete,
     pub(super) node_places: Labels,
@@ -79,7 +79,7 @@ impl Scope {
         }
     }
 
-    /// Whether it has a set or surface of this name.
+    /// Whether this scope has a set or surface with this name.
     pub(super) fn defines(&self, name: &Name) -> bool {
         self.node_sets.contains_key(name)
             || self.element_sets.contains_key(name)
@@ -94,13 +94,13 @@ impl Scope {
         }
     }
 
-    /// The place of a number.
+    /// The place of a number in the mesh.
     pub(super) fn place(&self, kind: Kind, label: u64) -> Option<u32> {
         let (labels, from) = self.labels(kind);
         Some(labels.get(label)? + from)
     }
 
-    /// The places of a range of numbers, and how many numbers were looked at.
+    /// The places of a range of numbers, and how many numbers were examined.
     pub(super) fn range(
         &self,
         kind: Kind,
@@ -113,7 +113,7 @@ impl Scope {
         (places, visited)
     }
 
-    /// What to do about a number that nothing has: says which numbers there are.
+    /// The advice for an unknown number: says which numbers exist.
     pub(super) fn hint_of_numbers(&self, kind: Kind) -> String {
         let (labels, _) = self.labels(kind);
         let (what, keyword) = match kind {
@@ -134,7 +134,7 @@ impl Scope {
         }
     }
 
-    /// A missing number may be on a line that could not be read.
+    /// Whether a missing number may be on a line that could not be read.
     pub(super) fn incomplete_numbers(&self, kind: Kind) -> bool {
         match kind {
             Kind::Elements => self.incomplete.elements,

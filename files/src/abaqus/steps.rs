@@ -1,4 +1,4 @@
-//! How the steps of a deck move its rigid bodies, and scale everything else.
+//! The motion of a deck's rigid bodies in its steps, and the factors of all other prescriptions.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,19 +9,19 @@ use super::rigid::{Body, Moving};
 use super::tool::Point;
 use super::written::{Force, Pressure};
 
-/// How a reference node moves.
+/// The motion of a reference node.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Motion {
-    /// Its displacement at the end of each step.
+    /// The displacement at the end of each step.
     pub(super) ends: Vec<Point>,
 }
 
-/// Values that are equal up to the digits of a file.
+/// Values that differ relatively by less are equal, since numbers in files are rounded.
 const SAME: f64 = 1e-9;
 
 impl Built {
-    /// Takes the rows of reference nodes out of the prescribed displacements: how each rigid body moves, `None` if that
-    /// is refused.
+    /// Removes the rows of reference nodes from the prescribed displacements; returns the motion of each rigid body,
+    /// `None` if it is refused.
     pub(super) fn take_motions(&mut self, axisymmetric: bool) -> Vec<Option<Motion>> {
         let count = self.deck.contact.steps.len().max(1);
         let bodies = std::mem::take(&mut self.tools.bodies);
@@ -104,8 +104,8 @@ impl Built {
         })
     }
 
-    /// The factors of loads and of prescribed displacements at the end of each step: those of the last are 1. What is
-    /// prescribed at the end replaces what was prescribed before, and must be in proportion to it.
+    /// The factors of loads and of prescribed displacements at the end of each step; those of the last step are 1.
+    /// Values prescribed at the end of a step replace those before, and must be in proportion to them.
     pub(super) fn factors(&mut self) -> Vec<[f64; 2]> {
         let steps = &self.deck.contact;
         let count = steps.steps.len().max(1);
@@ -144,7 +144,7 @@ impl Built {
                 line,
                 got,
                 "supports that hold from the first step on",
-                &format!("It would hold the body from the beginning. State it in the first step if that is meant. {WRITTEN_INSTEAD}"),
+                &format!("It would hold the body from the beginning. Write it in the first step if that is intended. {WRITTEN_INSTEAD}"),
             );
         }
         let found = [
@@ -171,7 +171,7 @@ impl Built {
             .collect()
     }
 
-    /// Leaves of each load only its row of the last step that has one.
+    /// Keeps for each load only the row of the last step that has one.
     pub(super) fn keep_last_loads(&mut self) {
         let steps = &self.deck.contact;
         let mut last: BTreeMap<String, usize> = BTreeMap::new();
@@ -193,7 +193,7 @@ impl Built {
 /// Values with their steps, in the order of the deck.
 type ByName = BTreeMap<Key, Vec<(usize, f64)>>;
 
-/// Adds a load: those of one step for the same set add.
+/// Adds a load; loads of one step on the same set are added up.
 fn add(rows: &mut Vec<(usize, f64)>, step: usize, value: f64) {
     match rows.last_mut() {
         Some((last, sum)) if *last == step => *sum += value,
@@ -201,8 +201,8 @@ fn add(rows: &mut Vec<(usize, f64)>, step: usize, value: f64) {
     }
 }
 
-/// The factor of all values at the end of each step; 0 where there are none. An error is the first step whose values are
-/// not in proportion to the last ones.
+/// The common factor of all values at the end of each step; 0 where there are none. The error is the first step whose
+/// values are not in proportion to the last ones.
 fn proportion<K>(rows: &BTreeMap<K, Vec<(usize, f64)>>, count: usize) -> Result<Vec<f64>, usize> {
     let at = |rows: &[(usize, f64)], step: usize| {
         let mut latest = rows.iter().rev();
@@ -230,7 +230,7 @@ fn proportion<K>(rows: &BTreeMap<K, Vec<(usize, f64)>>, count: usize) -> Result<
     (0..count).map(factor).collect()
 }
 
-/// The factors of indentations and of tangential displacements that all contacts have in common at the end of each step.
+/// The factors that the indentations and tangential displacements of all contacts share at the end of each step.
 pub(super) fn common_factors(moved: &[&[[f64; 2]]]) -> Option<Vec<[f64; 2]>> {
     let count = moved.first()?.len();
     let mut found = vec![[0.0; 2]; count];

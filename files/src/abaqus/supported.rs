@@ -1,4 +1,4 @@
-//! The keywords that a deck may have here, and what is said of others.
+//! The supported keywords of a deck, and messages about others.
 
 use super::written::on_line;
 use solver::error::{Findings, Reason};
@@ -38,13 +38,13 @@ pub(super) const READ: &[&str] = &[
     "TEMPERATURE",
 ];
 
-/// Keywords that stand for nodes or elements that are not in the deck, or not where they are written.
+/// Keywords for nodes or elements that are not written in the deck, or that are moved.
 pub(super) const NOT_WRITTEN_OUT: &[&str] = &[
     "INCLUDE", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM",
 ];
 
-/// Keywords without effect on a linear static step: requests for output, options of its solution, and what only other
-/// kinds of steps use.
+/// Keywords without effect on a linear static step: requests for output, options of its solution, and options of other
+/// kinds of steps.
 pub(super) const IDLE: &[&str] = &[
     "END STEP",
     "DENSITY",
@@ -97,7 +97,7 @@ pub(super) const IDLE: &[&str] = &[
     "POST OUTPUT",
 ];
 
-/// Properties of a material that a linear elastic one does not have. A material that nothing is made of may have them.
+/// Properties that a linear elastic material does not have. A material that no element has may have them.
 pub(super) const NOT_ELASTIC: &[&str] = &[
     "PLASTIC",
     "CYCLIC HARDENING",
@@ -127,20 +127,20 @@ pub(super) const NOT_ELASTIC: &[&str] = &[
     "FAIL STRESS",
 ];
 
-/// Unknown keywords that are kept of one part.
+/// The largest number of unknown keywords that are kept for one part.
 pub(super) const MOST_UNKNOWN: usize = 50;
 
-/// A keyword of which nothing is known.
+/// An unknown keyword.
 #[derive(Clone)]
 pub(super) struct UnknownKeyword {
     pub(super) name: String,
-    /// The line where it is first.
+    /// The line where it first occurs.
     pub(super) line: u64,
-    /// How often it follows.
+    /// The number of later occurrences.
     pub(super) more: usize,
 }
 
-/// Reports each unknown keyword once; the first with a list of those that are read.
+/// Reports each unknown keyword once; the first with a list of the supported ones.
 pub(super) fn report_unknown(mut unknown: Vec<UnknownKeyword>, doubts: &mut Findings) {
     unknown.sort_by(|a, b| (&a.name, a.line).cmp(&(&b.name, b.line)));
     unknown.dedup_by(|later, first| {
@@ -152,16 +152,16 @@ pub(super) fn report_unknown(mut unknown: Vec<UnknownKeyword>, doubts: &mut Find
     });
     unknown.sort_by_key(|keyword| keyword.line);
     let mut hint = format!(
-        "Remove it if the solution does not depend on it. These are read: *{}. Requests for output are passed over.",
+        "Remove it if the solution does not depend on it. Supported keywords: *{}. Requests for output are ignored.",
         READ.join(", *")
     );
     for UnknownKeyword { name, line, more } in unknown {
         let got = match more {
             0 => format!("*{name:.60}"),
-            more => format!("*{name:.60}, here and {more} times more"),
+            more => format!("*{name:.60}, here and {more} more times"),
         };
         let expected = "a keyword that is known here";
         doubts.add(on_line(line, Reason::NotUnderstood, got, expected, &hint));
-        hint = "Remove it if the solution does not depend on it. The message on the first unknown keyword lists those that are read.".to_owned();
+        hint = "Remove it if the solution does not depend on it. The message on the first unknown keyword lists the supported ones.".to_owned();
     }
 }

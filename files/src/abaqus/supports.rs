@@ -1,4 +1,5 @@
-//! Supports from the rows of `*BOUNDARY`: the last row that prescribes a displacement of a node holds, as in CalculiX.
+//! Supports from the rows of `*BOUNDARY`. As in CalculiX, the last row that prescribes a displacement of a node is
+//! used.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -10,7 +11,7 @@ use solver::problem::{BoundaryValue, Support};
 struct Entry<'a> {
     line: u64,
     set: &'a str,
-    /// 0: x, 1: y.
+    /// The component: 0 for x, 1 for y.
     component: usize,
     value: f64,
 }
@@ -18,15 +19,16 @@ struct Entry<'a> {
 /// The supports of a deck.
 pub(super) struct Supports {
     pub(super) list: Vec<Support>,
-    /// Sets of nodes that the deck does not have: what is left of a set where a later row holds for some of its nodes.
+    /// Sets of nodes that the deck does not have: the rest of a set where a later row applies to some of its nodes.
     pub(super) sets: BTreeMap<String, Vec<u32>>,
-    /// Sets that show that these supports are used, and for each a sentence.
+    /// The sets whose use shows that these supports are used, each with a sentence for the warning.
     pub(super) overlaps: Vec<(String, String)>,
-    /// Lines that prescribe displacements of no node, or other than 0 of nodes of no element, and their targets.
+    /// The lines that prescribe displacements of no node, or nonzero ones of nodes without an element, with their
+    /// targets.
     pub(super) of_no_element: Vec<(u64, String)>,
 }
 
-/// What the rows of a deck hold.
+/// The supports that the rows of a deck prescribe.
 pub(super) fn supports(built: &Built) -> Supports {
     let mut found = Supports {
         list: Vec::new(),
@@ -107,7 +109,7 @@ pub(super) fn supports(built: &Built) -> Supports {
     found
 }
 
-/// The values in the order in which they hold: of two for the same set the later one only.
+/// The values in the order in which they apply; of several values for the same set only the last one.
 fn entries(rows: &[Row<Prescribed>]) -> Vec<Entry<'_>> {
     let mut entries: Vec<Option<Entry<'_>>> = Vec::new();
     let mut places: HashMap<(&str, usize), usize> = HashMap::new();
@@ -136,7 +138,7 @@ fn overlap(built: &Built, entry: &Entry<'_>, node: u32, later: &Entry<'_>) -> St
         line, set, value, ..
     } = entry;
     format!(
-        "Node {label} at ({x}, {y}) belongs to `{set:.60}` (line {line}: u{} = {value}) and to `{:.60}` (line {}: {}). The later line holds there, as in CalculiX.",
+        "Node {label} at ({x}, {y}) belongs to `{set:.60}` (line {line}: u{} = {value}) and to `{:.60}` (line {}: {}). The later line is used there, as in CalculiX.",
         ["x", "y"][entry.component],
         later.set,
         later.line,

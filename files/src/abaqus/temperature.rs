@@ -1,16 +1,16 @@
-//! Temperatures of a deck. Thermal strains follow from their changes alone: those of `*INITIAL CONDITIONS` strain nothing
-//! by themselves, and neither does `*TEMPERATURE` that leaves them as they are.
+//! Temperatures of a deck. Only their changes cause thermal strains: `*INITIAL CONDITIONS` causes none, nor does a
+//! `*TEMPERATURE` that equals them.
 
 use super::block::Block;
 use super::deck::Deck;
 use super::keyword::Keyword;
 use super::written::{fields, number};
 
-/// Rows of `*INITIAL CONDITIONS` that are kept, to be compared with those of `*TEMPERATURE`.
+/// The largest number of rows of `*INITIAL CONDITIONS` that are kept for comparison with those of `*TEMPERATURE`.
 const MOST_ROWS: usize = 1 << 16;
 
 impl Deck {
-    /// `*INITIAL CONDITIONS`: some have no effect on a static step, others do.
+    /// Reads `*INITIAL CONDITIONS`; kinds that affect a static step are refused.
     pub(super) fn initial_conditions(&mut self, keyword: &Keyword, line: u64) -> Block {
         let kind = keyword.get("TYPE").unwrap_or_default().to_uppercase();
         match &kind[..] {
@@ -29,7 +29,7 @@ impl Deck {
                     line,
                     got,
                     "TYPE=TEMPERATURE or TYPE=VELOCITY, which do not change a static step by themselves",
-                    "The body is without stress and strain before the first step. Remove these conditions if that is meant.",
+                    "The body has no stress and strain before the first step. Remove these conditions if that is intended.",
                 );
                 Block::Skip
             }
@@ -45,7 +45,7 @@ impl Deck {
         Block::Temperatures
     }
 
-    /// A row of temperatures: node or set, value.
+    /// Reads a row of temperatures: node or set, value.
     pub(super) fn temperature(&mut self, is_initial: bool, line: u64, text: &str) {
         let words = fields(text);
         let word = |k: usize| words.get(k).copied().unwrap_or_default();

@@ -1,56 +1,57 @@
-//! The shape of a rigid surface: lines, arcs and parabolas, one after the other, with the body on the left.
+//! The shape of a rigid surface: consecutive lines, arcs and parabolas, with the elastic body on the left.
 
-/// A place or a direction.
+/// A point or a direction in the plane.
 pub(super) type Point = [f64; 2];
 
 /// A part of a rigid surface, from its start to its end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Piece {
     Line([Point; 2]),
-    /// The shorter way around the centre.
+    /// An arc, the shorter way around its centre.
     Arc {
         ends: [Point; 2],
         center: Point,
     },
-    /// Start, middle and end: the side of an element of second order, or a parabola of an analytical surface.
+    /// A parabola by start, middle and end: the side of an element of second order, or a parabola of an analytical
+    /// surface.
     Parabola([Point; 3]),
 }
 
-/// Angles up to this (radians) between two pieces are no corner: what the digits of a file leave.
+/// Angles up to this (radians) between two pieces are no corner, since coordinates in files are rounded.
 const SMOOTH: f64 = 2e-3;
 
 /// An arc is divided into parts of at most this angle (radians).
 const PART: f64 = 4e-3;
 
-/// Parts of a parabola.
+/// The number of parts of a parabola.
 const PARTS: usize = 32;
 
-/// Relative differences up to this are those of the digits of a file.
+/// Relative differences up to this are rounding in files.
 const DIGITS: f64 = 1e-4;
 
-/// A rigid surface as an obstacle can be written.
+/// A rigid surface in the form of an obstacle.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Outline {
-    /// Points of it, in its direction.
+    /// Its points, in its direction.
     pub(super) points: Vec<Point>,
-    /// What joins them.
+    /// How the points are joined.
     pub(super) joined: Joined,
 }
 
-/// What joins the points of an outline.
+/// How the points of an outline are joined.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Joined {
-    /// Straight lines, exactly.
+    /// By straight lines, exactly.
     Lines,
-    /// One circle, exactly. Convex: the body is outside of it.
+    /// By one circle, exactly. Convex: the body is outside of it.
     Circle {
         center: Point,
         radius: f64,
         convex: bool,
     },
-    /// Smooth curves: a spline, which differs from them by at most this length.
+    /// By a spline, which differs from the smooth curves by at most this length.
     Spline(f64),
-    /// Curves that meet in corners: straight lines, which differ from them by at most this length.
+    /// By straight lines in place of curves with corners, which differ by at most this length.
     Polygon(f64),
 }
 
@@ -67,7 +68,7 @@ impl Piece {
         }
     }
 
-    /// The same piece elsewhere.
+    /// The piece with all its points moved.
     pub(super) fn placed(self, to: impl Fn(Point) -> Point) -> Self {
         match self {
             Piece::Line(points) => Piece::Line(points.map(to)),
@@ -79,7 +80,7 @@ impl Piece {
         }
     }
 
-    /// The same piece in the other direction.
+    /// The piece in the opposite direction.
     pub(super) fn reversed(self) -> Self {
         match self {
             Piece::Line([a, b]) => Piece::Line([b, a]),
@@ -119,7 +120,7 @@ impl Piece {
         cross(from, to).atan2(dot(from, to))
     }
 
-    /// Unit tangents at start and end.
+    /// The unit tangents at start and end.
     fn tangents(&self) -> [Point; 2] {
         let along = match *self {
             Piece::Line([a, b]) => [minus(b, a); 2],
@@ -141,8 +142,9 @@ impl Piece {
         })
     }
 
-    /// Points from its start to before its end, and how far straight lines between them are off at most (length).
-    /// `graded`: those of a straight line come closer to each other towards its ends, where `finest` is the distance.
+    /// Points from the start of the piece to before its end, and the largest distance of straight lines between them
+    /// from it (length). `graded`: points on a straight line are closer together towards its ends, where `finest` is
+    /// their distance.
     fn points(&self, finest: Option<f64>) -> (Vec<Point>, f64) {
         match *self {
             Piece::Line([a, b]) => {
@@ -191,7 +193,7 @@ impl Piece {
     }
 }
 
-/// Sorts pieces so that each begins where the one before ends. `None`: they are no single chain, or none at all.
+/// Sorts pieces so that each begins where the one before ends. `None` if they do not form one chain, or there are none.
 pub(super) fn chain(pieces: &[Piece]) -> Option<Vec<Piece>> {
     let key = |[x, y]: Point| [(x + 0.0).to_bits(), (y + 0.0).to_bits()];
     let mut starts = std::collections::BTreeMap::new();
@@ -218,7 +220,7 @@ pub(super) fn chain(pieces: &[Piece]) -> Option<Vec<Piece>> {
     (!sorted.is_empty() && sorted.len() == pieces.len()).then_some(sorted)
 }
 
-/// The outline of pieces that follow one another.
+/// The outline of consecutive pieces.
 pub(super) fn outline(pieces: &[Piece]) -> Outline {
     let last = pieces.last().map(Piece::end);
     if pieces.iter().all(|piece| matches!(piece, Piece::Line(_))) {
@@ -263,7 +265,7 @@ pub(super) fn outline(pieces: &[Piece]) -> Outline {
 /// The circle that all pieces are arcs of, in the same direction: centre, radius, and whether the body, on the left, is
 /// outside of it.
 fn circle(pieces: &[Piece]) -> Option<(Point, f64, bool)> {
-    /// Of the radius: arcs of one circle.
+    /// The relative difference of radii up to which arcs belong to one circle.
     const SAME: f64 = 1e-6;
     let arc = |piece: &Piece| match *piece {
         Piece::Arc { ends, center } => Some((
@@ -284,8 +286,9 @@ fn circle(pieces: &[Piece]) -> Option<(Point, f64, bool)> {
     pieces.iter().all(same).then_some((center, radius, !turns))
 }
 
-/// Where the normal of a place on the body first meets a rigid surface, in front of it or up to `behind` behind it:
-/// the distance along n and the surface's own normal there, which points to the left of its direction.
+/// The first intersection of the normal at a place of the body with a rigid surface, ahead of the place or at most
+/// `behind` behind it: the distance along n and the surface's own normal there, which points to the left of its
+/// direction.
 pub(super) fn met(points: &[Point], place: Point, n: Point, behind: f64) -> Option<(f64, Point)> {
     let t = [n[1], -n[0]];
     let hit = |pair: &[Point]| {

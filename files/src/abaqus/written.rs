@@ -1,4 +1,4 @@
-//! What a deck says, as it is written: rows, sets, sections and materials, with their lines; and how a line is read.
+//! The data of a deck as written: rows, sets, sections and materials, with their lines; and how a line is read.
 
 use std::rc::Rc;
 
@@ -7,48 +7,49 @@ use solver::error::{Reason, Violation};
 /// A name of a set, surface or material, stored once however often the deck uses it.
 pub(super) type Name = Rc<str>;
 
-/// Characters of a name; Abaqus and CalculiX allow 80. A line may be a million times as long, and every entry of a
-/// set is compared with names.
+/// The largest number of characters of a name; Abaqus and CalculiX allow 80. A line may be a million times as long, and
+/// every entry of a set is compared with names.
 pub(super) const LONGEST_NAME: usize = 256;
 
-/// Names of sets and surfaces: each takes hundreds of bytes, and is compared with the whole surface of the mesh.
+/// The largest number of names of sets and surfaces: each takes hundreds of bytes, and is compared with the whole
+/// surface of the mesh.
 pub(super) const MOST_NAMES: usize = 1 << 16;
 
-/// Constants of a material.
+/// The largest number of constants of a material.
 pub(super) const MOST_CONSTANTS: usize = 10;
 
 /// The target of a set or a load.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Target {
     Label(u64),
-    /// First, last, step; in a box, since labels are many and ranges few.
+    /// A range: first, last, step; boxed, since labels are many and ranges few.
     Range(Box<[u64; 3]>),
     /// A set, or `INSTANCE.SET`, or `INSTANCE.7`.
     Set(Name),
 }
 
-/// `*ELASTIC`.
+/// Elastic constants, `*ELASTIC`.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Elastic {
     pub(super) line: u64,
     /// The form of the constants.
     pub(super) kind: String,
     pub(super) values: Vec<f64>,
-    /// A line of the constants could not be read, and a violation says so.
+    /// Whether a line of the constants could not be read, which a violation reports.
     pub(super) unreadable: bool,
 }
 
-/// `*MATERIAL`.
+/// A material, `*MATERIAL`.
 #[derive(Clone, Debug, Default)]
 pub(super) struct MaterialDefinition {
     pub(super) elastic: Option<Elastic>,
-    /// Lines and keywords that a linear elastic material does not have.
+    /// Lines and keywords of properties that a linear elastic material does not have.
     pub(super) other: Vec<(u64, String)>,
     /// The first line of `*EXPANSION`.
     pub(super) expansion: Option<u64>,
 }
 
-/// `*SOLID SECTION`.
+/// The material of some elements, `*SOLID SECTION`.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Section {
     pub(super) line: u64,
@@ -58,19 +59,20 @@ pub(super) struct Section {
     pub(super) orientation: Option<Name>,
 }
 
-/// `*ORIENTATION`: the angle of the first direction of the material (degrees), or why there is none.
+/// An orientation, `*ORIENTATION`: the angle of the first direction of the material (degrees), or the reason why it has
+/// none.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Orientation {
-    /// The system is not one of straight axes.
+    /// Whether the system has curved axes.
     pub(super) curved: bool,
     pub(super) lines: Vec<Vec<f64>>,
 }
 
-/// `*AMPLITUDE`: factors by time.
+/// An amplitude, `*AMPLITUDE`: factors by time.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Amplitude {
     pub(super) line: u64,
-    /// It is not a table of factors.
+    /// Whether it is something other than a table of factors.
     pub(super) other: bool,
     pub(super) values: Vec<f64>,
 }
@@ -90,13 +92,13 @@ pub(super) struct Prescribed {
 pub(super) struct Pressure {
     pub(super) line: u64,
     pub(super) target: Target,
-    /// Number of the side from 1; none: `target` is a surface.
+    /// The number of the side from 1; none if `target` is a surface.
     pub(super) side: Option<usize>,
     pub(super) value: f64,
     pub(super) amplitude: Option<Name>,
 }
 
-/// A row of `*CLOAD`.
+/// A force, a row of `*CLOAD`.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Force {
     pub(super) line: u64,
@@ -109,16 +111,16 @@ pub(super) struct Force {
 /// The temperatures of a deck.
 #[derive(Default)]
 pub(super) struct Temperatures {
-    /// What has a temperature at the beginning, and which.
+    /// The initial temperature of each target.
     pub(super) initial: Vec<(Target, f64)>,
-    /// Some of the initial temperatures are not known.
+    /// Whether some of the initial temperatures are unknown.
     pub(super) others: bool,
-    /// The first line that changes a temperature, and what it says.
+    /// The first line that changes a temperature, in words.
     pub(super) changed: Option<(u64, String)>,
 }
 
 impl Temperatures {
-    /// Whether a row leaves a temperature as it is; if that is not certain it counts as changed.
+    /// Whether a row leaves a temperature as it is; if that is uncertain it counts as changed.
     pub(super) fn is_initial(&self, target: &Target, value: f64) -> bool {
         let mut all = self.initial.iter();
         let same = all.clone().all(|(_, initial)| *initial == value);
@@ -132,8 +134,8 @@ impl Temperatures {
     }
 }
 
-/// What `OP=NEW` replaces. `*DLOAD` and `*DSLOAD` replace each other's pressures in CalculiX, and only their own in Abaqus:
-/// here both have to be stated again.
+/// The prescriptions that `OP=NEW` replaces. `*DLOAD` and `*DSLOAD` replace each other's pressures in CalculiX, and
+/// only their own in Abaqus: here both must be repeated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Replaces {
     Supports,
@@ -149,40 +151,40 @@ pub(super) struct Replacement {
     pub(super) what: Replaces,
 }
 
-/// A set as it is written.
+/// A set as written.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Set {
     /// The line that begins it.
     pub(super) line: u64,
     pub(super) members: Vec<Target>,
-    /// Members that are those of an instance.
+    /// Members that belong to an instance.
     pub(super) of_instances: Vec<(Name, Vec<Target>)>,
-    /// Sets of elements whose nodes belong to it, and their instances.
+    /// Sets of elements whose nodes belong to this set, with their instances.
     pub(super) of_elements: Vec<(Option<Name>, Name)>,
 }
 
 impl Set {
-    /// The number of members as they are written.
+    /// The number of members as written.
     pub(super) fn written(&self) -> usize {
         let inner = self.of_instances.iter().map(|(_, members)| members.len());
         self.members.len() + inner.sum::<usize>() + self.of_elements.len()
     }
 }
 
-/// Which sides of its elements belong to a surface.
+/// The sides of an element that belong to a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Sides {
     /// One side, by its number from 1.
     Number(usize),
-    /// All that lie on the surface of the body.
+    /// All sides on the surface of the body.
     Outer,
-    /// Faces that plane elements do not have, or their own plane.
+    /// Faces that plane elements do not have, or the element's own plane.
     None,
-    /// The left of lines from their first node to their second, SPOS, or the right of them, SNEG.
+    /// The left side of a line from its first node to its second (SPOS), or its right side (SNEG).
     OfLine { left: bool },
 }
 
-/// A surface as it is written: sides by element or set and number.
+/// A surface as written: sides by element or set and number.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Surface {
     /// The line that begins it.
@@ -190,12 +192,12 @@ pub(super) struct Surface {
     pub(super) sides: Vec<(Target, Sides)>,
 }
 
-/// Which parts of a deck are not all known, since a line of them could not be read.
+/// Which data of a part are incomplete because a line could not be read.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Incomplete {
     pub(super) nodes: bool,
     pub(super) elements: bool,
-    /// Names of sets, surfaces and materials.
+    /// Whether names of sets, surfaces or materials may be missing.
     pub(super) names: bool,
 }
 
@@ -223,7 +225,7 @@ pub(super) fn on_line(
     Violation::new("", reason, format!("line {line}: {got}"), expected, hint)
 }
 
-/// `element 3`, or `elements 3, 7, 12, 14, 20 and 31 others`.
+/// A list in words such as `element 3`, or `elements 3, 7, 12, 14, 20 and 31 others`.
 pub(super) fn numbered(what: &str, numbers: impl Iterator<Item = u64>) -> String {
     const MOST: usize = 5;
     let mut numbers = numbers.fuse();
@@ -236,8 +238,8 @@ pub(super) fn numbered(what: &str, numbers: impl Iterator<Item = u64>) -> String
     }
 }
 
-/// The values of a line, between commas and without blanks around them; one in quotation marks may contain commas.
-/// Those that are left out at the end are not listed.
+/// The values of a line, between commas and without blanks around them; a value in quotation marks may contain commas.
+/// Empty values at the end are left out.
 pub(super) fn fields(text: &str) -> Vec<&str> {
     let mut quoted = false;
     let mut fields: Vec<&str> = text
@@ -253,7 +255,7 @@ pub(super) fn fields(text: &str) -> Vec<&str> {
     fields
 }
 
-/// A number; Fortran writes exponents with D.
+/// A number, also with Fortran's exponent D.
 pub(super) fn number(word: &str) -> Option<f64> {
     let parsed = word
         .parse()

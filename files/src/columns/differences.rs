@@ -1,7 +1,7 @@
 //! Columns of numbers as differences from predictions, byte plane by byte plane.
 //!
-//! The first plane has the lowest byte of every difference, and so on. Planes that look random are kept as they are, the
-//! others are deflated, all in one stream: small results have many short columns.
+//! The first plane has the lowest byte of every difference, and so on. Planes that look random are stored unchanged.
+//! The others are deflated together in one stream, because small results have many short columns.
 
 use std::io::{Read, Write};
 
@@ -12,25 +12,26 @@ use super::{
     order::NodeOrder,
 };
 
-/// What a plane consists of.
+/// The kinds of content of a plane.
 const ZEROS: u8 = 0;
 const RANDOM: u8 = 1;
 const DEFLATED: u8 = 2;
 
-/// How the values of a column were predicted.
+/// The kinds of prediction of a column.
 const AS_PREDICTED: u8 = 0;
 const AS_BEFORE: u8 = 1;
 
-/// From this many bits of information in a byte on a plane is kept as it is: deflating it gains less than a tenth.
+/// A plane whose bytes have at least this many bits of information is stored unchanged: deflating it gains less than a
+/// tenth.
 const RANDOM_BITS: f64 = 7.2;
 
-/// Above this size speed counts more than the last per cent.
+/// The size above which compression speed counts more than the last per cent.
 const LARGE: usize = 1 << 20;
 
-/// Columns as bytes.
+/// Writes columns as bytes.
 pub(super) struct Writer {
     random: Vec<u8>,
-    /// To be deflated: sizes, numbers, marks of planes, and planes.
+    /// The data to be deflated: sizes, numbers, marks of planes, and planes.
     stream: Vec<u8>,
 }
 
@@ -42,17 +43,17 @@ impl Writer {
         }
     }
 
-    /// A size.
+    /// Writes a size.
     pub(super) fn size(&mut self, size: usize) {
         put_size(&mut self.stream, size);
     }
 
-    /// A number as it is.
+    /// Writes a number unchanged.
     pub(super) fn number(&mut self, number: f64) {
         self.stream.extend(number.to_le_bytes());
     }
 
-    /// Whole numbers, each predicted by the one before.
+    /// Writes whole numbers, each predicted by the one before.
     pub(super) fn whole(&mut self, values: impl Iterator<Item = i64> + Clone) {
         let before = std::iter::once(0).chain(values.clone());
         let differences: Vec<u64> = values
@@ -62,13 +63,13 @@ impl Writer {
         self.planes(&differences);
     }
 
-    /// Numbers, each predicted by the one before.
+    /// Writes numbers, each predicted by the one before.
     pub(super) fn sequence(&mut self, values: &[f64]) {
         let differences = differences_in_sequence(values);
         self.planes(&differences);
     }
 
-    /// Numbers at nodes.
+    /// Writes numbers at nodes.
     pub(super) fn nodal(&mut self, values: &[f64], order: &NodeOrder) {
         let difference =
             |place| difference(values[order.node(place)], order.predict(place, values));
@@ -76,7 +77,7 @@ impl Writer {
         self.planes(&differences);
     }
 
-    /// Numbers that were predicted; each by the one before, if those are nearer.
+    /// Writes numbers with their predictions, or each predicted by the one before if that is closer.
     pub(super) fn predicted(&mut self, values: &[f64], predicted: &[f64]) {
         let pairs = values.iter().zip(predicted);
         let own: Vec<u64> = pairs.map(|(v, p)| difference(*v, *p)).collect();
@@ -117,7 +118,7 @@ impl Writer {
         }
     }
 
-    /// The bytes, with the head of fields that have so many nodes, elements and integration points.
+    /// The bytes, with the head of fields that have these numbers of nodes, elements and integration points.
     pub(super) fn finish(self, [nodes, elements, points]: [usize; 3]) -> Vec<u8> {
         let head = Head {
             nodes,
@@ -141,7 +142,7 @@ impl Writer {
     }
 }
 
-/// Columns from bytes.
+/// Reads columns from bytes.
 pub(super) struct Reader<'a> {
     random: &'a [u8],
     stream: Vec<u8>,
@@ -150,7 +151,7 @@ pub(super) struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// From what follows a head that was checked.
+    /// Reads the bytes after a head that was checked.
     pub(super) fn new<'a>(head: &Head, bytes: &'a [u8]) -> Result<Reader<'a>, String> {
         let (random, deflated) = bytes
             .split_at_checked(head.random)
@@ -252,7 +253,7 @@ impl Reader<'_> {
         Ok(differences)
     }
 
-    /// An error unless all was read.
+    /// Fails unless all bytes were read.
     pub(super) fn finish(self) -> Result<(), String> {
         if (self.at, self.at_random) == (self.stream.len(), self.random.len()) {
             Ok(())
@@ -277,22 +278,22 @@ fn differences_in_sequence(values: &[f64]) -> Vec<u64> {
         .collect()
 }
 
-/// How many numbers lie between two, with its sign.
+/// The signed number of floating-point numbers between two.
 fn difference(value: f64, predicted: f64) -> u64 {
     folded(rank(value).wrapping_sub(rank(finite(predicted))))
 }
 
-/// The number so far from a prediction.
+/// The floating-point number at this difference from a prediction.
 fn moved(predicted: f64, difference: u64) -> f64 {
     ranked(rank(finite(predicted)).wrapping_add(unfolded(difference)))
 }
 
-/// The bits of a computed NaN are not the same on every machine.
+/// The prediction, with NaN replaced, since the bits of a computed NaN differ between machines.
 fn finite(predicted: f64) -> f64 {
     if predicted.is_nan() { 0.0 } else { predicted }
 }
 
-/// The place of a number among all, in their order.
+/// The place of a number among all floating-point numbers, in their order.
 fn rank(value: f64) -> i64 {
     let bits = value.to_bits() as i64;
     bits ^ (((bits >> 63) as u64) >> 1) as i64
@@ -302,7 +303,7 @@ fn ranked(rank: i64) -> f64 {
     f64::from_bits((rank ^ (((rank >> 63) as u64) >> 1) as i64) as u64)
 }
 
-/// Small numbers of both signs as small numbers without sign.
+/// Maps small numbers of both signs to small numbers without sign.
 fn folded(value: i64) -> u64 {
     ((value << 1) ^ (value >> 63)) as u64
 }
@@ -311,7 +312,7 @@ fn unfolded(value: u64) -> i64 {
     (value >> 1) as i64 ^ -((value & 1) as i64)
 }
 
-/// Mean bits of information in one of `total` bytes.
+/// The mean information (bits) in one of `total` bytes.
 fn bits_of_information(counts: &[u32; 256], total: usize) -> f64 {
     let total = total as f64;
     let bits = |count: &u32| match f64::from(*count) / total {
@@ -321,7 +322,7 @@ fn bits_of_information(counts: &[u32; 256], total: usize) -> f64 {
     counts.iter().map(bits).sum()
 }
 
-/// Nearly the bits of information that so few random bytes have.
+/// Approximately the information (bits) that this number of random bytes has.
 fn most_bits(count: usize) -> f64 {
     0.9 * (count as f64).log2()
 }

@@ -1,43 +1,45 @@
-//! The head of stored fields: how much there is of everything, and the memory that it takes, before any is taken.
+//! The head of stored fields: all sizes, and the memory that decoding takes, which are checked before any is allocated.
 
 use solver::element::Element;
 
 /// The version of the format.
 const VERSION: u8 = 1;
 
-/// For each node, element and integration point, in this order.
+/// Numbers for each node, element and integration point, in this order.
 type ForEach = [usize; 3];
 
-/// Characters of JSON at least. No number is shorter than `0.0`, and each has a comma or a bracket: eight columns and a state
-/// of contact, a list of six nodes and an error, six columns.
+/// The smallest number of characters of JSON for each. No number is shorter than `0.0`, and each has a comma or a
+/// bracket: eight columns and a contact state for a node; a list of six nodes and an error for an element; six columns
+/// for an integration point.
 const LEAST_JSON: ForEach = [8 * 4 + 2, 14 + 4, 6 * 4];
 
-/// Bytes of the planes at most, eight for each number. Of an element: how many nodes, eight of them, error, material.
+/// The largest number of bytes of the planes, eight for each number. An element has the number of its nodes, eight
+/// nodes, error and material.
 const MOST_CONTENT: ForEach = [9 * 8, 11 * 8, 6 * 8];
 
-/// What else there is: the law, and marks of planes.
+/// The largest number of other bytes: the law, and marks of planes.
 const MOST_BESIDE: usize = 64 << 10;
 
-/// Bytes of the fields themselves.
+/// The number of bytes of the fields themselves.
 const FIELDS: ForEach = [8 * 8 + 1, size_of::<Element>() + 8, 6 * 8];
 
-/// What decoding needs beside fields and planes: the order of nodes and how many elements each has, the elements by columns,
-/// differences of a column and their values.
+/// The number of bytes that decoding needs in addition to fields and planes: the order of nodes and the number of
+/// elements at each, the elements by columns, differences of a column and their values.
 const WORKING: ForEach = [12 + 4 + 16, 48, 16];
 
-/// The same whatever the size: windows of the inflater, and tables of the master elements.
+/// The number of bytes that decoding needs for any size: windows of the inflater, and tables of the master elements.
 const WORKING_ALWAYS: usize = 256 << 10;
 
-/// What stands before the planes.
+/// The data before the planes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Head {
     pub(super) nodes: usize,
     pub(super) elements: usize,
-    /// Integration points.
+    /// The number of integration points.
     pub(super) points: usize,
-    /// Bytes that are kept as they are.
+    /// The number of bytes that are stored unchanged.
     pub(super) random: usize,
-    /// Bytes that were deflated.
+    /// The number of bytes that were deflated.
     pub(super) stream: usize,
 }
 
@@ -55,7 +57,7 @@ impl Head {
         }
     }
 
-    /// The head, and what follows it.
+    /// Reads the head; returns it and the remaining bytes.
     pub(super) fn read(bytes: &[u8]) -> Result<(Head, &[u8]), String> {
         let (version, mut rest) = bytes.split_first().ok_or_else(|| damaged("no bytes"))?;
         if *version != VERSION {
@@ -74,8 +76,8 @@ impl Head {
         Ok((head, rest))
     }
 
-    /// An error if these cannot be fields with so many bytes of JSON. Planes of zeros take no bytes here, so that nothing else
-    /// limits their memory: after this it is six times the JSON at most.
+    /// Fails if fields of these sizes cannot have so many bytes of JSON. Planes of zeros take no bytes here, so that
+    /// nothing else limits their memory: after this check it is at most six times the JSON.
     pub(super) fn check(&self, json_bytes: usize) -> Result<(), String> {
         let content = self.random.saturating_add(self.stream);
         let most = self.sum(MOST_CONTENT).saturating_add(MOST_BESIDE);
@@ -89,7 +91,7 @@ impl Head {
         }
     }
 
-    /// Bytes that decoding takes at most, the fields among them.
+    /// The largest number of bytes that decoding takes, including the fields.
     pub(super) fn memory(&self) -> usize {
         [self.sum(FIELDS), self.sum(WORKING), WORKING_ALWAYS]
             .into_iter()
@@ -105,7 +107,7 @@ impl Head {
     }
 }
 
-/// A size, seven bits in each byte.
+/// Writes a size, seven bits in each byte.
 pub(super) fn put_size(to: &mut Vec<u8>, mut size: usize) {
     while size >= 0x80 {
         to.push(size as u8 | 0x80);
@@ -127,7 +129,7 @@ pub(super) fn take_size(from: &mut &[u8]) -> Result<usize, String> {
     Err(damaged("a size"))
 }
 
-/// Bytes that are not those of fields.
+/// The error for bytes that are not encoded fields.
 pub(super) fn damaged(what: &str) -> String {
     format!("stored fields are damaged: {what}")
 }

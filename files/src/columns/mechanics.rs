@@ -1,8 +1,9 @@
 //! Stresses from displacements by Hooke's law, as a prediction: thesis 2.2, and formulation 3.
 //!
-//! It repeats what the solver does for ordinary elements, in the same order of operations, with formulas of the master elements of
-//! its own (`version_1`): a change of one rounding there, or here, would make all that is stored unreadable; the files of
-//! `version_1` tell, in `stored.rs`. Of nearly incompressible elements it is a poor prediction, which costs space and nothing else.
+//! It repeats what the solver does for ordinary elements, in the same order of operations, with formulas of the master
+//! elements of its own (`version_1`): a change of one rounding there, or here, would make all stored fields unreadable; the test
+//! in `stored.rs` with the files of `version_1` detects that. For nearly incompressible elements the prediction is poor, which
+//! only costs space.
 
 use solver::{
     elasticity::{COMPONENTS, Moduli, isotropic, orthotropic},
@@ -13,20 +14,20 @@ use solver::{
 
 use super::version_1::{self, Place};
 
-/// Materials that stresses are predicted with; a solved problem has few.
+/// The largest number of materials for predicting stresses; a solved problem has few.
 pub(super) const MOST_MATERIALS: usize = u8::MAX as usize;
 
-/// What stresses are predicted with.
+/// The data for predicting stresses.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Law {
-    /// There is a hoop strain u_r / r.
+    /// Whether there is a hoop strain u_r / r.
     pub axisymmetric: bool,
-    /// Of each material of the problem (stress).
+    /// The moduli of each material of the problem (stress).
     pub moduli: Vec<Moduli>,
 }
 
 impl Law {
-    /// That of a problem.
+    /// The law of a problem.
     pub fn of(problem: &Problem) -> Law {
         let analysis = &problem.analysis;
         let moduli = |elasticity: &Elasticity| match elasticity {
@@ -47,7 +48,7 @@ impl Law {
     }
 }
 
-/// What is known when stresses are predicted.
+/// The fields that are known when stresses are predicted.
 pub(super) struct Known<'a> {
     x: &'a [f64],
     y: &'a [f64],
@@ -80,20 +81,21 @@ pub(super) fn at_points(gauss: &GaussFields) -> [&Vec<f64>; 4] {
     ]
 }
 
-/// What is predicted.
+/// The predicted values.
 pub(super) struct Stresses {
-    /// Integration points along x and y.
+    /// The integration points along x and y.
     pub(super) points: [Vec<f64>; 2],
-    /// Stresses there.
+    /// The stresses at the integration points.
     pub(super) at_points: [Vec<f64>; COMPONENTS],
-    /// Stresses at nodes, averaged over their elements.
+    /// The stresses at nodes, averaged over the elements there.
     pub(super) at_nodes: [Vec<f64>; COMPONENTS],
 }
 
-/// Elements whose nodes have the same places relative to the first one, to this part of their distances, have the same strains.
+/// Elements have the same strains if their nodes have the same places relative to the first one, within this part of
+/// their distances.
 const SAME_SHAPE: f64 = 1e-11;
 
-/// The strains at one place of an element are linear in its displacements.
+/// The strains at one place of an element, as linear functions of its displacements.
 struct Strains {
     dx: AtNodes<f64>,
     dy: AtNodes<f64>,
@@ -155,7 +157,7 @@ impl Master {
     }
 }
 
-/// The strains of the element that was looked at last, for those of the same shape after it.
+/// The strains of the last element, which are reused for the following ones of the same shape.
 struct Shape {
     family: Family,
     nodes: AtNodes<[f64; 2]>,
@@ -194,7 +196,7 @@ impl Shape {
     }
 }
 
-/// The elements of a mesh one after the other, each with its strains.
+/// Visits the elements of a mesh one after another, each with its strains.
 struct Walk<'a> {
     known: &'a Known<'a>,
     axisymmetric: bool,
@@ -213,12 +215,12 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Positions of its nodes.
+    /// The positions of an element's nodes.
     fn nodes(&self, element: &Element) -> AtNodes<[f64; 2]> {
         element.gather(|n| [self.known.x[n as usize], self.known.y[n as usize]])
     }
 
-    /// Displacements of its nodes.
+    /// The displacements of an element's nodes.
     fn displacements(&self, element: &Element) -> (AtNodes<f64>, AtNodes<f64>) {
         (
             element.gather(|n| self.known.ux[n as usize]),
@@ -239,7 +241,7 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// The material of each element, by which its stresses are predicted best: known only to who has the stresses.
+/// The material of each element with which its stresses are predicted best, found from the stresses themselves.
 pub(super) fn materials_by_element(fields: &Fields, law: &Law) -> Vec<u8> {
     if law.moduli.len() < 2 {
         return vec![0; fields.elements.len()];

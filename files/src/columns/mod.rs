@@ -1,9 +1,10 @@
 //! Fields as columns, compressed without loss: how results are stored.
 //!
-//! A field is nearly all stresses, and stresses follow from displacements. What is stored of each column is how far it is
-//! from a prediction that a reader can repeat: of stresses Hooke's law, of midside nodes the mean of the corners, of the rest the
-//! value before. Differences are those of the bits, so that every number comes back as it was, whatever the prediction is
-//! worth; most of them are zero or a few roundings, and take a byte in place of eight.
+//! Fields consist mostly of stresses, which follow from displacements. Each column is stored as differences from a
+//! prediction that a reader can repeat: by Hooke's law for stresses, by the mean of the corners for midside nodes, and
+//! by the value before for the rest. Differences are taken between bit patterns, so that every number is restored
+//! exactly, however good the prediction is; most of them are zero or a few roundings, and take one byte instead of
+//! eight.
 //!
 //! The predictions are a part of the format: a change of one of them, by a single rounding, needs another version.
 
@@ -74,8 +75,8 @@ pub fn encode(fields: &Fields, law: &Law) -> Result<Vec<u8>, String> {
     Ok(out.finish([nodes, fields.elements.len(), points]))
 }
 
-/// Returns the memory (bytes) that decoding takes at most, the fields among it, as the head of the bytes says; the rest
-/// of them may be missing.
+/// Returns the largest memory (bytes) that decoding takes, including the fields, as the head of the bytes says; the
+/// bytes after the head may be missing.
 ///
 /// # Errors
 ///
@@ -163,7 +164,7 @@ fn at_nodes(fields: &Fields) -> [&Vec<f64>; 4] {
     ]
 }
 
-/// The number of nodes of each element, then their nodes: the first of all, the second of all…
+/// Writes the number of nodes of each element, then the first nodes of all elements, the second nodes, and so on.
 fn write_elements(out: &mut Writer, elements: &[Element]) {
     out.whole(elements.iter().map(|element| element.len() as i64));
     for place in 0..8 {

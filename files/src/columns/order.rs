@@ -1,18 +1,18 @@
-//! Nodes in the order in which their values are predicted: corners of elements first, then midsides between them.
+//! The order in which values at nodes are predicted: corners of elements first, then the midsides between them.
 
 use solver::element::Element;
 
-/// In place of corners: the node before it in the order.
+/// Stands for the corners of a node that is not a midside: it is predicted from the node before it.
 const NONE: u32 = u32::MAX;
 
-/// The order of nodes.
+/// The order of the nodes of a mesh.
 pub(super) struct NodeOrder {
-    /// Each node, with the corners of its side if it lies on the middle of one.
+    /// Each node; a midside node with the two corners of its side.
     nodes: Vec<(u32, [u32; 2])>,
 }
 
 impl NodeOrder {
-    /// That of a mesh with so many nodes; all nodes of the elements are among them.
+    /// The order for a mesh with this many nodes, which include all nodes of the elements.
     pub(super) fn new(elements: &[Element], nodes: usize) -> NodeOrder {
         let mut between = vec![[NONE; 2]; nodes];
         for [a, b, middle] in elements.iter().flat_map(Element::sides) {
@@ -37,7 +37,7 @@ impl NodeOrder {
         NodeOrder { nodes: ordered }
     }
 
-    /// How many.
+    /// The number of nodes.
     pub(super) fn len(&self) -> usize {
         self.nodes.len()
     }
@@ -47,7 +47,7 @@ impl NodeOrder {
         self.nodes[place].0 as usize
     }
 
-    /// The value at a node, from those before it in the order.
+    /// The predicted value at a node, from nodes before it in the order.
     pub(super) fn predict(&self, place: usize, values: &[f64]) -> f64 {
         match (self.nodes[place].1, place) {
             ([NONE, _], 0) => 0.0,

@@ -1,4 +1,4 @@
-//! Fields of every kind as a version of the format has stored them: every later program must read them bit for bit.
+//! Tests that fields stored by every version of the format are still read bit for bit.
 #![allow(clippy::unwrap_used)]
 
 use flate2::Crc;
@@ -7,7 +7,7 @@ use solver::{elasticity::isotropic, problem::Analysis};
 use super::*;
 use mechanics::Known;
 
-/// A file of the folder of its version, with the checksum of the JSON of its fields.
+/// A file in the folder of its version, with the checksum of the JSON of its fields.
 type Stored = (&'static str, &'static [u8], u32);
 
 macro_rules! stored {
@@ -31,7 +31,7 @@ const VERSION_1: [Stored; 7] = [
 ];
 
 #[test]
-fn what_was_stored_by_version_1_is_read_bit_for_bit() {
+fn fields_stored_by_version_1_are_read_bit_for_bit() {
     for (name, bytes, sum) in VERSION_1 {
         let read = decode(bytes, 1 << 20);
         assert!(
@@ -43,14 +43,15 @@ fn what_was_stored_by_version_1_is_read_bit_for_bit() {
     }
 }
 
-/// Of the numbers as they are: their shortest digits differ where their bits do, that of zero included.
+/// A checksum of the exact numbers: their shortest digits differ where their bits do, also for the sign of zero.
 fn checksum(fields: &Fields) -> u32 {
     let mut sum = Crc::new();
     sum.update(&serde_json::to_vec(fields).unwrap());
     sum.sum()
 }
 
-/// With a folder in SIGNORINI_STORED_FOLDER it also writes such files there, for a new version, and prints their checksums.
+/// Fields of every kind are restored. With a folder in SIGNORINI_STORED_FOLDER the test also writes such files there,
+/// for a new version, and prints their checksums.
 #[test]
 fn fields_of_every_kind_come_back() {
     let folder = std::env::var("SIGNORINI_STORED_FOLDER").ok();
@@ -126,7 +127,7 @@ fn of_every_kind() -> Vec<(&'static str, Fields, Law)> {
     ]
 }
 
-/// So many cells along x and two along y, each a quadrilateral or two triangles in turn, with curved sides.
+/// A mesh of this many cells along x and two along y, each a quadrilateral or two triangles in turn, with curved sides.
 fn lattice(cells: u32, split: &[bool], order: u32, curved: f64) -> Fields {
     let mut fields = Fields::default();
     let width = 2 * cells + 1;
@@ -164,7 +165,7 @@ fn lattice(cells: u32, split: &[bool], order: u32, curved: f64) -> Fields {
     fields
 }
 
-/// With stresses near the predicted ones, of each material of the law in turn.
+/// Fields with stresses near the predicted ones, of each material of the law in turn.
 fn near(mut fields: Fields, law: &Law) -> Fields {
     let materials: Vec<u8> = (0..fields.elements.len())
         .map(|e| (e % law.moduli.len()) as u8)
@@ -195,7 +196,7 @@ fn near(mut fields: Fields, law: &Law) -> Fields {
     fields
 }
 
-/// With numbers that have nothing to do with each other, except for places.
+/// Fields with unrelated numbers, except for the places.
 fn anything(mut fields: Fields, number: &dyn Fn(u64) -> f64) -> Fields {
     let nodes = fields.x.len();
     let points = fields
@@ -239,7 +240,7 @@ fn extreme(place: u64) -> f64 {
     ALL[(mixed_up(place) % 10) as usize]
 }
 
-/// The bits of a number well mixed (the end of SplitMix64).
+/// A number whose bits are well mixed (the end of SplitMix64).
 fn mixed_up(number: u64) -> u64 {
     let mut mixed = number.wrapping_mul(0x9e37_79b9_7f4a_7c15);
     mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -6,7 +6,7 @@ use solver::problem::Problem;
 use super::*;
 use crate::fields::tests::mixed;
 
-/// A problem of this kind on a grid, with these materials and with more fields of it.
+/// A problem of this kind on a grid, with the given materials and mesh.
 fn problem(kind: &str, materials: &str, mesh: &str) -> Problem {
     let text = format!(
         r#"{{"analysis": {{"kind": "{kind}"}}, "mesh": {mesh}, "materials": {materials},
@@ -30,7 +30,7 @@ fn bits(fields: &Fields) -> Vec<u8> {
     serde_json::to_vec(fields).unwrap()
 }
 
-/// Bytes for each number of a nodal column, if the fields come back as they were.
+/// The number of bytes for each number of a nodal column; checks that the fields are restored exactly.
 fn checked(fields: &Fields, law: &Law) -> usize {
     let encoded = encode(fields, law).unwrap();
     let decoded = decode(&encoded, 1 << 20).unwrap();
@@ -71,7 +71,7 @@ fn fields_come_back_whatever_the_prediction_is_worth() {
 }
 
 #[test]
-fn elements_of_several_materials_are_told_apart_by_their_stresses() {
+fn the_material_of_an_element_is_found_from_its_stresses() {
     let materials = r#"[{"youngs_modulus": 1000, "poissons_ratio": 0.3}, {"youngs_modulus": 10, "poissons_ratio": 0.2, "group": "soft"}]"#;
     let mesh = r#"{"grid": {"x": [0, 0.5, 1, 2], "y": [-2, -1, -0.5, 0]}, "groups": {"soft": {"y": [-2, -1]}}}"#;
     let problem = problem("plane_strain", materials, mesh);

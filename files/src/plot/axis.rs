@@ -1,14 +1,16 @@
-//! What an axis shows of curves: from where to where, which parts, and its numbers.
+//! The range of an axis, the parts of curves within it, and its numbers.
 
 use std::ops::Range;
 
-/// Decades that a logarithmic axis spans at most, from the largest value down.
+/// The largest number of decades of a logarithmic axis, from the largest value down.
 const DECADES: f64 = 18.0;
-/// A stress is drawn up to so many times what half of the contact stays below; a peak beyond that is cut off and marked.
+/// A stress is drawn up to this many times the value that half of the contact stays below; a higher peak is cut off and
+/// marked.
 pub(super) const CUT: f64 = 6.0;
 
-/// Of stresses: from the least to the largest with zero, but up to `cut` times what half of the length stays below. What is
-/// usual is judged by length, not by points: a mesh has most of its points where the peak is.
+/// The range of an axis for stresses: from the smallest to the largest, including zero, but at most `cut` times the
+/// value that half of the length stays below. This is judged by length, not by points: a mesh has most of its points at
+/// the peak.
 pub(super) fn limits(curves: &[&[(f64, f64)]], cut: f64) -> Range<f64> {
     let mut parts: Vec<(f64, f64)> = Vec::new(); // value, length
     for points in curves {
@@ -59,7 +61,7 @@ fn quantile(mut parts: Vec<(f64, f64)>, share: f64) -> Option<f64> {
     reached.or(parts.last()).map(|part| part.0)
 }
 
-/// The parts of a curve that an axis shows, each ending where it leaves.
+/// The parts of a curve within the range of an axis, each ending where the curve leaves it.
 pub fn within(points: &[(f64, f64)], up: &Range<f64>) -> Vec<Vec<(f64, f64)>> {
     let inside = |y: f64| up.start <= y && y <= up.end;
     let mut parts: Vec<Vec<(f64, f64)>> = Vec::new();
@@ -92,7 +94,8 @@ pub fn within(points: &[(f64, f64)], up: &Range<f64>) -> Vec<Vec<(f64, f64)>> {
     parts
 }
 
-/// Where a curve is farthest beyond the axis, each time that it leaves it: x, the value, and whether it leaves at the top.
+/// The farthest points of a curve beyond the axis, one for each time that it leaves: x, the value, and whether it
+/// leaves at the top.
 pub(super) fn peaks(points: &[(f64, f64)], up: &Range<f64>) -> Vec<(f64, f64, bool)> {
     let mut found: Vec<(f64, f64, bool)> = Vec::new();
     let mut before = None;
@@ -114,8 +117,8 @@ pub(super) fn peaks(points: &[(f64, f64)], up: &Range<f64>) -> Vec<(f64, f64, bo
     found
 }
 
-/// The peak that a figure names: x, the value, and whether it is at the top. Of those beyond the axis the largest; where none is,
-/// the largest of the curves if there is more to say of it than that it is cut off.
+/// The peak that a figure names: x, the value, and whether it is at the top. Of peaks beyond the axis it is the
+/// largest; if there are none, the largest of the curves, provided that there is a remark about it.
 pub(super) fn named_peak(
     curves: &[&[(f64, f64)]],
     up: &Range<f64>,
@@ -137,7 +140,7 @@ pub(super) fn named_peak(
     Some((peak.0, peak.1, peak.1 > 0.0))
 }
 
-/// Linear between points whose first coordinate rises.
+/// The value at a place, linear between points whose first coordinate rises.
 pub(super) fn interpolated(
     points: impl Iterator<Item = (f64, f64)> + Clone,
     at: f64,
@@ -149,7 +152,7 @@ pub(super) fn interpolated(
     })
 }
 
-/// Where on the first axis the second has a value.
+/// The place on the first axis where the second has a value.
 pub(super) fn place_of(places: &[(f64, f64)], value: f64) -> Option<f64> {
     let turned = places.iter().map(|&(s, c)| (c, s));
     if places.first()?.1 <= places.last()?.1 {
@@ -159,12 +162,12 @@ pub(super) fn place_of(places: &[(f64, f64)], value: f64) -> Option<f64> {
     }
 }
 
-/// As many ticks as there are whole numbers, and no more than fit.
+/// The number of ticks: as many as there are whole numbers, and no more than fit.
 pub(super) fn ticks(range: &Range<f64>) -> usize {
     ((range.end - range.start) as usize + 1).clamp(2, 12)
 }
 
-/// 10ⁿ; nothing between the powers.
+/// The text of 10ⁿ for a whole n; empty for other numbers.
 pub(super) fn power_of_ten(exponent: f64) -> String {
     let round = exponent.round();
     if (exponent - round).abs() > 1e-6 {
@@ -187,7 +190,7 @@ pub(super) fn power_of_ten(exponent: f64) -> String {
     )
 }
 
-/// Whole decades around all exponents.
+/// The range of whole decades around all exponents.
 pub(super) fn decades(exponents: impl Iterator<Item = f64>) -> Range<f64> {
     let (low, high) = exponents.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), e| {
         (low.min(e), high.max(e))
@@ -199,7 +202,7 @@ pub(super) fn decades(exponents: impl Iterator<Item = f64>) -> Range<f64> {
     (low - 0.1).floor().max(top - DECADES).min(top - 2.0)..top
 }
 
-/// From the least to the largest value; never empty.
+/// The range from the smallest to the largest value; never empty.
 pub(super) fn extent(values: impl Iterator<Item = f64>) -> Range<f64> {
     let start = (f64::INFINITY, f64::NEG_INFINITY);
     let (low, high) = values.fold(start, |(low, high), v| (low.min(v), high.max(v)));

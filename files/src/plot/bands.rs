@@ -1,4 +1,4 @@
-//! A field in bands of colour, with its colour bar.
+//! A field drawn as bands of colour, with its colour bar.
 
 use plotters::prelude::*;
 use plotters::style::RGBColor;
@@ -11,31 +11,32 @@ use super::style::Style;
 use super::theme::{ColourMap, hex};
 use solver::element::{Element, Family};
 
-/// Most bands; there are at least about half as many.
+/// The largest number of bands; there are at least about half as many.
 const BANDS: f64 = 14.0;
-/// Side of the cells that an element is cut into (pixels), and most of them along a side.
+/// The side of the cells that an element is divided into (pixels), and the most cells along a side.
 const CELL: f64 = 6.0;
 const MOST_CELLS: usize = 16;
-/// An element smaller than this has one colour (pixels).
+/// An element smaller than this is drawn in one colour (pixels).
 const SPECK: f64 = 1.5;
 
-/// Height of the colour bar with its numbers and name (pixels).
+/// The height of the colour bar with its numbers and name (pixels).
 pub(super) const BAR: i32 = 76;
 
-/// Bands between round numbers.
+/// Bands of values between round numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Bands {
     /// The limits, one more than bands.
     edges: Vec<f64>,
-    /// The extremes of the field, if beyond the first and the last limit.
+    /// The extremes of the field, if they are beyond the first and the last limit.
     beyond: [Option<f64>; 2],
     colours: ColourMap,
 }
 
 impl Bands {
-    /// For values at nodes. `near`: value and area of those in the last window. At a sharp edge a few
-    /// nodes may exceed all others, and do not converge: then the bands end half their width beyond the values of
-    /// 97 % of that area, and the bar shows the extremes of the field. A field of both signs has colours that differ by the sign.
+    /// The bands for values at nodes. `near`: value and area of the nodes in the last window. At a sharp edge a few
+    /// nodes may exceed all others, and their values do not converge: then the bands end half their width beyond the
+    /// values of 97 % of that area, and the bar shows the extremes of the field. A field of both signs has colours that
+    /// differ by the sign.
     pub(super) fn of(values: &[f64], mut near: Vec<(f64, f64)>) -> Bands {
         let extreme = |pick: fn(f64, f64) -> f64| values.iter().copied().reduce(pick);
         let least = extreme(f64::min).unwrap_or(0.0);
@@ -94,7 +95,7 @@ impl Bands {
         self.edges.len() - 1
     }
 
-    /// The band of a value; values beyond belong to the first or the last.
+    /// The band of a value; values beyond all limits belong to the first or the last band.
     fn band(&self, value: f64) -> usize {
         let above = self.edges.partition_point(|edge| *edge <= value);
         above.saturating_sub(1).min(self.count() - 1)
@@ -111,7 +112,7 @@ impl Bands {
         self.colours.at(part)
     }
 
-    /// The field inside of a frame: one path per band.
+    /// Draws the field inside a frame, one path for each band.
     pub(super) fn fill(
         &self,
         frame: &Frame,
@@ -187,7 +188,7 @@ impl Bands {
         }
     }
 
-    /// A convex cell, cut along the limits of the bands that it reaches into.
+    /// Adds a convex cell to the paths, divided at the limits of its bands.
     fn fill_cell(&self, paths: &mut [Path], cell: &[Corner]) {
         let bands = cell.iter().map(|corner| self.band(corner.value));
         let (low, high) = bands.fold((usize::MAX, 0), |(l, h), b| (l.min(b), h.max(b)));
@@ -214,7 +215,7 @@ impl Bands {
         }
     }
 
-    /// The colour bar with its numbers, below `top` (pixels).
+    /// Draws the colour bar with its numbers, below `top` (pixels).
     pub(super) fn bar(&self, area: &Area<'_>, style: Style, name: &str, top: i32) -> Fallible<()> {
         const LEFT: i32 = 80;
         let width = style.width();
@@ -275,7 +276,7 @@ struct Corner {
     value: f64,
 }
 
-/// An element as convex cells, `n` along a side.
+/// An element divided into convex cells, `n` along a side.
 fn cut(family: Family, n: usize, at: &dyn Fn([f64; 2]) -> Corner) -> Vec<Vec<Corner>> {
     let part = |i: usize| i as f64 / n as f64;
     let mut cells = Vec::new();

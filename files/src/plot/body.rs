@@ -1,5 +1,5 @@
-//! Bodies between equal axes. The content is written as paths: they are clipped, have the
-//! parabolas of the sides of elements, and one path may contain thousands of shapes.
+//! Draws bodies between axes of equal scale. The content is written as paths: they are clipped, have the parabolas of
+//! the sides of elements, and one path may contain thousands of shapes.
 
 use std::fmt::Write;
 
@@ -13,7 +13,7 @@ use super::theme::hex;
 use solver::element::Element;
 use solver::mesh::runs;
 
-/// Around the axes (pixels): numbers and names left and below, a caption above.
+/// The space around the axes (pixels): numbers and names left and below, a caption above.
 const EDGE: i32 = 4;
 const LEFT: i32 = 84;
 const RIGHT: i32 = 16;
@@ -22,10 +22,10 @@ const GAP: i32 = 12;
 const CAPTION: i32 = 26;
 /// A page narrower than this has no room for two windows beside one another (pixels).
 const NARROW: i32 = 640;
-/// Highest axes: one above the other and beside one another (pixels).
+/// The largest height of the axes (pixels): one above the other, and side by side.
 const HIGHEST: [f64; 2] = [430.0, 420.0];
 
-/// A rectangle in space.
+/// A rectangle of the plane of the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Window {
     pub(super) low: [f64; 2],
@@ -33,7 +33,7 @@ pub(super) struct Window {
 }
 
 impl Window {
-    /// Around points; `None` without any.
+    /// The smallest window around points; `None` without any.
     pub(super) fn around(points: impl Iterator<Item = [f64; 2]>) -> Option<Window> {
         let mut window: Option<Window> = None;
         for p in points {
@@ -54,7 +54,7 @@ impl Window {
         self.size()[0].max(self.size()[1])
     }
 
-    /// Around both.
+    /// The smallest window around two windows.
     pub(super) fn with(&self, other: &Window) -> Window {
         Window {
             low: [0, 1].map(|a| self.low[a].min(other.low[a])),
@@ -66,7 +66,7 @@ impl Window {
         (0..2).all(|a| self.low[a] <= point[a] && point[a] <= self.high[a])
     }
 
-    /// With a margin, as a part of the larger side.
+    /// The window enlarged by a margin, as a part of its larger side.
     pub(super) fn grown(&self, part: f64) -> Window {
         let by = part * self.largest();
         Window {
@@ -76,7 +76,7 @@ impl Window {
     }
 }
 
-/// A square of that side around something small, as much of it as can be between the corners of `within`.
+/// A square window of that side around a small one, as far as possible between the corners of `within`.
 pub(super) fn square(around: &Window, side: f64, within: &Window) -> Window {
     let low = [0, 1].map(|a| {
         let middle = 0.5 * (around.low[a] + around.high[a]);
@@ -91,17 +91,17 @@ pub(super) fn square(around: &Window, side: f64, within: &Window) -> Window {
     }
 }
 
-/// Where a window stands on the page.
+/// The place of a window on the page.
 #[derive(Clone, Debug)]
 pub(super) struct Frame {
     pub(super) window: Window,
-    /// Left upper corner below the title, and size, in the units of the drawing.
+    /// The upper left corner below the title, and the size, in the units of the drawing.
     corner: [i32; 2],
     size: [i32; 2],
 }
 
 impl Frame {
-    /// A place in space, from the corner of the axes, in the units of the drawing.
+    /// A place of the body as a distance from the corner of the axes, in the units of the drawing.
     pub(super) fn at(&self, point: [f64; 2]) -> [f64; 2] {
         let part = |a: usize| (point[a] - self.window.low[a]) / self.window.size()[a];
         [
@@ -110,14 +110,14 @@ impl Frame {
         ]
     }
 
-    /// Whether something between two corners (as of `at`) is visible.
+    /// Whether something between two corners (given as by `at`) is visible.
     pub(super) fn shows(&self, low: [f64; 2], high: [f64; 2]) -> bool {
         (0..2).all(|a| high[a] >= 0.0 && low[a] <= f64::from(self.size[a]))
     }
 }
 
-/// Frames for one window or two, and the height that they take (pixels). Two stand side by side, but
-/// below one another where the first is wide, or the page narrow.
+/// The frames for one window or two, and their height (pixels). Two are side by side, but one below the other where the
+/// first is wide or the page narrow.
 pub(super) fn layout(style: Style, windows: &[Window]) -> (Vec<Frame>, i32) {
     let wide = |w: &Window| w.size()[0] > 1.7 * w.size()[1];
     let beside = windows.len() > 1 && !wide(&windows[0]) && style.width() >= NARROW;
@@ -157,7 +157,7 @@ pub(super) fn layout(style: Style, windows: &[Window]) -> (Vec<Frame>, i32) {
     (frames, height)
 }
 
-/// Numbers, names and a caption around a frame.
+/// Draws numbers, names and a caption around a frame.
 pub(super) fn axes(
     area: &Area<'_>,
     style: Style,
@@ -197,7 +197,7 @@ pub(super) fn axes(
     draw_text(area, style, caption, corner)
 }
 
-/// The content of the axes, clipped, in a border; put on top of the page.
+/// The SVG of the content of the axes, clipped, in a border, to be put on top of the page.
 pub(super) fn inside(style: Style, frame: &Frame, content: &str) -> String {
     let ([x, y], [w, h]) = (frame.corner, frame.size);
     let (place, border) = (
@@ -212,12 +212,12 @@ pub(super) fn inside(style: Style, frame: &Frame, content: &str) -> String {
     )
 }
 
-/// The `d` of a path, in whole units of the drawing.
+/// The data (`d`) of an SVG path, in whole units of the drawing.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Path(pub(super) String);
 
 impl Path {
-    /// A closed polygon; nothing if it has shrunk to a point.
+    /// Adds a closed polygon; nothing if it is only a point.
     pub(super) fn polygon(&mut self, points: &[[f64; 2]]) {
         let points: Vec<[i64; 2]> = points.iter().map(|p| p.map(round)).collect();
         let Some((first, rest)) = points.split_first() else {
@@ -237,7 +237,7 @@ impl Path {
         self.0.push('z');
     }
 
-    /// An open line through points.
+    /// Adds an open line through points.
     pub(super) fn line(&mut self, points: &[[f64; 2]]) {
         for (k, p) in points.iter().enumerate() {
             let [x, y] = p.map(round);
@@ -246,7 +246,7 @@ impl Path {
         }
     }
 
-    /// Sides as of `Element::sides`, one after the other; `closed` where they go round.
+    /// Adds consecutive sides, as given by `Element::sides`; `closed` if they form a loop.
     pub(super) fn sides(&mut self, sides: &[[[f64; 2]; 3]], closed: bool) {
         let mut here = None;
         for &[start, end, mid] in sides {
@@ -270,7 +270,7 @@ impl Path {
         }
     }
 
-    /// An element of SVG with these attributes; nothing if the path is empty.
+    /// The SVG element of the path with these attributes; empty if the path is empty.
     pub(super) fn drawn(&self, attributes: &str) -> String {
         if self.0.is_empty() {
             String::new()
@@ -292,7 +292,7 @@ pub(super) struct Sides {
 }
 
 impl Sides {
-    /// A side is known by its midside node.
+    /// Finds all sides; a side is identified by its midside node.
     pub(super) fn of(elements: &[Element], nodes: usize) -> Sides {
         let mut seen = vec![0u8; nodes];
         let mut all = Vec::new();
@@ -312,7 +312,7 @@ impl Sides {
     }
 }
 
-/// Names of the coordinates in the theory.
+/// The names of the coordinates in a type of analysis.
 pub(super) fn coordinates(analysis: &solver::problem::Analysis) -> [&'static str; 2] {
     match analysis {
         solver::problem::Analysis::Axisymmetric {} => ["r", "z"],

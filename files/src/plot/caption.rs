@@ -1,4 +1,4 @@
-//! What stands above and below a figure: its title, what the figures of a study differ in, the verdict, the warnings.
+//! The texts above and below a figure: title, parameters that distinguish the figures of a study, verdict, warnings.
 
 use std::collections::BTreeSet;
 
@@ -10,22 +10,22 @@ use super::numbers::number;
 /// The texts around a figure.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Caption {
-    /// In one line.
+    /// The title, in one line.
     pub title: String,
-    /// Below it, a text for each contact.
+    /// The parameters below the title, one text for each contact.
     pub parameters: Vec<String>,
-    /// How far what is shown can be relied on.
+    /// The verdict or state of the result.
     pub mark: Option<Mark>,
     /// The kinds of warnings of the result, in words.
     pub warnings: Vec<String>,
 }
 
-/// How far a figure can be relied on.
+/// How reliable the result of a figure is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mark {
     /// The verdict on a result.
     Verdict(Verdict),
-    /// The result is not all there will be, or is no solution; the reason, in words.
+    /// The result is partial, or is no solution: the reason, in words.
     Partial(&'static str),
 }
 
@@ -41,7 +41,7 @@ impl Mark {
 }
 
 impl Caption {
-    /// Of a problem: its title, or otherwise `default`, and its laws of friction.
+    /// The caption for a problem: its title, or else `default`, and its laws of friction.
     pub fn of_problem(problem: &Problem, default: &str) -> Caption {
         let title = problem.title.as_deref().unwrap_or(default);
         let several = problem.contacts.len() > 1;
@@ -60,7 +60,7 @@ impl Caption {
         }
     }
 
-    /// With what a result says of itself. `partial`: it is not that of the end of its job.
+    /// The caption with the verdict and warnings of a result. `partial`: the job has not finished.
     pub fn with_result(self, summary: Option<&Summary>, partial: bool) -> Caption {
         const UNFINISHED: Mark = Mark::Partial("job not finished");
         let Some(summary) = summary else {
@@ -99,7 +99,7 @@ fn length(problem: &Problem) -> &str {
         .unwrap_or_default()
 }
 
-/// The numbers of a law of friction by their symbols, with the unit of length.
+/// The parameters of a law of friction by their symbols, with the unit of length.
 fn law(contact: &Contact, unit: &str) -> String {
     let Some(friction) = &contact.friction else {
         return "no friction".to_owned();
@@ -136,7 +136,7 @@ mod tests {
     use crate::plot::tests::{problem, solution};
 
     #[test]
-    fn figures_of_a_study_are_told_apart_by_their_parameters() {
+    fn figures_of_a_study_show_their_parameters() {
         let mut problem = problem();
         let of = |problem: &Problem| Caption::of_problem(problem, "Contact").parameters;
         assert_eq!(of(&problem), ["μ = 0.3, ρ = 0.01 mm, ε = 1e−4 mm"]);
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_solution_says_so() {
+    fn a_figure_of_no_solution_says_so() {
         let problem = problem();
         let mut summary = solution(&problem).summary;
         let mark = |summary: &Summary, partial| {

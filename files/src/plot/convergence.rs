@@ -1,4 +1,4 @@
-//! Residuals and the contact set by iteration.
+//! The figure of residuals and of the contact set by iteration.
 
 use super::caption::Caption;
 use super::figure::{Curve, LineStyle, Panel, Scale, figure};
@@ -8,7 +8,7 @@ use solver::problem::Problem;
 use solver::solution::Iteration;
 
 /// Draws every residual on a logarithmic axis with the tolerance above, the contact set below, against the number of
-/// the iteration; vertical lines are where load steps begin.
+/// the iteration; vertical lines mark the start of load steps.
 ///
 /// # Errors
 ///
@@ -92,7 +92,7 @@ pub fn convergence_svg(
     )
 }
 
-/// Where each load step begins, between two iterations, with its name.
+/// The places where load steps begin, each between two iterations, with the step's name.
 fn steps(problem: &Problem, history: &[Iteration], named: bool) -> Vec<(f64, String)> {
     let mut marks = Vec::new();
     if problem.steps.len() < 2 {

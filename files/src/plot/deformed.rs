@@ -1,4 +1,4 @@
-//! The deformed body, filled with its stresses, over its undeformed outline.
+//! The figure of the deformed body, filled with its stresses, over its undeformed outline.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -16,16 +16,16 @@ use crate::stress::von_mises;
 use solver::problem::{Analysis, Condition, Problem};
 use solver::solution::{ContactProfile, Fields, NodeState};
 
-/// The largest displacement is drawn as this part of the body, or of the window at the contact.
+/// The largest displacement is drawn as this part of the size of the body, or of the window at the contact.
 const VISIBLE: f64 = 0.1;
 /// A contact below this part of the body gets a window of its own, twice its size.
 const SMALL: f64 = 0.2;
-/// Height of the legend (pixels), and width of the line along the contact.
+/// The height of the legend and the width of the line along the contact (pixels).
 const LEGEND: i32 = 24;
 const LINE: i32 = 4;
 
 impl Stress {
-    /// At a node.
+    /// The stress at a node.
     fn at(self, fields: &Fields, n: usize) -> f64 {
         let of = |column: &[f64]| column.get(n).copied().unwrap_or(0.0);
         let (xx, yy) = (of(&fields.stress_xx), of(&fields.stress_yy));
@@ -138,14 +138,14 @@ pub fn deformed_svg(
     })
 }
 
-/// A contact boundary: the nodes of its profile that the body has.
+/// A contact boundary, by the nodes of its profile that the body has.
 struct Surface<'a> {
     profile: &'a ContactProfile,
-    /// The row of the profile, and the node.
+    /// The rows of the profile with their nodes.
     nodes: Vec<(usize, u32)>,
-    /// There is an obstacle: the contact is more than a prescribed friction.
+    /// Whether there is an obstacle, rather than only prescribed friction.
     faces: bool,
-    /// Its states are stick and slip.
+    /// Whether its states are stick and slip.
     rough: bool,
 }
 
@@ -165,7 +165,7 @@ impl Surface<'_> {
         Face::after(&surface)
     }
 
-    /// The surface in contact, in the colours of its states.
+    /// The surface in contact, drawn in the colours of its states.
     fn states(&self, body: &Body<'_>, style: Style, frame: &Frame, factor: f64) -> String {
         let nodes: Vec<([f64; 2], NodeState)> = self
             .nodes
@@ -199,7 +199,7 @@ impl Surface<'_> {
     }
 }
 
-/// The states that have a colour of their own; without friction contact is contact.
+/// The states that have a colour of their own; without friction there is only one for contact.
 fn looks(style: Style, rough: bool) -> Vec<(&'static [NodeState], RGBColor)> {
     let palette = style.palette();
     if rough {
@@ -212,7 +212,7 @@ fn looks(style: Style, rough: bool) -> Vec<(&'static [NodeState], RGBColor)> {
     }
 }
 
-/// What the colours along the contacts mean.
+/// Draws the legend for the colours along the contacts.
 fn draw_legend(
     area: &Area<'_>,
     style: Style,
@@ -261,8 +261,8 @@ fn draw_legend(
     Ok(())
 }
 
-/// The factor on displacements, 1, 2 or 5 times a power of ten, that makes the largest one about
-/// `wanted`; 1 if that is near enough.
+/// The factor on displacements (1, 2 or 5 times a power of ten) that makes the largest one about `wanted`; 1 if that is
+/// close enough.
 fn visible(wanted: f64, largest: f64) -> f64 {
     let factor = wanted / largest;
     if !factor.is_normal() || (0.25..2.0).contains(&factor) {
@@ -320,7 +320,7 @@ impl Body<'_> {
         areas
     }
 
-    /// The contact boundaries; profiles identify nodes by their positions.
+    /// The contact boundaries. The nodes of profiles are recognised by their positions.
     fn surfaces<'b>(
         &self,
         problem: &Problem,
@@ -368,7 +368,7 @@ impl Body<'_> {
         found.into_iter().collect()
     }
 
-    /// A square around the contact, twice its size, as much of it in the body as can be.
+    /// A square window around the contact, twice its size, as far as possible inside the body.
     fn near(&self, contact: &[u32], touching: &Window, whole: &Window) -> (Window, f64) {
         let side = (2.0 * touching.largest()).max(0.002 * whole.largest());
         let largest = contact.iter().map(|&n| self.moved(n)).fold(0.0, f64::max);
@@ -490,7 +490,8 @@ mod tests {
         assert!(of(&short).is_err());
     }
 
-    /// Five thousand elements are a large mesh here, and still a figure that a browser shows at once.
+    /// A figure of five thousand elements, a large mesh here, stays below two megabytes, so that a browser shows it at
+    /// once.
     #[test]
     fn a_figure_of_five_thousand_elements_stays_below_two_megabytes() {
         let mut problem = problem();

@@ -17,15 +17,15 @@ use super::page::{self, Area, Fallible, LETTERS, draw_text, px};
 use super::style::Style;
 use super::theme::Palette;
 
-/// Of the axes of a panel, without names and legend (pixels).
+/// The height of the axes of a panel, without names and legend (pixels).
 const PANEL: i32 = 198;
-/// Height of one line of the legend above a panel (pixels).
+/// The height of one line of the legend above a panel (pixels).
 const LEGEND: i32 = 22;
-/// Above and below the axes (pixels): a margin; numbers, and the name of the axis.
+/// The space above and below the axes (pixels): a margin; numbers, and the name of the axis.
 const MARGIN: i32 = 8;
 const NUMBERS: i32 = 26;
 const NAME: i32 = 24;
-/// Left of the names of axes, and of the axes (pixels).
+/// The space left of the names of axes, and of the axes (pixels).
 const EDGE: i32 = 4;
 const LEFT: i32 = 92;
 const RIGHT: i32 = 20;
@@ -35,33 +35,33 @@ const RIGHT: i32 = 20;
 pub enum LineStyle {
     /// A line in one of six colours, counted from 0.
     Line(usize),
-    /// A line with a mark at every value: a circle, or a square in every other colour.
+    /// A line with a mark at every value: a circle or a square, alternating with the colour.
     Marked(usize),
-    /// A thin grey line: a reference.
+    /// A thin grey line, for a reference.
     Reference,
-    /// Thin grey dashes: a bound, which does not decide how far the axis reaches.
+    /// Thin grey dashes, for a bound that does not affect the range of the axis.
     Bound,
-    /// A dashed line: a limit.
+    /// A dashed line, for a limit.
     Dashed,
-    /// Small circles in one of the colours: single values.
+    /// Small circles in one of the colours, for single values.
     Points(usize),
 }
 
 /// One curve.
 #[derive(Clone, Debug)]
 pub struct Curve {
-    /// Its name in the legend; empty: it has no entry.
+    /// The name in the legend; empty: no entry.
     pub label: String,
     /// The style of its line.
     pub style: LineStyle,
-    /// In order of x.
+    /// The points in order of x.
     pub points: Vec<(f64, f64)>,
 }
 
 /// The scale of the vertical axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scale {
-    /// Linear; a peak far beyond all else is cut off, since nothing else could be seen beside it, and marked.
+    /// Linear; a peak far beyond all else is cut off and marked, since nothing else would be visible.
     #[default]
     Peaked,
     /// Linear.
@@ -75,13 +75,13 @@ pub enum Scale {
 /// A part of the x axis in a colour of its own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shade {
-    /// What it is.
+    /// The meaning of the colour.
     pub kind: ShadeKind,
-    /// From and to.
+    /// The start and end of the part.
     pub extent: [f64; 2],
 }
 
-/// What a shaded part is.
+/// The meaning of a shaded part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShadeKind {
     /// Contact that sticks.
@@ -106,33 +106,33 @@ impl ShadeKind {
     }
 }
 
-/// A second axis above a panel: another coordinate along the same line.
+/// A second axis above a panel, for another coordinate along the same line.
 #[derive(Clone, Debug, Default)]
 pub struct Above {
-    /// Its name.
+    /// The name of the axis.
     pub name: String,
-    /// The value of the axis below and its own, both monotone.
+    /// Pairs of values on the axis below and on this one, both monotone.
     pub places: Vec<(f64, f64)>,
 }
 
 /// One pair of axes.
 #[derive(Clone, Debug, Default)]
 pub struct Panel {
-    /// Name of the x axis; empty: it has numbers only, since the panel below has the same axis.
+    /// The name of the x axis; empty: numbers only, since the panel below has the same axis.
     pub x: String,
     /// Name of the y axis.
     pub y: String,
     /// Scale of the y axis.
     pub scale: Scale,
-    /// Drawn in this order.
+    /// The curves in the order in which they are drawn.
     pub curves: Vec<Curve>,
-    /// Vertical lines with a word each at their top, in order of x.
+    /// Vertical lines with a word at their top, in order of x.
     pub marks: Vec<(f64, String)>,
-    /// Behind the curves; the legend names them where no curve has a name.
+    /// Shaded parts behind the curves; the legend names them if no curve has a name.
     pub shades: Vec<Shade>,
-    /// Another coordinate along x.
+    /// A second axis for another coordinate along x.
     pub above: Option<Above>,
-    /// What is said of the largest peak, after its value; empty: only one that is cut off is named.
+    /// A remark about the largest peak, after its value; empty: only a peak that is cut off is named.
     pub of_peak: String,
 }
 
@@ -143,7 +143,7 @@ impl Panel {
         legend + self.room_above() + PANEL + NUMBERS + name + MARGIN
     }
 
-    /// Between legend and axes.
+    /// The space between legend and axes.
     fn room_above(&self) -> i32 {
         match self.above {
             Some(_) => NUMBERS + NAME + MARGIN,
@@ -322,7 +322,7 @@ fn draw_panel(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
     legend(&head, style, panel)
 }
 
-/// Where the axes of a panel are, in the units of the drawing, and what they show.
+/// The position of the axes of a panel, in the units of the drawing, and their ranges.
 struct Frame {
     left: i32,
     right: i32,
@@ -354,7 +354,7 @@ impl Frame {
     }
 }
 
-/// A part of the axis in its colour, and hatched where the contact slips.
+/// Draws a shaded part of the axis, hatched where the contact slips.
 fn draw_shade(area: &Area<'_>, palette: &Palette, frame: &Frame, shade: &Shade) -> Fallible<()> {
     let [from, to] = shade
         .extent
@@ -372,7 +372,7 @@ fn draw_shade(area: &Area<'_>, palette: &Palette, frame: &Frame, shade: &Shade) 
     Ok(())
 }
 
-/// Thin lines at 45° in a rectangle.
+/// Draws thin lines at 45° in a rectangle.
 fn hatch(
     area: &Area<'_>,
     [(left, top), (right, bottom)]: [(i32, i32); 2],
@@ -394,8 +394,8 @@ fn hatch(
     Ok(())
 }
 
-/// Two strokes through the axis wherever a curve leaves the panel, and how far the largest peak goes; that is also said of one
-/// that is not cut off, if there is more to say of it.
+/// Draws two strokes through the axis wherever a curve leaves the panel, and the value of the largest peak; a peak that
+/// is not cut off is also named if there is a remark about it.
 fn draw_cuts(
     area: &Area<'_>,
     style: Style,
@@ -444,7 +444,7 @@ fn draw_cuts(
     Ok(())
 }
 
-/// The second axis.
+/// Draws the second axis.
 fn draw_above(
     area: &Area<'_>,
     style: Style,
@@ -487,18 +487,18 @@ fn draw_above(
     Ok(())
 }
 
-/// Whether a curve decides how far its axis reaches.
+/// Whether a curve affects the range of its axis.
 fn decides(style: LineStyle) -> bool {
     style != LineStyle::Bound
 }
 
-/// The curves that do.
+/// The curves that affect the range of the axis.
 fn deciding(panel: &Panel) -> Vec<&[(f64, f64)]> {
     let curves = panel.curves.iter().filter(|curve| decides(curve.style));
     curves.map(|curve| &curve.points[..]).collect()
 }
 
-/// What the vertical axis shows; of a logarithmic one the exponents.
+/// The range of the vertical axis; for a logarithmic one in exponents.
 fn up(panel: &Panel) -> Range<f64> {
     let values = || {
         panel
@@ -539,7 +539,7 @@ fn stroke(palette: &Palette, style: LineStyle) -> ShapeStyle {
     }
 }
 
-/// The mark of a value: a circle, or a square.
+/// The mark of a value: a circle or a square.
 fn dot((x, y): (i32, i32), k: usize, line: ShapeStyle) -> Polygon<(i32, i32)> {
     let size = 2.7 * f64::from(px(1));
     let corners: Vec<(i32, i32)> = match k % 2 {
@@ -599,14 +599,14 @@ fn entries(style: Style, panel: &Panel) -> Vec<(Entry<'_>, i32, i32)> {
     placed.collect()
 }
 
-/// Lines of the legend.
+/// The number of lines of the legend.
 fn rows(style: Style, panel: &Panel) -> i32 {
     entries(style, panel)
         .last()
         .map_or(0, |(_, row, _)| row + 1)
 }
 
-/// Samples of the curves, above the panel so that they cover no curve.
+/// Draws samples of the curves, above the panel so that they cover no curve.
 fn legend(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
     let palette = style.palette();
     for (entry, row, x) in entries(style, panel) {

@@ -1,4 +1,4 @@
-//! The mesh: elements, and the named boundaries in colours.
+//! The figure of the mesh: elements, and the named boundaries in colours.
 
 use std::collections::BTreeMap;
 
@@ -18,23 +18,23 @@ use super::style::Style;
 use super::theme::hex;
 use crate::external::external_mesh;
 
-/// Height of one line of the legend (pixels).
+/// The height of one line of the legend (pixels).
 const LEGEND: i32 = 22;
 const LEFT: i32 = 84;
-/// How far outside of the body a boundary is marked, each further one on the same side by that much more, and how wide
-/// (pixels): the elements at a graded edge stay visible.
+/// The distance at which boundaries are marked outside the body, with an additional step for each further one on the
+/// same side, and their width (pixels): the elements at a graded edge stay visible.
 const OUTSIDE: f64 = 3.5;
 const WIDE: f64 = 2.0;
-/// Boundaries beside one another at most; further ones lie over the last.
+/// The largest number of boundaries side by side; further ones are drawn over the last.
 const BESIDE: usize = 3;
-/// With more elements than this only the outline is drawn: the lines would cover the body, and viewers refuse
-/// files of some ten megabytes.
+/// With more elements than this only the outline is drawn: the lines would cover the body, and viewers refuse files of
+/// some ten megabytes.
 const DRAWN: usize = 30_000;
-/// Most boundaries with a name.
+/// The largest number of boundaries that are named.
 const MOST: usize = 12;
-/// The obstacle is in the picture as far as it is this near to the body, as a part of the body's size.
+/// The distance up to which the obstacle is in the picture, as a part of the body's size.
 const NEAR: f64 = 0.12;
-/// A contact below this part of the body has a window of its own, at least so large.
+/// A contact below this part of the body has a window of its own, of at least this size.
 const SMALL: f64 = 0.2;
 const CLOSE: f64 = 0.1;
 
@@ -183,8 +183,8 @@ pub fn mesh_svg(
     })
 }
 
-/// Around the nodes that the obstacles are pushed to, or that are nearest to them, where those are a small part of the body; and
-/// the side of a window for them.
+/// The window around the nodes that the obstacles are pushed to, or that are nearest to them, if those are a small part
+/// of the body; and the side of a window for them.
 fn at_contact(model: &Model, body: &Window) -> Option<(Window, f64)> {
     let mut reached = Vec::new();
     for contact in &model.contacts {
@@ -199,7 +199,7 @@ fn at_contact(model: &Model, body: &Window) -> Option<(Window, f64)> {
     small.then(|| (around, (2.0 * around.largest()).max(CLOSE * body.largest())))
 }
 
-/// The boundaries, outside of the body.
+/// Draws the boundaries, outside the body.
 fn marks(style: Style, frame: &Frame, mesh: &Mesh, own: &Sides, names: &[String]) -> String {
     let palette = style.palette();
     // each side of the surface as its element goes round, by its midside node
@@ -250,7 +250,7 @@ fn in_order(problem: &Problem, mut names: Vec<String>) -> Vec<String> {
     names
 }
 
-/// The name, and its use in the problem.
+/// The label of a boundary: its name, and its use in the problem.
 fn label(problem: &Problem, name: &str) -> String {
     let contact = problem.contacts.iter().any(|c| c.boundary == name);
     let support = problem

@@ -1,8 +1,8 @@
-//! Figures for papers and lectures, light or dark, for a column, a page or a slide; as SVG, and `image` makes PNG and PDF
-//! of it. The Python client's look the same.
+//! Figures for papers and lectures, light or dark, for a column, a page or a slide, as SVG; `image` converts them to
+//! PNG and PDF. The figures of the Python client look the same.
 //!
-//! Axes, text and curves are drawn by plotters; bodies (`body`) are paths written here, since plotters
-//! neither clips nor joins shapes.
+//! Axes, text and curves are drawn by plotters. Bodies (`body`) are paths written here, since plotters neither clips
+//! nor joins shapes.
 //!
 //! # Where to look
 //!
@@ -61,10 +61,10 @@ pub enum Plot {
 }
 
 impl Plot {
-    /// All of them.
+    /// All kinds of figures.
     pub const ALL: &[Plot] = Plot::VARIANTS;
 
-    /// Its name in paths and file names.
+    /// The figure's name in paths and file names.
     pub fn as_str(self) -> &'static str {
         self.into()
     }
@@ -73,19 +73,19 @@ impl Plot {
 /// The parts of a solution that figures are drawn from. Parts that a figure does not need may be empty.
 #[derive(Clone, Copy, Debug)]
 pub struct Parts<'a> {
-    /// For `convergence`.
+    /// The iterations, for `convergence`.
     pub history: &'a [Iteration],
-    /// Verdict, outcome and warnings stand on every figure of a result.
+    /// The summary: every figure of a result shows its verdict, outcome and warnings.
     pub summary: Option<&'a Summary>,
-    /// The result is not that of the end of its job.
+    /// Whether the job has not finished.
     pub partial: bool,
     /// The load step at whose end the result is, if it is not the last.
     pub step: Option<&'a str>,
-    /// For `profile`, at all points, so that the peaks are seen; for `deformed`.
+    /// The profiles at all points, so that the peaks are visible, for `profile`; also for `deformed`.
     pub profiles: &'a BTreeMap<String, ContactProfile>,
-    /// For `deformed`; `mesh` draws the problem's own mesh without them.
+    /// The fields, for `deformed`; without them `mesh` draws the problem's own mesh.
     pub fields: &'a Fields,
-    /// The mesh that the problem names by its hash, if it does; for `mesh`.
+    /// The mesh that the problem names by its hash, if it does, for `mesh`.
     pub stored: Option<&'a Mesh>,
 }
 

@@ -1,4 +1,4 @@
-//! The obstacle beside a body: its face, and a band behind it.
+//! The obstacle next to a body: its face, and a band behind it.
 
 use solver::model::ContactModel;
 use solver::problem::Condition;
@@ -8,7 +8,7 @@ use super::page::{px, tinted};
 use super::style::Style;
 use super::theme::hex;
 
-/// How deep the band is (pixels).
+/// The depth of the band (pixels).
 pub(super) const DEPTH: i32 = 13;
 
 /// The face of an obstacle, with the direction out of the body at each point.
@@ -19,7 +19,7 @@ pub(super) struct Face {
 }
 
 impl Face {
-    /// Where it is before it is pushed; empty without an obstacle.
+    /// The face before the obstacle is pushed; empty without an obstacle.
     pub(super) fn before(contact: &ContactModel) -> Face {
         let mut face = Face::default();
         if contact.condition == Condition::None {
@@ -56,9 +56,9 @@ impl Face {
         face
     }
 
-    /// Where it is at the end: on the surface of the body where they touch, and as far from it as their gap elsewhere, along the
-    /// body's normal. `surface`: in order of arc length the place of each node before deformation, where it is drawn, and how
-    /// far from it the obstacle is drawn.
+    /// The face at the end: on the surface of the body where they touch, elsewhere at the distance of their gap along
+    /// the body's normal. `surface`: in order of arc length, the place of each node before deformation, its place in
+    /// the figure, and the distance of the obstacle from it.
     pub(super) fn after(surface: &[([f64; 2], [f64; 2], f64)]) -> Face {
         let mut face = Face::default();
         for (i, &(_, drawn, gap)) in surface.iter().enumerate() {
@@ -82,7 +82,7 @@ impl Face {
         }
     }
 
-    /// As SVG inside of a frame.
+    /// The SVG of the face inside a frame.
     pub(super) fn drawn(&self, style: Style, frame: &Frame) -> String {
         if self.points.len() < 2 {
             return String::new();

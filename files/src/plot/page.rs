@@ -1,4 +1,4 @@
-//! The page of a figure: size, background, the texts around it, and how numbers and names are written.
+//! The page of a figure: size, background, the texts around it, and the format of numbers and names.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -11,29 +11,29 @@ use solver::error::shortened;
 use solver::problem::Units;
 use solver::solution::Verdict;
 
-/// Height of the title, and of a line below it (pixels).
+/// The height of the title, and of a line below it (pixels).
 const TITLE: i32 = 34;
 const LINE: i32 = 22;
-/// Height of a line of warnings (pixels), and of their letters.
+/// The height of a line of warnings and of its letters (pixels).
 const FOOT: i32 = 17;
 const SMALL: i32 = 12;
-/// Left of title and warnings, and right of the verdict (pixels).
+/// The space left of title and warnings, and right of the verdict (pixels).
 const MARGIN: i32 = 8;
-/// plotters draws in whole units: a tenth of a pixel keeps curves smooth.
+/// The units of the drawing per pixel: plotters draws in whole units, and a tenth of a pixel keeps curves smooth.
 pub(super) const FINE: i32 = 10;
 const FONT: &str = "sans-serif";
-/// Height of numbers, legends and names (pixels): 7 pt in a column of 88 mm.
+/// The height of numbers, legends and names (pixels): 7 pt in a column of 88 mm.
 pub(super) const LETTERS: i32 = 15;
-/// Height of the letters of a title (pixels), and how many of them are shown; in smaller letters where there are many.
+/// The height of the letters of a title (pixels); a long title has smaller letters.
 const LARGE: i32 = 19;
 const LONGEST: usize = 84;
-/// Lines of warnings and of parameters at most.
+/// The largest number of lines of warnings, and of parameters.
 const LINES: usize = 6;
 
 pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 pub(super) type Fallible<T> = Result<T, Box<dyn std::error::Error>>;
 
-/// Pixels in the units of the drawing.
+/// Converts pixels to the units of the drawing.
 pub(super) const fn px(pixels: i32) -> i32 {
     pixels * FINE
 }
@@ -125,7 +125,7 @@ fn colour(style: Style, mark: Mark) -> RGBColor {
     }
 }
 
-/// A line below the title.
+/// A line of text below the title.
 struct Line {
     left: String,
     right: Option<Mark>,
@@ -157,7 +157,7 @@ fn above(style: Style, caption: &Caption) -> Vec<Line> {
     lines
 }
 
-/// The lines of the warnings.
+/// The lines of warnings below the figure.
 fn foot(style: Style, caption: &Caption) -> Vec<String> {
     if caption.warnings.is_empty() {
         return vec![];
@@ -170,7 +170,7 @@ fn foot(style: Style, caption: &Caption) -> Vec<String> {
     wrapped(&words, " ", style.width() - 2 * MARGIN, small)
 }
 
-/// Texts one after another in as many lines as they need, and at most `LINES`.
+/// Joins texts to as many lines as they need, and at most `LINES`.
 fn wrapped(texts: &[String], between: &str, room: i32, width: impl Fn(&str) -> i32) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for text in texts {
@@ -191,19 +191,19 @@ fn wrapped(texts: &[String], between: &str, room: i32, width: impl Fn(&str) -> i
     lines
 }
 
-/// Text of a height in pixels.
+/// The style of a text with this height in pixels.
 pub(super) fn text(style: Style, pixels: i32) -> TextStyle<'static> {
     (FONT, plotters_size(pixels))
         .into_font()
         .color(&style.palette().text)
 }
 
-/// plotters writes a font of size s as s/1.24.
+/// The size that plotters needs for a height: it writes a font of size s as s/1.24.
 fn plotters_size(pixels: i32) -> f64 {
     1.24 * f64::from(px(pixels))
 }
 
-/// A line of text with its left end and its middle at a place (pixels).
+/// Draws a line of text with its left end and its middle at a place (pixels).
 pub(super) fn draw_text(
     area: &Area<'_>,
     style: Style,
@@ -215,18 +215,19 @@ pub(super) fn draw_text(
     Ok(())
 }
 
-/// How wide a text of that height is about, without asking a font (pixels): fonts differ, and this is a wide one.
+/// The approximate width of a text of that height (pixels), without reading a font: fonts differ, and this is a wide
+/// one.
 pub(super) fn width(words: &str) -> i32 {
     43 * words.chars().count() as i32 / 5
 }
 
-/// How many large bold letters a line holds.
+/// How many large bold letters fit on a line.
 fn bold_letters(width: i32) -> usize {
     ((width - 2 * MARGIN) / 13).max(1) as usize
 }
 
-/// `σ_xx` with letters below the line in place of the underscore. Sizes are numbers: not every program reads those that are
-/// relative.
+/// The SVG with subscripts: `σ_xx` becomes σ with lowered letters. Sizes are numbers: not every program reads relative
+/// ones.
 fn with_subscripts(svg: &str) -> String {
     let mut out = String::with_capacity(svg.len());
     let mut rest = svg;
@@ -263,7 +264,7 @@ fn with_subscripts(svg: &str) -> String {
     out
 }
 
-/// That of the last text that begins here.
+/// The font size of the last text that begins in this SVG.
 fn font_size(svg: &str) -> Option<f64> {
     const NAME: &str = "font-size=\"";
     let text = &svg[svg.rfind("<text")?..];
@@ -289,7 +290,7 @@ pub(super) fn stress(units: &Option<Units>) -> Option<&str> {
     units.as_ref()?.stress.as_deref()
 }
 
-/// A rectangle of a colour that lets what is behind it be seen, as SVG.
+/// A transparent rectangle of a colour, as SVG.
 pub(super) fn tinted(colour: RGBColor, opacity: f64) -> String {
     format!(r#"fill="{}" fill-opacity="{opacity}""#, hex(colour))
 }

@@ -1,4 +1,4 @@
-//! σ_n and σ_t along contact boundaries, as thesis figs 4.3 … 4.16.
+//! The figure of σ_n and σ_t along contact boundaries, as in thesis figs 4.3 … 4.16.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -99,7 +99,7 @@ fn panels(
     vec![normal, tangential]
 }
 
-/// What is to be said of the peak of σ_n beside its value.
+/// The remark about the peak of σ_n, after its value.
 fn of_peak(name: &str, summary: Option<&Summary>) -> &'static str {
     let accuracy = summary.and_then(|summary| summary.accuracy.as_ref());
     let no_limit = accuracy.is_some_and(|accuracy| {
@@ -116,19 +116,20 @@ fn of_peak(name: &str, summary: Option<&Summary>) -> &'static str {
     }
 }
 
-/// What figures show of the stresses along a contact boundary, for those who draw both of them over one axis themselves.
+/// What figures show of the stresses along a contact boundary, for programs that draw both of them over one axis
+/// themselves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProfileView {
     /// The points under stress, with a margin on each side.
     pub points: Range<usize>,
-    /// From where to where the axis of stresses goes.
+    /// The range of the axis of stresses.
     pub stresses: Range<f64>,
     /// A sentence about the peak of σ_n where it is cut off, or where it grows on finer meshes.
     pub peak: Option<String>,
 }
 
 impl ProfileView {
-    /// Of this contact boundary. The summary tells whether the peak has a limit.
+    /// The view of this contact boundary. The summary tells whether the peak has a limit.
     pub fn of(name: &str, profile: &ContactProfile, summary: Option<&Summary>) -> ProfileView {
         let points = stressed(profile);
         let curve = |values: &[f64]| -> Vec<(f64, f64)> {
@@ -160,7 +161,7 @@ impl ProfileView {
     }
 }
 
-/// Stick and slip: each reaches half of the way to a neighbour in another state.
+/// The shaded parts of stick and slip: each extends half-way to a neighbour in another state.
 fn shades(profile: &ContactProfile, shown: Range<usize>) -> Vec<Shade> {
     let kind = |i: usize| match profile.state.get(i)? {
         NodeState::Open => None,
@@ -193,7 +194,8 @@ fn shades(profile: &ContactProfile, shown: Range<usize>) -> Vec<Shade> {
     shades
 }
 
-/// The position along the boundary: x, or y where x does not run along it. `None` where neither does, and where it is s itself.
+/// The position along the boundary: x, or y where x does not increase along it. `None` where neither does, and where it
+/// equals s.
 fn position(
     profile: &ContactProfile,
     [x, y]: [&str; 2],

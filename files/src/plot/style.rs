@@ -1,4 +1,4 @@
-//! How a figure is drawn: its colours, its width, the stress that it shows.
+//! The style of a figure: its colours, its width, and the stress that it shows.
 
 use std::str::FromStr;
 
@@ -6,7 +6,7 @@ use strum::{IntoStaticStr, VariantArray};
 
 use super::theme::{Palette, Theme};
 
-/// What a figure is for: how wide it is beside its letters.
+/// The use of a figure, which determines its width in relation to its letters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, IntoStaticStr, VariantArray)]
 #[strum(serialize_all = "snake_case")]
 pub enum Size {
@@ -31,7 +31,7 @@ impl FromStr for Size {
 }
 
 impl Size {
-    /// Its name in queries.
+    /// The size's name in queries.
     pub fn as_str(self) -> &'static str {
         self.into()
     }
@@ -51,12 +51,12 @@ impl Size {
     }
 }
 
-/// How a figure is drawn.
+/// The style of a figure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Style {
-    /// Its colours.
+    /// The colours.
     pub theme: Theme,
-    /// Its width.
+    /// The size.
     pub size: Size,
     /// The stress that the contours of `deformed` show.
     pub stress: Stress,
@@ -67,7 +67,7 @@ impl Style {
         self.theme.palette()
     }
 
-    /// In pixels, of which letters have 15.
+    /// The width in pixels, for letters of 15 pixels.
     pub(super) fn width(self) -> i32 {
         match self.size {
             Size::Column => 520,
@@ -88,16 +88,16 @@ impl From<Theme> for Style {
 /// The stress that the contours show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stress {
-    /// √(½((σ_xx − σ_yy)² + (σ_yy − σ_zz)² + (σ_zz − σ_xx)²) + 3σ_xy²).
+    /// The von Mises stress √(½((σ_xx − σ_yy)² + (σ_yy − σ_zz)² + (σ_zz − σ_xx)²) + 3σ_xy²).
     #[default]
     VonMises,
-    /// σ_xx (σ_rr).
+    /// The stress σ_xx (σ_rr).
     Xx,
-    /// σ_yy (σ_zz in axisymmetry).
+    /// The stress σ_yy (σ_zz in axisymmetry).
     Yy,
-    /// σ_zz (σ_θθ in axisymmetry).
+    /// The stress σ_zz (σ_θθ in axisymmetry).
     Zz,
-    /// σ_xy (σ_rz).
+    /// The stress σ_xy (σ_rz).
     Xy,
 }
 

@@ -1,5 +1,5 @@
-//! Colours for light and for dark pages: those of Okabe and Ito, which people with any of the common kinds of colour
-//! blindness tell apart. The Python client draws with the same.
+//! Colours for light and for dark pages: those of Okabe and Ito, which people with any common kind of colour blindness
+//! can distinguish. The Python client uses the same colours.
 
 use std::str::FromStr;
 
@@ -35,18 +35,18 @@ pub(super) struct Palette {
     pub(super) text: RGBColor,
     pub(super) axis: RGBColor,
     pub(super) grid: RGBColor,
-    /// Bounds and references, sides of elements, warnings.
+    /// The colour of bounds and references, sides of elements, and warnings.
     pub(super) faint: RGBColor,
-    /// Inside of a body without contours.
+    /// The colour of the inside of a body without contours.
     pub(super) body: RGBColor,
     pub(super) obstacle: RGBColor,
     pub(super) stick: RGBColor,
     pub(super) slip: RGBColor,
-    /// The verdicts, and whatever is good, fair or poor.
+    /// The colours of the verdicts good, fair and poor.
     pub(super) good: RGBColor,
     pub(super) fair: RGBColor,
     pub(super) poor: RGBColor,
-    /// Curves and boundaries; the first is that of normal stress, the second that of tangential stress.
+    /// The colours of curves and boundaries; the first is for normal stress, the second for tangential stress.
     pub(super) curves: [RGBColor; 6],
 }
 
@@ -109,12 +109,12 @@ impl Theme {
 pub(super) enum ColourMap {
     /// Cividis, for values ≥ 0: even steps for the eye, also in grey and with colour blindness.
     Rising,
-    /// From orange over white to purple (ColorBrewer's PuOr), for values of either sign.
+    /// From orange through white to purple (ColorBrewer's PuOr), for values of either sign.
     Signed,
 }
 
 impl ColourMap {
-    /// At t from 0 to 1.
+    /// The colour at t from 0 to 1.
     pub(super) fn at(self, t: f64) -> RGBColor {
         const RISING: [[u8; 3]; 9] = [
             [0, 34, 78],
@@ -153,7 +153,7 @@ impl ColourMap {
     }
 }
 
-/// As SVG writes it.
+/// The colour as hexadecimal digits, as in SVG.
 pub(super) fn hex(RGBColor(r, g, b): RGBColor) -> String {
     format!("#{r:02X}{g:02X}{b:02X}")
 }
@@ -162,7 +162,8 @@ pub(super) fn hex(RGBColor(r, g, b): RGBColor) -> String {
 mod tests {
     use super::*;
 
-    /// What people with a kind of colour blindness see, in linear light: Machado, Oliveira and Fernandes 2009, table 1, severity 1.
+    /// The matrices for the colours that people with a kind of colour blindness see, in linear light: Machado, Oliveira
+    /// and Fernandes 2009, table 1, severity 1.
     #[rustfmt::skip]
     const SEEN: [(&str, [[f64; 3]; 3]); 4] = [
         ("all colours", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
@@ -186,7 +187,7 @@ mod tests {
         [0, 1, 2].map(|i| (0..3).map(|k| matrix[i][k] * v[k]).sum())
     }
 
-    /// CIE L*a*b* of linear light, with the white of D65.
+    /// The CIE L*a*b* values of linear light, with the white of D65.
     fn lab(rgb: [f64; 3]) -> [f64; 3] {
         const TO_XYZ: [[f64; 3]; 3] = [
             [0.4124, 0.3576, 0.1805],
@@ -209,7 +210,7 @@ mod tests {
         (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
     }
 
-    /// As WCAG 2 defines it.
+    /// The contrast of two colours as WCAG 2 defines it.
     fn contrast(a: RGBColor, b: RGBColor) -> f64 {
         let light = |c| {
             let [r, g, b] = linear(c);
@@ -220,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn colours_are_told_apart_with_every_kind_of_colour_blindness() {
+    fn colours_are_distinguishable_with_every_kind_of_colour_blindness() {
         for theme in [Theme::Light, Theme::Dark] {
             let palette = theme.palette();
             for (kind, seen) in &SEEN {

@@ -1,4 +1,4 @@
-//! Where a JSON Pointer leads in a text.
+//! Finds the place that a JSON Pointer names in a text.
 
 mod parts;
 
@@ -12,36 +12,37 @@ use serde_json::value::RawValue;
 
 pub(crate) use parts::{List, Named, list, members};
 
-/// Where a pointer leads in a text.
+/// The place that a pointer names in a text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Place {
-    /// To this value.
+    /// The range of this value.
     Value(Range<usize>),
-    /// To a member that the object lacks.
+    /// A member that the object lacks.
     Absent {
-        /// Where it begins, after its brace.
+        /// The place after the object's opening brace.
         inside: usize,
-        /// Whether it has no members.
+        /// Whether the object has no members.
         empty: bool,
-        /// The name.
+        /// The name of the member.
         name: String,
     },
 }
 
-/// Why a pointer leads nowhere.
+/// Why a pointer names no place in a text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Nowhere {
-    /// The pointer to the last value on the way.
+    /// The pointer to the last existing value on the way.
     pub(crate) parent: String,
-    /// What was looked for there.
+    /// The name or number that was missing there.
     pub(crate) token: String,
-    /// What is there: `an object`, `a list of 2`, `a value`.
+    /// A description of that value: `an object`, `a list of 2`, `a value`.
     pub(crate) found: String,
-    /// The names in it, if it is an object.
+    /// The names in that value, if it is an object.
     pub(crate) names: Vec<String>,
 }
 
-/// The line, from 1, of what a pointer leads to, or of the last value on its way that is there; none if the text is not JSON.
+/// The line, from 1, of the value that a pointer names, or of the last existing value on the way to it; none if the
+/// text is not JSON.
 pub fn line_of(text: &str, pointer: &str) -> Option<usize> {
     serde_json::from_str::<&RawValue>(text).ok()?;
     let unescaped = |token: &str| token.replace("~1", "/").replace("~0", "~");
@@ -58,7 +59,7 @@ pub fn line_of(text: &str, pointer: &str) -> Option<usize> {
     Some(1 + text[..start].matches('\n').count())
 }
 
-/// Where a pointer (RFC 6901) leads. The text is well formed.
+/// The place that a pointer (RFC 6901) names. The text must be well formed.
 pub(crate) fn locate(text: &str, tokens: &[String]) -> Result<Place, Nowhere> {
     let mut value = text;
     let mut parent = String::new();
@@ -111,11 +112,11 @@ pub(crate) fn locate(text: &str, tokens: &[String]) -> Result<Place, Nowhere> {
     Ok(Place::Value(start..start + value.len()))
 }
 
-/// Most members of an object that are looked at: no object of a problem with fixed names has more, and one with free
-/// names is not read further.
+/// The largest number of members of an object that are searched: no object of a problem with fixed names has more, and
+/// one with free names is not read further.
 const MOST_NAMES: usize = 1 << 14;
 
-/// An item of a list; the text is one.
+/// Finds an item of a list, which the text must be.
 fn item(text: &str, place: usize) -> Found<'_> {
     let mut reader = serde_json::Deserializer::from_str(text.trim_end());
     let read = serde::de::DeserializeSeed::deserialize(Item(place), &mut reader);

@@ -1,4 +1,4 @@
-//! The parts of a list or an object in a JSON text, which stay text.
+//! The parts of a list or an object in a JSON text, without parsing them.
 
 use std::{borrow::Cow, fmt};
 
@@ -8,16 +8,16 @@ use serde::{
 };
 use serde_json::value::RawValue;
 
-/// Members of an object by their names, in their order.
+/// The members of an object with their names, in order.
 pub(crate) type Named<'a> = Vec<(Cow<'a, str>, &'a RawValue)>;
 
-/// The first items of a list, and how many it has.
+/// The first items of a list, and their total number.
 pub(crate) struct List<'a> {
     pub(crate) items: Vec<&'a RawValue>,
     pub(crate) count: usize,
 }
 
-/// The first items of a list; none if the text is something else.
+/// The first items of a list; none if the text is no list.
 pub(crate) fn list(text: &str, most: usize) -> Option<List<'_>> {
     let mut reader = serde_json::Deserializer::from_str(text);
     struct Read(usize);
@@ -47,7 +47,7 @@ pub(crate) fn list(text: &str, most: usize) -> Option<List<'_>> {
     reader.deserialize_seq(Read(most)).ok()
 }
 
-/// The first members of an object; none if the text is something else.
+/// The first members of an object; none if the text is no object.
 pub(crate) fn members(text: &str, most: usize) -> Option<Named<'_>> {
     #[derive(Deserialize)]
     struct Name<'a>(#[serde(borrow)] Cow<'a, str>);

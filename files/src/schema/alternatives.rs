@@ -1,4 +1,4 @@
-//! Which of several alternatives a value is meant to be, told by its type, its `kind` and its names.
+//! Finds out which of several alternatives a value is meant to be, from its type, its `kind` and its names.
 
 use std::{borrow::Cow, iter};
 
@@ -10,17 +10,17 @@ use super::shape::{Shape, Type};
 use super::words;
 use solver::error::{Reason, Violation, either};
 
-/// A violation that lacks its place.
+/// A violation whose place is not known yet.
 pub(super) type Displaced = Box<dyn FnOnce(String) -> Violation>;
 
-/// A value from outside.
+/// The features of a value that distinguish alternatives.
 pub(super) struct Outline<'de> {
     pub(super) found: Type,
     /// The text of the value.
     text: &'de str,
     /// The text of `kind`.
     kind: Option<&'de str>,
-    /// Members that are not null, among those that tell forms apart.
+    /// The members that are not null, among those that distinguish the forms.
     given: Vec<&'static str>,
 }
 
@@ -72,14 +72,14 @@ impl<'de> Outline<'de> {
                 || branches.iter().any(|branch| self.resembles_nested(branch)))
     }
 
-    /// As [`resembles`](Self::resembles), by type alone: the `kind` was not looked for.
+    /// As [`resembles`](Self::resembles), but by type alone, where the `kind` was not read.
     fn resembles_nested(&self, shape: &Shape) -> bool {
         let branches = shape.branches();
         shape.allows(self.found)
             && (branches.is_empty() || branches.iter().any(|branch| self.resembles_nested(branch)))
     }
 
-    /// The form that is meant, judged by the names that it alone requires: there must be exactly one.
+    /// The form that is meant: the one of whose own required names the value has some. There must be exactly one.
     pub(super) fn form(&self, forms: &'static [Vec<String>]) -> Result<usize, Displaced> {
         let given = |name: &String| self.given.contains(&name.as_str());
         let mut meant = (0..).zip(forms).filter(|(_, form)| form.iter().any(given));
@@ -99,7 +99,7 @@ impl<'de> Outline<'de> {
         }))
     }
 
-    /// The violation of a value that is none of these, and at which of its members it is.
+    /// The violation of a value that is none of the alternatives, with the member that it concerns.
     pub(super) fn no_alternative(
         &self,
         branches: &'static [Shape],
@@ -143,7 +143,7 @@ impl<'de> Outline<'de> {
     }
 }
 
-/// The values that a shape allows, in words; without `null`.
+/// The values that a shape allows, in words, without `null`.
 fn offers(shape: &'static Shape) -> Vec<String> {
     match &shape.only {
         Some(only) => vec![format!("{only:?}")],
@@ -156,7 +156,7 @@ fn offers(shape: &'static Shape) -> Vec<String> {
     }
 }
 
-/// Reads the members that tell alternatives apart.
+/// Reads the members that distinguish alternatives.
 struct Members<'o, 'de> {
     outline: &'o mut Outline<'de>,
     names: Vec<&'static str>,

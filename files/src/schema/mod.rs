@@ -1,9 +1,9 @@
 //! The faults of the structure of a problem, found with our JSON Schema and described in words.
 //!
-//! Of draft 2020-12 it supports the keywords that the schema of our types has. Written here rather than left to a
-//! library: the existing ones bring regular expressions, URIs and references over the network (a tenth of the
-//! build), need a tree of the whole text, and answer in terms of the schema ("not valid under any of the schemas")
-//! instead of naming the intended alternative and its faults.
+//! It supports those keywords of draft 2020-12 that the schema of our types has. Written here rather than left to a
+//! library: the existing ones bring regular expressions, URIs and references over the network (a tenth of the build),
+//! need a tree of the whole text, and answer in terms of the schema ("not valid under any of the schemas") instead of
+//! naming the intended alternative and its faults.
 
 mod alternatives;
 mod numbers;
@@ -29,7 +29,7 @@ pub(crate) fn violations(text: &str) -> serde_json::Result<Vec<Violation>> {
     let mut found = found.into_violations();
     if let Some(last) = found.last_mut().filter(|_| stopped) {
         last.hint
-            .push_str(" (There are more violations: at most 100 are looked for.)");
+            .push_str(" (There are more violations: the check ends after 100.)");
     }
     Ok(found)
 }

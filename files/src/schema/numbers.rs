@@ -1,10 +1,10 @@
-//! Lists of numbers, which are most of a large problem, checked by their characters: serde converts them afterwards,
-//! and to do that twice takes longer than all else together.
+//! Checks lists of numbers, which are most of a large problem, by their characters: serde converts them afterwards, and
+//! doing that twice takes longer than everything else together.
 
 use super::shape::{Shape, Type};
 
-/// The number of items of a text in JSON that fits the shape, a list of numbers or of lists of them; none if it does
-/// not, or if only reading it shows whether it does.
+/// The number of items of a JSON text if it fits the shape, a list of numbers or of lists of them; none if it does not,
+/// or if that cannot be decided without reading it.
 pub(super) fn count(shape: &Shape, text: &str) -> Option<usize> {
     list(shape, text.as_bytes(), &mut 0)
 }
@@ -57,7 +57,7 @@ mod tests {
     use super::super::shape::shape;
 
     #[test]
-    fn lists_of_numbers_are_told_from_others() {
+    fn lists_of_numbers_are_distinguished_from_other_lists() {
         let count = |schema: &serde_json::Value, text: &str| {
             assert!(text.is_empty() || serde_json::from_str::<serde_json::Value>(text).is_ok());
             super::count(&shape(schema, schema).unwrap(), text)

@@ -1,4 +1,4 @@
-//! The JSON Schema of a problem in the form that values are checked with: references resolved, once per process.
+//! The JSON Schema of a problem in the form used for checking values: references resolved, once per process.
 
 use std::{collections::BTreeMap, sync::LazyLock};
 
@@ -19,7 +19,7 @@ pub(super) static PROBLEM: LazyLock<Shape> = LazyLock::new(|| {
     shape(&schema, &schema).unwrap_or_default()
 });
 
-/// The shape that a schema describes; `whole` has the definitions.
+/// The shape that a schema describes; `whole` contains the definitions.
 pub(super) fn shape(schema: &Value, whole: &Value) -> serde_json::Result<Shape> {
     let mut shape: Shape = serde_json::from_value(plain(schema, whole))?;
     shape.find_forms();
@@ -40,8 +40,8 @@ pub(super) enum Type {
     Object,
 }
 
-/// What a value may be. The fields are the keywords of draft 2020-12 that the schema of our types has; any other
-/// keyword is an error of [`shape`].
+/// The values that are allowed. The fields are the keywords of draft 2020-12 that the schema of our types has; any
+/// other keyword is an error of [`shape`].
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "camelCase")]
 pub(super) struct Shape {
@@ -57,7 +57,7 @@ pub(super) struct Shape {
     pub(super) items: Option<Box<Shape>>,
     min_items: usize,
     max_items: Option<usize>,
-    /// A length between the least and the most that a list must not have.
+    /// Whether a shape is excluded: a length between the smallest and the largest.
     not: Option<Box<Shape>>,
     pub(super) minimum: Option<f64>,
     any_of: Vec<Shape>,
@@ -67,7 +67,7 @@ pub(super) struct Shape {
     pub(super) then: Option<Box<Shape>>,
     #[serde(rename = "else")]
     pub(super) otherwise: Option<Box<Shape>>,
-    /// The names that only one of the alternatives requires, for each of them, if they distinguish all of them.
+    /// For each alternative, the names that only it requires, if these distinguish all of them.
     #[serde(skip)]
     pub(super) forms: Option<Vec<Vec<String>>>,
 }
@@ -101,7 +101,7 @@ impl Shape {
         types.is_empty() || types.iter().any(same)
     }
 
-    /// Whether it is a list of any length of numbers, or of short lists of them.
+    /// Whether the shape is a list of any length of numbers, or of short lists of them.
     pub(super) fn is_long_list_of_numbers(&self) -> bool {
         let number = |shape: &Shape| matches!(shape.types(), [Type::Number | Type::Integer]);
         // the lengths of inner lists are not compared with the limits of a walk
@@ -121,7 +121,7 @@ impl Shape {
         }
     }
 
-    /// Whether it can only be decided from the whole value which parts of the shape apply.
+    /// Whether the whole value must be known to decide which parts of the shape apply.
     pub(super) fn has_alternatives(&self) -> bool {
         !self.branches().is_empty() || self.condition.is_some()
     }
@@ -131,14 +131,14 @@ impl Shape {
         self.types().is_empty() && self.properties.is_empty() && self.required.is_empty()
     }
 
-    /// Whether serde keeps the whole value, until it knows which alternative it is. For a value or null it does not.
+    /// Whether serde keeps the whole value in memory until it knows the alternative. It does not for a value or null.
     pub(super) fn is_kept(&self) -> bool {
         let null = |branch: &Shape| branch.types() == [Type::Null];
         let by_kind = self.one_of.iter().any(|branch| branch.kind().is_some());
         by_kind || !self.any_of.is_empty() && !self.any_of.iter().any(null)
     }
 
-    /// The value of `kind` that an object of this shape has.
+    /// The value of `kind` that an object of this shape must have.
     pub(super) fn kind(&self) -> Option<&str> {
         self.properties.get("kind")?.only.as_deref()
     }
@@ -151,7 +151,7 @@ impl Shape {
             && !self.not.as_deref().is_some_and(excluded)
     }
 
-    /// The most items of a list.
+    /// The largest number of items of a list.
     pub(super) fn most_items(&self) -> Option<usize> {
         self.max_items
     }
@@ -182,7 +182,7 @@ impl Shape {
     }
 }
 
-/// The names that only one form of an object requires, for each form, if they distinguish the forms.
+/// For each form of an object, the names that only it requires, if these distinguish the forms.
 fn forms(branches: &[Shape]) -> Option<Vec<Vec<String>>> {
     if branches.is_empty() || branches.iter().any(|branch| !branch.types().is_empty()) {
         return None;
@@ -204,8 +204,8 @@ fn all_required(form: &Shape) -> Vec<&str> {
     own.chain(further).collect()
 }
 
-/// The schema with its references replaced by what they name, and without what is only for readers. Our types do
-/// not contain themselves.
+/// The schema with references replaced by their definitions, and without descriptions for readers. Our types do not
+/// contain themselves.
 fn plain(schema: &Value, whole: &Value) -> Value {
     let Value::Object(words) = schema else {
         return json!({ "never": *schema == Value::Bool(false) });
@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn the_forms_of_a_load_are_told_by_the_names_that_only_they_require() {
+    fn the_forms_of_a_load_are_recognised_by_their_own_required_names() {
         let loads = PROBLEM.properties["loads"].items.as_ref().unwrap();
         let forms = loads.forms.as_ref().unwrap();
         assert_eq!(forms[0], ["pressure"]);

@@ -1,8 +1,8 @@
-//! A walk through a JSON text and the shape of a problem at once.
+//! Checks a JSON text against the shape of a problem in one pass.
 //!
-//! The text is checked while it is read, without a tree of its values: a tree takes 32 bytes and more for a value
-//! of two. Only where alternatives have to be told apart is the text of one value read again. The walk ends at the
-//! hundredth violation, so that it costs no more the more there are.
+//! The text is checked while it is read, without a tree of its values: a tree takes 32 bytes and more for a value of
+//! two. Only where alternatives must be distinguished, the text of one value is read again. The check ends at the
+//! hundredth violation, so that its cost does not grow with their number.
 
 use std::{borrow::Cow, collections::BTreeSet, fmt};
 
@@ -16,28 +16,28 @@ use super::shape::{Shape, Type};
 use super::words;
 use solver::error::{Findings, Reason, Violation, escape};
 
-/// Most entries of a list of objects, and most names of an object whose names are free: an entry of three bytes
-/// takes a hundred and more in memory. No problem that can be solved comes near.
+/// The largest number of entries of a list of objects, and of names of an object whose names are free: an entry of
+/// three bytes takes a hundred and more in memory. No problem that can be solved comes close.
 const MOST_OBJECTS: usize = 1 << 14;
 
-/// Most numbers of a list: lines of a grid, members of a group. They take less than their text, but a mesh of a
-/// million elements takes more than the largest body.
+/// The largest number of values in a list of numbers: lines of a grid, members of a group. They take less memory than
+/// their text, but a mesh of a million elements takes more than the largest body.
 const MOST_NUMBERS: usize = 1 << 20;
 
-/// Most numbers of a list, and most lists of a list, inside of an object with a `kind`: serde keeps such an object
-/// until it knows its kind, with 32 bytes for a number and 200 for a list.
+/// The largest number of values in a list, and of lists in a list, inside an object with a `kind`: serde keeps such an
+/// object in memory until it knows its kind, with 32 bytes for a number and 200 for a list.
 const MOST_KEPT_NUMBERS: usize = 1 << 17;
 const MOST_KEPT_LISTS: usize = 1 << 16;
 
-/// The violations of a walk, and where it is.
+/// The violations found so far, and the present place.
 pub(super) struct Walk<'a> {
-    /// The list of violations; `None` if the question is only whether there is one.
+    /// The list of violations; `None` if only their existence matters.
     found: Option<&'a mut Findings>,
-    /// Names and numbers from the problem to the current value.
+    /// The names and numbers from the problem to the current value.
     place: Vec<Token>,
-    /// Values around the current one that serde keeps.
+    /// The number of values around the current one that serde keeps in memory.
     kept: usize,
-    /// It ended before the end of the text: there are as many violations as wanted.
+    /// Whether the check ended before the end of the text, because there were enough violations.
     pub(super) stopped: bool,
     faults: usize,
 }
@@ -58,7 +58,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Checks a text. An error is one of its syntax, unless the walk has stopped.
+    /// Checks a text. The error is one of its syntax, unless the check was stopped.
     pub(super) fn check(&mut self, shape: &'static Shape, text: &str) -> serde_json::Result<()> {
         let mut reader = serde_json::Deserializer::from_str(text);
         self.at(shape).deserialize(&mut reader)?;
@@ -110,7 +110,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// The same, at a member or an item.
+    /// Adds a violation at a member or an item of the current value. The error stops the reader.
     pub(super) fn report_inside<E: Error>(
         &mut self,
         name: impl Into<Cow<'static, str>>,
@@ -122,7 +122,7 @@ impl<'a> Walk<'a> {
         reported
     }
 
-    /// The value has several alternatives: which of them is meant, and does it fit.
+    /// Checks a value that has several alternatives: which of them is meant, and whether it fits.
     fn check_alternatives(
         &mut self,
         shape: &'static Shape,
@@ -170,7 +170,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// The most items of a list that are read.
+    /// The largest number of items of a list that are read.
     fn most_items(&self, items: &Shape) -> usize {
         let list = items.items.is_some();
         let number = !list && items.allows(Type::Number) && !items.has_alternatives();
@@ -192,7 +192,7 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// One value of the text, which is checked as it is read.
+/// One value of the text, checked while it is read.
 struct Value<'w, 'a> {
     shape: &'static Shape,
     walk: &'w mut Walk<'a>,
@@ -251,7 +251,7 @@ impl<'de> DeserializeSeed<'de> for Value<'_, '_> {
         if self.shape.never {
             let value = <&RawValue>::deserialize(reader)?;
             let expected = "no such field: it cannot be combined with the others";
-            let hint = "Leave it out, or choose another form.";
+            let hint = "Remove it, or choose another form.";
             let got = || words::value(value.get());
             let not_used = |at| Violation::new(at, Reason::NotUsed, got(), expected, hint);
             return self.walk.report(not_used);
@@ -399,7 +399,7 @@ impl<'de> Visitor<'de> for Value<'_, '_> {
                 checked?;
             } else {
                 members.next_value::<IgnoredAny>()?;
-                let hint = "Leave one of them out; one would be ignored.";
+                let hint = "Remove one of them; one would be ignored.";
                 let (reason, got, expected) =
                     (Reason::DuplicateName, "the name twice", "each name once");
                 walk.report_inside(known, |at| Violation::new(at, reason, got, expected, hint))?;
@@ -422,6 +422,6 @@ impl<'de> Visitor<'de> for Value<'_, '_> {
     }
 }
 
-/// The name of a member, without a copy where it has no escapes.
+/// The name of a member, not copied unless it has escapes.
 #[derive(Deserialize)]
 struct Name<'a>(#[serde(borrow)] Cow<'a, str>);

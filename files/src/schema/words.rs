@@ -1,10 +1,10 @@
-//! Values and names of a text in the words of a violation: short, however long they are.
+//! Quotes values and names of a text in violations: short, however long they are.
 
 use std::borrow::Cow;
 
 use solver::error::{Reason, Violation};
 
-/// Characters of a name or text that are quoted.
+/// The largest number of characters of a name or text that are quoted.
 const QUOTED: usize = 80;
 
 /// The beginning of a long text, and its length in characters.
@@ -34,12 +34,12 @@ pub(super) fn text(text: &str) -> String {
     }
 }
 
-/// A value, as it is written.
+/// A value in quotes, as it is written.
 pub(super) fn value(json: &str) -> String {
     quoted(json)
 }
 
-/// A list or an object by the number of its entries.
+/// A list or an object described by the number of its entries.
 pub(super) fn counted(count: usize, what: &str, of: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
     let article = if what.starts_with('o') { "an" } else { "a" };
@@ -55,7 +55,7 @@ pub(super) fn listed<S: AsRef<str>>(names: &[S], between: &str) -> String {
     names.join(between)
 }
 
-/// The violation for a name that is not known.
+/// The violation for an unknown name.
 pub(super) fn unknown_name<'a>(
     at: String,
     name: &str,
@@ -72,9 +72,10 @@ pub(super) fn unknown_name<'a>(
     Violation::new(at, Reason::UnknownName, got, expected, hint)
 }
 
-/// “Did you mean …”: the known name that differs from `name` by the fewest letters, if by few.
+/// The hint “Did you mean …” with the known name that differs from `name` by the fewest letters, if by few.
 pub fn meant<S: AsRef<str>>(name: &str, known: impl IntoIterator<Item = S>) -> Option<String> {
-    /// Longer ones are not misspelt but something else, and the comparison takes the square of their length.
+    /// The longest name that is compared: a longer one is not just misspelt, and the comparison takes the square of its
+    /// length.
     const LONGEST: usize = 40;
     if name.len() > LONGEST {
         return None;

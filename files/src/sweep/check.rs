@@ -1,4 +1,4 @@
-//! Checking all members of a sweep before any is solved, and grouping those that share a body.
+//! Checks all members of a sweep before any is solved, and groups those that share a body.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,18 +10,18 @@ use solver::problem::{MeshSource, NormalOf, Problem, Refine};
 use super::numbers::{Problems, Read};
 use super::read::Sweep;
 
-/// Most violations of members that are told.
+/// The largest number of violations of members that are reported.
 pub const MOST_TOLD: usize = 50;
 
-/// Members on one body, by their numbers in order.
+/// The numbers of members on one body, in order.
 pub type Group = Vec<usize>;
 
-/// Puts the members of a sweep into groups that share a body. Structure and numbers of each member are checked; what
-/// shows only on the mesh does not refuse a member here.
+/// Puts the members of a sweep into groups that share a body. Structure and numbers of each member are checked; faults
+/// that only the mesh can show do not refuse a member here.
 ///
 /// # Errors
 ///
-/// What is wrong with some of the members, at most [`MOST_TOLD`] places.
+/// The violations of some of the members, at most [`MOST_TOLD`].
 pub fn groups(sweep: &Sweep) -> Result<Vec<Group>, Vec<Violation>> {
     let plan = &sweep.plan;
     let mut found = Findings::default();
@@ -86,7 +86,7 @@ fn with_rest(mut violations: Vec<Violation>, left: usize) -> Vec<Violation> {
     violations
 }
 
-/// What is wrong with the numbers of a problem, whatever its mesh is.
+/// The violations in the numbers of a problem, whatever its mesh is.
 fn violations(problem: &Problem) -> Vec<Violation> {
     let mut meshless = problem.clone();
     meshless.mesh.source = MeshSource::Gmsh(String::new());
@@ -96,12 +96,12 @@ fn violations(problem: &Problem) -> Vec<Violation> {
         .unwrap_or_default()
 }
 
-/// Whether a problem whose mesh is refined so shares no body with others: it is solved on meshes of its own.
+/// Whether a problem with this refinement has meshes of its own and shares no body with others.
 pub fn has_own_meshes(problem: &Problem, refine: &Refine) -> bool {
     problem.solver.verifies() || matches!(refine, Refine::Adaptive(_))
 }
 
-/// The same of a member.
+/// Whether a member shares no body with others.
 fn is_alone(problem: &Problem, sweep: &Sweep) -> bool {
     let refine = if sweep.plan.changes_mesh() {
         &problem.mesh.refine
@@ -111,7 +111,7 @@ fn is_alone(problem: &Problem, sweep: &Sweep) -> bool {
     has_own_meshes(problem, refine)
 }
 
-/// What members on one body have in common, as text. The solver decides in the end whether they share it.
+/// The data that members on one body have in common, as text. Finally the solver decides whether they share it.
 fn body(problem: &Problem, sweep: &Sweep, number: usize) -> String {
     let Problem {
         analysis,

@@ -1,8 +1,8 @@
 //! Sweeps: one problem, and many that differ from it in a few values.
 //!
-//! A sweep is kept as text: that of the base problem with gaps where values go, and the values. A member is that text
-//! with its values filled in, which is then read as any other problem. The mesh of the base is left out of the text
-//! unless the sweep changes it, so that a large one is read once and not once for each member.
+//! A sweep is stored as text: the base problem with gaps for values, and the values. A member is that text with its
+//! values filled in, which is then read as any other problem. The mesh of the base is not part of this text unless the
+//! sweep changes it, so that a large mesh is read only once.
 //!
 //! # Where to look
 //!

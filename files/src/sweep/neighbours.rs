@@ -1,33 +1,33 @@
-//! From which other member a member's solution begins: one that differs from it in one value of a grid, by one place.
-//! It depends on the sweep alone, so that a member's numbers have the same bits whichever members were solved before,
-//! by whom and when.
+//! Chooses the member from whose solution another member starts: one that differs from it in one value of a grid, by
+//! one place. The choice depends on the sweep alone, so that a member's numbers have the same bits whichever members
+//! were solved before, by which worker, and when.
 
 use super::check::Group;
 use super::plan::{Plan, Values};
 
-/// So many members of a line follow one another; the next one begins from the first of them again. To solve one anew
-/// takes those before it.
+/// The number of consecutive members of a line that start from each other; the next one starts from the first of them
+/// again. Solving one member anew requires those before it.
 const CHAIN: usize = 64;
 
-/// The member that another one begins from.
+/// The member that another one starts from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Neighbour {
-    /// Its number.
+    /// The number of that member.
     pub number: usize,
-    /// The line that both are on, along an axis of the grid: once its last member is known, those before it on the
-    /// line are not needed again.
+    /// The number of the line that both are on, along an axis of the grid: once its last member is known, those before
+    /// it on the line are not needed again.
     pub line: usize,
-    /// It is the member before in the group.
+    /// Whether it is the previous member in the group.
     pub adjacent: bool,
 }
 
 impl Plan {
-    /// Lines that members of a group are on.
+    /// The number of lines that members of a group are on.
     pub fn lines(&self) -> usize {
         self.paths.len() + 2
     }
 
-    /// The member that the one at a place of its group begins from; none for the first, which is alone on line 0.
+    /// The member that the one at a place of its group starts from; none for the first, which is alone on line 0.
     pub fn neighbour(&self, group: &Group, place: usize) -> Option<Neighbour> {
         let (first, number) = (*group.first()?, *group.get(place)?);
         if place == 0 {

@@ -1,5 +1,5 @@
-//! The problems of members, one after the other. Where members differ only in numbers that a law of friction or the
-//! motion of an obstacle is made of, their text is read once: the numbers are put into the last problem.
+//! Reads the problems of members, one after another. Where members differ only in numbers of a friction law or of the
+//! motion of an obstacle, the text is read once, and the numbers are changed in the last problem.
 
 use solver::error::Violation;
 use solver::problem::Problem;
@@ -14,7 +14,7 @@ pub struct Problems<'a> {
 
 /// The problem that was read last.
 struct Last<'a> {
-    /// By path: the text of the member's value, or that it is a number which can be exchanged.
+    /// For each path: the text of the member's value, or the fact that it is a number that can be changed.
     values: Vec<Known<'a>>,
     problem: Problem,
 }
@@ -27,14 +27,14 @@ enum Known<'a> {
 
 /// The problem of a member.
 pub struct Read<'a> {
-    /// As [`Plan::problem`] gives it.
+    /// The problem, as [`Plan::problem`] gives it.
     pub problem: &'a Problem,
-    /// It differs from the one before in numbers of laws and motions alone: its body is the same.
+    /// Whether it differs from the one before only in numbers of laws and motions, so that its body is the same.
     pub same_body: bool,
 }
 
 impl<'a> Problems<'a> {
-    /// Of a sweep.
+    /// Starts reading the members of a sweep.
     pub fn new(plan: &'a Plan) -> Self {
         Problems { plan, last: None }
     }
@@ -43,7 +43,7 @@ impl<'a> Problems<'a> {
     ///
     /// # Errors
     ///
-    /// Its violations, as [`Plan::problem`] gives them.
+    /// The violations of the member, as [`Plan::problem`] gives them.
     pub fn read(&mut self, number: usize) -> Result<Read<'_>, Vec<Violation>> {
         let texts = self.plan.values(number);
         let paths = || self.plan.paths().iter().zip(&texts);
@@ -74,13 +74,13 @@ impl<'a> Problems<'a> {
     }
 }
 
-/// The number that a value is, if it is one that can be exchanged in a problem.
+/// The number in a value, if it can be changed in a problem that was read.
 fn exchanged(path: &str, text: Option<&str>) -> Option<f64> {
     field(path)?;
     serde_json::from_str(text?).ok()
 }
 
-/// The contact and the name of the number that a pointer leads to, if it can be exchanged.
+/// The contact and the name of the number that a pointer names, if it can be changed.
 fn field(path: &str) -> Option<(usize, &str)> {
     let (contact, name) = path.strip_prefix("/contacts/")?.split_once('/')?;
     let number: usize = contact.parse().ok()?;
@@ -88,7 +88,7 @@ fn field(path: &str) -> Option<(usize, &str)> {
     (number.to_string() == contact && NAMES.contains(&name)).then_some((number, name))
 }
 
-/// Numbers that neither the body nor the structure of a problem depends on.
+/// The numbers that affect neither the body nor the structure of a problem.
 const NAMES: [&str; 7] = [
     "indentation",
     "tangential_displacement",
@@ -99,7 +99,7 @@ const NAMES: [&str; 7] = [
     "friction/shear_cap",
 ];
 
-/// Puts a number into a problem; false if it has no such place.
+/// Changes a number in a problem; false if the problem has no such place.
 fn set(problem: &mut Problem, path: &str, number: f64) -> bool {
     let Some((contact, name)) = field(path) else {
         return false;

@@ -4,16 +4,16 @@ use solver::error::{Findings, Reason, Violation};
 
 use crate::schema::quoted;
 
-/// A pointer into the problem, and where it stands in the definition.
+/// A pointer into the problem, and its place in the definition.
 pub(super) struct Path {
     pub(super) at: String,
     pub(super) text: String,
     pub(super) tokens: Vec<String>,
 }
 
-/// Most bytes of a pointer: names in a problem are short.
+/// The largest number of bytes of a pointer: names in a problem are short.
 pub const MOST_POINTER_BYTES: usize = 1 << 10;
-/// Most names and numbers in a pointer: JSON is read to this depth.
+/// The largest number of names and numbers in a pointer: JSON is read to this depth.
 pub const MOST_POINTER_TOKENS: usize = 64;
 
 /// A pointer to a part of a problem; `at` is its place in the definition.
@@ -59,7 +59,7 @@ pub(super) fn path(at: String, text: &str, found: &mut Findings) -> Option<Path>
     }
 }
 
-/// Whether no path is another one, or inside it.
+/// Checks that no path equals another one or leads inside it.
 pub(super) fn are_apart(paths: &[Path], found: &mut Findings) -> bool {
     let mut apart = true;
     for (k, path) in paths.iter().enumerate() {
@@ -81,9 +81,13 @@ pub(super) fn are_apart(paths: &[Path], found: &mut Findings) -> bool {
             found.add(Violation::new(
                 path.at.clone(),
                 reason,
-                format!("{} beside {}", quoted(&path.text), quoted(&other.text)),
+                format!(
+                    "{} together with {}",
+                    quoted(&path.text),
+                    quoted(&other.text)
+                ),
                 expected,
-                "Leave one of them out: one value would replace the other.",
+                "Remove one of them: one value would replace the other.",
             ));
         }
     }

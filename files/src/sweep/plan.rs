@@ -1,4 +1,4 @@
-//! All members of a sweep: what they differ in, and their values.
+//! All members of a sweep: the places where they differ, and their values.
 
 use std::collections::BTreeMap;
 
@@ -10,14 +10,15 @@ use solver::problem::{MeshInput, Problem};
 use super::template::Template;
 use crate::json::parse;
 
-/// Most members of a sweep.
+/// The largest number of members of a sweep.
 pub const MOST_MEMBERS: usize = 10_000;
-/// Most values that a member may differ in.
+/// The largest number of values in which members may differ.
 pub const MOST_PATHS: usize = 16;
-/// Bytes of the problems of all members together, as text: checking them reads all of it.
+/// The largest number of bytes of the problems of all members together, as text: checking them reads all of it.
 pub const MOST_BYTES: u64 = 64 << 20;
 
-/// Bytes of the values of all members together, as text: a table of all members holds all of them.
+/// The largest number of bytes of the values of all members together, as text: a table of all members contains all of
+/// them.
 pub const MOST_VALUE_BYTES: u64 = 8 << 20;
 
 /// How the values of several axes are combined.
@@ -29,15 +30,15 @@ pub enum Mode {
     Grid,
     /// The first values of all axes, then the second ones, and so on.
     Zip,
-    /// As listed in `points`, without axes.
+    /// The members as listed in `points`, without axes.
     List,
 }
 
-/// All members of a sweep: what is stored, and what a worker receives.
+/// All members of a sweep, in the form that is stored and that a worker receives.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     pub(super) template: Template,
-    /// The mesh is a part of the template, since the sweep changes it.
+    /// Whether the mesh is part of the template, because the sweep changes it.
     pub(super) with_mesh: bool,
     pub(super) paths: Vec<String>,
     pub(super) values: Values,
@@ -54,7 +55,7 @@ pub(super) enum Values {
 }
 
 impl Plan {
-    /// How many members there are; their numbers count from 0.
+    /// The number of members; they are numbered from 0.
     pub fn count(&self) -> usize {
         match &self.values {
             Values::Grid(axes) => axes
@@ -65,7 +66,7 @@ impl Plan {
         }
     }
 
-    /// JSON Pointers into the problem: what members may differ in.
+    /// JSON Pointers to the values in which members may differ.
     pub fn paths(&self) -> &[String] {
         &self.paths
     }
@@ -75,7 +76,7 @@ impl Plan {
         self.with_mesh
     }
 
-    /// The values of a member as JSON, in the order of the paths; none where it keeps that of the base.
+    /// The values of a member as JSON, in the order of the paths; none where it keeps the value of the base.
     pub fn values(&self, number: usize) -> Vec<Option<&str>> {
         match &self.values {
             Values::Grid(axes) => {
@@ -103,8 +104,8 @@ impl Plan {
         }
     }
 
-    /// The values of a member by path, without those of the base: as JSON without spaces, since many are kept at a time, and
-    /// a tree of values takes twenty times as much.
+    /// The values of a member by path, without those of the base: as JSON without spaces, since many are held at a
+    /// time, and a tree of values takes twenty times as much memory.
     pub fn parameters(&self, number: usize) -> BTreeMap<String, Box<RawValue>> {
         let values = self.paths.iter().zip(self.values(number));
         let read = |(path, value): (&String, Option<&str>)| {
@@ -114,7 +115,7 @@ impl Plan {
         values.filter_map(read).collect()
     }
 
-    /// Bytes of the values of a member, as text.
+    /// The number of bytes of the values of a member, as text.
     pub fn bytes_of(&self, number: usize) -> usize {
         self.values(number)
             .into_iter()
@@ -136,7 +137,7 @@ impl Plan {
     ///
     /// # Errors
     ///
-    /// As for [`Plan::problem`].
+    /// The errors of [`Plan::problem`].
     pub fn whole_problem(
         &self,
         number: usize,
@@ -149,7 +150,7 @@ impl Plan {
         Ok(problem)
     }
 
-    /// Where in the definition of the sweep a violation of a member comes from.
+    /// The place in the definition of the sweep that a violation of a member comes from.
     pub(super) fn place(&self, number: usize, violation: &Violation) -> String {
         let pointer = violation.pointer.as_str();
         let inside = |path: &String| {
@@ -179,7 +180,7 @@ impl Plan {
         }
     }
 
-    /// Where the definition of the sweep tells a member: its point, or the axes.
+    /// The place in the definition of the sweep that determines a member: its point, or the axes.
     pub fn origin(&self, number: usize) -> String {
         match &self.values {
             Values::List(_) => format!("/points/{number}"),
@@ -187,14 +188,14 @@ impl Plan {
         }
     }
 
-    /// Bytes of the problems of all members, as text.
+    /// The number of bytes of the problems of all members, as text.
     pub(super) fn bytes(&self) -> u64 {
         let text = self.template.bytes() as u64;
         text.saturating_mul(self.count() as u64)
             .saturating_add(self.value_bytes())
     }
 
-    /// Bytes of the values of all members, as text.
+    /// The number of bytes of the values of all members, as text.
     pub(super) fn value_bytes(&self) -> u64 {
         let count = self.count() as u64;
         let length = |values: &[String]| values.iter().map(|value| value.len() as u64).sum();

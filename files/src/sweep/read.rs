@@ -1,4 +1,4 @@
-//! Reading the definition of a sweep, with all its violations.
+//! Reads the definition of a sweep, with all its violations.
 
 use std::borrow::Cow;
 
@@ -19,16 +19,16 @@ use crate::{
     schema::{meant, quoted},
 };
 
-/// A sweep that was read.
+/// A sweep as read.
 #[derive(Clone, Debug)]
 pub struct Sweep {
-    /// The problem that members differ from, with its mesh.
+    /// The base problem, from which members differ, with its mesh.
     pub base: Problem,
     /// Its members.
     pub plan: Plan,
 }
 
-/// In place of a mesh that all members share: a file that is not read.
+/// A placeholder for the mesh that all members share: a file that is not read.
 const NO_MESH: &str = r#"{"gmsh":""}"#;
 
 /// Reads the definition of a sweep. Its members are not checked yet, see [`groups`](super::groups).
@@ -112,7 +112,7 @@ pub fn read(fields: &Fields<'_>) -> Result<Sweep, Vec<Violation>> {
             Reason::TooLarge,
             format!("{count} members of {} bytes together", bytes),
             format!("at most {MOST_BYTES} bytes as JSON"),
-            if with_mesh { "Upload the mesh and name it as `stored`, or sweep its refinement in several sweeps." } else { "Shorten what the base has beside its mesh, or give fewer values." },
+            if with_mesh { "Upload the mesh and name it as `stored`, or sweep its refinement in several sweeps." } else { "Shorten the base apart from its mesh, or give fewer values." },
         ));
     }
     found.into_result(Sweep { base, plan })
@@ -124,7 +124,7 @@ fn base(raw: Option<&RawValue>, found: &mut Findings) -> Option<Problem> {
             "/base",
             Reason::Missing,
             "nothing",
-            "the problem that members differ from",
+            "the base problem, from which members differ",
             "Send {\"base\": {…}, \"axes\": […]}.",
         ));
         return None;
@@ -153,13 +153,13 @@ fn mode(raw: Option<&RawValue>, found: &mut Findings) -> Option<Mode> {
             Reason::UnknownAlternative,
             quoted(raw.get()),
             "\"grid\", \"zip\" or \"list\"",
-            hint.unwrap_or_else(|| "Leave it out for grid.".to_owned()),
+            hint.unwrap_or_else(|| "Remove it for grid.".to_owned()),
         ));
     }
     mode
 }
 
-/// The violation of a pointer that leads nowhere in the problem.
+/// The violation of a pointer that names no value of the problem.
 fn leads_nowhere(path: &Path, nowhere: &Nowhere) -> Violation {
     let Nowhere {
         parent,

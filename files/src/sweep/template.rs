@@ -1,4 +1,4 @@
-//! A text of JSON with gaps, into which values are written.
+//! A JSON text with gaps that are filled with values.
 
 use std::ops::Range;
 
@@ -6,29 +6,29 @@ use serde::{Deserialize, Serialize};
 
 use crate::pointer::Place;
 
-/// A text of JSON with gaps.
+/// A JSON text with gaps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Template {
     text: String,
-    /// In the order of the paths.
+    /// The gaps in the order of the paths.
     gaps: Vec<Gap>,
-    /// The gaps in the order of their places.
+    /// The numbers of the gaps in the order of their places.
     order: Vec<usize>,
 }
 
-/// A place of a value.
+/// A gap for a value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Gap {
-    /// The text that the value replaces: empty for a member that the object there lacks.
+    /// The range of the text that the value replaces: empty for a member that the object there lacks.
     place: Range<usize>,
-    /// Written before the value: the name of such a member.
+    /// The text before the value: the name of such a member.
     before: String,
-    /// Written after it.
+    /// The text after the value.
     after: String,
 }
 
 impl Template {
-    /// A text with a gap at each of these places, of which none is inside another.
+    /// A text with a gap at each of these places; none may be inside another.
     pub(super) fn new(text: &str, places: Vec<Place>) -> Template {
         let mut gaps: Vec<Gap> = Vec::with_capacity(places.len());
         for place in places {
@@ -68,7 +68,7 @@ impl Template {
         }
     }
 
-    /// The text with these values; where there is none, it stays as it is.
+    /// The text with these values; where there is none, the text is not changed.
     pub(super) fn filled(&self, values: &[Option<&str>]) -> String {
         let mut filled = String::with_capacity(self.text.len() + 64);
         let mut at = 0;

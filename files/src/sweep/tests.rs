@@ -224,7 +224,7 @@ fn members_that_share_a_body_are_one_group() {
 }
 
 #[test]
-fn all_violations_are_told_at_once_each_at_its_place() {
+fn all_violations_are_reported_at_once_with_their_places() {
     let mut broken = base();
     broken["materials"][0]["poisons_ratio"] = json!(0.3);
     let found = refused(&json!({"base": broken, "mode": "grit", "axes": 7}));
@@ -330,7 +330,7 @@ fn a_violation_of_a_member_names_the_value_that_causes_it() {
 }
 
 #[test]
-fn many_wrong_members_are_told_by_some_of_them() {
+fn of_many_invalid_members_some_are_reported() {
     let values: Vec<i32> = (1..=200).map(|n| -n).collect();
     let sweep =
         reading(&json!({"base": base(), "axes": [{"path": MU, "values": values}]})).unwrap();
@@ -393,7 +393,7 @@ fn a_plan_is_stored_as_json() {
 }
 
 #[test]
-fn problems_read_one_after_the_other_are_those_of_their_text() {
+fn problems_read_one_after_another_equal_their_texts() {
     let mut base = base();
     base["contacts"][0]["tangential_displacement"] = json!(0.01);
     let two = |path: &str, values: Value| json!({"path": path, "values": values});
@@ -462,7 +462,7 @@ fn a_member_of_a_grid_begins_from_one_that_differs_by_one_place_of_one_axis() {
     assert_eq!([1, 64, 65, 128].map(from), [0, 0, 64, 0].map(Some));
 }
 
-/// Millions of names in one pointer: it is refused before it is divided into them.
+/// A pointer of megabytes with millions of names is refused by its length before it is divided into them.
 #[test]
 fn a_pointer_of_megabytes_is_refused_by_its_length() {
     let swept = |path: &str| {

@@ -15,20 +15,20 @@ use crate::{
     schema::{meant, quoted},
 };
 
-/// The fields of a definition as text, as far as they are given.
+/// The given fields of a definition, as text.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Fields<'a> {
-    /// The problem.
+    /// The base problem.
     pub base: Option<&'a RawValue>,
-    /// A list of objects with a `path` and its values.
+    /// The axes: a list of objects with a `path` and its values.
     pub axes: Option<&'a RawValue>,
-    /// How they are combined.
+    /// How the axes are combined.
     pub mode: Option<&'a RawValue>,
-    /// For the mode `list`: a list of objects from pointer to value.
+    /// The points, for the mode `list`: a list of objects from pointer to value.
     pub points: Option<&'a RawValue>,
 }
 
-/// A field that a mode does not use.
+/// Reports a field that a mode does not use.
 fn not_used(name: &str, raw: Option<&RawValue>, mode: &str, hint: &str, found: &mut Findings) {
     if raw.is_some_and(|raw| raw.get() != "null") {
         found.add(Violation::new(
@@ -51,13 +51,13 @@ fn wrong_type(at: impl Into<String>, raw: &RawValue, expected: &str) -> Violatio
     )
 }
 
-/// Most members of an axis or a point that are looked at: more than they may have.
+/// The largest number of members of an axis or a point that are read: more than they may have.
 const MOST_NAMES: usize = 64;
 
 const AXES_HINT: &str = "Change several values together by the mode zip or list.";
 const VALUES_HINT: &str = "An axis has at least one value, and a sweep at most that many members.";
 
-/// The items of a list of 1 … `most` of `what`.
+/// The items of a list that must have 1 … `most` of `what`.
 fn counted<'a>(
     at: &str,
     raw: &'a RawValue,
@@ -168,7 +168,7 @@ fn axis(at: &str, members: Named<'_>, found: &mut Findings) -> (Option<Path>, Op
                 Reason::DuplicateName,
                 "the name twice",
                 "each name once",
-                "Leave one of them out; one would be ignored.",
+                "Remove one of them; one would be ignored.",
             ));
         }
     }
@@ -225,7 +225,7 @@ fn axis(at: &str, members: Named<'_>, found: &mut Findings) -> (Option<Path>, Op
     (path, values)
 }
 
-/// A list of any values.
+/// Reads a list of any values.
 fn values(at: &str, raw: &RawValue, found: &mut Findings) -> Option<Vec<String>> {
     let items = counted(at, raw, MOST_MEMBERS, "values", VALUES_HINT, found)?;
     let mut sound = true;
@@ -237,7 +237,8 @@ fn values(at: &str, raw: &RawValue, found: &mut Findings) -> Option<Vec<String>>
     sound.then_some(texts)
 }
 
-/// Whether a value is not a number that is too large. Inside of lists and objects the problem's reader tells it.
+/// Checks that a value is not too large a number. Numbers inside lists and objects are checked when the problem is
+/// read.
 fn is_finite(at: &str, raw: &RawValue, found: &mut Findings) -> bool {
     let number = raw
         .get()
@@ -255,7 +256,7 @@ fn is_finite(at: &str, raw: &RawValue, found: &mut Findings) -> bool {
     finite
 }
 
-/// Numbers at equal distances or ratios, both ends among them.
+/// Numbers at equal distances or ratios, including both ends.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Spaced {
@@ -310,7 +311,7 @@ fn spaced(at: &str, ratios: bool, raw: &RawValue, found: &mut Findings) -> Optio
     sound.then(|| (0..count).map(|k| number(value(k))).collect())
 }
 
-/// To 15 digits, so that 0.9 is not 0.8999999999999999.
+/// A number rounded to 15 digits, so that 0.9 is not 0.8999999999999999.
 fn rounded(value: f64) -> f64 {
     format!("{value:.14e}").parse().unwrap_or(value)
 }
@@ -391,7 +392,7 @@ pub(super) fn points(fields: &Fields<'_>, found: &mut Findings) -> Option<(Vec<P
                     Reason::DuplicateName,
                     "the name twice",
                     "each name once",
-                    "Leave one of them out; one would be ignored.",
+                    "Remove one of them; one would be ignored.",
                 ));
                 sound = false;
             }

@@ -1,4 +1,4 @@
-//! `signorini backup`.
+//! The command `signorini backup`.
 
 use std::path::PathBuf;
 
@@ -15,16 +15,17 @@ pub(super) struct Arguments {
     #[command(flatten)]
     folder: Folder,
 
-    /// Do not read every job, result and mesh in the backup as the service would. Its digest is written all the same
+    /// Skip reading every job, result and mesh of the backup as the service would. The digest of the backup is written
+    /// anyway
     #[arg(long)]
     unchecked: bool,
 
-    /// The folder to write, which must not exist. It appears when the backup is complete; until then it has the ending
+    /// The folder to write, which must not exist. It appears when the backup is complete; until then its name ends in
     /// .partial
     target: PathBuf,
 }
 
-/// Prints a line for each damage, and a summary as the last one.
+/// Runs the command: prints a line for each damage, and a summary as the last one.
 pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     let Arguments {
         folder,
@@ -43,12 +44,12 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         return Ok(Exit::Ok);
     }
     eprintln!(
-        "The backup is made, but the store itself is damaged: keep earlier backups, and see `signorini doctor --help`"
+        "The backup is complete, but the store itself is damaged: keep earlier backups, and see `signorini doctor --help`"
     );
     Ok(Exit::Damaged)
 }
 
-/// What a backup contains, in a line.
+/// The content of a backup, in a line.
 pub(super) fn summed_up(manifest: &Manifest) -> String {
     let Manifest {
         created_at,

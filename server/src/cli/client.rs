@@ -17,30 +17,31 @@ use rustls::pki_types::{CertificateDer, pem::PemObject};
 
 use super::pinned;
 
-/// A connection is made in this time, or not at all.
+/// The longest time for making a connection.
 const CONNECT: Duration = Duration::from_secs(10);
-/// What a service is told of this program.
+/// The name of this program, which is sent to a service.
 const PROGRAM: &str = concat!("signorini/", env!("CARGO_PKG_VERSION"));
-/// A service that waits for the end of a job, or streams its events, says something at least every 30 s.
+/// The longest silence of a service that waits for the end of a job or streams its events: it sends something at least
+/// every 30 s.
 const SILENCE: Duration = Duration::from_secs(90);
 
-/// Whom a client command trusts.
+/// The certificates that a client command trusts.
 #[derive(Debug, Args)]
 pub(super) struct Trust {
-    /// File of the certificates, as PEM, of the authority that issued the service's, or of the service's own; with https://
-    /// [default: those that this machine trusts]
+    /// PEM file of the certificates of the authority that issued the service's certificate, or of the service's own
+    /// certificate; with https:// [default: the certificates that this machine trusts]
     #[arg(long, env = "SIGNORINI_CA", value_name = "FILE", value_parser = OsStringValueParser::new())]
     ca: Option<OsString>,
 }
 
-/// A client, and the proxy of the environment through which it goes to the service.
+/// A client, and the proxy from the environment through which it reaches the service.
 #[derive(Debug)]
 pub(super) struct Way {
     pub(super) client: Client,
     pub(super) proxy: Option<Proxy>,
 }
 
-/// A proxy that is named by a variable of the environment: its address, without a password.
+/// The address of a proxy that an environment variable names, without a password.
 #[derive(Clone, Debug)]
 pub(super) struct Proxy(String);
 
@@ -79,7 +80,7 @@ impl Trust {
             .connect_timeout(CONNECT)
             .read_timeout(SILENCE)
             .build()
-            .context("a client with TLS cannot be made; --ca names the authority to trust")?;
+            .context("TLS cannot be set up; --ca names the authority to trust")?;
         Ok(Way { client, proxy })
     }
 }
@@ -107,7 +108,7 @@ fn is_this_machine(host: &str) -> bool {
         || number.is_ok_and(|ip| ip.to_canonical().is_loopback())
 }
 
-/// A client for the service on this machine, whatever certificate it shows: only for what is no secret.
+/// A client for the service on this machine that accepts any certificate: only for data that are not secret.
 pub(super) fn local() -> anyhow::Result<Client> {
     provide();
     // a local address, which a proxy from the environment could not reach
@@ -115,7 +116,7 @@ pub(super) fn local() -> anyhow::Result<Client> {
     Ok(builder.tls_danger_accept_invalid_certs(true).build()?)
 }
 
-/// `reqwest` asks for the process's provider of cryptography, whether it speaks TLS or not.
+/// Installs the process's provider of cryptography, which `reqwest` requires with or without TLS.
 fn provide() {
     // an error says that there is one already
     let _ = rustls::crypto::ring::default_provider().install_default();
@@ -128,7 +129,7 @@ fn authorities(file: &Path) -> anyhow::Result<Vec<CertificateDer<'static>>> {
     let found = found.with_context(|| format!("--ca {shown}: expected certificates as PEM"))?;
     ensure!(
         !found.is_empty(),
-        "--ca {shown}: there is no certificate; expected PEM, with a line -----BEGIN CERTIFICATE-----"
+        "--ca {shown}: found no certificate; expected PEM, with a line -----BEGIN CERTIFICATE-----"
     );
     Ok(found)
 }

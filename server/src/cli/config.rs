@@ -1,4 +1,4 @@
-//! `signorini config show`.
+//! The command `signorini config show`.
 
 use std::{ffi::OsStr, fmt::Write};
 
@@ -21,7 +21,8 @@ pub(super) struct Arguments {
 enum Command {
     /// Print the settings that `serve` would have with the same options, as a file that it can read
     Show {
-        /// Add to each where its value comes from: a flag, an environment variable, a line of the file, or the default
+        /// Add to each setting where its value comes from: a flag, an environment variable, a line of the file, or the
+        /// default
         #[arg(long)]
         origin: bool,
         #[command(flatten)]
@@ -52,13 +53,13 @@ pub(super) fn run(
     Ok(Exit::Ok)
 }
 
-/// `key = value`.
+/// A setting as `key = value`.
 fn value(arg: &Arg, matches: &ArgMatches) -> anyhow::Result<String> {
     let (key, id) = (settings::key(arg), arg.get_id().as_str());
     let mut texts = vec![];
     for raw in matches.get_raw(id).into_iter().flatten() {
         let Some(text) = raw.to_str() else {
-            bail!("{key} is {raw:?}, which is not UTF-8, and a file of settings cannot have it");
+            bail!("{key} is {raw:?}, which is not UTF-8 and cannot be in a file of settings");
         };
         texts.push(text);
     }
@@ -74,14 +75,14 @@ fn value(arg: &Arg, matches: &ArgMatches) -> anyhow::Result<String> {
     Ok(format!("{key} = {value}"))
 }
 
-/// A text of TOML. It is written as that of JSON is, but for one character.
+/// A text as a TOML string, which differs from a JSON string in one character.
 fn quoted(text: impl AsRef<str>) -> String {
     serde_json::Value::from(text.as_ref())
         .to_string()
         .replace('\u{7f}', "\\u007f")
 }
 
-/// A setting without a value, with what its help says of that.
+/// A comment for a setting without a value, with the remark of its help.
 fn unset(arg: &Arg) -> String {
     let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
     let default = help.rsplit_once("[default: ");

@@ -1,5 +1,5 @@
-//! `signorini demo`: a service on a free port with a temporary store, to which the five examples are
-//! submitted over both protocols, as any client submits them.
+//! The command `signorini demo`: starts a service on a free port with a temporary store, and submits the five examples
+//! to it over both protocols, as any client would.
 
 use std::io::IsTerminal;
 
@@ -24,7 +24,7 @@ use crate::{
     run::Summary,
 };
 
-/// The example whose stresses are printed, at so many places.
+/// The example whose stresses are printed, and the number of places.
 const SHOWN: &str = "cylinder";
 const PLACES: usize = 21;
 

@@ -1,4 +1,4 @@
-//! `signorini doctor`.
+//! The command `signorini doctor`.
 
 use std::path::PathBuf;
 
@@ -19,18 +19,18 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "NEW_FOLDER")]
     salvage: Option<PathBuf>,
 
-    /// Accept the store as it is, although something that was in it is missing: after a restore from a backup, or to
-    /// start anew in this folder
+    /// Accept the store as it is, although something that was in it is missing: after a restore from a backup, or for a
+    /// fresh start in this folder
     #[arg(long, conflicts_with = "salvage")]
     accept: bool,
 
-    /// Rebuild the database without unused space, which takes as much space again for a while. From then on it gives the space of
-    /// what is deleted back to the file system
+    /// Rebuild the database without unused space, which temporarily needs as much space again. From then on it returns
+    /// the space of deleted data to the file system
     #[arg(long, conflicts_with_all = ["salvage", "accept"])]
     compact: bool,
 }
 
-/// Prints a line for each finding, and a summary as the last one.
+/// Runs the command: prints a line for each finding, and a summary as the last one.
 pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     let Arguments {
         folder,
@@ -55,8 +55,8 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
             StoreError::Folder(format!("cannot change {}: {error}", data.display()))
         })?;
         let text = match known {
-            true => "what is in the folder is accepted at the next start\n",
-            false => "nothing was recorded of this folder: the next start accepts what is in it\n",
+            true => "the next start accepts the content of the folder\n",
+            false => "nothing was recorded about this folder: the next start accepts its content\n",
         };
         output::print(text)?;
         return Ok(Exit::Ok);
@@ -74,7 +74,10 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
             _ => format!("; they were copied to {}", new.display()),
         };
         if report.intact < report.jobs {
-            text += &format!("; keep {}, which has what was not copied", data.display());
+            text += &format!(
+                "; keep {}, which has the data that were not copied",
+                data.display()
+            );
         }
     }
     text.push('\n');
@@ -84,12 +87,12 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     }
     match (&salvage, report.intact) {
         (None, 1..) => eprintln!(
-            "To save what is intact in a new store: signorini doctor --data {} --salvage NEW_FOLDER",
+            "To save everything that is intact in a new store: signorini doctor --data {} --salvage NEW_FOLDER",
             data.display()
         ),
         (_, 0) if report.jobs > 0 => eprintln!(
-            "No job is whole. If the service still starts on {}, it answers what can be read of them, like a result \
-             without its events",
+            "No job is fully intact. The service may still start on {} and serve the readable parts, for example a result \
+             without its events.",
             data.display()
         ),
         _ => {}
@@ -97,7 +100,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     Ok(Exit::Damaged)
 }
 
-/// How many jobs are intact.
+/// The summary line: how many jobs are intact.
 fn summed_up(report: &Report) -> String {
     let Report { intact, jobs, .. } = report;
     match (report.incomplete, jobs) {

@@ -1,6 +1,6 @@
-//! The five problems of the thesis, chapter 4, compiled in.
+//! The five problems of chapter 4 of the thesis, compiled into the program.
 
-/// Name and JSON of each.
+/// The name and JSON of each example.
 pub const ALL: [(&str, &str); 5] = [
     (
         "rectangular_punch",

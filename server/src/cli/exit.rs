@@ -11,8 +11,8 @@ use crate::{
     store::StoreError,
 };
 
-/// How a command ends. A signal ends it as the system does, for a shell 128 and its number: Ctrl-C during `solve` 130;
-/// a panic with 101.
+/// How a command ends. A signal ends it as usual, for a shell with 128 plus its number: Ctrl-C during `solve` gives
+/// 130; a panic gives 101.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, VariantArray)]
 pub(super) enum Exit {
     /// Success.
@@ -27,28 +27,29 @@ pub(super) enum Exit {
     Canceled,
     /// The folder of the store cannot be used.
     Folder,
-    /// The jobs that were waited for have not ended.
+    /// The jobs to wait for have not ended in time.
     TimedOut,
     /// Another process uses the store.
     Locked,
     /// The service cannot be reached.
     Unreachable,
-    /// The store is of another program, or of a later version of this one.
+    /// The store belongs to another program, or to a later version of this one.
     Schema,
     /// There is no such job or sweep.
     NotFound,
     /// Something that was stored is missing or damaged.
     Damaged,
-    /// The service wants another token.
+    /// The service requires another token.
     Denied,
-    /// The owner's share is used up, or the queue is full.
+    /// The owner's quota is used up, or the queue is full.
     Quota,
     /// The solution did not converge.
     NotConverged,
 }
 
 impl Exit {
-    /// The number that the process ends with. Commands for a store and commands for a running service share some.
+    /// The number that the process exits with. Commands for a store and commands for a running service share some
+    /// numbers.
     pub(super) fn code(self) -> u8 {
         match self {
             Exit::Ok => 0,
@@ -64,51 +65,49 @@ impl Exit {
         }
     }
 
-    /// What it means, for `--help` and the README.
+    /// The meaning, for `--help` and the README.
     fn meaning(self) -> &'static str {
         match self {
             Exit::Ok => {
-                "success; of solve and sweep: converged; of watch and wait: the jobs succeeded; of serve: stopped by SIGTERM or SIGINT"
+                "success: solve and sweep converged; the jobs of watch and wait succeeded; serve was stopped by SIGTERM or SIGINT"
             }
             Exit::Failed => {
-                "anything else: a file that cannot be read or written, a body that its contacts do not hold in the end, no memory; a job that failed, but for 9"
+                "anything else: a file cannot be read or written, contacts do not hold the body in the end, memory runs out, or a job failed (but see 9)"
             }
             Exit::Invalid => {
-                "invalid or too large: the problem, an option, a certificate, a token, or the code to be explained"
+                "invalid or too large input: the problem, an option, a certificate, a token, or the code to be explained"
             }
             Exit::Listen => "serve: cannot listen at the address",
             Exit::Canceled => "client commands: the job was canceled",
             Exit::Folder => "serve, doctor, backup, restore, token: the folder cannot be used",
-            Exit::TimedOut => {
-                "client commands: the time to wait is over, and the job has not ended"
-            }
+            Exit::TimedOut => "client commands: the job has not ended in the time to wait",
             Exit::Unreachable => "client commands: the service cannot be reached",
             Exit::NotFound => {
                 "client commands: there is no such job, sweep, load step, result or token"
             }
-            Exit::Denied => "client commands: no valid token, or one that may not do this",
-            Exit::Quota => "client commands: the owner's share is used up, or the queue is full",
+            Exit::Denied => "client commands: no valid token, or a token without the needed scope",
+            Exit::Quota => "client commands: the owner's quota is used up, or the queue is full",
             Exit::Locked => "serve, doctor, restore, token: another server uses the folder",
             Exit::Schema => {
-                "serve, doctor, backup, restore, token: the tables are of another program or version"
+                "serve, doctor, backup, restore, token: the store belongs to another program or version"
             }
             Exit::Damaged => {
                 "serve, doctor, backup, restore, token: stored data is missing or damaged"
             }
             Exit::NotConverged => {
-                "not converged; of a sweep: some members failed; the result is there all the same"
+                "not converged, or some members of a sweep failed; the result is available anyway"
             }
         }
     }
 
-    /// All exit codes, a line each.
+    /// All exit codes, one line each.
     pub(super) fn list() -> String {
         let line = |exit: &Exit| format!("\n  {}  {}", exit.code(), exit.meaning());
         let lines: String = Exit::VARIANTS.iter().map(line).collect();
         format!("Exit codes:{lines}")
     }
 
-    /// Of a command that ended with this error.
+    /// The exit code of a command that ended with this error.
     pub(super) fn of(error: &anyhow::Error) -> Exit {
         match error.downcast_ref() {
             Some(StoreError::Folder(_)) => Exit::Folder,
@@ -126,7 +125,7 @@ impl Exit {
     }
 }
 
-/// Of a call to a running service.
+/// The exit code of a failed call to a running service.
 fn of_call(error: &anyhow::Error) -> Exit {
     let Some(CallError::Refused(refusal)) = error.downcast_ref() else {
         return Exit::Unreachable;

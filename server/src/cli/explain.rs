@@ -1,4 +1,4 @@
-//! `signorini explain CODE`: what the code of an error or of a warning means, and what to do about it.
+//! The command `signorini explain CODE`: the meaning of the code of an error or of a warning, and what to do about it.
 
 use clap::Args;
 use solver::solution::WarningCode;
@@ -7,7 +7,7 @@ use strum::VariantArray;
 use super::{exit::Exit, output};
 use crate::catalog::{Code, Kind, WarningKind, warning};
 
-/// Letters of the longest code.
+/// The number of letters of the longest code.
 const WIDTH: usize = 28;
 
 #[derive(Debug, Args)]
@@ -33,7 +33,7 @@ pub(super) fn run(Arguments { code }: &Arguments) -> anyhow::Result<Exit> {
         };
         let warnings: String = WarningCode::VARIANTS.iter().map(line).collect();
         output::print(&format!(
-            "{errors}\nCodes of warnings: the result is there, but read the warning first.\n\n{warnings}"
+            "{errors}\nCodes of warnings: the result is available, but read the warning first.\n\n{warnings}"
         ))?;
         return Ok(Exit::Ok);
     };

@@ -1,4 +1,4 @@
-//! `signorini health`.
+//! The command `signorini health`.
 
 use std::{
     net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr},
@@ -17,18 +17,18 @@ use super::{
 };
 use crate::config::address;
 
-/// The service itself takes two seconds at most.
+/// The longest time to wait for the answer; the service itself takes two seconds at most.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// More is no answer of this program.
+/// The largest number of characters of the answer; a longer one does not come from this program.
 const MOST_CHARS: usize = 2000;
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Address of the service, as http://127.0.0.1:8080 [default: where `serve` listens on this machine]
+    /// Address of the service, such as http://127.0.0.1:8080 [default: where `serve` listens on this machine]
     #[arg(long, env = "SIGNORINI_URL", value_name = "URL")]
     url: Option<String>,
 
-    /// What `serve` was told to listen on, if no --url is given
+    /// The address that `serve` listens on, if no --url is given
     #[arg(
         long,
         env = "SIGNORINI_LISTEN",
@@ -38,8 +38,8 @@ pub(super) struct Arguments {
     )]
     listen: SocketAddr,
 
-    /// The certificate that `serve` was told to show, if no --url is given: it is asked over TLS then. The certificate is not
-    /// checked, since it need not name this machine, and nothing secret is sent
+    /// The certificate of `serve`, if no --url is given: TLS is used then. The certificate is not checked, since it
+    /// need not name this machine, and nothing secret is sent
     #[arg(long, env = "SIGNORINI_TLS_CERT", value_name = "FILE")]
     tls_cert: Option<PathBuf>,
 
@@ -50,7 +50,7 @@ pub(super) struct Arguments {
     trust: Trust,
 }
 
-/// Prints what `/readyz` answers.
+/// Runs the command: prints the answer of `/readyz`.
 pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     let (way, url) = match arguments.url.filter(|url| !url.is_empty()) {
         Some(url) => (arguments.trust.client(&url)?, url),
@@ -83,7 +83,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     Ok(Exit::Ok)
 }
 
-/// Where a service that listens on this address is reached from its own machine.
+/// The address at which a service that listens on this address is reached from its own machine.
 fn reachable(mut address: SocketAddr) -> SocketAddr {
     match address.ip() {
         IpAddr::V4(ip) if ip.is_unspecified() => address.set_ip(Ipv4Addr::LOCALHOST.into()),

@@ -1,4 +1,4 @@
-//! The log: one line per event on standard error. No work ever waits for who reads it.
+//! The log: one line for each event on standard error. A slow reader of the log never delays any work.
 
 use std::{io::IsTerminal, panic, time::Duration};
 
@@ -13,7 +13,7 @@ use crate::{
     metrics::METRICS,
 };
 
-/// Lines that wait to be written; further ones are lost, and counted. A line has some 200 bytes.
+/// The largest number of lines that wait to be written; further lines are lost, and counted. A line has some 200 bytes.
 const MOST_WAITING: usize = 10_000;
 /// How often lost lines are reported.
 const INTERVAL: Duration = Duration::from_secs(10);
@@ -24,8 +24,8 @@ pub(super) struct Log {
     _writing: WorkerGuard,
 }
 
-/// Starts the log of a command, filtered by SIGNORINI_LOG or RUST_LOG. A filter that cannot be read is told and ignored: it
-/// may have been meant for another program.
+/// Starts the log of a command, filtered by SIGNORINI_LOG or RUST_LOG. An invalid filter is reported and ignored: it
+/// may be intended for another program.
 pub(super) fn start(default: LevelFilter) -> Log {
     let filter = of_variable("SIGNORINI_LOG").or_else(|| of_variable("RUST_LOG"));
     // a certificate that is not accepted is the command's own message
@@ -36,7 +36,7 @@ pub(super) fn start(default: LevelFilter) -> Log {
     write(filter.unwrap_or_else(usual), LogFormat::Text)
 }
 
-/// Starts the log of a worker process, which is a part of that of the service.
+/// Starts the log of a worker process, which is part of the log of the service.
 pub(super) fn start_of_worker() -> Log {
     let asked = std::env::var("SIGNORINI_LOG_FORMAT").unwrap_or_default();
     let format = LogFormat::from_str(&asked, true).unwrap_or_default();
@@ -53,7 +53,7 @@ pub(super) fn start_as(settings: &Telemetry) -> Log {
     write(filter.unwrap_or_else(usual), settings.log_format)
 }
 
-/// Without what a figure's letters, which are a client's, make the library that draws them say.
+/// The filter without messages of the drawing library about the letters of figures, which clients choose.
 fn quiet(filter: Targets) -> Targets {
     filter.with_target("usvg", LevelFilter::OFF)
 }
@@ -109,7 +109,7 @@ fn write(filter: Targets, format: LogFormat) -> Log {
 }
 
 impl Log {
-    /// Counts the lines that were lost, since nobody read them in time.
+    /// The counter of lines that were lost because nobody read them in time.
     pub(super) fn lost(&self) -> ErrorCounter {
         self.lost.clone()
     }
@@ -126,7 +126,7 @@ pub(super) async fn report_lost_lines(lost: ErrorCounter) {
             METRICS.log_lines_lost.inc_by(lines as u64);
             warn!(
                 lines,
-                "{lines} lines of this log were lost: they were not read in time"
+                "{lines} lines of this log were lost, because they were not read in time"
             );
             reported = all;
         }

@@ -1,5 +1,5 @@
-//! A line of the log as it is written: one line, whatever names, paths and headers of clients are in it; without the secrets
-//! of tokens; not too long.
+//! Cleans a line of the log: one line, whatever names, paths and headers of clients are in it; without the secrets of
+//! tokens; not too long.
 
 use std::{
     borrow::Cow,
@@ -12,19 +12,19 @@ use tracing_subscriber::fmt::MakeWriter;
 
 use crate::config::LogFormat;
 
-/// Longest line, in bytes.
+/// The longest line, in bytes.
 const LONGEST_LINE: usize = 4096;
-/// Longest text in a longer line of JSON, which could not be read if it was cut.
+/// The longest text in a long line of JSON, which could not be parsed if it was cut anywhere.
 const LONGEST_TEXT: usize = 500;
-/// What follows `sgn_` in a token and is not secret: its id.
+/// The length of a token's id after `sgn_`, which is not secret.
 const ID: usize = 12;
 
-/// Writes lines, each in one call, as the layer of `tracing_subscriber` does.
+/// Writes lines, each in one call, as the layer of `tracing_subscriber` requires.
 #[derive(Clone, Debug)]
 pub(super) struct Lines {
     pub(super) to: NonBlocking,
     pub(super) format: LogFormat,
-    /// Colours: escape sequences, which the layer removes from what it is given.
+    /// Whether to keep colours: escape sequences, which the layer removes from its input.
     pub(super) colours: bool,
 }
 
@@ -49,7 +49,7 @@ impl MakeWriter<'_> for Lines {
     }
 }
 
-/// The line, with its end.
+/// The clean line, with its end.
 fn clean(line: &str, format: LogFormat, colours: bool) -> Cow<'_, str> {
     let body = line.strip_suffix('\n').unwrap_or(line);
     let harmless = |character| !breaks(character) || (colours && character == '\u{1b}');
@@ -85,13 +85,13 @@ fn clean(line: &str, format: LogFormat, colours: bool) -> Cow<'_, str> {
     Cow::Owned(text)
 }
 
-/// Control characters, ends of lines, and what changes the direction of text.
+/// Whether a character is a control character, ends a line, or changes the direction of text.
 fn breaks(character: char) -> bool {
     character.is_control()
         || matches!(character, '\u{2028}' | '\u{2029}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// Without what follows the ids of tokens. Nothing here logs a token; a client may have put one into a path.
+/// The line without the secrets of tokens. No token is ever logged here, but a client may have put one into a path.
 fn without_secrets(line: &str) -> String {
     let mut text = String::with_capacity(line.len());
     let mut rest = line;

@@ -12,10 +12,10 @@
 //! | certificates that client commands trust | `pinned` |
 //! | exit codes | `exit` |
 //! | completions and manual pages | `pages` |
-//! | `-o` by a file's name, written atomically | `output` |
-//! | what is printed: progress, results, tables | `progress`, `report`, `table` |
+//! | `-o`: formats by file names, written atomically | `output` |
+//! | printing progress, results, tables | `progress`, `report`, `table` |
 //! | the log | `log`, `log_line` |
-//! | what systemd is told | `notify` |
+//! | messages to systemd | `notify` |
 
 mod backup;
 mod client;
@@ -62,32 +62,32 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Start the service: REST and gRPC on one port. Exit code: 0 stopped, 3 cannot listen, 4 the folder cannot be used,
-    /// 5 another server uses it, 6 its tables are of another program or version, 7 stored data is missing or damaged, 2 an
-    /// invalid option, 1 anything else
+    /// Start the service: REST and gRPC on one port. Exit code: 0 stopped, 3 cannot listen, 4 the folder cannot be
+    /// used, 5 another server uses it, 6 the store belongs to another program or version, 7 stored data is missing or
+    /// damaged, 2 an invalid option, 1 anything else
     Serve(Box<settings::Arguments>),
     /// Show the settings of the service, and where they come from. Exit code: 0 printed, 2 an invalid setting
     Config(config::Arguments),
-    /// Check a store that no server is using, and save what is intact. Exit code: 0 all is intact, 4 the folder cannot be
-    /// used, 5 a server uses it, 6 its tables are of another program or version, 7 something is missing or damaged, 2 an
-    /// invalid option, 1 anything else
+    /// Check a store that no server is using, and save everything that is intact. Exit code: 0 all is intact, 4 the
+    /// folder cannot be used, 5 a server uses it, 6 the store belongs to another program or version, 7 something is
+    /// missing or damaged, 2 an invalid option, 1 anything else
     Doctor(doctor::Arguments),
-    /// Write a backup of the store to a new folder, while a server uses it or not. Exit code: 0 done, 4 a folder cannot be
-    /// used, 6 the tables are of another program or a later version, 7 something is missing or damaged (if the store can be
-    /// read, the backup is made all the same), 2 an invalid option, 1 anything else
+    /// Write a backup of the store to a new folder, also while a server uses it. Exit code: 0 done, 4 a folder cannot
+    /// be used, 6 the store belongs to another program or a later version, 7 something is missing or damaged (if the
+    /// store can be read, the backup is made anyway), 2 an invalid option, 1 anything else
     Backup(backup::Arguments),
-    /// Make a backup the store in a folder, for `serve`. Exit code: 0 done, 4 a folder cannot be used, 5 a server uses it, 6
-    /// the backup is of a later version, 7 the backup is damaged, 2 an invalid option, 1 anything else
+    /// Copy a backup to a folder as a store for `serve`. Exit code: 0 done, 4 a folder cannot be used, 5 a server uses
+    /// it, 6 the backup is of a later version, 7 the backup is damaged, 2 an invalid option, 1 anything else
     Restore(restore::Arguments),
-    /// Ask a running service whether it is ready, and print what it says. Exit code: 0 it is, 2 an invalid option, 1 it is
-    /// not, or does not answer within five seconds
+    /// Ask a running service whether it is ready, and print its answer. Exit code: 0 ready, 2 an invalid option, 1 not
+    /// ready, or no answer within five seconds
     Health(health::Arguments),
-    /// Create, list, revoke and rotate tokens, by which clients are identified. Exit code: 0 done, 4 the folder cannot be used,
-    /// 5 a server uses it (give its address with --url), 2 an invalid option, 1 anything else; with --url those of client
-    /// commands
+    /// Create, list, revoke and rotate the tokens that identify clients. Exit code: 0 done, 4 the folder cannot be
+    /// used, 5 a server uses it (give its address with --url), 2 an invalid option, 1 anything else; with --url those
+    /// of client commands
     Token(token::Arguments),
-    /// Solve one problem without a service. Exit code: 0 converged, 9 not converged (the result is written), 2 invalid or
-    /// too large, 1 anything else, such as a file that cannot be read, or a body that its contacts do not hold
+    /// Solve one problem without a service. Exit code: 0 converged, 9 not converged (the result is written), 2 invalid
+    /// or too large, 1 anything else, such as a file that cannot be read, or contacts that do not hold the body
     Solve(solve::Arguments),
     /// Solve a sweep without a service: one problem with many values. Exit code: 0 all members converged, 9 some did not
     /// (the table is written), 2 invalid or too large, 1 anything else
@@ -108,7 +108,7 @@ enum Command {
     Completions(pages::Completions),
     /// Print or write the manual pages of the commands
     Man(pages::Man),
-    /// Solve what the service sends over standard input, for `serve --isolation process`
+    /// Solve the tasks that the service sends over standard input, for `serve --isolation process`
     #[command(name = WORKER, hide = true)]
     Worker,
     /// Start a temporary service, submit the five examples over REST and gRPC, and watch them converge

@@ -1,5 +1,5 @@
-//! What systemd is told of a service with `Type=notify`: that it is ready, alive, or stops. Nothing, where nobody asks
-//! (no `NOTIFY_SOCKET`).
+//! Messages to systemd for a service with `Type=notify`: that it is ready, alive, or stopping. Nothing is sent without
+//! `NOTIFY_SOCKET`.
 
 use std::time::Duration;
 
@@ -8,22 +8,22 @@ use tokio::time::{sleep, timeout};
 
 use crate::app::Pulse;
 
-/// How often the status is told, at least.
+/// The longest time between two messages about the status.
 const STATUS_PERIOD: Duration = Duration::from_secs(10);
 
-/// The service answers at its address.
+/// Reports that the service answers at its address.
 pub(super) fn ready(url: &str) {
     tell(&[NotifyState::Ready, NotifyState::Status(url)]);
 }
 
-/// It was asked to stop.
+/// Reports that the service was asked to stop.
 pub(super) fn stopping() {
     let status = "stopping: running jobs are requeued";
     tell(&[NotifyState::Stopping, NotifyState::Status(status)]);
 }
 
-/// Tells that the service is alive, as often as the watchdog expects (`WatchdogSec=`), each time only when its store has
-/// answered; and what it is doing.
+/// Reports that the service is alive, as often as the watchdog expects (`WatchdogSec=`), each time only when its store
+/// has answered; also its status.
 pub(super) async fn keep_alive(url: String, pulse: Pulse) {
     let watchdog = sd_notify::watchdog_enabled();
     // three in the time that the watchdog allows, of which one may be late
@@ -51,6 +51,6 @@ pub(super) async fn keep_alive(url: String, pulse: Pulse) {
 
 fn tell(state: &[NotifyState]) {
     if let Err(error) = sd_notify::notify(state) {
-        tracing::warn!(%error, "systemd cannot be told {state:?}: {error}");
+        tracing::warn!(%error, "the message {state:?} to systemd failed: {error}");
     }
 }

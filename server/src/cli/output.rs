@@ -1,4 +1,4 @@
-//! `-o`: what a file holds according to its name, and writing it atomically.
+//! The option `-o`: the content of a file is chosen by its name, and files are written atomically.
 
 use std::{
     fs::File,
@@ -17,7 +17,7 @@ use crate::{
     run::Document,
 };
 
-/// The help of `-o`.
+/// The help text of `-o`.
 pub(super) fn help() -> String {
     let whole = [Format::Json, Format::Npz];
     let mut tables = Format::OF_TABLES.to_vec();
@@ -32,14 +32,14 @@ pub(super) fn help() -> String {
     )
 }
 
-/// How the figures look.
+/// Options for the look of figures.
 #[derive(Clone, Copy, Debug, Args)]
 pub(super) struct Look {
     /// Colours of a figure: light or dark
     #[arg(long, default_value = "light")]
     theme: Theme,
 
-    /// What a figure is for: a column of 88 mm, a page of 160 mm, or a slide of 254 mm
+    /// Use of a figure: a column of 88 mm, a page of 160 mm, or a slide of 254 mm
     #[arg(long, default_value = "page", value_name = "column|page|slide")]
     size: Size,
 }
@@ -53,7 +53,7 @@ impl Look {
         }
     }
 
-    /// As parameters of a request.
+    /// The options as parameters of a request.
     pub(super) fn query(self) -> String {
         format!(
             "theme={}&size={}",
@@ -63,20 +63,20 @@ impl Look {
     }
 }
 
-/// One file to write.
+/// One file to be written.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Output {
-    /// The file; `None` is standard output.
+    /// The file's path; `None` is standard output.
     pub(super) path: Option<PathBuf>,
     pub(super) part: Part,
     pub(super) format: Format,
 }
 
-/// What of a result a file holds.
+/// The part of a result that a file contains.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Part {
     Everything,
-    /// All but what has a row for each node, point or iteration.
+    /// Everything except columns with a row for each node, point or iteration.
     Summary,
     /// The profile of this contact boundary.
     Profile(String),
@@ -86,8 +86,8 @@ pub(super) enum Part {
 }
 
 impl Output {
-    /// What to write to `path`, in a problem with these contact boundaries; an `Err` is the reason why it cannot be
-    /// written. Called before the problem is solved, which may take hours.
+    /// Reads the name of a file for a problem with these contact boundaries; the error is the reason why the file
+    /// cannot be written. Called before the problem is solved, which may take hours.
     pub(super) fn parse(path: &Path, contacts: &[&str]) -> Result<Output, String> {
         if path.as_os_str() == "-" {
             return Ok(Output {
@@ -124,7 +124,7 @@ impl Output {
         })
     }
 
-    /// Writes it; `problem` with the mesh that it names by a hash, `look` is that of a figure.
+    /// Writes the file. `problem` has the mesh that it names by a hash; `look` is for figures.
     pub(super) fn write(
         &self,
         problem: (&Problem, Option<&Mesh>),
@@ -251,8 +251,8 @@ fn one_of(contacts: &[&str], asked: Option<String>, ending: &str) -> Result<Stri
     }
 }
 
-/// Writes a temporary file beside `path` and renames it, so that there is never an incomplete file of that
-/// name, and an older one is kept until the new one is complete. A pipe or device is written directly.
+/// Writes a temporary file beside `path` and renames it, so that a file of that name is never incomplete, and an older
+/// one is kept until the new one is complete. A pipe or device is written directly.
 pub(super) fn replace(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> anyhow::Result<()>,
@@ -281,7 +281,7 @@ pub(super) fn replace(
     Ok(())
 }
 
-/// Writes to standard output. A reader that is gone, as `head` is after its last line, is not an error.
+/// Writes to standard output. It is no error if the reader has ended, like `head` after its last line.
 pub(super) fn print(text: &str) -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {

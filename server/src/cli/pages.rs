@@ -1,4 +1,4 @@
-//! `signorini completions` and `signorini man`: what shells and readers of manuals are told of the commands.
+//! The commands `signorini completions` and `signorini man`.
 
 use std::{io::Write, path::PathBuf};
 
@@ -17,7 +17,7 @@ pub(super) struct Completions {
     shell: Shell,
 }
 
-/// Prints the script that completes commands and options.
+/// Runs `completions`: prints the script that completes commands and options.
 pub(super) fn completions(
     arguments: &Completions,
     mut command: clap::Command,
@@ -32,7 +32,7 @@ pub(super) fn completions(
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  signorini man ~/.local/share/man/man1 && man signorini-submit")]
 pub(super) struct Man {
-    /// Folder in which to write a page for each command; without it the page of all is printed
+    /// Folder in which to write a page for each command; without it the page of the whole program is printed
     folder: Option<PathBuf>,
 }
 
@@ -48,7 +48,7 @@ pub(super) fn man(arguments: &Man, command: clap::Command) -> anyhow::Result<Exi
     Ok(Exit::Ok)
 }
 
-/// The page of a command, and those of its subcommands.
+/// Writes the page of a command, and those of its subcommands.
 fn write(command: clap::Command, name: &str, folder: &PathBuf) -> anyhow::Result<()> {
     for subcommand in command.get_subcommands().filter(|one| !one.is_hide_set()) {
         write(

@@ -1,6 +1,6 @@
-//! Whom a client command trusts that was given certificates: what they have issued, and each of them as that of the service
-//! itself. A certificate that a service has made for itself is usually that of an authority, too, which `webpki` does not take
-//! for that of a service.
+//! Trust in given certificates only: in everything they have issued, and in each of them as the service's own
+//! certificate. A certificate that a service has made for itself is usually also that of an authority, which `webpki`
+//! does not accept as that of a service.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use rustls::{
     server::ParsedCertificate,
 };
 
-/// TLS that trusts these certificates alone.
+/// A TLS configuration that trusts only these certificates.
 pub(super) fn trusting(pinned: Vec<CertificateDer<'static>>) -> anyhow::Result<ClientConfig> {
     let provider = Arc::new(ring::default_provider());
     let mut roots = RootCertStore::empty();
@@ -98,7 +98,7 @@ impl ServerCertVerifier for Pinned {
     }
 }
 
-/// Whether it is about who has issued the certificate, or what for. Its time was found right before.
+/// Whether the error concerns the issuer or the purpose of the certificate. Its validity in time was checked before.
 fn is_about_the_issuer(error: &Error) -> bool {
     match error {
         Error::InvalidCertificate(CertificateError::UnknownIssuer) => true,

@@ -1,4 +1,4 @@
-//! What is told of a solution while it is made: a line for each iteration, and below them, on a terminal, its state.
+//! Shows the progress of a solution: a line for each iteration and, on a terminal, the present state below them.
 
 use std::{collections::VecDeque, io::IsTerminal, time::Duration};
 
@@ -7,19 +7,19 @@ use solver::solution::{Iteration, Phase, Warning};
 
 use super::{output, report};
 
-/// Residuals that the curve shows.
+/// The number of residuals that the curve shows.
 const CURVE: usize = 24;
 
-/// Where the lines go.
+/// The stream that lines are written to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum To {
-    /// They are what the command prints.
+    /// Standard output: they are the output of the command.
     Output,
-    /// They are beside what it prints.
+    /// Standard error: they accompany the output of the command.
     Error,
 }
 
-/// The lines of one solution, and its state.
+/// The lines of one solution, and its present state.
 pub(super) struct View {
     to: To,
     bar: ProgressBar,
@@ -46,7 +46,7 @@ impl View {
         }
     }
 
-    /// A line above the state.
+    /// Prints a line above the state.
     pub(super) fn line(&self, text: &str) -> std::io::Result<()> {
         self.bar.suspend(|| match self.to {
             To::Output => output::print(&format!("{text}\n")),
@@ -57,7 +57,7 @@ impl View {
         })
     }
 
-    /// What goes on now.
+    /// Shows the present state.
     pub(super) fn state(&mut self, state: &str) {
         state.clone_into(&mut self.state);
         let curve = match self.residuals.is_empty() {
@@ -71,7 +71,8 @@ impl View {
         self.bar.set_message(format!("{}{curve}", self.state));
     }
 
-    /// A phase begins: the state on a terminal, else a line, but not among lines that are what the command prints.
+    /// Shows that a phase begins: as the state on a terminal, else as a line, unless lines are the output of the
+    /// command.
     pub(super) fn phase(&mut self, phase: Phase) -> std::io::Result<()> {
         let words = report::phase(phase);
         if self.to == To::Error && !std::io::stderr().is_terminal() {
@@ -107,19 +108,19 @@ impl View {
         ))
     }
 
-    /// It is solved anew.
+    /// Starts over, when the job is solved again.
     pub(super) fn anew(&mut self) {
         self.residuals.clear();
     }
 
-    /// Takes the state away.
+    /// Removes the state from the terminal.
     pub(super) fn end(&self) {
         self.bar.finish_and_clear();
     }
 }
 
-/// Numbers as a curve of blocks, by their logarithms: the highest block is the largest number. No crate draws one in a
-/// line of text without a whole screen around it.
+/// Numbers as a curve of block characters, by their logarithms: the highest block is the largest number. No crate draws
+/// one in a line of text without managing a whole screen.
 fn sparkline(numbers: &VecDeque<f64>) -> String {
     const BLOCKS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
     let logarithms: Vec<f64> = numbers

@@ -1,4 +1,4 @@
-//! Results as text: a line per iteration, a summary, a table of stresses.
+//! Results as text: a line for each iteration, a summary, a table of stresses.
 
 use std::fmt::Write;
 
@@ -10,18 +10,18 @@ use solver::solution::{
 use super::table::harmless;
 use crate::run::{Document, Summary};
 
-/// Reasons of a verdict that are shown.
+/// The largest number of reasons of a verdict that are shown.
 const MOST_REASONS: usize = 5;
 
-/// A phase that begins.
+/// The text for a phase that begins.
 pub(super) fn phase(phase: Phase) -> &'static str {
     match phase {
-        Phase::Verify => "verify: solving once more, on the mesh split in two",
+        Phase::Verify => "verify: solving once more on the refined mesh",
         phase => phase.as_str(),
     }
 }
 
-/// The mesh that adaptive refinement is on.
+/// The text for the present mesh of adaptive refinement.
 pub(super) fn mesh(number: u32, elements: u64, error: Option<f64>) -> String {
     let before = error.map_or(String::new(), |error| {
         format!("; largest error before {:.2} %", 100.0 * error)
@@ -29,7 +29,7 @@ pub(super) fn mesh(number: u32, elements: u64, error: Option<f64>) -> String {
     format!("mesh {number}: {elements} elements{before}")
 }
 
-/// One row of history on one line.
+/// One row of the history on one line.
 pub(super) fn iteration(row: &Iteration) -> String {
     let mut line = format!(
         "{:>4}  {:<12}  residual {:8.2e}  friction {:8.2e}  contact {:>3} (+{} -{})",
@@ -54,21 +54,21 @@ pub(super) fn iteration(row: &Iteration) -> String {
     line
 }
 
-/// Facts, each on a line behind its name.
+/// Facts, one on each line after its name.
 pub(super) fn lines(facts: impl Iterator<Item = (impl std::fmt::Display, String)>) -> String {
     facts
         .map(|(name, value)| format!("{name:<20}{}\n", harmless(&value)))
         .collect()
 }
 
-/// The summary of a document.
+/// The text of a document: its summary with a title.
 pub(super) fn document(title: Option<&str>, document: &Document) -> String {
     let steps = document.steps.iter();
     let steps = steps.map(|step| (step.name.as_str(), &step.summary));
     result(title, &document.summary, steps)
 }
 
-/// How far a result can be trusted, for who reads it from files: its verdict, and its warnings.
+/// How reliable a result is, for readers of its files: verdict and warnings.
 pub(super) fn trust(document: &Document) -> String {
     let solution = &document.summary.solution;
     let verdict = solution.accuracy.iter().map(|accuracy| {
@@ -86,7 +86,7 @@ pub(super) fn trust(document: &Document) -> String {
     lines(verdict.chain(warnings))
 }
 
-/// A summary, and those of its load steps by their names.
+/// The text of a summary, and of those of its load steps by their names.
 pub(super) fn result<'a>(
     title: Option<&str>,
     summary: &Summary,
@@ -96,9 +96,9 @@ pub(super) fn result<'a>(
     let ended = match s.outcome {
         Outcome::Converged => "converged",
         Outcome::NotConverged => "NOT CONVERGED",
-        Outcome::ContactCycling => "NOT CONVERGED: the iteration cycles",
+        Outcome::ContactCycling => "NOT CONVERGED: the iteration repeats in a cycle",
         Outcome::FalseConvergence => {
-            "NOT CONVERGED: the iteration settled in a state that is not a solution; see the residuals"
+            "NOT CONVERGED: the iteration converged to a state that is not a solution; see the residuals"
         }
         Outcome::Canceled => "CANCELED",
     };
@@ -112,7 +112,7 @@ pub(super) fn result<'a>(
     if let Some(accuracy) = &s.accuracy {
         let verdict = accuracy.verdict.in_words();
         let verified = match accuracy.verified {
-            Some(true) => "; compared with the mesh split in two",
+            Some(true) => "; compared with the refined mesh",
             _ => "",
         };
         line("accuracy", format!("{verdict}{verified}"));
@@ -169,7 +169,7 @@ pub(super) fn result<'a>(
         line(
             "  mesh",
             format!(
-                "{:>6} elements: Y {}, T {}, peak σ_t {}{change}{error}",
+                "{:>6} elements: normal force {}, tangential force {}, peak σ_t {}{change}{error}",
                 mesh.elements,
                 number(mesh.normal_force),
                 number(mesh.tangential_force),
@@ -181,7 +181,7 @@ pub(super) fn result<'a>(
         line(
             &format!("step {name:?}"),
             format!(
-                "Y {}, T {}, {} iterations",
+                "normal force {}, tangential force {}, {} iterations",
                 number(step.normal_force),
                 number(step.tangential_force),
                 step.iterations
@@ -190,10 +190,12 @@ pub(super) fn result<'a>(
     }
     if let Some(second) = &s.uniqueness {
         let found = match (second.converged, second.agrees) {
-            (false, _) => "unknown: the method does not converge from the bonded state".to_string(),
-            (true, true) => "the bonded state leads to the same solution".to_string(),
+            (false, _) => "unknown: from the bonded state the method does not converge".to_string(),
+            (true, true) => {
+                "yes: from the bonded state the solver finds the same solution".to_string()
+            }
             (true, false) => format!(
-                "NO: the bonded state leads to Y {}",
+                "NOT UNIQUE: from the bonded state the solver finds a normal force of {}",
                 number(second.normal_force)
             ),
         };
@@ -212,7 +214,7 @@ pub(super) fn result<'a>(
     text
 }
 
-/// A line for each quantity that was compared with the mesh split in two.
+/// Prints a line for each quantity that was compared with the refined mesh.
 fn verified_lines(accuracy: &Accuracy, line: &mut impl FnMut(&str, String)) {
     for q in &accuracy.quantities {
         let (Some(finer), Some(difference)) = (q.finer, q.difference) else {
@@ -224,13 +226,13 @@ fn verified_lines(accuracy: &Accuracy, line: &mut impl FnMut(&str, String)) {
         let error = match (q.error, q.method) {
             (Some(error), _) => format!("stated error {error:.1e}"),
             (None, ErrorMethod::NoLimit) => "without a limit".to_owned(),
-            (None, ErrorMethod::TooMany) => "one of too many".to_owned(),
+            (None, ErrorMethod::TooMany) => "no stated error".to_owned(),
             (None, _) => "error unknown".to_owned(),
         };
         line(
             "  verified",
             format!(
-                "{} of {:?}: {}, finer {}, difference {difference:.1e}{order}; {error}",
+                "{} at {:?}: {}, on the refined mesh {}, difference {difference:.1e}{order}; {error}",
                 <&str>::from(q.quantity),
                 q.contact,
                 number(q.value),
@@ -240,7 +242,7 @@ fn verified_lines(accuracy: &Accuracy, line: &mut impl FnMut(&str, String)) {
     }
 }
 
-/// Six digits, plain where that is readable.
+/// A number with six digits, without an exponent where that is readable.
 pub(super) fn number(value: f64) -> String {
     if value == 0.0 {
         "0".to_string()
@@ -283,7 +285,8 @@ fn contact_lines(
     }
 }
 
-/// The error of a quantity of a contact, or of its sum over all contacts, after its value; nothing if none was assessed.
+/// The error of a quantity of a contact, or of its sum over all contacts, as a text after the value; empty if errors
+/// were not assessed.
 fn stated(accuracy: Option<&Accuracy>, name: QuantityName, contact: Option<&str>) -> String {
     let all = accuracy.iter().flat_map(|accuracy| &accuracy.quantities);
     let of_contact = |q: &EstimatedQuantity| contact.is_none_or(|contact| contact == q.contact);
@@ -293,7 +296,7 @@ fn stated(accuracy: Option<&Accuracy>, name: QuantityName, contact: Option<&str>
         return String::new();
     }
     if own.iter().any(|q| q.method == ErrorMethod::NoLimit) {
-        return ", but there is no limit".to_owned();
+        return ", but it grows without limit on finer meshes".to_owned();
     }
     let errors: Option<Vec<f64>> = own.iter().map(|q| q.error).collect();
     match errors.map(|errors| errors.iter().sum::<f64>()) {
@@ -303,7 +306,7 @@ fn stated(accuracy: Option<&Accuracy>, name: QuantityName, contact: Option<&str>
     }
 }
 
-/// The lines of one contact.
+/// The lines about one contact.
 pub(super) fn contact(name: &str, contact: &ContactSummary, accuracy: Option<&Accuracy>) -> String {
     let mut text = String::new();
     contact_lines(name, contact, accuracy, &mut |name, value| {

@@ -1,4 +1,4 @@
-//! `signorini restore`.
+//! The command `signorini restore`.
 
 use std::path::PathBuf;
 
@@ -15,8 +15,8 @@ pub(super) struct Arguments {
     #[command(flatten)]
     folder: Folder,
 
-    /// Replace the store that is in the folder, which is kept in a folder `replaced-…` within it. Otherwise the folder must be
-    /// empty or missing
+    /// Replace the store in the folder; the old one is kept in a folder `replaced-…` within it. Otherwise the folder
+    /// must be empty or missing
     #[arg(long)]
     replace: bool,
 }
@@ -31,12 +31,12 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     let restored = store::restore(&backup, data, replace).await?;
     let mut text = String::new();
     if let Some(replaced) = &restored.replaced {
-        text += &format!("the store that was there is in {}\n", replaced.display());
+        text += &format!("the previous store is in {}\n", replaced.display());
     }
     text += &format!("{}: {}\n", data.display(), summed_up(&restored.manifest));
     output::print(&text)?;
     eprintln!(
-        "Unfinished jobs are solved when the service starts. Tokens are as they were then: one that was revoked since is \
+        "Unfinished jobs are solved when the service starts. Tokens are those of the backup: one that was revoked since then is \
          valid again"
     );
     Ok(Exit::Ok)

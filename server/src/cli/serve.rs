@@ -1,4 +1,4 @@
-//! `signorini serve`.
+//! The command `signorini serve`.
 
 use std::{io::Write, time::Duration};
 
@@ -11,7 +11,7 @@ use tracing_appender::non_blocking::ErrorCounter;
 use super::{exit::Exit, log, notify, settings};
 use crate::{app::App, config::Config, listener, queue};
 
-/// Serves until SIGTERM or SIGINT. `lost` counts the lines of the log that were lost.
+/// Runs the service until SIGTERM or SIGINT. `lost` counts the lines of the log that were lost.
 pub(super) async fn run(config: &Config, lost: ErrorCounter) -> anyhow::Result<Exit> {
     // Installed first, so that no signal arrives before its handler.
     let hangup = signal(SignalKind::hangup()).context("SIGHUP cannot be caught")?;
@@ -23,7 +23,7 @@ pub(super) async fn run(config: &Config, lost: ErrorCounter) -> anyhow::Result<E
     let mut interrupt = signal(SignalKind::interrupt()).context("SIGINT cannot be caught")?;
     tokio::spawn(log::report_lost_lines(lost));
     for (name, similar) in settings::unknown_variables() {
-        warn!("{name} is no setting, and is ignored; did you mean {similar}?");
+        warn!("{name} is not a setting and is ignored; did you mean {similar}?");
     }
     let app = App::start(config).await?;
     match app.tls() {
@@ -45,8 +45,8 @@ pub(super) async fn run(config: &Config, lost: ErrorCounter) -> anyhow::Result<E
     Ok(Exit::Ok)
 }
 
-/// Solves what the service sends, as a worker process. A signal to stop that reaches the service and its processes
-/// alike is for the service: it decides about its jobs, and its end is that of this process.
+/// Runs a worker process: solves the tasks that the service sends. A signal to stop that reaches the service and its
+/// processes together is ignored here: the service decides about its jobs, and this process ends with it.
 pub(super) async fn work() -> anyhow::Result<Exit> {
     for kind in [
         SignalKind::terminate(),

@@ -1,4 +1,4 @@
-//! A running service, as client commands call it.
+//! Calls from client commands to a running service.
 
 use std::{
     error::Error as _,
@@ -18,18 +18,18 @@ use uuid::Uuid;
 
 use super::client::{Proxy, Trust, Way};
 
-/// The header that makes a repeated submission find what the first one created.
+/// The header with which a repeated submission finds the job that the first one created.
 const IDEMPOTENCY_KEY: &str = "Idempotency-Key";
-/// A request that may be repeated is sent so many times if its answer does not arrive.
+/// The number of times that a repeatable request is sent if its answer does not arrive.
 const TRIES: u32 = 4;
-/// Before the first repetition; twice as long before each further one.
+/// The pause before the first repetition; doubled before each further one.
 const FIRST_PAUSE: Duration = Duration::from_millis(250);
 
-/// Where the service is.
+/// The options for reaching the service.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Service")]
 pub(super) struct Connection {
-    /// Address of the service; it is called with the token in SIGNORINI_TOKEN, if that is set [default:
+    /// Address of the service; requests carry the token in SIGNORINI_TOKEN, if that is set [default:
     /// http://127.0.0.1:8080]
     #[arg(long, env = "SIGNORINI_URL", value_name = "URL")]
     url: Option<String>,
@@ -55,22 +55,22 @@ pub(super) struct Service {
     token: Option<String>,
 }
 
-/// Why a call has no answer that could be used.
+/// Why a call has no usable answer.
 #[derive(Debug, Error)]
 pub(super) enum CallError {
     /// There is no connection.
     #[error("cannot reach {way}: {cause}. {advice}")]
     Unreachable {
-        /// Address of the service, and the proxy on the way to it.
+        /// The address of the service, and the proxy on the way to it.
         way: String,
         /// The innermost cause.
         cause: String,
-        /// What can be done.
+        /// Advice on what to do.
         advice: &'static str,
-        /// There was a connection, which broke: something is there, or was.
+        /// Whether there was a connection, which broke: something is or was there.
         connected: bool,
     },
-    /// The service has refused it.
+    /// The service has refused the request.
     #[error("{0}")]
     Refused(Box<Refusal>),
 }
@@ -80,10 +80,11 @@ pub(super) enum CallError {
 pub(super) struct Refusal {
     /// HTTP status.
     pub(super) status: u16,
-    /// Whether the service says that the same request may succeed later; absent if it is not this service that has answered.
+    /// Whether the service says that the same request may succeed later; absent if the answer does not come from this
+    /// service.
     #[serde(default)]
     retryable: Option<bool>,
-    /// The kind of error; empty if it is not this service that has answered.
+    /// The kind of error; empty if the answer does not come from this service.
     pub(super) code: String,
     title: String,
     #[serde(default)]
@@ -151,7 +152,7 @@ impl Service {
         }
     }
 
-    /// The address of the service, and the proxy on the way to it.
+    /// The address of the service, and the proxy on the way to it, in words.
     fn way(&self) -> String {
         match &self.proxy {
             Some(proxy) => format!("{} through {proxy}", self.url),
@@ -159,8 +160,8 @@ impl Service {
         }
     }
 
-    /// Sends a request that changes nothing more when it arrives twice: again if its answer does not arrive, or the service is
-    /// for a moment not able to answer. A service that does not listen is told at once.
+    /// Sends a request that is safe to repeat: again if its answer does not arrive, or the service is temporarily
+    /// unable to answer. A service that does not listen is reported at once.
     pub(super) async fn send_surely(&self, request: RequestBuilder) -> anyhow::Result<Response> {
         let mut pause = FIRST_PAUSE;
         for _ in 1..TRIES {
@@ -184,18 +185,18 @@ impl Service {
         self.send(request).await
     }
 
-    /// Asks for something.
+    /// Gets a path; returns the answer.
     pub(super) async fn fetch(&self, path: &str) -> anyhow::Result<Response> {
         self.send_surely(self.request(Method::GET, path)).await
     }
 
-    /// Asks for a document.
+    /// Gets a document.
     pub(super) async fn get<T: DeserializeOwned>(&self, path: &str) -> anyhow::Result<T> {
         let answer = self.fetch(path).await?;
         self.document(answer).await
     }
 
-    /// Submits something. A repetition finds what the first request created.
+    /// Submits something. A repetition finds what the first request has created.
     pub(super) async fn submit(
         &self,
         path: &str,
@@ -212,7 +213,7 @@ impl Service {
         self.document(answer).await
     }
 
-    /// Calls something that has no effect when it is repeated.
+    /// Calls an operation that is safe to repeat.
     pub(super) async fn call(&self, method: Method, path: &str) -> anyhow::Result<Value> {
         let answer = self.send_surely(self.request(method, path)).await?;
         match answer.status() {
@@ -232,7 +233,7 @@ impl Service {
         serde_json::from_slice(&text).with_context(misunderstood)
     }
 
-    /// There was no answer, or no whole one.
+    /// The error that there was no answer, or no complete one.
     pub(super) fn unreachable(&self, error: &reqwest::Error) -> CallError {
         let mut cause: &dyn std::error::Error = error;
         while let Some(inner) = cause.source() {
@@ -244,7 +245,7 @@ impl Service {
         };
         let advice = match &self.proxy {
             _ if cause.contains("UnknownIssuer") || cause.contains("CaUsedAsEndEntity") => {
-                "--ca or SIGNORINI_CA names a file with its certificate, or with that of the authority that has issued it"
+                "--ca or SIGNORINI_CA must name a file with its certificate, or with that of the authority that issued it"
             }
             Some(_) => "Does the proxy reach it? --url or SIGNORINI_URL gives another address",
             None => "Is the service running there? --url or SIGNORINI_URL gives another address",
@@ -259,13 +260,13 @@ impl Service {
 }
 
 impl Refusal {
-    /// Waiting may help: the service says so, or something that stands before it has lost it.
+    /// Whether waiting may help: the service says so, or something in front of it has lost it.
     pub(super) fn may_pass(&self) -> bool {
         let of_proxy = matches!(self.status, 429 | 502..=504);
         self.retryable.unwrap_or(of_proxy)
     }
 
-    /// The same request may succeed in a moment.
+    /// Whether the same request may succeed in a moment.
     fn is_passing(&self) -> bool {
         matches!(
             self.code.as_str(),
@@ -274,19 +275,19 @@ impl Refusal {
     }
 }
 
-/// A key for one submission, of its own.
+/// A new key for one submission.
 pub(super) fn new_key() -> String {
     format!("command-line-{}", Uuid::now_v7())
 }
 
-/// A name as a part of a path.
+/// A name as a segment of a path.
 pub(super) fn segment(name: &str) -> String {
     let escaped: String = form_urlencoded::byte_serialize(name.as_bytes()).collect();
     // a plus is a space in a query only
     escaped.replace('+', "%20")
 }
 
-/// That the service is of another version than this program, once it has said so.
+/// A remark that the service has another version than this program, once that is known.
 static OTHER_VERSION: OnceLock<String> = OnceLock::new();
 
 fn note_version(answer: &Response) {
@@ -303,15 +304,15 @@ fn note_version(answer: &Response) {
     }
 }
 
-/// That an answer of the service cannot be read.
+/// The error that an answer of the service cannot be read.
 pub(super) fn misunderstood(what: &str) -> String {
     match OTHER_VERSION.get() {
         Some(other) => format!("{what} is not understood: {other}"),
-        None => format!("{what} is not of this version of signorini"),
+        None => format!("{what} cannot be read by this version of signorini"),
     }
 }
 
-/// Something that is not this service, or that stands before it, has answered.
+/// The refusal for an answer that does not come from this service, but from something else or in front of it.
 fn foreign(way: &str, status: StatusCode) -> Refusal {
     Refusal {
         status: status.as_u16(),
@@ -319,7 +320,7 @@ fn foreign(way: &str, status: StatusCode) -> Refusal {
         code: String::new(),
         title: String::new(),
         detail: Some(format!(
-            "{way} answers {status}, and not as a signorini service does: is the address right?"
+            "{way} answers {status}, but not like a signorini service: is the address right?"
         )),
         violations: vec![],
     }

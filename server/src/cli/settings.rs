@@ -1,10 +1,10 @@
-//! The settings of `serve`, from the command line, the environment and a file, in this order of precedence. Other commands
-//! that need some of them, such as the folder of the store, read them in the same way.
+//! The settings of `serve`, from the command line, the environment and a file, in this order of precedence. Other
+//! commands that need some of them, such as the folder of the store, read them in the same way.
 //!
-//! The struct `Config` is the only list of them: what is known of a setting (its flag, variable, type and values) is asked
-//! of clap's description of it. Values of the file become defaults of the command line, so that precedence is clap's own. No
-//! crate that merges sources is used: it would read into a second, serializable form of that struct, and with other
-//! messages than those of flags.
+//! The struct `Config` is the only list of them: the flag, variable, type and values of a setting are taken from clap's
+//! description of it. Values of the file become defaults of the command line, so that clap decides the precedence. No
+//! crate that merges sources is used: it would need a second, serializable form of that struct, and its messages would
+//! differ from those of flags.
 
 use std::{
     any::TypeId,
@@ -28,7 +28,7 @@ use toml::{
 
 use crate::config::{Config, StoreFolder};
 
-/// The settings, and where they are read from.
+/// The settings, and the file they are read from.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -38,8 +38,8 @@ pub(super) struct Arguments {
     pub(super) settings: Config,
 }
 
-/// The file that a command reads its settings from. Whatever command has it may also have arguments with the variables of
-/// settings, which then have their values from the file too.
+/// The file that a command reads its settings from. Other arguments of such a command that have the variables of
+/// settings also take their values from the file.
 #[derive(Debug, Args)]
 pub(super) struct File {
     /// File of settings, in TOML; each key is the name of an environment variable of `signorini serve --help` without
@@ -48,7 +48,7 @@ pub(super) struct File {
     path: Option<PathBuf>,
 }
 
-/// Where a command finds the store that the service with the same settings uses.
+/// The folder of the store, read like the service's setting.
 #[derive(Debug, Args)]
 pub(super) struct Folder {
     #[command(flatten)]
@@ -66,14 +66,14 @@ impl Folder {
 
 /// The id of the argument that names the file; it is not itself a setting.
 const FILE: &str = "settings_file";
-/// What the names of all variables begin with.
+/// The beginning of the names of all variables.
 const PREFIX: &str = "SIGNORINI_";
-/// A larger file is not one of settings.
+/// The largest size of a file of settings.
 const LARGEST_FILE: u64 = 1 << 20;
-/// Names that are so similar are proposed for one that is not known.
+/// The similarity of names from which one is proposed for an unknown one.
 const SIMILAR: f64 = 0.85;
 
-/// What is wrong with a setting, and where it stands.
+/// An invalid setting, and its place.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Wrong {
     place: String,
@@ -86,11 +86,12 @@ impl fmt::Display for Wrong {
     }
 }
 
-/// Where each value of the file stands: `file:line`, by the key of its setting.
+/// The place `file:line` of each value of the file, by the key of its setting.
 pub(super) type Lines = BTreeMap<String, String>;
 
-/// The command with the values of the file as defaults, and where these stand; or all that is wrong with the file and with
-/// the variables that the command takes. A command line that is wrong itself, or whose command reads no file, stays as it is.
+/// The command with the values of the file as defaults, and their places; or all errors in the file and in the
+/// variables that the command takes. A command line that is itself invalid, or whose command reads no file, is not
+/// changed.
 pub(super) fn with_file(
     command: Command,
     line: &[OsString],
@@ -141,7 +142,7 @@ pub(super) fn with_file(
     Ok((command, lines.collect()))
 }
 
-/// The subcommand that is run, which may be one of a subcommand, and what was given to it.
+/// The subcommand that is run, at any depth, and its arguments.
 pub(super) fn innermost<'a>(
     command: &'a Command,
     matches: &'a ArgMatches,
@@ -180,7 +181,7 @@ pub(super) fn key(arg: &Arg) -> String {
     name.trim_start_matches(PREFIX).to_ascii_lowercase()
 }
 
-/// An empty variable counts as one that is not set, as many programs that start services write it.
+/// Whether a variable is empty, which counts as not set, since many programs that start services write empty variables.
 fn is_empty_variable(arg: &Arg) -> bool {
     let value = arg.get_env().and_then(env::var_os);
     value.is_some_and(|value| value.is_empty())
@@ -203,7 +204,7 @@ fn wrong_variables<'a>(settings: impl Iterator<Item = &'a Arg>) -> Vec<Wrong> {
     wrong
 }
 
-/// Variables that look like a setting and are none, each with the one that is most similar.
+/// Variables that look like settings but are none, each with the most similar setting.
 pub(super) fn unknown_variables() -> Vec<(String, String)> {
     const OTHERS: [&str; 3] = ["SIGNORINI_CONFIG", "SIGNORINI_URL", "SIGNORINI_TOKEN"];
     let settings = settings();
@@ -230,12 +231,12 @@ fn most_similar<'a, T>(name: &str, known: &'a [T], text: impl Fn(&T) -> &str) ->
     (best.0 >= SIMILAR).then_some(best.1)
 }
 
-/// What a file may have for a setting.
+/// The kind of value that a setting has in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Text,
     Integer,
-    /// With or without a decimal point.
+    /// A number with or without a decimal point.
     Number,
     Flag,
     List,
@@ -270,7 +271,7 @@ impl Kind {
     }
 }
 
-/// Checks a value as clap would on the command line; an error is what was expected.
+/// Checks a value as clap would on the command line; the error is the expected value.
 fn check(arg: &Arg, value: &OsStr) -> Result<(), String> {
     let kind = Kind::of(arg);
     if kind == Kind::Flag {
@@ -302,7 +303,7 @@ fn check(arg: &Arg, value: &OsStr) -> Result<(), String> {
 /// A setting in a file.
 #[derive(Debug)]
 struct Value {
-    /// One, or those of a list.
+    /// The text, or the texts of a list.
     texts: Vec<String>,
     place: String,
 }
@@ -311,13 +312,13 @@ fn read(path: &Path) -> Result<String, String> {
     let unread = |error: std::io::Error| format!("cannot be read: {error}");
     // opening a pipe would wait for its writer
     if !fs::metadata(path).map_err(unread)?.is_file() {
-        return Err("expected a file of settings, and this is not a file".into());
+        return Err("expected a file of settings, but this is not a file".into());
     }
     let mut text = String::new();
     let file = fs::File::open(path).map_err(unread)?;
     let read = file.take(LARGEST_FILE + 1).read_to_string(&mut text);
     if read.map_err(unread)? as u64 > LARGEST_FILE {
-        return Err("expected a file of settings, and this has more than 1 MiB".into());
+        return Err("expected a file of settings, but this has more than 1 MiB".into());
     }
     Ok(text)
 }
@@ -339,7 +340,7 @@ fn values_of(
     for error in &errors {
         wrong.push(Wrong {
             place: place(error.span().map_or(0, |span| span.start)),
-            what: format!("this is no TOML: {}", error.message()),
+            what: format!("not valid TOML: {}", error.message()),
         });
     }
     if !errors.is_empty() {
@@ -356,9 +357,9 @@ fn values_of(
             let similar = most_similar(&name.replace('-', "_"), &keys, |(key, _)| key);
             let hint = match similar {
                 Some((key, _)) => format!("did you mean {key}?"),
-                None => "`signorini config show` prints all that there are".into(),
+                None => "`signorini config show` prints all settings".into(),
             };
-            let what = format!("{name:?}: there is no such setting; {hint}");
+            let what = format!("{name:?} is not a setting; {hint}");
             wrong.push(Wrong { place, what });
             continue;
         };
@@ -415,7 +416,7 @@ fn texts(arg: &Arg, value: &DeValue<'_>) -> Result<Vec<String>, String> {
     Ok(texts)
 }
 
-/// A value for a message: itself if it is short.
+/// A value for a message, itself if it is short.
 fn shown(value: &DeValue<'_>) -> String {
     match value {
         DeValue::String(text) if text.len() <= 60 => format!("{text:?}"),
@@ -464,7 +465,7 @@ mod tests {
     }
 
     #[test]
-    fn all_that_is_wrong_is_told_with_its_line_what_was_found_and_what_is_expected() {
+    fn every_error_has_its_line_the_value_found_and_the_expected_one() {
         let (_, wrong) = read(
             "wokers = 2\nworkers = 'many'\n\nisolation = 'proces'\nmax_queued = -1\nallowed_hosts = 'lab'\n\
              allowed_origins = ['https://a', 'lab/']\nproxy_admins = ['a,b']\nallow_unauthenticated = 1\nlisten = 80\n\
@@ -488,7 +489,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_toml_is_told_with_all_its_lines() {
+    fn invalid_toml_is_reported_with_line_numbers() {
         let (values, wrong) = read("workers = \nlisten 80\nworkers = 3\n");
         assert!(values.is_empty());
         assert!(wrong.len() >= 2, "{wrong:?}");

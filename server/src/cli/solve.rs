@@ -1,4 +1,4 @@
-//! `signorini solve FILE`: runs the same code as a worker of the service.
+//! The command `signorini solve FILE`, which runs the same code as a worker of the service.
 
 use std::{
     fs::File,
@@ -44,8 +44,8 @@ pub(super) struct Arguments {
     #[arg(short, long, value_name = "OUT", help = output::help())]
     output: Vec<PathBuf>,
 
-    /// The file of the mesh that the problem names by its hash (mesh.stored), as it was uploaded. `solve` of the mesh
-    /// itself prints that hash
+    /// The file of the mesh that the problem names by its hash (mesh.stored), as it was uploaded. `signorini solve`
+    /// with the mesh file itself prints that hash
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
 
@@ -59,7 +59,7 @@ pub(super) struct Arguments {
     threads: Threads,
 }
 
-/// How many processors a large problem may use. The result is the same, bit for bit.
+/// The option for the number of processors that a large problem may use. The result is the same, bit for bit.
 #[derive(Clone, Copy, Debug, Args)]
 pub(super) struct Threads {
     /// Threads for a large problem: 1, or 2 where there are two processors [default: 2]
@@ -68,7 +68,7 @@ pub(super) struct Threads {
 }
 
 impl Threads {
-    /// Whether a second one may be used.
+    /// Whether a second thread may be used.
     pub(super) fn second(self) -> ControlFlow<()> {
         let processors = || std::thread::available_parallelism().map_or(1, usize::from);
         match self.threads.map_or_else(processors, usize::from) {
@@ -99,7 +99,7 @@ pub(super) fn run(
                     && ["/base", "/axes", "/points"].contains(&violation.pointer.as_str())
             };
             if violations.iter().any(of_sweep) {
-                eprintln!("This seems to be a sweep: solve it by `signorini sweep`.");
+                eprintln!("This seems to be a sweep: solve it with `signorini sweep`.");
             }
             return Ok(exit);
         }
@@ -229,8 +229,8 @@ fn stored_mesh(
         (None, None) => return Ok(None),
         (Some(_), None) => {
             return Err(Unusable::Reason(
-                "the problem names its mesh by a hash (mesh.stored): give its file by --mesh FILE, or have a service \
-                 solve it that has the mesh: signorini submit"
+                "the problem names its mesh by a hash (mesh.stored): give its file with --mesh FILE, or submit the problem to a service \
+                 that has the mesh: signorini submit"
                     .into(),
             ));
         }
@@ -245,7 +245,7 @@ fn stored_mesh(
     let (found, bytes) = hashed(&mut opened)?;
     if found != named {
         return Err(Unusable::Reason(format!(
-            "--mesh {}: it has the hash {found}, and the problem names {named}",
+            "--mesh {}: this file has the hash {found}, but the problem names {named}",
             file.display()
         )));
     }
@@ -257,7 +257,7 @@ fn stored_mesh(
     Ok(Some((info, mesh)))
 }
 
-/// The hash of what is left of a file, and how many bytes that is.
+/// The hash of the rest of a file, and its number of bytes.
 fn hashed(opened: &mut File) -> std::io::Result<(String, u64)> {
     let mut hash = Sha256::new();
     let (mut piece, mut bytes) = (vec![0; 1 << 16], 0);
@@ -272,15 +272,15 @@ fn hashed(opened: &mut File) -> std::io::Result<(String, u64)> {
     }
 }
 
-/// What a file is.
+/// The content of a file.
 enum Given {
-    /// A problem, and what is done differently here than its deck says.
+    /// A problem, and warnings about deviations from its deck.
     Problem(Box<Problem>, Vec<Warning>),
     /// A mesh of Gmsh, or a deck without a step.
     Mesh,
 }
 
-/// Says what a mesh is, and how a problem refers to it.
+/// Prints what a mesh contains, and how a problem refers to it.
 fn only_a_mesh(file: &Path) -> anyhow::Result<Exit> {
     let cannot = || format!("cannot read {}", file.display());
     let mut opened = File::open(file).with_context(cannot)?;
@@ -305,7 +305,7 @@ fn only_a_mesh(file: &Path) -> anyhow::Result<Exit> {
     };
     let name = file.display();
     eprintln!(
-        "{name}: a mesh and no problem: {} nodes, {} elements, {}, {}, {}.",
+        "{name} is a mesh, not a problem: {} nodes, {} elements, {}, {}, {}.",
         mesh.nodes.len(),
         mesh.elements.len(),
         names("boundaries", mesh.boundaries.keys().collect()),
@@ -313,13 +313,14 @@ fn only_a_mesh(file: &Path) -> anyhow::Result<Exit> {
         names("node sets", mesh.node_sets.keys().collect()),
     );
     eprintln!(
-        "  Write a problem as JSON with \"mesh\": {{\"stored\": \"{hash}\"}}, materials, supports and contacts, and solve it by \
+        "  Write a problem as JSON with \"mesh\": {{\"stored\": \"{hash}\"}}, materials, supports and contacts, and solve it with \
          `signorini solve problem.json --mesh {name}`."
     );
     Ok(Exit::Invalid)
 }
 
-/// Reads a problem by the ending of its file: of a JSON file with a mesh only the mesh is held, not its text.
+/// Reads a file, depending on its extension. For a JSON file with a mesh, only the mesh is held in memory, not its
+/// text.
 fn read(file: &Path) -> Result<Given, ReadError> {
     let mut opened = File::open(file).map_err(ReadError::Io)?;
     let is = |wanted: &str| {
@@ -352,7 +353,7 @@ fn read(file: &Path) -> Result<Given, ReadError> {
     Ok(problem(read, warnings))
 }
 
-/// `signorini schema`.
+/// The command `signorini schema`.
 pub(super) fn schema() -> anyhow::Result<Exit> {
     output::print(&format!("{:#}\n", files::schema()))?;
     Ok(Exit::Ok)
@@ -383,8 +384,8 @@ mod tests {
 
     use crate::{digest, fake};
 
-    /// Of a large inline mesh only the columns are held, which grow by doubling, and a few pieces of the text; nothing
-    /// for its fingerprint.
+    /// A large inline mesh is read and hashed in the memory of its columns, which grow by doubling, and of a few pieces
+    /// of the text.
     #[test]
     fn a_large_inline_mesh_is_read_and_hashed_in_the_memory_of_its_columns() {
         const PIECES: i64 = 512 << 10;

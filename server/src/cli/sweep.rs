@@ -1,4 +1,4 @@
-//! `signorini sweep FILE`: solves all members of a sweep, by the same code as a worker of the service.
+//! The command `signorini sweep FILE`: solves all members of a sweep, by the same code as a worker of the service.
 
 use std::{
     borrow::Cow,
@@ -33,10 +33,11 @@ use crate::{
 
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Example:\n  signorini sweep examples/sweeps/stick_width.json -o study.csv\n\nSolved here, without a service; `signorini submit` takes the same file."
+    after_help = "Example:\n  signorini sweep examples/sweeps/stick_width.json -o study.csv\n\nIt is solved on this machine, without a service; `signorini submit` accepts the same file."
 )]
 pub(super) struct Arguments {
-    /// The sweep: a JSON file as for POST /v1/sweeps; `base` may also be the path of a problem, from that file's folder
+    /// The sweep: a JSON file as for POST /v1/sweeps; `base` may also be the path of a problem, relative to that file's
+    /// folder
     file: PathBuf,
 
     /// Write the table to this file, in the format of its extension: .json, .csv, .jsonl, .arrow or .npz; - writes JSON to
@@ -51,7 +52,7 @@ pub(super) struct Arguments {
     threads: Threads,
 }
 
-/// A file with a sweep. What is for the service only is not used.
+/// A file with a sweep. Fields for the service only are ignored.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Definition<'a> {
@@ -73,7 +74,7 @@ struct Definition<'a> {
     _limits: Option<IgnoredAny>,
 }
 
-/// How often progress is told.
+/// How often progress is printed.
 const PAUSE: Duration = Duration::from_millis(500);
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
@@ -181,7 +182,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
     })
 }
 
-/// The format of a table by the name of its file; an error says why there is none.
+/// The format of a table by the name of its file; the error says why there is none.
 pub(super) fn format_of(path: &Path) -> Result<Format, String> {
     if path.as_os_str() == "-" {
         return Ok(Format::Json);
@@ -209,7 +210,7 @@ pub(super) fn format_of(path: &Path) -> Result<Format, String> {
     }
 }
 
-/// The base of a sweep in this file, if it names a file instead of being a problem.
+/// The base of a sweep, read from the file that it names; `None` if it is a problem itself.
 pub(super) fn base_from_file(
     file: &Path,
     base: Option<&RawValue>,
@@ -238,7 +239,7 @@ fn malformed(pointer: &str, found: String) -> Vec<Violation> {
     )]
 }
 
-/// Reads a sweep from a file's text; an error if the file of its base cannot be read.
+/// Reads a sweep from a file's text; the error says why the file of its base cannot be read.
 fn read(file: &Path, text: &str) -> anyhow::Result<Result<Sweep, Vec<Violation>>> {
     if let Some(place) = files::json::too_deep(text) {
         return Ok(Err(malformed("", place)));

@@ -1,13 +1,13 @@
-//! Rows of texts as a table.
+//! Formats rows of texts as a table.
 
 use unicode_width::UnicodeWidthStr;
 
-/// A text of somebody else for a terminal: without characters that would do something there.
+/// A text from elsewhere made safe for a terminal: without control characters.
 pub(super) fn harmless(text: &str) -> String {
     text.replace(char::is_control, "\u{fffd}")
 }
 
-/// A line for each row, below the headings. Columns are as wide as their widest cell.
+/// A table with a line for each row, below the headings. Columns are as wide as their widest cell.
 pub(super) fn table<const N: usize>(headings: [&str; N], rows: &[[String; N]]) -> String {
     let rows: Vec<[String; N]> = rows
         .iter()

@@ -1,4 +1,4 @@
-//! `signorini token`: in a store that no server uses, or through a running service.
+//! The command `signorini token`: for a store that no server uses, or through a running service.
 
 use std::sync::Arc;
 
@@ -31,13 +31,13 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Create a token and print it; it is not stored, and cannot be printed again. The first one must have the scope admin;
-    /// once there is one, every request needs a token
+    /// Create a token and print it; it is not stored and cannot be printed again. The first one must have the scope
+    /// admin; once there is a token, every request needs one
     Create {
-        /// For people: where it is used
+        /// A name for people, such as where the token is used
         #[arg(long)]
         name: String,
-        /// Whose jobs it submits: letters, digits and . _ @ + -
+        /// Owner of the jobs that it submits: letters, digits and . _ @ + -
         #[arg(long)]
         owner: String,
         /// read, submit, cancel or admin, which includes the others for the jobs of all owners; can be repeated, or a list
@@ -48,7 +48,7 @@ enum Command {
             default_value = "read,submit,cancel"
         )]
         scopes: Vec<String>,
-        /// Seconds, or with a unit as 90d, 12h, 30m, until it expires [default: it does not]
+        /// Time until the token expires, in seconds or with a unit such as 90d, 12h, 30m [default: never]
         #[arg(long, value_name = "TIME", value_parser = duration_s)]
         expires_in: Option<f64>,
         #[command(flatten)]
@@ -59,30 +59,30 @@ enum Command {
         #[command(flatten)]
         at: TokenStore,
     },
-    /// Revoke a token: from then on it is refused
+    /// Revoke a token, which is refused from then on
     Revoke {
-        /// Its id, as `list` shows it
+        /// The token's id, as `list` shows it
         id: String,
         #[command(flatten)]
         at: TokenStore,
     },
-    /// Give a token another secret and print it; from then on the old one is refused
+    /// Give a token a new secret and print it; the old one is refused from then on
     Rotate {
-        /// Its id, as `list` shows it
+        /// The token's id, as `list` shows it
         id: String,
         #[command(flatten)]
         at: TokenStore,
     },
 }
 
-/// Where the tokens are.
+/// The options for the place of the tokens.
 #[derive(Debug, Args)]
 struct TokenStore {
     #[command(flatten)]
     folder: Folder,
 
-    /// Address of a running service, as http://127.0.0.1:8080. It is called with the token in SIGNORINI_TOKEN. Without it, no
-    /// server may be using the store
+    /// Address of a running service, such as http://127.0.0.1:8080. Requests carry the token in SIGNORINI_TOKEN.
+    /// Without it, no server may be using the store
     #[arg(long, env = "SIGNORINI_URL", value_name = "URL")]
     url: Option<String>,
 
@@ -90,13 +90,13 @@ struct TokenStore {
     trust: Trust,
 }
 
-/// Whether the command line names a folder and no address: that goes before an address in the environment.
+/// Whether the command line names a folder and no address, which takes precedence over an address in the environment.
 pub(super) fn names_folder(given: &ArgMatches) -> bool {
     let named = |id: &str| given.value_source(id) == Some(ValueSource::CommandLine);
     named("data") && !named("url")
 }
 
-/// `folder`: the tokens are those of a store, and not of a running service.
+/// Runs the command. `folder`: the tokens are those of a store, and not of a running service.
 pub(super) async fn run(arguments: Arguments, folder: bool) -> anyhow::Result<Exit> {
     match arguments.command {
         Command::Create {
@@ -197,20 +197,20 @@ fn new_token(mut answer: Value) -> anyhow::Result<(Token, String)> {
     Ok((token, secret))
 }
 
-/// What is called for the tokens.
+/// Where tokens are changed.
 enum Target {
     Store(Arc<Store>),
     Service(Service),
 }
 
 impl TokenStore {
-    /// `create`: a store may be made for it; `folder`: it is not the address that counts.
+    /// Opens the store, or connects to the service. `create`: a store may be created; `folder`: the address is ignored.
     async fn open(&self, create: bool, folder: bool) -> anyhow::Result<Target> {
         let Some(url) = self.url.as_ref().filter(|url| !folder && !url.is_empty()) else {
             let folder = self.folder.path();
             if !folder.exists() {
                 match create {
-                    true => eprintln!("a new store is made in {}", folder.display()),
+                    true => eprintln!("creating a new store in {}", folder.display()),
                     false => bail!(StoreError::Folder(format!(
                         "there is no store in {}",
                         folder.display()
@@ -259,7 +259,7 @@ fn state(token: &Token, now: Time) -> String {
     }
 }
 
-/// A line for each, below their headings.
+/// A table of the tokens, below headings.
 fn listed(tokens: &[Token]) -> String {
     let now = Time::of_the_machine();
     let row = |token: &Token| {
@@ -278,7 +278,7 @@ fn listed(tokens: &[Token]) -> String {
     table(["ID", "OWNER", "NAME", "SCOPES", "STATE"], &rows)
 }
 
-/// Seconds, or a number with one of the units s, m, h, d.
+/// Reads a duration: seconds, or a number with one of the units s, m, h, d.
 fn duration_s(text: &str) -> Result<f64, String> {
     let (number, unit) = match text.strip_suffix(['s', 'm', 'h', 'd']) {
         Some(number) => (number, &text[number.len()..]),

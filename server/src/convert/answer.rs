@@ -54,7 +54,7 @@ impl IntoMessage<String> for JobId {
     }
 }
 
-/// Enums that are texts both in JSON and in messages.
+/// Converts enums that are texts both in JSON and in messages.
 macro_rules! words {
     ($($type:ty),*) => {
         $(impl IntoMessage<String> for $type {
@@ -122,7 +122,7 @@ impl From<Event> for pb::Event {
     }
 }
 
-/// Values of any type, as JSON.
+/// Converts values of any type to JSON.
 impl IntoMessage<String> for crate::sweep::ParameterValue {
     fn into_message(self) -> String {
         self.json().to_owned()

@@ -16,7 +16,7 @@ use crate::{
     verbs::{bulk, info, jobs, lists, problems, queue, results, tokens},
 };
 
-/// A type that is written as a message, by itself and as a field that is always set.
+/// Converts a type to a message, by itself and as a field that is always set.
 macro_rules! written {
     ($ours:ty => $message:ty) => {
         impl IntoMessage<$message> for $ours {
@@ -33,7 +33,7 @@ macro_rules! written {
     };
 }
 
-/// A type that is read from a message that must be set.
+/// Reads a type from a message that must be set.
 macro_rules! required {
     ($message:ty => $ours:ty, $expected:literal) => {
         impl FromMessage<Option<$message>> for $ours {
@@ -47,7 +47,7 @@ macro_rules! required {
     };
 }
 
-/// A type that is read from a message that may be absent.
+/// Reads a type from a message that may be absent.
 macro_rules! defaulted {
     ($message:ty => $ours:ty) => {
         impl FromMessage<Option<$message>> for $ours {

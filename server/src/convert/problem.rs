@@ -82,7 +82,7 @@ impl From<MeshInput> for pb::Mesh {
     }
 }
 
-/// A type that is written with fields of which not all may be set together.
+/// Reads a type whose message has fields that exclude each other.
 macro_rules! checked {
     ($($message:ty => $fields:ty => $ours:ty),*) => { $(
         impl FromMessage<$message> for $ours {
@@ -102,7 +102,7 @@ macro_rules! checked {
 
 checked!(pb::Material => MaterialFields => Material, pb::Load => LoadFields => Load);
 
-/// A number, or two of them.
+/// Reads one number, or two.
 impl FromMessage<pb::BoundaryValue> for BoundaryValue {
     fn from_message(message: pb::BoundaryValue, read: &mut Reader) -> Option<Self> {
         let pb::BoundaryValue { start, end } = message;
@@ -126,7 +126,7 @@ impl From<BoundaryValue> for pb::BoundaryValue {
     }
 }
 
-/// A number, or a table.
+/// Reads a number, or a table.
 impl FromMessage<Bound> for PrescribedBound {
     fn from_message(message: Bound, read: &mut Reader) -> Option<Self> {
         match message {

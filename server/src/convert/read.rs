@@ -1,24 +1,24 @@
-//! From messages. Errors that are possible in a message but not in JSON (an absent message, an unknown enum
+//! Reads types from messages. Errors that are possible in a message but not in JSON (an absent message, an unknown enum
 //! number, a number that is not finite) are all found here, with the pointers that the JSON form would have.
 
 use std::collections::BTreeMap;
 
 use solver::error::{Findings, Reason, Violation, escape};
 
-/// A type that a message, or a field of one, can be read as.
+/// A type that can be read from a message, or from a field of one.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not read from `{M}`",
     note = "a field of a message and the field of its name in our struct have types that do not fit",
     note = "`server/build/mirrors.rs` lists what is converted field by field, `server/src/convert` has the rest"
 )]
 pub trait FromMessage<M>: Sized {
-    /// `None` if it cannot be read; `read` then holds the violation.
+    /// Reads the message. `None` if that fails; `read` then has the violation.
     fn from_message(message: M, read: &mut Reader) -> Option<Self>;
 }
 
 /// A field that a message may leave out.
 pub trait FromOptional<M>: Sized {
-    /// `default` if it is left out.
+    /// Reads the field; `default` if it is left out.
     fn from_optional(message: Option<M>, default: Self, read: &mut Reader) -> Option<Self>;
 }
 
@@ -66,28 +66,28 @@ impl Reader {
         self.at(Token::Index(index), |read| T::from_message(message, read))
     }
 
-    /// Reads what belongs to a field.
+    /// Reads the parts of a field.
     pub fn inside<T>(&mut self, name: &'static str, read: impl FnOnce(&mut Self) -> T) -> T {
         self.at(Token::Name(name), read)
     }
 
-    /// Reads what belongs to an entry of a list.
+    /// Reads the parts of an entry of a list.
     pub fn item<T>(&mut self, index: usize, read: impl FnOnce(&mut Self) -> T) -> T {
         self.at(Token::Index(index), read)
     }
 
-    /// A message that must be set is absent.
+    /// Reports that a required message is absent.
     pub fn missing<T>(&mut self, expected: &str) -> Option<T> {
         self.wrong(Reason::Missing, "nothing", expected)
     }
 
-    /// None of the alternatives of `kind` is set.
+    /// Reports that none of the alternatives of `kind` is set.
     pub fn no_kind<T>(&mut self, kinds: &str) -> Option<T> {
         let kinds = format!("one of {kinds}");
         self.at(Token::Name("kind"), |read| read.missing(&kinds))
     }
 
-    /// A number that the enum does not have.
+    /// Reports a number that the enum does not have.
     pub fn unknown<T>(&mut self, number: i32, name: &str) -> Option<T> {
         self.wrong(
             Reason::UnknownAlternative,
@@ -96,13 +96,13 @@ impl Reader {
         )
     }
 
-    /// A violation at the current place.
+    /// Reports a violation at the current place.
     pub fn wrong<T>(&mut self, reason: Reason, got: impl ToString, expected: &str) -> Option<T> {
         let hint = "See the comments in signorini.proto.";
         self.violation(Violation::new("", reason, got, expected, hint))
     }
 
-    /// A violation at or below the current place.
+    /// Reports a violation at or below the current place.
     pub fn violation<T>(&mut self, violation: Violation) -> Option<T> {
         if self.found.is_full() {
             self.found.count(1);
@@ -158,7 +158,7 @@ macro_rules! as_it_is {
 
 as_it_is!(bool, u32, String);
 
-/// Names that are left out are empty.
+/// A name that is left out is empty.
 impl FromMessage<String> for Option<String> {
     fn from_message(name: String, _: &mut Reader) -> Option<Self> {
         Some(Some(name).filter(|name| !name.is_empty()))
@@ -183,7 +183,7 @@ impl<M, T: FromMessage<M>> FromMessage<Vec<M>> for Vec<T> {
     }
 }
 
-/// Lists that are left out are empty.
+/// A list that is left out is empty.
 impl<M, T: FromMessage<M>> FromMessage<Vec<M>> for Option<Vec<T>> {
     fn from_message(messages: Vec<M>, read: &mut Reader) -> Option<Self> {
         let some = !messages.is_empty();

@@ -1,4 +1,4 @@
-//! What requests hold beside a problem.
+//! Reads the parts of requests other than a problem.
 
 use files::sweep::Fields;
 use prost_types::Timestamp;
@@ -21,7 +21,7 @@ use crate::{
     },
 };
 
-/// A job as it is asked for. Pointers go into the request.
+/// Reads the request for a job. Pointers refer to the request.
 pub fn job_request(request: pb::CreateJobRequest) -> JobRequest {
     let pb::CreateJobRequest {
         problem,
@@ -52,7 +52,8 @@ pub fn job_request(request: pb::CreateJobRequest) -> JobRequest {
     JobRequest { envelope, problem }
 }
 
-/// A sweep as it is asked for: its definition as JSON, which is read as over REST. Pointers go into the request.
+/// Reads the request for a sweep: its definition as JSON, which is then read as over REST. Pointers refer to the
+/// request.
 pub fn sweep_request(request: pb::CreateSweepRequest) -> SweepRequest {
     let pb::CreateSweepRequest {
         base,
@@ -114,7 +115,7 @@ pub fn sweep_request(request: pb::CreateSweepRequest) -> SweepRequest {
     }
 }
 
-/// Each item as JSON; what cannot be read is noted at its place.
+/// Reads each item as JSON; violations are recorded at their places.
 fn read_each<M>(
     name: &'static str,
     messages: Vec<M>,
@@ -127,7 +128,7 @@ fn read_each<M>(
     })
 }
 
-/// An axis as JSON.
+/// Reads an axis as JSON.
 fn axis(message: pb::SweepAxis, read: &mut Reader) -> Option<String> {
     use pb::sweep_axis::Values;
     let pb::SweepAxis { path, values } = message;
@@ -160,7 +161,7 @@ fn axis(message: pb::SweepAxis, read: &mut Reader) -> Option<String> {
     }
 }
 
-/// A point as JSON.
+/// Reads a point as JSON.
 fn point(message: pb::SweepPoint, read: &mut Reader) -> Option<String> {
     let mut members = vec![];
     let mut sound = true;
@@ -173,7 +174,7 @@ fn point(message: pb::SweepPoint, read: &mut Reader) -> Option<String> {
     sound.then(|| format!("{{{}}}", members.join(",")))
 }
 
-/// A text that is a value as JSON, and nested no deeper than a problem may be.
+/// Reads a text that is a JSON value, nested no deeper than a problem may be.
 fn json_text(text: String, read: &mut Reader) -> Option<String> {
     let deep = files::json::too_deep(&text);
     let read_one = || serde_json::from_str::<&RawValue>(&text).map(|_| ());
@@ -184,7 +185,7 @@ fn json_text(text: String, read: &mut Reader) -> Option<String> {
     }
 }
 
-/// Which jobs.
+/// Reads the filter for jobs.
 pub fn filter(message: Option<pb::JobFilter>) -> Result<Filter, ApiError> {
     let pb::JobFilter {
         status: numbers,
@@ -234,7 +235,7 @@ fn time(name: &'static str, stamp: Option<Timestamp>) -> Result<Option<Time>, Ap
     }
 }
 
-/// What is changed of a job.
+/// Reads the changes of a job.
 pub fn edit(request: pb::UpdateJobRequest) -> Result<Edit, ApiError> {
     let pb::UpdateJobRequest {
         update_mask,
@@ -272,7 +273,7 @@ pub fn edit(request: pb::UpdateJobRequest) -> Result<Edit, ApiError> {
     Ok(edit)
 }
 
-/// A field with a value that it cannot have.
+/// The error for a field with an invalid value.
 pub fn invalid_field(
     name: &'static str,
     got: impl ToString,

@@ -1,15 +1,15 @@
-//! Into messages.
+//! Converts types to messages.
 
 use std::collections::BTreeMap;
 
-/// A type that a message, or a field of one, can be made of.
+/// A type that can be converted to a message, or to a field of one.
 #[diagnostic::on_unimplemented(
     message = "`{M}` is not written from `{Self}`",
     note = "a field of our struct and the field of its name in the message have types that do not fit",
     note = "`server/build/mirrors.rs` lists what is converted field by field, `server/src/convert` has the rest"
 )]
 pub trait IntoMessage<M> {
-    /// All of it.
+    /// Converts the whole value.
     fn into_message(self) -> M;
 }
 

@@ -1,5 +1,5 @@
-//! The fingerprints of a problem (`input_hash`) and of a result (`digest`) are the SHA-256 of canonical JSON (RFC 8785),
-//! so that any client in any language can check them. That of a body is for this process alone.
+//! The fingerprints of a problem (`input_hash`) and of a result (`digest`) are the SHA-256 of canonical JSON (RFC
+//! 8785), so that any client in any language can check them. The fingerprint of a body is used within one process only.
 
 mod number;
 
@@ -17,31 +17,31 @@ use solver::solution::{Fields, GaussFields, Solution};
 
 use crate::bodies::Key;
 
-/// Fingerprint of a problem with its defaults filled in. The title is for people and not included. Units are:
-/// problems are stored once per fingerprint, and figures show their units.
+/// The fingerprint of a problem with its defaults filled in. The title is for people and not included. Units are
+/// included: problems are stored once per fingerprint, and figures show their units.
 pub fn input_hash(problem: &Problem) -> serde_json::Result<String> {
     let mut hash = Hash::new();
     hash.problem(problem)?;
     Ok(hash.finish())
 }
 
-/// Fingerprint of anything that has a canonical form.
+/// The fingerprint of anything that has a canonical form.
 pub fn of_json(value: &impl Serialize) -> serde_json::Result<String> {
     let mut hash = Hash::new();
     hash.json(value)?;
     Ok(hash.finish())
 }
 
-/// Fingerprint of all that a model's body is made from. It is that of a binary form, not of JSON: it never leaves this
-/// process, and the canonical writer would hold a large mesh as text.
+/// The fingerprint of everything that a model's body is made from. It uses a binary form, not JSON: it never leaves
+/// this process, and the canonical writer would hold a large mesh as text.
 pub fn of_body(model: &Model) -> postcard::Result<Key> {
     let hash = postcard::to_io(&Source::of(model), Hash::new())?;
     Ok(hash.sha256().finalize().into())
 }
 
-/// Fingerprint of a result: equal digests mean equal bits. Times, the program's version and what is said about the
-/// accuracy are not included. All numbers must be finite: others have no canonical form. `go_on` is asked before
-/// every row and load step; `None` if it says no.
+/// Fingerprint of a result: equal digests mean equal bits. Times, the program's version and the statements about
+/// accuracy are not included. All numbers must be finite: others have no canonical form. `go_on` is called before every
+/// row and load step; `None` if it returns false.
 pub fn digest(
     solution: &Solution,
     input_hash: &str,
@@ -71,7 +71,7 @@ pub fn digest(
     Ok(Some(hash.finish()))
 }
 
-/// A finished hash in its text form.
+/// A finished hash as text.
 pub fn sha256_text(hash: Sha256) -> String {
     format!("sha256:{}", hex(&hash.finalize()))
 }
@@ -81,13 +81,13 @@ pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Bytes that are hashed at once.
+/// The number of bytes that are hashed at once.
 const AT_ONCE: usize = 1 << 14;
 
-/// SHA-256 as something to write canonical JSON to.
+/// A writer of canonical JSON that computes its SHA-256.
 struct Hash {
     sha256: Sha256,
-    /// What is yet to be hashed: the first `length` bytes.
+    /// The text that is not hashed yet: the first `length` bytes.
     text: Box<[u8; AT_ONCE]>,
     length: usize,
     recent: Recent,
@@ -126,7 +126,7 @@ impl Hash {
         self.length += 1;
     }
 
-    /// Room for so many more bytes, or nothing left to be hashed before them.
+    /// Makes room for this many more bytes, by hashing those before them.
     #[inline]
     fn make_room(&mut self, bytes: usize) {
         if self.length + bytes > AT_ONCE {
@@ -139,7 +139,7 @@ impl Hash {
         serde_json_canonicalizer::to_writer(value, self)
     }
 
-    /// An array, one value after the other; false if `go_on` says no before one.
+    /// Writes an array, one value after another; false if `go_on` returns false before one.
     fn array(
         &mut self,
         values: &[impl Serialize],
@@ -157,7 +157,7 @@ impl Hash {
         Ok(true)
     }
 
-    /// A problem without its title. As of fields, the mesh is written by hand.
+    /// Writes a problem without its title. Its mesh is written by hand, like fields.
     fn problem(&mut self, problem: &Problem) -> serde_json::Result<()> {
         // all of them by name, here and below, so that a new one is not forgotten
         let Problem {
@@ -292,7 +292,7 @@ impl Hash {
         Ok(())
     }
 
-    /// A key and the list of its numbers, as the canonical writer has them.
+    /// Writes a key and its list of numbers in canonical form.
     fn column(&mut self, key: &str, numbers: &[f64]) -> serde_json::Result<()> {
         are_finite(numbers)?;
         self.text_of(key);
@@ -302,7 +302,7 @@ impl Hash {
         Ok(())
     }
 
-    /// The same of numbers that repeat.
+    /// Writes a key and its list of numbers that repeat often.
     fn coordinates(&mut self, key: &str, numbers: &[f64]) -> serde_json::Result<()> {
         are_finite(numbers)?;
         self.text_of(key);
@@ -323,7 +323,7 @@ impl Hash {
         });
     }
 
-    /// A number that `write` writes.
+    /// Writes a number by `write`.
     #[inline]
     fn number(&mut self, write: impl FnOnce(&mut Recent, &mut [u8; ROOM]) -> usize) {
         self.make_room(ROOM);
@@ -354,7 +354,7 @@ impl Hash {
     }
 }
 
-/// Others have no canonical form.
+/// Fails unless all numbers are finite: others have no canonical form.
 fn are_finite(numbers: &[f64]) -> serde_json::Result<()> {
     match numbers.iter().find(|value| !value.is_finite()) {
         Some(value) => {

@@ -1,8 +1,8 @@
-//! Numbers in canonical JSON (RFC 8785), which are those of ECMAScript: the fewest digits that tell a number from all
-//! others, as `zmij` finds them, which also writes most of them so. What differs is where the point stands: ECMAScript
-//! writes whole numbers without one, and numbers from 1e-6 and below 1e21 without an exponent.
+//! Numbers in canonical JSON (RFC 8785), in the form of ECMAScript: the fewest digits that distinguish a number from
+//! all others, as `zmij` finds them. The form of `zmij` differs only in the place of the point: ECMAScript writes whole
+//! numbers without one, and numbers from 1e-6 and below 1e21 without an exponent.
 
-/// Room for any number, and for copies of a fixed size.
+/// The room for any number, and for copies of a fixed size.
 pub(super) const ROOM: usize = 32;
 
 /// Writes a finite number to the start of `out`, and returns its length.
@@ -22,7 +22,7 @@ pub(super) fn write(value: f64, out: &mut [u8; ROOM]) -> usize {
     }
 }
 
-/// The same for a whole number, in a third of the time.
+/// Writes a whole number, in a third of the time that [`write`] takes.
 #[inline]
 pub(super) fn write_whole(value: u32, out: &mut [u8; ROOM]) -> usize {
     let length = value.checked_ilog10().unwrap_or_default() as usize + 1;
@@ -34,8 +34,8 @@ pub(super) fn write_whole(value: u32, out: &mut [u8; ROOM]) -> usize {
     length
 }
 
-/// The texts of numbers that come again and again, as coordinates do: of points on a line, and of the integration points
-/// of an element.
+/// The texts of numbers that occur repeatedly, like coordinates of points on a line or of the integration points of an
+/// element.
 pub(super) struct Recent(Box<[Written; RECENT]>);
 
 const RECENT: usize = 256;
@@ -57,7 +57,7 @@ impl Recent {
         Recent(Box::new([zero; RECENT]))
     }
 
-    /// As [`write`], from memory if it can.
+    /// As [`write`], using a remembered text if there is one.
     #[inline]
     pub(super) fn write(&mut self, value: f64, out: &mut [u8; ROOM]) -> usize {
         let bits = value.to_bits();
@@ -73,7 +73,7 @@ impl Recent {
     }
 }
 
-/// Copies a number by pieces of fixed sizes, which overlap: a call that copies any number of bytes takes as long as
+/// Copies a number in pieces of fixed sizes, which overlap: a call that copies any number of bytes takes as long as
 /// finding the digits.
 #[inline]
 fn copy(text: &[u8], out: &mut [u8; ROOM]) -> usize {
@@ -89,7 +89,7 @@ fn copy(text: &[u8], out: &mut [u8; ROOM]) -> usize {
     length
 }
 
-/// The same number with its point among its digits: `1.5e-6` and `1.5e+20`.
+/// Writes a number without its exponent, such as `1.5e-6` and `1.5e+20`.
 fn without_exponent(text: &[u8], out: &mut [u8; ROOM]) -> usize {
     let point = |byte: &&u8| **byte != b'.';
     let (sign, number) = match text.strip_prefix(b"-") {

@@ -1,4 +1,4 @@
-//! Reading the fields of messages, by the same parameters as over REST; and what fits into a message.
+//! Reads the fields of messages, by the same parameters as over REST, and limits answers to the size of a message.
 
 use prost::Message;
 use tonic::{Request, Response, Status, metadata::MetadataValue};
@@ -16,12 +16,12 @@ use crate::{
     },
 };
 
-/// Most rows of a history in one answer, some 200 bytes each, so that it fits into a message.
+/// The largest number of rows of a history in one answer, some 200 bytes each, so that it fits into a message.
 pub(super) const MAX_ROWS: usize = 4000;
-/// Most points of a profile in one answer, some 90 bytes each.
+/// The largest number of points of a profile in one answer, some 90 bytes each.
 const MAX_PLACES: usize = 10_000;
 
-/// How many of these fit into one message; at least one.
+/// How many of these messages fit into one; at least one.
 pub(super) fn messages_that_fit<M: Message>(messages: &[M]) -> usize {
     const AROUND: usize = 16; // tag and length of each, and the page's token
     let mut bytes = 0;
@@ -32,7 +32,8 @@ pub(super) fn messages_that_fit<M: Message>(messages: &[M]) -> usize {
     messages.iter().take_while(fits).count().max(1)
 }
 
-/// An answer that cannot be divided into pages, or, if it is larger than a message may be, where REST has it.
+/// An answer that cannot be divided into pages; if it is larger than a message may be, an error that says where REST
+/// has it.
 pub(super) fn one_message<M: Message>(
     message: M,
     instead: &'static str,
@@ -51,7 +52,7 @@ pub(super) fn caller_and_message<T>(mut request: Request<T>) -> Result<(Caller, 
     Ok((caller, request.into_inner()))
 }
 
-/// The value of a text field, or `None` if it is empty, that is, left out.
+/// The value of a text field; `None` if it is empty, which means left out.
 pub(super) fn read_if_set<V: Values>(
     parameter: &Parameter<V>,
     text: &str,
@@ -74,13 +75,13 @@ pub(super) fn paging(size: i32, token: String) -> Result<Paging, ApiError> {
     })
 }
 
-/// The key of a request that may be repeated.
+/// The idempotency key of a request.
 pub(super) fn key(request_id: Option<String>) -> Result<Option<Key>, ApiError> {
     let key = request_id.map(|key| IDEMPOTENCY_KEY.read(&key));
     key.transpose()
 }
 
-/// The points at which a profile is requested, if it fits into a message.
+/// The points at which a profile is requested; an error if they do not fit into a message.
 pub(super) fn points(text: Option<&str>) -> Result<Points, ApiError> {
     let Some(text) = text else {
         return Ok(Points::default());

@@ -35,8 +35,8 @@ pub async fn router(
     Ok((router.layer(map_response(too_large)), reporter))
 }
 
-/// tonic refuses a message over the limit before it reaches a method, and without details. This adds the details
-/// that every error of a method has.
+/// Adds the details that every error has to tonic's refusal of a message over the limit, which tonic gives without
+/// details before the message reaches a method.
 async fn too_large(response: axum::response::Response) -> axum::response::Response {
     let bare = Status::from_header_map(response.headers())
         .is_some_and(|status| status.code() == Code::OutOfRange && status.details().is_empty());
@@ -73,7 +73,7 @@ async fn report_health(reporter: HealthReporter, service: Arc<Service>) {
     }
 }
 
-/// Health turns to NOT_SERVING before the listener closes.
+/// Reports NOT_SERVING, before the listener closes.
 pub async fn report_draining(reporter: &HealthReporter) {
     reporter.set_not_serving::<JobServiceServer<Grpc>>().await;
     reporter

@@ -638,7 +638,7 @@ impl JobService for Grpc {
 
 type EventStream = Pin<Box<dyn Stream<Item = Result<pb::Event, Status>> + Send>>;
 
-/// An answer whose metadata says whether the result that it is from is all there will be.
+/// Adds metadata that says whether the answer is from a partial or a final result.
 fn marked<T>(answer: T, available: ResultAvailable) -> Response<T> {
     let mut response = Response::new(answer);
     let words: &'static str = available.into();
@@ -658,7 +658,7 @@ fn messages(
 }
 
 impl Grpc {
-    /// The contract on that service.
+    /// The implementation of the contract by this service.
     pub(super) fn new(service: Arc<Service>) -> Grpc {
         Grpc { service }
     }

@@ -1,4 +1,4 @@
-//! What happens on one connection: requests under way, and for how long there has been none.
+//! The activity of one connection: its open requests, and how long there has been none.
 
 use std::{
     collections::HashMap,
@@ -12,33 +12,33 @@ use tokio_util::sync::CancellationToken;
 
 use crate::pace::Pace;
 
-/// How long the head of a request may take, from its first byte or from the opening of the connection.
+/// The longest time for the head of a request, from its first byte or from the opening of the connection.
 const LONGEST_HEAD: Duration = Duration::from_secs(30);
-/// How long a connection is kept open for a further request.
+/// How long a connection without a request is kept open.
 const LONGEST_IDLE: Duration = Duration::from_secs(75);
-/// How often a connection is looked at.
+/// How often a connection is checked.
 const INTERVAL: Duration = Duration::from_secs(5);
 
-/// What happens on one connection.
+/// The activity of one connection.
 #[derive(Debug)]
 pub(super) struct Activity {
     state: Mutex<State>,
-    /// Canceled when the connection is to be closed at once.
+    /// Canceled when the connection must be closed at once.
     cut: CancellationToken,
 }
 
 #[derive(Debug)]
 struct State {
-    /// The requests that are not answered completely, and how fast their answers are read.
+    /// The requests whose answers are not complete, with the speed at which these are read.
     under_way: HashMap<u64, Arc<Mutex<Delivery>>>,
     last: u64,
-    /// Since when no request has been under way.
+    /// The time since which there has been no request.
     idle_since: Instant,
-    /// When the connection is to be closed if no request has begun.
+    /// The time at which the connection is closed if no request has begun.
     deadline: Instant,
 }
 
-/// A request under way, until its answer is sent to the last byte or given up.
+/// An open request, until its answer is sent to the last byte or given up.
 #[derive(Debug)]
 pub(super) struct UnderWay {
     activity: Arc<Activity>,
@@ -46,15 +46,15 @@ pub(super) struct UnderWay {
     delivery: Arc<Mutex<Delivery>>,
 }
 
-/// How an answer is read.
+/// The progress of sending an answer.
 #[derive(Debug, Default)]
 struct Delivery {
     pace: Pace,
-    /// Pieces that wait to be sent.
+    /// The number of pieces that wait to be sent.
     waiting: usize,
 }
 
-/// A piece of an answer. It is dropped when it is sent, or nobody wants it any more.
+/// A piece of an answer. It is dropped when it is sent, or no longer needed.
 struct Piece {
     bytes: Bytes,
     under_way: Arc<UnderWay>,
@@ -74,7 +74,7 @@ impl Activity {
         })
     }
 
-    /// A request has arrived.
+    /// Records that a request has arrived.
     pub(super) fn begin(self: &Arc<Self>) -> UnderWay {
         let mut state = self.state();
         state.last += 1;
@@ -87,7 +87,7 @@ impl Activity {
         }
     }
 
-    /// Bytes have arrived: of the head of a request, if none is under way.
+    /// Records that bytes have arrived: if no request is open, they are the head of one.
     pub(super) fn received(&self) {
         let mut state = self.state();
         if state.under_way.is_empty() {
@@ -95,7 +95,7 @@ impl Activity {
         }
     }
 
-    /// Since when no request has been under way; `None` while there is one.
+    /// The time since which there has been no request; `None` while there is one.
     pub(super) fn idle_since(&self) -> Option<Instant> {
         let state = self.state();
         state.under_way.is_empty().then_some(state.idle_since)
@@ -120,12 +120,12 @@ impl Activity {
         }
     }
 
-    /// Closes the connection at once.
+    /// Makes the connection close at once.
     pub(super) fn cut(&self) {
         self.cut.cancel();
     }
 
-    /// Returns when the connection is to be closed at once.
+    /// Returns when the connection must be closed at once.
     pub(super) async fn is_cut(&self) {
         self.cut.cancelled().await;
     }
@@ -141,7 +141,7 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl UnderWay {
-    /// Bytes of the answer that wait to be sent from now on: until then the request is under way, though hyper may have
+    /// Wraps bytes of the answer that wait to be sent: the request is open until they are sent, although hyper may have
     /// dropped the body.
     pub(super) fn deliver(self: &Arc<Self>, bytes: Bytes) -> Bytes {
         let mut delivery = locked(&self.delivery);

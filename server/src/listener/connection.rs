@@ -1,4 +1,4 @@
-//! One connection: its requests go to the router, its answers back, until it ends or is ended.
+//! Serves one connection: passes its requests to the router and the answers back, until it ends or is closed.
 
 use std::{
     convert::Infallible,
@@ -28,31 +28,32 @@ use tracing::debug;
 use super::{
     activity::{Activity, UnderWay},
     guarded::Guarded,
-    places::Place,
+    slots::Slot,
     tls::{Stream, Tls},
 };
 use crate::{address, caller::Peer, error::ApiError, metrics::METRICS, rest};
 
-/// Requests at the same time on one connection; a client with more waits or opens another one.
+/// The largest number of simultaneous requests on one connection; a client with more waits or opens another one.
 const MOST_STREAMS: u32 = 100;
-/// Bytes of answers that one stream keeps until the client reads them, and pieces in which answers are sent.
+/// Bytes of answers that one stream buffers until the client reads them, and the size of the pieces in which answers
+/// are sent.
 const PIECE_BYTES: usize = 64 << 10;
-/// Largest head of a request.
+/// The largest head of a request (bytes).
 const HEAD_BYTES: usize = 64 << 10;
-/// How long requests get to finish when the client has not asked for more for too long.
+/// The time that open requests have to finish when the client has sent no further one for too long.
 const FAREWELL: Duration = Duration::from_secs(2);
-/// How often a client over HTTP/2 that says nothing is asked whether it is still there.
+/// How often a silent client over HTTP/2 is asked whether it is still there.
 const PING: Duration = Duration::from_secs(60);
 
-/// Serves a connection until it ends, is idle or stalled for too long, or its place is given to another one.
+/// Serves a connection until it ends, is idle or stalled for too long, or is closed in favour of another one.
 pub(super) async fn serve(
     (stream, peer): (TcpStream, Peer),
     tls: Option<Arc<Tls>>,
     router: Router,
-    place: Place,
+    slot: Slot,
     closing: CancellationToken,
 ) {
-    let activity = place.activity().clone();
+    let activity = slot.activity().clone();
     let stream = match tls {
         None => Stream::Plain(stream),
         // until then no request is under way: the time for the head of the first one counts from the opening
@@ -73,7 +74,7 @@ pub(super) async fn serve(
     let service = service_fn(|request: Request<Incoming>| {
         let mut request = request.map(Body::new);
         request.extensions_mut().insert(peer);
-        answer(router.clone(), request, place.is_reserved(), &activity)
+        answer(router.clone(), request, slot.is_reserved(), &activity)
     });
     let mut builder = Builder::new(TokioExecutor::new());
     builder
@@ -118,7 +119,7 @@ pub(super) async fn serve(
     }
 }
 
-/// Returns when no request has been under way for this time.
+/// Returns when there has been no request for this time.
 async fn idle_for(activity: &Activity, time: Duration) {
     while activity
         .idle_since()
@@ -155,10 +156,10 @@ fn answer(
     }
 }
 
-/// The body of an answer, in pieces whose progress can be seen.
+/// The body of an answer, in pieces whose progress is recorded.
 struct Sent {
     body: Body,
-    /// What was taken from `body` and not sent yet.
+    /// The part taken from `body` that is not sent yet.
     rest: Bytes,
     under_way: Arc<UnderWay>,
 }

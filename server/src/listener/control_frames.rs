@@ -1,42 +1,42 @@
-//! Frames of HTTP/2 that carry no data: a client may send some, not a flood of them.
+//! Limits the frames of HTTP/2 that carry no data, so that a client cannot flood the service with them.
 //!
-//! Each PING and SETTINGS wants an answer, each PRIORITY, WINDOW_UPDATE and empty DATA frame some work. The h2 library
-//! limits streams that are reset and headers that never end, but not these.
+//! Each PING and SETTINGS requires an answer, each PRIORITY, WINDOW_UPDATE and empty DATA frame some work. The h2
+//! library limits streams that are reset and headers that never end, but not these.
 
 use tokio::time::Instant;
 
-/// What every connection over HTTP/2 begins with.
+/// The bytes that every connection over HTTP/2 begins with.
 const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
-/// Control frames at once.
+/// The largest number of control frames at once.
 const MOST: f64 = 1000.0;
-/// Control frames a second that a client may send without asking for anything.
+/// The number of control frames per second that a client may send without requesting anything.
 const PER_SECOND: f64 = 100.0;
-/// A client that reads answers may send more: it acknowledges what it reads. One frame for so many bytes sent.
+/// The number of sent bytes that allow one more control frame: a client acknowledges the answers that it reads.
 const BYTES_PER_FRAME: f64 = 64.0;
 
 const DATA: u8 = 0;
 const HEADERS: u8 = 1;
 const END_STREAM: u8 = 1;
 
-/// The control frames of one connection.
+/// The limit of control frames for one connection.
 #[derive(Debug)]
 pub(super) struct ControlFrames {
     position: Position,
-    /// How many more the client may send now.
+    /// How many more frames the client may send now.
     credit: f64,
     counted: Instant,
 }
 
-/// What the next byte belongs to.
+/// The place of the next byte in the protocol.
 #[derive(Debug)]
 enum Position {
-    /// The preface, of which so many bytes have arrived.
+    /// Inside the preface, after this many bytes.
     Preface(usize),
-    /// The head of a frame: so many of its bytes have arrived.
+    /// Inside the head of a frame, after this many bytes.
     Head([u8; 9], usize),
-    /// The content of a frame: so many bytes are to come.
+    /// Inside the content of a frame, with this many bytes left.
     Content(usize),
-    /// A connection over HTTP/1.
+    /// The connection uses HTTP/1.
     NotHttp2,
 }
 
@@ -49,12 +49,12 @@ impl ControlFrames {
         }
     }
 
-    /// Bytes were sent to the client.
+    /// Records that bytes were sent to the client.
     pub(super) fn sent(&mut self, bytes: usize) {
         self.credit = (self.credit + bytes as f64 / BYTES_PER_FRAME).min(MOST);
     }
 
-    /// Bytes were received from the client; false if they contain too many control frames.
+    /// Records that bytes were received; false if they contain too many control frames.
     pub(super) fn received(&mut self, mut bytes: &[u8]) -> bool {
         let now = Instant::now();
         let time = now.duration_since(self.counted).as_secs_f64();
@@ -118,7 +118,7 @@ mod tests {
         frames
     }
 
-    /// How many of these frames, in pieces of any size, are accepted.
+    /// How many of these frames are accepted, in pieces of any size.
     fn accepted(frame: &[u8]) -> usize {
         let mut frames = connection();
         (0..5000)
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn who_reads_much_or_waits_may_send_more() {
+    async fn a_client_that_reads_much_or_waits_may_send_more_frames() {
         let ping = frame(6, 0, &[0; 8]);
         let mut frames = connection();
         for _ in 0..5000 {

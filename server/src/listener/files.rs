@@ -1,12 +1,12 @@
-//! How many files the process may open: the store, uploads and every connection need one each.
+//! The limit of open files: the store, uploads and every connection need one each.
 
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use tracing::{debug, warn};
 
-/// Files that are not connections: the database with its log for each connection to it, uploads, standard streams,
-/// the runtime, and files that are written by a command.
+/// The number of files that are not connections: the database with its log for each connection to it, uploads, standard
+/// streams, the runtime, and files that a command writes.
 const RESERVED: u64 = 128;
-/// Connections even if hardly any files may be open.
+/// The smallest number of connections, even if hardly any files may be open.
 const FEWEST: u64 = 16;
 
 /// Raises the limit to the highest that the system allows, since the usual one, 1024, is soon reached by connections.
@@ -26,7 +26,7 @@ fn raise_file_limit() -> u64 {
     limit
 }
 
-/// How many connections there may be: as many as are wanted, if the limit of open files allows it.
+/// The number of connections: as many as wanted, if the limit of open files allows it.
 pub fn most_connections(wanted: u32) -> usize {
     let limit = raise_file_limit();
     let rest = limit.saturating_sub(RESERVED).max(FEWEST);

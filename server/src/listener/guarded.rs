@@ -1,4 +1,5 @@
-//! The stream of a connection, watched: when something arrives, floods of HTTP/2 frames, errors without a document.
+//! The stream of a connection with checks: it records arriving data, limits HTTP/2 control frames, and adds documents
+//! to hyper's own errors.
 
 use std::{
     io::{self, IoSlice},
@@ -10,14 +11,14 @@ use std::{
 use axum::body::Bytes;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 
-use super::{activity::Activity, bare, control_frames::ControlFrames, tls::Stream};
+use super::{activity::Activity, control_frames::ControlFrames, error_document, tls::Stream};
 
 /// The stream of a connection.
 pub(super) struct Guarded {
     stream: Stream,
     activity: Arc<Activity>,
     frames: ControlFrames,
-    /// Written instead of what was given to be written.
+    /// Bytes that are written in place of others.
     instead: Bytes,
 }
 
@@ -31,7 +32,7 @@ impl Guarded {
         }
     }
 
-    /// Writes what stands instead of something else.
+    /// Writes the bytes that replace others.
     fn poll_instead(&mut self, context: &mut Context<'_>) -> Poll<io::Result<()>> {
         while !self.instead.is_empty() {
             let stream = Pin::new(&mut self.stream);
@@ -43,11 +44,11 @@ impl Guarded {
         Poll::Ready(Ok(()))
     }
 
-    /// The document for an answer that hyper gives by itself; it is the last one on its connection.
+    /// The answer with a document if hyper gave it by itself; it is the last one on its connection.
     fn document(&self, head: &[u8]) -> Option<Bytes> {
         // while a request is under way, this is a piece of its answer, whatever it looks like
         self.activity.idle_since()?;
-        bare::with_document(head)
+        error_document::with_document(head)
     }
 }
 

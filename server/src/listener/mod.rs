@@ -1,27 +1,27 @@
 //! Accepts connections and serves requests on them, within limits that no client can exceed.
 //!
-//! axum's own loop has none of them: a connection on which nothing arrives, or nothing is read, would stay open for
-//! ever, and with the last file descriptor the service would be unreachable.
+//! axum's own loop has no limits: idle or stalled connections would stay open for ever, and without file descriptors
+//! the service would be unreachable.
 //!
 //! # Where to look
 //!
 //! | subject | where |
 //! |---|---|
-//! | how many connections there may be, and which gives way | `places`, `files` |
+//! | the limit on connections, and which one is closed for another | `slots`, `files` |
 //! | serving one connection | `connection` |
 //! | how long a connection may be idle | `activity` |
-//! | the stream of a connection, watched for floods and errors | `guarded` |
+//! | the stream of a connection with checks for floods and errors | `guarded` |
 //! | floods of HTTP/2 frames | `control_frames` |
-//! | errors that hyper answers by itself | `bare` |
+//! | documents for errors that hyper answers by itself | `error_document` |
 //! | TLS | `tls` |
 
 mod activity;
-mod bare;
 mod connection;
 mod control_frames;
+mod error_document;
 mod files;
 mod guarded;
-mod places;
+mod slots;
 mod tls;
 
 use std::{
@@ -36,24 +36,24 @@ use tokio::net::{TcpListener, TcpSocket, TcpStream};
 use tokio_util::{sync::CancellationToken, task::TaskTracker};
 use tracing::{info, warn};
 
-use self::places::Places;
+use self::slots::Slots;
 use crate::{caller::Peer, metrics::METRICS};
 
 pub use files::most_connections;
 pub use tls::{BadCertificate, Tls, reload_on};
 
-/// Connections that wait to be accepted.
+/// The number of connections that may wait to be accepted.
 const BACKLOG: u32 = 1024;
-/// Bytes of an answer that the system keeps for a slow reader. Its own choice would be up to some megabytes.
+/// Bytes of an answer that the system buffers for a slow reader. By default it would buffer up to some megabytes.
 const SEND_BUFFER_BYTES: u32 = 256 << 10;
-/// How often the same difficulty with connections is logged.
+/// How often the same problem with connections is logged.
 const LOG_INTERVAL: Duration = Duration::from_secs(60);
 
 /// A socket that listens, and the limit on its connections.
 #[derive(Debug)]
 pub struct Listener {
     socket: TcpListener,
-    places: Arc<Places>,
+    slots: Arc<Slots>,
     tls: Option<Arc<Tls>>,
 }
 
@@ -70,7 +70,7 @@ impl Listener {
         socket.bind(address)?;
         Ok(Listener {
             socket: socket.listen(BACKLOG)?,
-            places: Places::new(most),
+            slots: Slots::new(most),
             tls,
         })
     }
@@ -105,7 +105,7 @@ impl Listener {
                     if is_due(&mut logged) {
                         warn!(%error, "connections cannot be accepted: {error}");
                     }
-                    self.places.close_longest_idle();
+                    self.slots.close_longest_idle();
                     tokio::time::sleep(Duration::from_millis(50)).await;
                 }
             }
@@ -115,7 +115,7 @@ impl Listener {
         connections.wait().await;
     }
 
-    /// Serves a connection in a task of its own, if there is a place for it.
+    /// Serves a connection in a task of its own, if there is a free slot.
     fn open(
         &self,
         (stream, peer): (TcpStream, Peer),
@@ -128,23 +128,23 @@ impl Listener {
         if let Err(error) = stream.set_nodelay(true) {
             tracing::debug!(%error, "TCP_NODELAY: {error}");
         }
-        let Some(place) = self.places.take() else {
+        let Some(slot) = self.slots.take() else {
             METRICS.refused_connections.inc();
             if is_due(logged) {
-                warn!("a connection was closed at once: all places are taken by busy ones");
+                warn!("a connection was closed at once: all connections are busy");
             }
             return;
         };
-        if place.is_reserved() && is_due(logged) {
+        if slot.is_reserved() && is_due(logged) {
             info!("all connections are busy; further ones can only ask for the probes");
         }
         let (tls, router) = (self.tls.clone(), router.clone());
-        let serving = connection::serve((stream, peer), tls, router, place, closing.clone());
+        let serving = connection::serve((stream, peer), tls, router, slot, closing.clone());
         connections.spawn(serving);
     }
 }
 
-/// Whether an error of `accept` is about the one connection that was to be accepted.
+/// Whether an error of `accept` concerns only the connection that was to be accepted.
 fn of_connection(error: &io::Error) -> bool {
     matches!(
         error.kind(),

@@ -27,20 +27,20 @@ use webpki::{EndEntityCert, KeyUsage};
 
 use crate::{config::TlsFiles, error::ApiError, time::Time};
 
-/// A file of certificates is some kilobytes; something else may have no end.
+/// The largest size of a file of certificates, which has some kilobytes; another file may have no end.
 const MOST_BYTES: u64 = 1 << 20;
-/// How long before its end a certificate is worth a warning.
+/// How long before its end the expiry of a certificate is logged.
 const SOON: Duration = Duration::from_secs(14 * 86400);
-/// How often the end of the certificate is looked at.
+/// How often the expiry of the certificate is checked.
 const DAY: Duration = Duration::from_secs(86400);
 
-/// The certificate that the listener shows.
+/// The certificate of the listener.
 pub struct Tls {
     files: TlsFiles,
     in_use: RwLock<Arc<CertificateInUse>>,
 }
 
-/// A certificate, and what shows it to clients.
+/// A certificate, and the configuration that uses it.
 struct CertificateInUse {
     acceptor: TlsAcceptor,
     certificate: CertificateDer<'static>,
@@ -52,7 +52,7 @@ struct CertificateInUse {
 pub struct BadCertificate(String);
 
 impl Tls {
-    /// Reads both files. A certificate that has expired is used with a warning: jobs go on, and clients are told.
+    /// Reads both files. A certificate that has expired is used with a warning: jobs continue, and clients are told.
     pub fn read(files: TlsFiles) -> Result<Arc<Tls>, BadCertificate> {
         let read = CertificateInUse::read(&files)?;
         if let Err(bad) = read.check_time(UnixTime::now()) {
@@ -64,7 +64,7 @@ impl Tls {
         }))
     }
 
-    /// Reads both files again, for connections from now on; with an error, the certificate so far stays in use.
+    /// Reads both files again, for new connections; after an error the present certificate remains in use.
     pub fn reload(&self) -> Result<(), BadCertificate> {
         let read = CertificateInUse::read(&self.files)?;
         read.check_time(UnixTime::now())?;
@@ -73,7 +73,7 @@ impl Tls {
         Ok(())
     }
 
-    /// Warns each day of a certificate that has expired, or will soon. Never returns.
+    /// Logs a warning each day while the certificate has expired, or will soon. Never returns.
     pub async fn watch_expiry(&self) {
         loop {
             let (in_use, now) = (self.in_use(), UnixTime::now());
@@ -93,7 +93,7 @@ impl Tls {
         current.unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// The handshake; an error if the client does not take part in it.
+    /// The TLS handshake; an error if the client does not complete it.
     pub(super) async fn accept(&self, mut stream: TcpStream) -> io::Result<Stream> {
         const HANDSHAKE: u8 = 22;
         let mut first = [0];
@@ -106,7 +106,7 @@ impl Tls {
     }
 }
 
-/// Who asks in plain text gets an answer that can be read.
+/// Answers a client that speaks plain HTTP with a readable error.
 async fn refuse_plain(stream: &mut TcpStream) -> io::Result<()> {
     let error = ApiError::BadRequest("this port speaks TLS: use https:// in its address".into());
     let document = error.document("").to_string();
@@ -192,7 +192,7 @@ fn certificates(path: &Path) -> Result<Vec<CertificateDer<'static>>, BadCertific
     let found = found.map_err(|error| bad_pem(path, &error))?;
     match found.is_empty() {
         true => Err(BadCertificate(format!(
-            "there is no certificate in {}; expected PEM, with a line -----BEGIN CERTIFICATE-----",
+            "found no certificate in {}; expected PEM, with a line -----BEGIN CERTIFICATE-----",
             path.display()
         ))),
         false => Ok(found),
@@ -206,12 +206,12 @@ fn private_key(path: &Path) -> Result<PrivateKeyDer<'static>, BadCertificate> {
         Ok(key) => Ok(key),
         Err(pem::Error::NoItemsFound) if text.windows(9).any(|bytes| bytes == b"ENCRYPTED") => {
             Err(BadCertificate(format!(
-                "the key in {shown} is encrypted, and nobody could enter its password when the service starts; decrypt it \
+                "the key in {shown} is encrypted, and the service cannot ask for its password; decrypt it \
                  with openssl pkey -in {shown} -out plain.pem, readable for the service only"
             )))
         }
         Err(pem::Error::NoItemsFound) => Err(BadCertificate(format!(
-            "there is no private key in {shown}; expected PEM, with a line -----BEGIN PRIVATE KEY-----"
+            "found no private key in {shown}; expected PEM, with a line -----BEGIN PRIVATE KEY-----"
         ))),
         Err(error) => Err(bad_pem(path, &error)),
     }
@@ -234,12 +234,14 @@ fn read(path: &Path) -> Result<Vec<u8>, BadCertificate> {
     }
 }
 
-/// Loads the files again for every signal that comes.
+/// Reads the files again at every signal.
 pub async fn reload_on(mut signals: tokio::signal::unix::Signal, tls: Arc<Tls>) {
     while signals.recv().await.is_some() {
         match tls.reload() {
             Ok(()) => info!("SIGHUP: the certificate was read again"),
-            Err(bad) => warn!(error = %bad, "SIGHUP: the certificate so far stays in use: {bad}"),
+            Err(bad) => {
+                warn!(error = %bad, "SIGHUP: the previous certificate remains in use: {bad}")
+            }
         }
     }
 }
@@ -250,7 +252,7 @@ impl fmt::Debug for Tls {
     }
 }
 
-/// The stream of a connection, encrypted or not. By hand, since `tokio_util::either` writes pieces one by one.
+/// The stream of a connection, encrypted or not. Written by hand, since `tokio_util::either` writes pieces one by one.
 pub(super) enum Stream {
     Plain(TcpStream),
     Tls(Box<TlsStream<TcpStream>>),

@@ -1,7 +1,7 @@
-//! What is counted and measured, for `/metrics`: of the process as a whole, as its log is.
+//! Counters and measurements for `/metrics`, of the process as a whole.
 //!
-//! Every label has few values: names of routes, rpcs, statuses, reasons and phases. Ids, paths and names of owners, which
-//! clients choose, are never labels.
+//! Every label has few values: names of routes, rpcs, statuses, reasons and phases. Ids, paths and names of owners,
+//! which clients choose, are never labels.
 
 mod process;
 
@@ -28,9 +28,9 @@ use prometheus_client::{
 type Labels<const N: usize> = [(&'static str, Cow<'static, str>); N];
 type Seconds = Counter<f64, AtomicU64>;
 
-/// Bounds of durations of requests and commits.
+/// The histogram bounds for durations of requests and commits.
 const SHORT_S: [f64; 8] = [0.001, 0.005, 0.025, 0.1, 0.5, 2.5, 10.0, 60.0];
-/// Bounds of durations of jobs.
+/// The histogram bounds for durations of jobs.
 const LONG_S: [f64; 10] = [
     0.01, 0.1, 1.0, 10.0, 60.0, 300.0, 1800.0, 7200.0, 28800.0, 86400.0,
 ];
@@ -39,10 +39,10 @@ fn short() -> Histogram {
     Histogram::new(SHORT_S)
 }
 
-/// Of this process.
+/// The metrics of this process.
 pub static METRICS: LazyLock<Metrics> = LazyLock::new(Metrics::new);
 
-/// Everything that is counted where it happens.
+/// All counters and gauges that are updated where events happen.
 #[derive(Debug)]
 pub struct Metrics {
     registry: Registry,
@@ -50,15 +50,15 @@ pub struct Metrics {
     http_durations: Family<Labels<2>, Histogram, fn() -> Histogram>,
     grpc_requests: Family<Labels<2>, Counter>,
     grpc_durations: Family<Labels<1>, Histogram, fn() -> Histogram>,
-    /// Requests that are being answered.
+    /// The number of requests that are being answered.
     pub in_progress: Gauge,
-    /// Bytes of answers.
+    /// The bytes of answers.
     pub sent_bytes: Counter,
-    /// Open connections.
+    /// The number of open connections.
     pub connections: Gauge,
-    /// Connections that were accepted.
+    /// The number of accepted connections.
     pub accepted_connections: Counter,
-    /// Connections that were closed at once, or could only ask for the probes.
+    /// The number of connections that were closed at once or could only be used for the probes.
     pub refused_connections: Counter,
     jobs_accepted: Family<Labels<1>, Counter>,
     jobs_ended: Family<Labels<2>, Counter>,
@@ -66,11 +66,11 @@ pub struct Metrics {
     job_run: Histogram,
     phases: Family<Labels<1>, Seconds>,
     commits: Histogram,
-    /// Spans that a collector has taken.
+    /// The number of spans that a collector has received.
     pub spans_exported: Counter,
-    /// Spans that were dropped, since the collector does not take them, or not in time.
+    /// The number of spans that were dropped, because the collector did not receive them, or not in time.
     pub spans_dropped: Counter,
-    /// Lines of the log that nobody read in time.
+    /// The number of lines of the log that were not read in time.
     pub log_lines_lost: Counter,
 }
 
@@ -100,29 +100,29 @@ impl Metrics {
         };
         let mut all = Registry::default();
         let build = [("version", env!("CARGO_PKG_VERSION"))];
-        all.register("signorini_build", "The running program", Info::new(build));
-        all.register("signorini_http_requests", "Requests over REST that were answered", metrics.http_requests.clone());
-        all.register("signorini_http_request_duration_seconds", "From the head of a request to the end of its answer", metrics.http_durations.clone());
-        all.register("signorini_grpc_requests", "Calls over gRPC that were answered", metrics.grpc_requests.clone());
-        all.register("signorini_grpc_request_duration_seconds", "From the head of a call to the end of its answer", metrics.grpc_durations.clone());
-        all.register("signorini_requests_in_progress", "Requests of both protocols that are being answered", metrics.in_progress.clone());
-        all.register("signorini_sent_bytes", "Bytes of bodies of answers", metrics.sent_bytes.clone());
+        all.register("signorini_build", "Version of the running program", Info::new(build));
+        all.register("signorini_http_requests", "Answered requests over REST", metrics.http_requests.clone());
+        all.register("signorini_http_request_duration_seconds", "Time from the head of a request to the end of its answer, in seconds", metrics.http_durations.clone());
+        all.register("signorini_grpc_requests", "Answered calls over gRPC", metrics.grpc_requests.clone());
+        all.register("signorini_grpc_request_duration_seconds", "Time from the head of a call to the end of its answer, in seconds", metrics.grpc_durations.clone());
+        all.register("signorini_requests_in_progress", "Requests being answered, over REST and gRPC", metrics.in_progress.clone());
+        all.register("signorini_sent_bytes", "Bytes of the bodies of answers", metrics.sent_bytes.clone());
         all.register("signorini_connections", "Open connections", metrics.connections.clone());
-        all.register("signorini_connections_accepted", "Connections that were accepted", metrics.accepted_connections.clone());
-        all.register("signorini_connections_refused", "Connections and requests that found no free connection", metrics.refused_connections.clone());
-        all.register("signorini_jobs_accepted", "Jobs that were accepted, by what their result comes from", metrics.jobs_accepted.clone());
-        all.register("signorini_jobs_ended", "Jobs that have ended, by status and reason", metrics.jobs_ended.clone());
-        all.register("signorini_job_wait_seconds", "From acceptance to the start of the last attempt, of jobs that ran", metrics.job_wait.clone());
-        all.register("signorini_job_run_seconds", "From the start of the last attempt to the end, of jobs that ran", metrics.job_run.clone());
-        all.register("signorini_solver_phase_seconds", "Time that solvers spent in each phase", metrics.phases.clone());
-        all.register("signorini_store_commit_duration_seconds", "Commits of the store, each until it is on the disk", metrics.commits.clone());
-        all.register("signorini_spans_exported", "Spans that the collector has taken", metrics.spans_exported.clone());
-        all.register("signorini_spans_dropped", "Spans that the collector did not take in time", metrics.spans_dropped.clone());
-        all.register("signorini_log_lines_lost", "Lines of the log that nobody read in time", metrics.log_lines_lost.clone());
+        all.register("signorini_connections_accepted", "Accepted connections", metrics.accepted_connections.clone());
+        all.register("signorini_connections_refused", "Connections closed or limited to probes because all connections were busy", metrics.refused_connections.clone());
+        all.register("signorini_jobs_accepted", "Accepted jobs, by the source of their result", metrics.jobs_accepted.clone());
+        all.register("signorini_jobs_ended", "Ended jobs, by status and reason", metrics.jobs_ended.clone());
+        all.register("signorini_job_wait_seconds", "Time from acceptance of a job to the start of its last attempt, in seconds", metrics.job_wait.clone());
+        all.register("signorini_job_run_seconds", "Time from the start of the last attempt of a job to its end, in seconds", metrics.job_run.clone());
+        all.register("signorini_solver_phase_seconds", "Time that solvers spent in each phase, in seconds", metrics.phases.clone());
+        all.register("signorini_store_commit_duration_seconds", "Time of a commit of the store until it is on the disk, in seconds", metrics.commits.clone());
+        all.register("signorini_spans_exported", "Spans that the collector has received", metrics.spans_exported.clone());
+        all.register("signorini_spans_dropped", "Spans dropped because the collector did not receive them in time", metrics.spans_dropped.clone());
+        all.register("signorini_log_lines_lost", "Lines of the log lost because they were not read in time", metrics.log_lines_lost.clone());
         Metrics { registry: all, ..metrics }
     }
 
-    /// A request over REST was answered. Its route is a template, its method one of a few.
+    /// Records an answered request over REST. Its route is a template, its method one of a few.
     pub fn answered(&self, method: &'static str, route: &str, status: u16, took: Duration) {
         let class = match status {
             100..=199 => "1xx",
@@ -144,7 +144,7 @@ impl Metrics {
         durations.observe(took.as_secs_f64());
     }
 
-    /// A call over gRPC was answered. Its rpc is one of the contract.
+    /// Records an answered call over gRPC. Its rpc is one of the contract.
     pub fn answered_call(&self, rpc: &'static str, code: &'static str, took: Duration) {
         let labels = [("rpc", rpc.into()), ("code", code.into())];
         self.grpc_requests.get_or_create(&labels).inc();
@@ -152,14 +152,14 @@ impl Metrics {
         durations.observe(took.as_secs_f64());
     }
 
-    /// A job was accepted, and its result comes from the solver, from an earlier result, or from a job with the same input that
-    /// waits or runs.
+    /// Records an accepted job. Its result comes from the solver, from an earlier result, or from a queued or running
+    /// job with the same input.
     pub fn job_accepted(&self, result_from: &'static str) {
         let labels = [("result_from", result_from.into())];
         self.jobs_accepted.get_or_create(&labels).inc();
     }
 
-    /// A job has ended; with how long it waited and ran, if it did run.
+    /// Records that a job has ended, with the times that it waited and ran, if it ran.
     pub fn job_ended(
         &self,
         status: &'static str,
@@ -175,18 +175,19 @@ impl Metrics {
         }
     }
 
-    /// A solver was in a phase for so many seconds.
+    /// Records that a solver was in a phase for this time.
     pub fn phase(&self, phase: &'static str, seconds: f64) {
         let labels = [("phase", phase.into())];
         self.phases.get_or_create(&labels).inc_by(seconds.max(0.0));
     }
 
-    /// The store has committed.
+    /// Records a commit of the store.
     pub fn committed(&self, took: Duration) {
         self.commits.observe(took.as_secs_f64());
     }
 
-    /// All, with figures of this moment, in the text format of OpenMetrics. It reads files of /proc, and so may block.
+    /// All metrics with the present figures, in the text format of OpenMetrics. It reads files of /proc, and so may
+    /// block.
     pub fn text(&self, now: Snapshot) -> Result<String, fmt::Error> {
         let mut text = String::new();
         encode_registry(&mut text, &self.registry)?;
@@ -198,17 +199,17 @@ impl Metrics {
     }
 }
 
-/// Figures of one moment, which others know.
+/// The present figures that other parts of the service know.
 #[derive(Debug, Default)]
 pub struct Snapshot(Registry);
 
 impl Snapshot {
-    /// A figure that goes up and down.
+    /// Adds a figure that goes up and down.
     pub fn gauge(&mut self, name: &str, help: &str, value: f64) {
         self.0.register(name, help, ConstGauge::new(value));
     }
 
-    /// A figure for each value of a label.
+    /// Adds a figure for each value of a label.
     pub fn gauges<const N: usize>(
         &mut self,
         name: &str,
@@ -223,7 +224,7 @@ impl Snapshot {
         self.0.register(name, help, family);
     }
 
-    /// A figure that only goes up; `_total` is added to its name.
+    /// Adds a figure that only goes up; `_total` is added to its name.
     pub fn counter(&mut self, name: &str, help: &str, value: u64) {
         self.0.register(name, help, ConstCounter::new(value));
     }

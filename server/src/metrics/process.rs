@@ -1,5 +1,4 @@
-//! Figures of the process under the names that all programs with metrics use, from /proc. The crates that read them bring
-//! a parser for all of /proc.
+//! Figures of the process from /proc, under the usual names. The crates that read them bring a parser for all of /proc.
 
 use std::fs;
 
@@ -8,7 +7,7 @@ use prometheus_client::{
     registry::Registry,
 };
 
-/// Adds what can be read; elsewhere than on Linux, nothing.
+/// Adds the figures that can be read; on systems other than Linux none.
 pub(super) fn register(registry: &mut Registry) {
     let mut gauge = |name: &str, help: &str, value: Option<f64>| {
         if let Some(value) = value {
@@ -19,13 +18,21 @@ pub(super) fn register(registry: &mut Registry) {
     let (resident, virtual_) = (kib(&status, "VmRSS:"), kib(&status, "VmSize:"));
     gauge("process_resident_memory_bytes", "Resident memory", resident);
     gauge("process_virtual_memory_bytes", "Virtual memory", virtual_);
-    gauge("process_threads", "Threads", field(&status, "Threads:"));
+    gauge(
+        "process_threads",
+        "Number of threads",
+        field(&status, "Number of threads:"),
+    );
     let open = fs::read_dir("/proc/self/fd").ok();
     let open = open.map(|entries| entries.count() as f64);
     gauge("process_open_fds", "Open file descriptors", open);
     let most = rustix::process::getrlimit(rustix::process::Resource::Nofile);
     let most = most.current.map(|most| most as f64);
-    gauge("process_max_fds", "Most open file descriptors", most);
+    gauge(
+        "process_max_fds",
+        "Largest number of open file descriptors",
+        most,
+    );
     let ticks = rustix::param::clock_ticks_per_second() as f64;
     let stat = fs::read_to_string("/proc/self/stat").unwrap_or_default();
     let times = stat_times(&stat);
@@ -43,7 +50,7 @@ pub(super) fn register(registry: &mut Registry) {
         let used = ConstCounter::new(used / ticks);
         registry.register(
             "process_cpu_seconds",
-            "Processor time, of user and system",
+            "Processor time (user and system), in seconds",
             used,
         );
     }
@@ -58,8 +65,8 @@ fn kib(text: &str, name: &str) -> Option<f64> {
     field(text, name).map(|kib| kib * 1024.0)
 }
 
-/// Ticks of processor time, and those from the start of the machine to that of the process. The fields are counted from
-/// behind the name of the program, which may contain anything.
+/// The ticks of processor time, and the ticks from the start of the machine to that of the process. Fields are counted
+/// from after the name of the program, which may contain anything.
 fn stat_times(stat: &str) -> Option<(f64, f64)> {
     let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
     let ticks = |k: usize| fields.get(k)?.parse::<f64>().ok();

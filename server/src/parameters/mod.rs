@@ -1,5 +1,5 @@
-//! Parameters of requests, defined once for both protocols. A definition has a name, the values that are allowed, and
-//! what they mean; reading, range check, error and description follow from it.
+//! Parameters of requests, defined once for both protocols. A definition has a name, the allowed values, and their
+//! meaning; reading, range check, error and description follow from it.
 
 mod parameter;
 mod values;

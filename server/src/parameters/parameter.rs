@@ -1,4 +1,4 @@
-//! A parameter, and a variable of a path: name, meaning and values.
+//! A parameter, and a variable of a path: name, meaning and allowed values.
 
 use serde_json::json;
 
@@ -8,11 +8,11 @@ use crate::{error::ApiError, violations};
 /// An input of a request: a query parameter or a header over REST, a field of a message over gRPC.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameter<V> {
-    /// Its name; the field's is the same.
+    /// The name, also of the field over gRPC.
     pub name: &'static str,
-    /// What it does: one line, without a full stop.
+    /// The meaning: one line, without a full stop.
     pub meaning: &'static str,
-    /// Its values.
+    /// The allowed values.
     pub values: V,
 }
 
@@ -73,14 +73,14 @@ impl Parameter<Seconds> {
     }
 }
 
-/// A variable of a path. A text that is not one of its values is answered with *not found*.
+/// A variable of a path. A text that is not an allowed value is answered with *not found*.
 #[derive(Clone, Copy, Debug)]
 pub struct Variable<V> {
-    /// Its name in the path, in braces; the field's is the same.
+    /// The name in the path, in braces; also the name of the field over gRPC.
     pub name: &'static str,
-    /// What it refers to, for errors: `job`, `plot`.
+    /// The kind of thing that it refers to, for errors: `job`, `plot`.
     pub kind: &'static str,
-    /// What it means: one line, without a full stop.
+    /// The meaning: one line, without a full stop.
     pub meaning: &'static str,
     /// The names that exist.
     pub values: V,
@@ -108,29 +108,29 @@ impl<V: Values> Variable<V> {
     }
 }
 
-/// Where a parameter is in a request over REST.
+/// The place of a parameter in a request over REST.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, strum::IntoStaticStr)]
 #[strum(serialize_all = "snake_case")]
 pub enum Location {
-    /// A segment of the path.
+    /// The parameter is a segment of the path.
     Path,
-    /// The query.
+    /// The parameter is in the query.
     Query,
-    /// A header.
+    /// The parameter is a header.
     Header,
 }
 
 /// A parameter in the description of the API.
 #[derive(Clone, Debug)]
 pub struct Description {
-    /// Its place in the request.
+    /// The place in the request.
     pub location: Location,
-    /// Its name; with `{key}` at its end it is a name for each key.
+    /// The name; with `{key}` at its end there is a name for each key.
     pub name: &'static str,
-    /// Its values, as JSON Schema.
+    /// The allowed values, as JSON Schema.
     pub schema: serde_json::Value,
-    /// What it does.
+    /// The meaning.
     pub meaning: &'static str,
-    /// It may be given several times.
+    /// Whether it may be given several times.
     pub repeatable: bool,
 }

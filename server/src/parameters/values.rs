@@ -1,4 +1,4 @@
-//! The values that a parameter may have: how they are described, read, and listed in errors.
+//! The allowed values of a parameter: how they are described, read, and listed in errors.
 
 use std::ops::RangeInclusive;
 
@@ -7,18 +7,18 @@ use strum::VariantArray;
 
 use crate::time::Time;
 
-/// A set of values, written as text.
+/// A set of allowed values, written as text.
 pub trait Values {
-    /// The meaning of a text.
+    /// The type of a value that was read.
     type Value;
 
-    /// The texts, as JSON Schema.
+    /// The allowed texts, as JSON Schema.
     fn schema(&self) -> serde_json::Value;
 
-    /// The same in words, for errors.
+    /// The allowed texts in words, for errors.
     fn expected(&self) -> String;
 
-    /// The meaning of this text; `None` if it is not in the set.
+    /// The value of this text; `None` if it is not allowed.
     fn read(&self, text: &str) -> Option<Self::Value>;
 }
 
@@ -106,7 +106,7 @@ impl Values for Times {
     }
 }
 
-/// A few values, each with its word, as a list of pairs.
+/// A list of words, each with its value.
 #[derive(Clone, Copy, Debug)]
 pub struct Words<T>(pub fn() -> Vec<(&'static str, T)>);
 
@@ -117,7 +117,7 @@ impl<T> Values for Words<T> {
         json!({ "type": "string", "enum": self.words() })
     }
 
-    /// `a, b or c`.
+    /// The words in a list such as `a, b or c`.
     fn expected(&self) -> String {
         let words = self.words();
         match words.split_last() {

@@ -1,4 +1,4 @@
-//! Waiting before a failed write to the store is retried.
+//! Waits before a failed write to the store is retried.
 
 use std::time::Duration;
 
@@ -7,10 +7,10 @@ use tracing::error;
 
 use crate::{job::JobId, store::StoreError};
 
-/// After so many, which take some seconds, a disk that could not be read is not asked again.
+/// The number of attempts, over some seconds, after which an unreadable disk is not tried again.
 const MOST_TRIES_TO_READ: u32 = 5;
 
-/// Increasing waits between attempts to store data that must not be lost.
+/// Growing pauses between attempts to store data that must not be lost.
 #[derive(Debug)]
 pub(super) struct Backoff {
     pause: Duration,
@@ -27,19 +27,19 @@ impl Default for Backoff {
 }
 
 impl Backoff {
-    /// Whether it is no use to try again to store something of this job, which the log is told then: its worker is free
-    /// for others.
+    /// Whether further attempts to store data of this job are useless, which is then logged: its worker is free for
+    /// others.
     pub(super) fn gives_up(&self, id: JobId, key: i64, cause: &StoreError) -> bool {
         let unreadable =
             matches!(cause, StoreError::Damaged(_)) && self.tries >= MOST_TRIES_TO_READ;
         let gives_up = unreadable || cause.is_lasting(key);
         if gives_up {
-            error!(job.id = %id, %cause, "nothing more of job {id} can be stored: {cause}");
+            error!(job.id = %id, %cause, "job {id} cannot be stored any more: {cause}");
         }
         gives_up
     }
 
-    /// Waits; false if the service stops meanwhile.
+    /// Waits; false if the service stops in the meantime.
     pub(super) async fn wait(&mut self, stopping: &CancellationToken) -> bool {
         const LONGEST: Duration = Duration::from_secs(5);
         let pause = self.pause;

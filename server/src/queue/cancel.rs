@@ -14,13 +14,12 @@ use crate::{
     store::{CancelOutcome, Ending, Result, StoreError},
 };
 
-/// How long a solver may take to stop; then its job is canceled without waiting for it, and only the worker stays
-/// busy. Half of the time that the API promises: the rest is for commits.
+/// How long a solver may take to stop; after that its job is canceled without waiting for it, and only the worker stays
+/// busy. It is half of the time that the API promises: the rest is for commits.
 pub(super) const CANCEL_GRACE: Duration = Duration::from_millis(250);
 
 impl Queue {
-    /// Asks a job to stop. A queued one is canceled when this returns, a running one within half a
-    /// second.
+    /// Asks a job to stop. A queued job is canceled when this returns, a running one within half a second.
     pub async fn cancel(self: &Arc<Self>, key: i64) -> Result<CancelOutcome> {
         let _guard = self.claiming.write().await;
         let requested = self.store.request_cancel(key).await;
@@ -61,7 +60,7 @@ impl Queue {
         Ok(outcome)
     }
 
-    /// Asks the first of these jobs to stop: those that wait in one transaction. Returns how many were dealt with, and
+    /// Asks the first of these jobs to stop; those that wait, in one transaction. Returns how many were handled, and
     /// how many of them had not ended before.
     pub async fn cancel_some(self: &Arc<Self>, keys: &[i64]) -> Result<(usize, usize)> {
         let batch = self.store.cancel_queued(keys).await?;
@@ -74,8 +73,8 @@ impl Queue {
         Ok((batch.seen, changed))
     }
 
-    /// Cancels a job whose solver does not stop in time; does nothing if it has stopped. This is retried for as long as
-    /// it takes, since the client was told that the job ends.
+    /// Cancels a job whose solver does not stop in time; does nothing if it has stopped. It is retried until it
+    /// succeeds, since the client was told that the job ends.
     async fn force_cancel(self: Arc<Self>, key: i64, running: Running) {
         let Running { id, attempt, .. } = running;
         tokio::time::sleep(CANCEL_GRACE).await;
@@ -85,7 +84,7 @@ impl Queue {
                 Ok(true) => {
                     return warn!(
                         job.id = %id,
-                        "job {id} was canceled, and its worker is not free yet"
+                        "job {id} was canceled, but its worker is not free yet"
                     );
                 }
                 Ok(false) => return,
@@ -100,8 +99,8 @@ impl Queue {
         }
     }
 
-    /// Takes no more jobs, and requeues those that are running for the next start of the service, without waiting
-    /// for their solvers.
+    /// Stops taking jobs, and requeues the running ones for the next start of the service, without waiting for their
+    /// solvers.
     pub async fn drain(&self) {
         self.stopping.cancel();
         let _guard = self.claiming.write().await; // no claim is under way

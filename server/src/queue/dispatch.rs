@@ -1,4 +1,4 @@
-//! Starting jobs, whenever a worker is free and a job waits; and periodic tasks.
+//! Starts jobs whenever a worker is free and a job waits; runs periodic tasks.
 
 use std::{sync::Arc, time::Duration};
 
@@ -12,14 +12,14 @@ use super::{
 };
 use crate::{
     failpoint::{self, Point},
-    store::{Accepted, Claim, Complaint, Result, Submission},
+    store::{Accepted, Claim, RepeatedError, Result, Submission},
     time::Time,
 };
 
 /// How often the time limits of waiting jobs are checked.
 const CHECK_INTERVAL: Duration = Duration::from_secs(1);
 
-/// So that a task that panics at once does not occupy a processor.
+/// The pause after a panic, so that a task that panics at once does not occupy a processor.
 const PAUSE_AFTER_PANIC: Duration = Duration::from_millis(100);
 
 impl Queue {
@@ -65,9 +65,9 @@ impl Queue {
         }
     }
 
-    /// Claims whenever a slot is free and a job waits, until the service stops.
+    /// Claims a job whenever a slot is free and a job waits, until the service stops.
     async fn dispatch(self: Arc<Self>) {
-        let mut starting = Complaint::new("no job can be started");
+        let mut starting = RepeatedError::new("no job can be started");
         loop {
             // a notification from here on is kept for the wait below, so that none is missed
             while self.store.waiting() > 0
@@ -86,7 +86,7 @@ impl Queue {
         }
     }
 
-    /// An idle worker, unless nothing is to be started.
+    /// An idle worker, unless no job may start now.
     fn free_slot(&self) -> Option<OwnedSemaphorePermit> {
         if self.store.is_paused() || self.stopping.is_cancelled() {
             return None;
@@ -94,7 +94,7 @@ impl Queue {
         self.slots.clone().try_acquire_owned().ok()
     }
 
-    /// Claims the next job for a worker; false if there was nothing to do.
+    /// Claims the next job for a worker; false if no job was ready.
     async fn claim(self: &Arc<Self>, slot: OwnedSemaphorePermit) -> Result<bool> {
         let _guard = self.claiming.read().await;
         if self.stopping.is_cancelled() || self.store.is_paused() {
@@ -110,7 +110,7 @@ impl Queue {
         Ok(true)
     }
 
-    /// Gives a claimed job to a worker. To be called while `claiming` is held.
+    /// Gives a claimed job to a worker. Call this while `claiming` is held.
     fn start_worker(self: &Arc<Self>, claim: Claim, slot: OwnedSemaphorePermit) {
         failpoint::pass(Point::Given, claim.job.id);
         let running = Running {
@@ -127,7 +127,7 @@ impl Queue {
         tokio::spawn(async move { worker::run_attempt(&queue, claim, running, slot).await });
     }
 
-    /// Jobs that run, as the store has it, but that no worker has.
+    /// Jobs that run according to the store, but that no worker has.
     async fn lost(&self) -> Result<Vec<(i64, i32)>> {
         let mut running = self.store.running().await?;
         let ours = self.running();
@@ -135,8 +135,8 @@ impl Queue {
         Ok(running)
     }
 
-    /// Requeues jobs that have no worker: what was to give them to one has panicked, or the disk was full when the
-    /// service that solved them ended, and when this one began.
+    /// Requeues jobs that have no worker: because the task that should have given them to one has panicked, or because
+    /// the disk was full when the last service ended and when this one started.
     async fn requeue_lost(&self) -> Result<()> {
         if self.lost().await?.is_empty() {
             return Ok(()); // nearly always
@@ -154,7 +154,7 @@ impl Queue {
             };
             error!(
                 job.key = key,
-                attempt, "a job was left without a worker: it waits again, or has ended"
+                attempt, "a job was left without a worker: it was requeued, or has ended"
             );
             self.announce(&changed);
             self.wake.notify_one();
@@ -162,12 +162,12 @@ impl Queue {
         Ok(())
     }
 
-    /// Ends jobs that have waited too long, requeues those that were lost, and removes the ids of jobs deleted long ago,
-    /// until the service stops.
+    /// Ends jobs that have waited too long, requeues lost jobs, and removes the ids of jobs deleted long ago, until the
+    /// service stops.
     async fn run_periodic_tasks(self: Arc<Self>) {
-        let mut expiring = Complaint::new("jobs that waited too long could not be ended");
-        let mut requeuing = Complaint::new("lost jobs could not be requeued");
-        let mut forgetting = Complaint::new("ids of deleted jobs could not be removed");
+        let mut expiring = RepeatedError::new("jobs that waited too long could not be ended");
+        let mut requeuing = RepeatedError::new("lost jobs could not be requeued");
+        let mut forgetting = RepeatedError::new("ids of deleted jobs could not be removed");
         loop {
             match expiring.note(self.store.expire_queued(Time::now()).await) {
                 Some(changed) if !changed.is_empty() => {
@@ -187,7 +187,7 @@ impl Queue {
     }
 }
 
-/// Runs a task of the queue until it ends, and once more after each panic.
+/// Runs a task of the queue until it ends, and again after each panic.
 async fn keep_running<F>(queue: Arc<Queue>, task: fn(Arc<Queue>) -> F)
 where
     F: Future<Output = ()> + Send + 'static,
@@ -196,7 +196,7 @@ where
         if panic.is_cancelled() {
             return; // with the whole runtime
         }
-        error!(%panic, "a task of the queue has panicked, and is started again: {panic}");
+        error!(%panic, "a task of the queue has panicked and is started again: {panic}");
         tokio::time::sleep(PAUSE_AFTER_PANIC).await;
     }
 }

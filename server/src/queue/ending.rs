@@ -1,4 +1,4 @@
-//! How a job ends, by what its solver has left.
+//! Decides how a job ends, from the result of its solver.
 
 use std::any::Any;
 
@@ -22,7 +22,7 @@ use crate::{
 /// A solution ready to be stored.
 pub(super) struct Solved {
     pub(super) ending: Ending,
-    /// It was to be verified on a finer mesh, and is not.
+    /// Whether the requested verification is missing.
     pub(super) unverified: bool,
     pub(super) iterations: usize,
     pub(super) parts: Parts,
@@ -37,7 +37,7 @@ pub(super) enum NoSolution {
     Failed(Reason, String),
     /// An error of the service, not of the client.
     Internal(String),
-    /// The process that solved it died: how.
+    /// The process that solved it died: the reason in words.
     Lost(String),
 }
 
@@ -59,7 +59,7 @@ impl From<SolveError> for NoSolution {
     }
 }
 
-/// Warnings that a job has, and characters of their messages: it is read in lists of a thousand.
+/// The largest number of warnings of a job, and of characters of their messages: jobs are read in lists of a thousand.
 const MOST_WARNINGS: usize = 5;
 const LONGEST_WARNING: usize = 400;
 
@@ -75,7 +75,8 @@ fn worst(warnings: &[Warning]) -> Vec<Warning> {
     found.into_iter().take(MOST_WARNINGS).map(short).collect()
 }
 
-/// 0: the numbers are not those of the problem that was meant; 1: some are not, or may not be; 2: good to know.
+/// The severity of a warning. 0: the numbers are not those of the intended problem; 1: some are not, or may not be; 2:
+/// good to know.
 fn gravity(code: WarningCode) -> u8 {
     use WarningCode::*;
     match code {
@@ -106,7 +107,7 @@ fn gravity(code: WarningCode) -> u8 {
     }
 }
 
-/// What the outcome of a solution means for its job.
+/// The end of a job that follows from the outcome of its solution.
 pub(super) fn ending_of_solution(document: &Document) -> Ending {
     let (summary, partial) = (&document.summary.solution, ResultAvailable::Partial);
     let failed = |reason| {
@@ -136,7 +137,7 @@ pub(super) fn ending_of_solution(document: &Document) -> Ending {
     }
 }
 
-/// How the job ends, by what its solver has returned; with the result that is to be stored.
+/// The end of a job that follows from the result of its solver, with the result to be stored.
 pub(super) fn ending_of_attempt(
     job: &Job,
     solved: Result<Solved, NoSolution>,
@@ -176,7 +177,7 @@ pub(super) fn ending_of_attempt(
     (ending, None)
 }
 
-/// The end of a job whose solver was asked to stop, and does not know why.
+/// The end of a job whose solver was asked to stop, depending on the reason.
 fn stopped_for(job: &Job, reason: Option<StopReason>) -> Ending {
     match reason {
         Some(StopReason::OutOfTime) => timed_out(job),
@@ -185,7 +186,7 @@ fn stopped_for(job: &Job, reason: Option<StopReason>) -> Ending {
     }
 }
 
-/// Failed since it needs more memory than its share, without a result.
+/// The failure of a job that needs more memory than its share, without a result.
 fn out_of_memory(
     Outgrown {
         used,
@@ -194,7 +195,7 @@ fn out_of_memory(
     }: &Outgrown,
 ) -> Ending {
     let detail = format!(
-        "it used {} and needed {} more, of a share of {}: use a coarser mesh, above all along the contacts, or \
+        "the job used {} and needed {} more, but its share is {}: use a coarser mesh, above all along the contacts, or \
          fewer load steps",
         size(*used),
         size(*needed),
@@ -203,10 +204,10 @@ fn out_of_memory(
     Ending::failed(Reason::ResourceExhausted, detail)
 }
 
-/// The process that solved a job of this share (bytes) was refused so many bytes more by the system.
+/// The failure of a job with this share (bytes) whose process was refused this many more bytes by the system.
 pub(super) fn refused_memory(bytes: u64, share: u64) -> NoSolution {
     let detail = format!(
-        "it has used its share of {} of the memory, and was refused {} more: use a coarser mesh, fewer contacts or fewer \
+        "the job has used its share of {} of the memory and was refused {} more: use a coarser mesh, fewer contacts or fewer \
          load steps",
         size(share),
         size(bytes)
@@ -214,10 +215,10 @@ pub(super) fn refused_memory(bytes: u64, share: u64) -> NoSolution {
     NoSolution::Failed(Reason::ResourceExhausted, detail)
 }
 
-/// Failed at its time limit, without a result.
+/// The failure of a job at its time limit, without a result.
 pub(super) fn timed_out(job: &Job) -> Ending {
     let detail = format!(
-        "it was stopped after {} s; see limits.timeout_s",
+        "the job was stopped after {} s; see limits.timeout_s",
         job.limits.timeout_s
     );
     Ending::failed(Reason::TimedOut, detail)
@@ -235,7 +236,7 @@ pub(super) fn internal(job: &Job, cause: &dyn std::fmt::Display) -> Ending {
     }
 }
 
-/// What a panic of `who` says.
+/// The message of a panic of `who`.
 pub(super) fn panicked(who: &str, panic: &(dyn Any + Send)) -> String {
     let text = |panic: &(dyn Any + Send)| {
         panic

@@ -1,7 +1,7 @@
 //! The events of a job, read from the store once for all of its watchers.
 //!
-//! Events reach watchers only from committed rows; what is shared here is such rows. Without it two hundred watchers
-//! would read two hundred times, and the solver would wait for the processor.
+//! Watchers receive events only from committed rows; these rows are shared here. Otherwise two hundred watchers would
+//! read two hundred times, and the solver would wait for the processor.
 
 use std::{collections::VecDeque, sync::Arc};
 
@@ -12,13 +12,13 @@ use crate::{
     store::{self, Store},
 };
 
-/// Events that are read at a time, and the most that are kept for other watchers.
+/// The number of events that are read at a time, and the most that are kept for other watchers.
 const MOST: i64 = 256;
 
-/// What a watcher has not seen yet.
+/// The events that a watcher has not seen yet.
 #[derive(Debug)]
 pub struct News {
-    /// The next events, in order; some at a time.
+    /// The next events in order, up to a limit.
     pub events: Vec<Arc<Event>>,
     /// Whether the job had ended before these events were read; `None`: it is deleted.
     pub ended: Option<bool>,
@@ -27,23 +27,23 @@ pub struct News {
 /// The latest events of a job.
 #[derive(Debug, Default)]
 pub(super) struct Feed {
-    /// Held while the store is read, so that other watchers wait for what is read.
+    /// Locked while the store is read, so that other watchers wait for the result.
     latest: Mutex<Latest>,
 }
 
 #[derive(Debug, Default)]
 struct Latest {
-    /// Without gaps, the last of them is event number `last`.
+    /// Consecutive events; the last one is number `last`.
     events: VecDeque<Arc<Event>>,
     last: i64,
-    /// The number of announcements when the store was read; `None`: never, or there was more to read.
+    /// The number of announcements when the store was read; `None`: never read, or there was more to read.
     complete_at: Option<u64>,
     ended: Option<bool>,
 }
 
 impl Feed {
-    /// Events after number `after`. `announced`: how many changes of the job the watcher knows of. `others`: whether
-    /// events are kept for others.
+    /// The events after number `after`. `announced`: how many changes of the job the watcher knows of. `others`:
+    /// whether events are kept for other watchers.
     pub(super) async fn news(
         &self,
         store: &Store,
@@ -71,7 +71,7 @@ impl Feed {
     }
 }
 
-/// The end first: if the job had ended, all its events are there.
+/// Reads the end before the events: if the job had ended then, all its events are there.
 async fn read(store: &Store, key: i64, after: i64) -> store::Result<News> {
     let ended = store.has_ended(key).await?;
     let events = store.events_after(key, after, MOST).await?;
@@ -82,7 +82,7 @@ async fn read(store: &Store, key: i64, after: i64) -> store::Result<News> {
 }
 
 impl Latest {
-    /// The news for a watcher, if they need not be read.
+    /// The news for a watcher, if they can be given without reading the store.
     fn known(&self, announced: u64, after: i64) -> Option<News> {
         if after == self.last && self.complete_at.is_some_and(|at| at >= announced) {
             return Some(News {
@@ -103,7 +103,7 @@ impl Latest {
         })
     }
 
-    /// Adds what was read after event number `after`, which no watcher of this feed had read.
+    /// Adds the result of reading after event number `after`.
     fn add(&mut self, news: &News, announced: u64, after: i64) {
         if after > self.last {
             self.events.clear();
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn what_one_watcher_has_read_the_others_know() {
+    fn events_read_by_one_watcher_are_shared_with_the_others() {
         let mut latest = Latest::default();
         latest.add(&news(1..=3), 1, 0);
         assert_eq!(known(&latest, 1, 0).unwrap(), [1, 2, 3]);
@@ -170,7 +170,7 @@ mod tests {
         assert_eq!(known(&latest, 1, 1).unwrap().len() as i64, MOST);
     }
 
-    /// Clients name any number.
+    /// A watcher may resume after any number, since clients choose it.
     #[test]
     fn a_watcher_may_resume_after_any_number() {
         let mut latest = Latest::default();
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn a_watcher_that_resumes_ahead_of_the_others_begins_anew() {
+    fn a_watcher_that_resumes_ahead_of_the_others_reads_again() {
         let mut latest = Latest::default();
         latest.add(&news(1..=3), 1, 0);
         latest.add(&news(8..=9), 1, 7);

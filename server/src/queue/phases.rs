@@ -1,4 +1,4 @@
-//! What is told of an attempt when it has ended: how long its solver was in each phase, as metrics, and its spans.
+//! Reports an attempt that has ended: metrics of how long its solver was in each phase, and its spans.
 
 use opentelemetry::KeyValue;
 use solver::solution::Phase;
@@ -12,10 +12,10 @@ use crate::{
     trace::Trace,
 };
 
-/// Phases that become spans; problems of many load steps have thousands.
+/// The largest number of phases that become spans; problems of many load steps have thousands.
 const MOST: usize = 200;
 
-/// The phases of one attempt, in order, as its solver tells them.
+/// The phases of one attempt, in order.
 #[derive(Debug, Default)]
 pub(super) struct Phases {
     current: Option<(Phase, Time)>,
@@ -23,13 +23,13 @@ pub(super) struct Phases {
 }
 
 impl Phases {
-    /// A phase begins, and with it the one before ends.
+    /// Records that a phase begins, which ends the phase before.
     pub(super) fn enter(&mut self, phase: Phase, now: Time) {
         self.end(now);
         self.current = Some((phase, now));
     }
 
-    /// The solver has ended.
+    /// Records that the solver has ended.
     pub(super) fn end(&mut self, now: Time) {
         let Some((phase, begun)) = self.current.take() else {
             return;
@@ -41,8 +41,8 @@ impl Phases {
         }
     }
 
-    /// Tells the spans of an attempt: the job, within it that it was queued and ran, within that the phases. `origin` is the
-    /// request that has submitted it, if that was answered by this process.
+    /// Sends the spans of an attempt: the job, inside it the time in the queue and the run, and inside the run the
+    /// phases. `origin` is the request that submitted the job, if this process answered it.
     pub(super) fn tell_spans(&self, job: &Job, origin: Option<&Trace>, ending: Option<&Ending>) {
         if !spans::are_wanted() {
             return;

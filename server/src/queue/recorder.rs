@@ -1,4 +1,4 @@
-//! Records what a running solver reports: commits its events in batches, then announces them.
+//! Records the reports of a running solver: commits its events in batches, then announces them.
 
 use std::time::Duration;
 
@@ -24,29 +24,29 @@ use crate::{
     time::Time,
 };
 
-/// Most events in a batch …
+/// The most events in a batch.
 const MOST_EVENTS: usize = 50;
-/// … most members of a sweep …
+/// The most members of a sweep in a batch.
 const MOST_MEMBERS: usize = 200;
-/// … and the longest time from its first event until it is stored.
+/// The longest time from the first event of a batch until it is stored.
 const LATENCY: Duration = Duration::from_millis(50);
 
-/// Reports that are stored together.
+/// A batch of reports that are stored together.
 #[derive(Debug, Default)]
 struct Batch {
     events: Vec<(Time, Payload)>,
     /// Members of a sweep.
     members: Vec<(Time, MemberRow)>,
-    /// A partial result, reported after them.
+    /// A partial result that was reported after the events.
     partial: Option<Box<Parts>>,
     one_level: bool,
-    /// The solver has ended: nothing comes after them.
+    /// Whether the solver has ended, so that this is the last batch.
     last: bool,
 }
 
-/// Stores the reports of the solver until it ends, and returns its last events: these are stored together with the
-/// end of the job, in one commit. A failed write is retried while the solver waits, since the disk may be full for a
-/// while. When the attempt is no longer the current one, the solver is asked to stop and the rest is dropped.
+/// Stores the reports of the solver until it ends, and returns its last events: these are stored together with the end
+/// of the job, in one commit. A failed write is retried while the solver waits, since the disk may be full temporarily.
+/// When the attempt is no longer the current one, the solver is asked to stop and the rest is dropped.
 pub(super) async fn record(
     queue: &Queue,
     job: &Job,
@@ -93,8 +93,7 @@ pub(super) async fn record(
     (FinalBatch::default(), phases)
 }
 
-/// Stores a batch, however long that takes; false when the attempt is no longer the current one, or the service
-/// stops.
+/// Stores a batch, however long that takes; false when the attempt is no longer the current one, or the service stops.
 async fn store_with_retries(
     queue: &Queue,
     job: &Job,
@@ -154,7 +153,7 @@ async fn store_batch(
     }
 }
 
-/// The next reports.
+/// Receives the next batch of reports.
 async fn next_batch(reports: &mut mpsc::Receiver<Report>) -> Batch {
     let mut batch = Batch::default();
     match reports.recv().await {
@@ -227,9 +226,8 @@ fn update_progress(progress: &mut Progress, payload: &Payload, one_level: bool) 
     }
 }
 
-/// Seconds to the end: the time of the remaining iterations, if each reduces the residual by the factor q and takes
-/// as long as those before:
-/// n = ln(tolerance / residual) / ln q.
+/// The estimated seconds to the end: the time of the remaining iterations, if each reduces the residual by the factor q
+/// and takes as long as those before: n = ln(tolerance / residual) / ln q.
 fn eta_s(TimedIteration { row, wall_s }: &TimedIteration) -> Option<f64> {
     let q = row.contraction.filter(|q| (1e-6..1.0).contains(q))?;
     let residual = row.residual.max(row.friction_residual);

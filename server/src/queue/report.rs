@@ -1,22 +1,22 @@
-//! What a solver reports while it is at work.
+//! The messages of a running solver.
 
 use std::ops::ControlFlow;
 
 use crate::{event::Payload, memory::Outgrown, store::Parts, sweep::MemberRow, time::Time};
 
-/// What a solver tells; the answer is whether it is to continue.
+/// A message of a solver; the answer is whether it should continue.
 pub(super) enum Told {
-    /// To record.
+    /// A report to be recorded.
     Report(Report),
-    /// It needs more memory than its share.
+    /// The solver needs more memory than its share.
     OutOfMemory(Outgrown),
-    /// It only asks.
+    /// No news; the solver asks whether to continue.
     Nothing,
-    /// It could share its next work with a second thread: the answer is whether there is a processor for it.
+    /// The solver could share its next work with a second thread; the answer is whether a processor is free.
     SecondThread,
 }
 
-/// The answer of a yes or no.
+/// Continues if `yes`, else breaks.
 pub(super) fn go_on_if(yes: bool) -> ControlFlow<()> {
     match yes {
         true => ControlFlow::Continue(()),
@@ -29,11 +29,11 @@ pub(super) fn go_on_if(yes: bool) -> ControlFlow<()> {
 pub(super) enum Report {
     /// An event, with the time when it happened.
     Event(Time, Payload),
-    /// A member of a sweep is solved, or cannot be, with the time of that.
+    /// A member of a sweep that is solved, or cannot be, with the time.
     Member(Time, Box<MemberRow>),
     /// A partial result, ready to be stored.
     Partial(Box<Parts>),
-    /// There is one load level on one grid: when its iterations end, the job ends, and the time until then can be
-    /// estimated.
+    /// The problem has one load level on one grid: when its iterations end, the job ends, so that the time until then
+    /// can be estimated.
     OneLevel,
 }

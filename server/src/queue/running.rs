@@ -7,7 +7,7 @@ use crate::{job::JobId, memory::Outgrown};
 /// The handle on a running solver.
 #[derive(Clone, Debug)]
 pub(super) struct Running {
-    /// The job, for the log.
+    /// The job's id, for the log.
     pub(super) id: JobId,
     /// The number of the attempt.
     pub(super) attempt: i32,
@@ -27,8 +27,8 @@ impl Running {
 pub(super) enum StopReason {
     /// The job has reached its time limit.
     OutOfTime,
-    /// It needs more memory than its share.
+    /// The job needs more memory than its share.
     OutOfMemory(Outgrown),
-    /// Its result is not needed: the job was canceled or requeued.
+    /// The result is not needed: the job was canceled or requeued.
     Unwanted,
 }

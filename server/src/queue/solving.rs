@@ -1,4 +1,4 @@
-//! Solving a problem on a blocking thread, and reporting it.
+//! Solves a problem on a blocking thread, and reports the progress.
 
 use std::{ops::ControlFlow, time::Duration, time::Instant};
 
@@ -30,7 +30,7 @@ use crate::{
     time::Time,
 };
 
-/// The stored form of a mesh, which was there when the job was accepted. On a blocking thread.
+/// Reads the stored form of a mesh, which existed when the job was accepted. Call this on a blocking thread.
 pub(super) fn stored_mesh(store: &Store, hash: &str) -> Result<Vec<u8>, NoSolution> {
     let failed =
         |cause: &dyn std::fmt::Display| NoSolution::Internal(format!("mesh {hash}: {cause}"));
@@ -39,13 +39,13 @@ pub(super) fn stored_mesh(store: &Store, hash: &str) -> Result<Vec<u8>, NoSoluti
     body.ok_or_else(|| failed(&"it is not stored"))
 }
 
-/// A mesh from its stored form.
+/// Decodes a mesh from its stored form.
 pub(super) fn read_mesh(body: &[u8]) -> Result<Mesh, NoSolution> {
     crate::mesh::read_stored(body)
         .map_err(|error| NoSolution::Internal(format!("a stored mesh cannot be read: {error}")))
 }
 
-/// What is left of the members of a sweep that a job solves. On a blocking thread.
+/// Reads the members of a sweep that a job still has to solve. Call this on a blocking thread.
 pub(super) fn members_of(store: &Store, key: i64) -> Result<MembersTask, NoSolution> {
     let failed = |cause: String| NoSolution::Internal(format!("the members of the job: {cause}"));
     let task = tokio::runtime::Handle::current().block_on(store.members_task(key));
@@ -53,7 +53,7 @@ pub(super) fn members_of(store: &Store, key: i64) -> Result<MembersTask, NoSolut
     task.ok_or_else(|| failed("they are not stored".into()))
 }
 
-/// Solves the problem of a job within its memory, and with it members of its sweep. On a blocking thread.
+/// Solves the problem of a job within its memory, and with it members of its sweep. Call this on a blocking thread.
 pub(super) fn solve_task(
     problem: &str,
     mesh: Option<Mesh>,
@@ -81,7 +81,7 @@ pub(super) fn solve_task(
     })
 }
 
-/// Reads the problem and solves it, within its memory, with partial results as `partials` decides.
+/// Reads the problem and solves it within its memory, with partial results as `partials` decides.
 pub(super) fn solve_and_store(
     problem: &str,
     mesh: Option<Mesh>,
@@ -218,8 +218,8 @@ pub(super) fn solve_and_store(
     })
 }
 
-/// A problem on its body, which is made and kept unless it is kept already. Two jobs that begin at the same time each make
-/// their own: the first does not know yet whether there will be one.
+/// Prepares a problem on its body, which is made and kept unless it is kept already. Two jobs that begin at the same
+/// time each make their own, since the first body is not finished yet.
 pub(super) fn prepare(
     problem: &Problem,
     external: Option<External>,
@@ -249,7 +249,7 @@ pub(super) fn prepare(
     Ok(prepared)
 }
 
-/// Tells the row of the first member, and solves the others; an error if that was stopped.
+/// Reports the row of the first member, and solves the others; an error if that was stopped.
 fn solve_others(
     problem: &Problem,
     mesh: Option<Mesh>,
@@ -300,19 +300,20 @@ fn solve_others(
     })
 }
 
-/// Decides when the results of finished load steps are stored as a partial result: not after each, since all of it is
-/// written each time and a problem may have a thousand steps; and not at all once the partial result has grown large.
+/// Decides when the results of finished load steps are stored as a partial result: not after each step, since
+/// everything is written each time and a problem may have a thousand steps; and not at all once the partial result is
+/// large.
 pub(super) struct Partials {
-    /// The least time between two.
+    /// The shortest time between two partial results.
     pause: Duration,
-    /// Storing takes at most one part in so many of the time.
+    /// Storing takes at most this part of the time (1/n).
     part: u32,
-    /// When the next one may be stored; `None` once one was too large.
+    /// The time when the next one may be stored; `None` once one was too large.
     next: Option<Instant>,
 }
 
 impl Partials {
-    /// At most once a second, and at most a tenth of the time.
+    /// Stores at most once a second, and for at most a tenth of the time.
     fn paced() -> Self {
         Partials {
             pause: Duration::from_secs(1),
@@ -321,7 +322,7 @@ impl Partials {
         }
     }
 
-    /// After every step: what a slow machine may do, so that tests do not depend on the clock.
+    /// Stores after every step, as on a slow machine, so that tests do not depend on the clock.
     #[cfg(test)]
     pub(super) fn every_step() -> Self {
         Partials {
@@ -331,11 +332,12 @@ impl Partials {
         }
     }
 
-    /// The partial result, if it is time to store it.
+    /// The partial result, if it is time to store one.
     fn next(&mut self, partial: &PartialSolution<'_>) -> Option<Report> {
-        /// A result of this size is written in one transaction, which occupies the single writer for some 40 ms.
+        /// The largest partial result: it is written in one transaction, which occupies the single writer for some 40
+        /// ms.
         const MOST_BYTES: usize = 4 << 20;
-        /// So many points take a tenth of a second to be written, in which nothing is asked.
+        /// The largest number of points: writing them takes a tenth of a second without a check whether to stop.
         const MOST_POINTS: usize = 20_000;
         let start = Instant::now();
         if self.next.is_none_or(|next| start < next) {

@@ -20,9 +20,9 @@ use crate::{
     trace::Trace,
 };
 
-/// Reads of jobs by those who wait for them, at the same time: a few for each connection to the database.
+/// The largest number of simultaneous reads of jobs by waiting requests: a few for each connection to the database.
 const MOST_TURNS: usize = 16;
-/// Jobs whose requests are remembered: as many as may wait, by default.
+/// The largest number of jobs whose requests are remembered: as many as may wait, by default.
 const MOST_ORIGINS: usize = 100_000;
 
 /// Where problems are solved.
@@ -45,23 +45,23 @@ pub struct Queue {
     /// Notified when a job may be ready to be claimed.
     pub(super) wake: Notify,
     pub(super) watchers: Watchers,
-    /// Those of sweeps, by their keys.
+    /// The watchers of sweeps, by the sweeps' keys.
     pub(super) sweeps: Watchers,
-    /// How many that wait for jobs may read them at the same time.
+    /// Limits how many waiting requests may read jobs at the same time.
     turns: Semaphore,
     /// Jobs that a worker of this process is solving.
     pub(super) running: Mutex<HashMap<i64, Running>>,
-    /// Held for reading while a job is claimed and entered into `running`, for writing while one is asked to stop, so
+    /// Locked for reading while a job is claimed and entered into `running`, for writing while one is asked to stop, so
     /// that no cancel comes between the two steps.
     pub(super) claiming: RwLock<()>,
-    /// The requests that have submitted the jobs, by the keys of these, for spans. They are not stored: after a restart a
-    /// job begins a trace of its own.
+    /// The requests that submitted the jobs, by the jobs' keys, for spans. They are not stored: after a restart a job
+    /// begins a trace of its own.
     origins: Mutex<BTreeMap<i64, Trace>>,
     /// Canceled when the service is about to stop.
     pub(super) stopping: CancellationToken,
 }
 
-/// A worker that is busy, until the last clone of this is dropped; then the next job is claimed.
+/// A busy worker, until the last clone of this is dropped; then the next job is claimed.
 #[derive(Debug)]
 pub(super) struct Slot {
     pub(super) permit: Option<OwnedSemaphorePermit>,
@@ -78,20 +78,20 @@ impl Drop for Slot {
 /// The state of the queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct State {
-    /// No new job is started.
+    /// Whether the queue is paused, so that no new job is started.
     pub paused: bool,
-    /// Jobs that wait for a worker, or for the job that they are coalesced into.
+    /// The number of jobs that wait for a worker, or for the job that they are coalesced into.
     pub queued: usize,
-    /// Jobs that workers are solving.
+    /// The number of jobs that workers are solving.
     pub running: usize,
-    /// How many workers there are.
+    /// The number of workers.
     pub workers: u16,
-    /// How many of them are idle. A worker whose job was ended by force stays busy until its solver returns.
+    /// The number of idle workers. A worker whose job was ended by force stays busy until its solver returns.
     pub idle: usize,
 }
 
 impl Queue {
-    /// A queue over `store`, not yet started.
+    /// A queue over `store` that is not started yet.
     pub fn new(store: Arc<Store>, solver: Solver, workers: u16) -> Arc<Queue> {
         Arc::new(Queue {
             store,
@@ -109,7 +109,7 @@ impl Queue {
         })
     }
 
-    /// Subscribes to the changes of a job; to be called before its rows are read.
+    /// Subscribes to the changes of a job. Call this before its rows are read.
     pub fn subscribe(&self, key: i64) -> Subscription<'_> {
         self.watchers.subscribe(key)
     }
@@ -119,12 +119,12 @@ impl Queue {
         jobs.iter().for_each(|key| self.watchers.announce(*key));
     }
 
-    /// Notifies the watchers of this job that it has new events, and is otherwise as before.
+    /// Notifies the watchers of this job that it has new events but is otherwise unchanged.
     pub(super) fn announce_events(&self, key: i64) {
         self.watchers.announce_events(key);
     }
 
-    /// Subscribes to the rows of a sweep's members; to be called before they are read.
+    /// Subscribes to the rows of a sweep's members. Call this before they are read.
     pub fn subscribe_to_sweep(&self, key: i64) -> Subscription<'_> {
         self.sweeps.subscribe(key)
     }
@@ -134,7 +134,7 @@ impl Queue {
         self.sweeps.announce(key);
     }
 
-    /// The turn of somebody who waits for a job to look at it: some at a time, since one change may wake thousands.
+    /// A permit for a waiting request to read its job. Their number is limited, since one change may wake thousands.
     pub async fn turn(&self) -> Option<SemaphorePermit<'_>> {
         self.turns.acquire().await.ok()
     }
@@ -155,13 +155,13 @@ impl Queue {
         }
     }
 
-    /// Starts no more jobs until the queue is resumed, also after a restart; running jobs continue.
+    /// Pauses the queue: no more jobs are started until it is resumed, also after a restart; running jobs continue.
     pub async fn pause(&self) -> store::Result<()> {
         let _guard = self.claiming.write().await; // no claim is under way
         self.store.set_paused(true).await
     }
 
-    /// Starts jobs again.
+    /// Resumes the queue.
     pub async fn resume(&self) -> store::Result<()> {
         let _guard = self.claiming.write().await; // no pause is under way
         self.store.set_paused(false).await?;
@@ -185,7 +185,7 @@ impl Queue {
         Ok(changed.is_some())
     }
 
-    /// Remembers which request has submitted these jobs; of too many, the latest.
+    /// Remembers the request that submitted these jobs; beyond the limit, only the latest requests.
     pub fn remember_origin(&self, jobs: &[Job], trace: &Trace) {
         let mut origins = self.origins();
         for job in jobs.iter().filter(|job| !job.status.is_terminal()) {
@@ -196,12 +196,12 @@ impl Queue {
         }
     }
 
-    /// The request that has submitted a job.
+    /// The request that submitted a job.
     pub(super) fn origin(&self, key: i64) -> Option<Trace> {
         self.origins().get(&key).cloned()
     }
 
-    /// The job has ended, or its request is not needed any more.
+    /// Forgets the request of a job that has ended, or whose request is no longer needed.
     pub(super) fn forget_origin(&self, key: i64) {
         self.origins().remove(&key);
     }
@@ -211,7 +211,7 @@ impl Queue {
         self.origins.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Its worker has finished with the job. If it was requeued, another worker may have it already.
+    /// Records that its worker has finished with the job. If it was requeued, another worker may have it already.
     pub(super) fn release(&self, job: &Job) {
         let mut running = self.running();
         let ours = |running: &Running| running.attempt == job.attempt;
@@ -220,8 +220,8 @@ impl Queue {
         }
     }
 
-    /// Whether there are processors for a second thread of every job that runs. A job that starts a moment later gets its
-    /// time from the system.
+    /// Whether there are processors for a second thread of every running job. A job that starts a moment later shares
+    /// the processors.
     pub(super) fn has_spare_processor(&self) -> bool {
         let processors = std::thread::available_parallelism().map_or(1, usize::from);
         2 * self.running().len() <= processors

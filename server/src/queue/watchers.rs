@@ -1,4 +1,4 @@
-//! The watchers of a job are notified of changes, without their content: they read the store, together (see `feed`).
+//! Notifies the watchers of a job of changes, without their content: watchers read the store, together (see `feed`).
 
 use std::{
     collections::HashMap,
@@ -10,7 +10,7 @@ use tokio::sync::watch;
 use super::feed::{Feed, News};
 use crate::store::{self, Store, StoreError};
 
-/// From so many watchers of one job on, each looks for news less often.
+/// The number of watchers of one job from which each reads less often.
 const CROWD: usize = 16;
 
 /// The jobs that are watched.
@@ -26,12 +26,12 @@ struct Watched {
     feed: Feed,
 }
 
-/// How often changes were announced.
+/// How many changes were announced.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Changes {
     /// Changes of any kind.
     all: u64,
-    /// Changes of the job itself, and not only further events.
+    /// Changes of the job itself, without new events.
     of_job: u64,
 }
 
@@ -41,7 +41,7 @@ impl Watchers {
         self.change(key, |changes| changes.of_job += 1);
     }
 
-    /// Notifies the watchers of a job that it has new events, and is otherwise as before.
+    /// Notifies the watchers of a job that it has new events but is otherwise unchanged.
     pub(super) fn announce_events(&self, key: i64) {
         self.change(key, |_| {});
     }
@@ -87,7 +87,7 @@ pub struct Subscription<'a> {
     key: i64,
     watched: Arc<Watched>,
     receiver: watch::Receiver<Changes>,
-    /// Changes of the job that were announced before the subscription, or returned for.
+    /// The number of changes that were announced before the subscription, or already returned.
     seen: u64,
 }
 
@@ -109,8 +109,8 @@ impl Subscription<'_> {
     }
 
     /// Events after number `after`, and whether the job has ended. All watchers of a job share what one of them reads.
-    /// It is read in a task of its own: a client that does not read stops its stream at any point, and would stop
-    /// the others if it held what they wait for.
+    /// The reading is done in a task of its own: a client that does not read blocks its stream at any point, and would
+    /// block the others if it held the lock that they wait for.
     pub async fn news(&mut self, store: &Arc<Store>, after: i64) -> store::Result<News> {
         let announced = self.receiver.borrow_and_update().all;
         let others = self.receiver_count() > 1;
@@ -123,7 +123,7 @@ impl Subscription<'_> {
         read.unwrap_or_else(|panic| Err(StoreError::Unexpected(panic.to_string())))
     }
 
-    /// Whether so many watch this job that each of them should look for news less often.
+    /// Whether so many watch this job that each should read less often.
     pub fn is_crowded(&self) -> bool {
         self.receiver_count() > CROWD
     }
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn who_waits_for_a_change_of_the_job_is_not_notified_of_events() {
+    async fn a_request_that_waits_for_a_change_is_not_notified_of_events() {
         let watchers = Watchers::default();
         let mut subscription = watchers.subscribe(7);
         let wait = Duration::from_secs(1);

@@ -23,7 +23,7 @@ use crate::{
     store::{Claim, Ending, FinalBatch, Parts, StoreError},
 };
 
-/// Most reports of a solver that are not recorded yet; if there are more, the solver waits.
+/// The largest number of reports of a solver that are not recorded yet; after that the solver waits.
 const MOST_UNRECORDED: usize = 256;
 
 /// How long the solver of a job that has reached its time limit may take to return its last state (see `Limits`).
@@ -145,7 +145,7 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Ar
     failpoint::pass(Point::Done, id);
 }
 
-/// The points of a job at which its solver tells something.
+/// Passes the failpoints at which a solver sends a message.
 fn pass_failpoint(told: &Told, id: JobId) {
     let point = match told {
         Told::Report(Report::OneLevel) => Some(Point::Parsed),
@@ -157,7 +157,7 @@ fn pass_failpoint(told: &Told, id: JobId) {
     }
 }
 
-/// Requeues a job whose process died, or ends it if that was its last attempt; for as long as it takes.
+/// Requeues a job whose process died, or ends it if that was its last attempt; retried until it succeeds.
 async fn requeue_with_retries(queue: &Queue, job: &Job, how: &str) {
     warn!(job.id = %job.id, job.attempt, "the process that solved job {} died: {how}", job.id);
     let mut backoff = Backoff::default();
@@ -186,7 +186,7 @@ async fn time_out(queue: Arc<Queue>, job: Job, running: Running) {
         match queue.end_attempt(job.key, running.attempt, &ending).await {
             Ok(true) => warn!(
                 job.id = %job.id,
-                "job {} was ended at its time limit, and its solver has not stopped yet", job.id
+                "job {} was ended at its time limit, but its solver has not stopped yet", job.id
             ),
             Ok(false) => {}
             Err(cause) => {
@@ -196,8 +196,8 @@ async fn time_out(queue: Arc<Queue>, job: Job, running: Running) {
     });
 }
 
-/// Stores the result, then the end. This is retried for as long as it takes, since the disk may be full for a while
-/// and a job must not stay running. If the service stops meanwhile, its next start requeues the job.
+/// Stores the result, then the end. It is retried until it succeeds, since the disk may be full temporarily and a job
+/// must not stay running. If the service stops in the meantime, its next start requeues the job.
 async fn end_with_retries(
     queue: &Queue,
     job: &Job,

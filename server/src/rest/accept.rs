@@ -11,11 +11,11 @@ use crate::{
     violations,
 };
 
-/// One of these formats, chosen by the parameter `format`, else by `Accept`, else the first.
+/// The choice of one of these formats, by the parameter `format`, else by `Accept`, else the first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FormatOf(pub(super) &'static [Format]);
 
-/// The parameter's name.
+/// The name of the parameter.
 const FORMAT: &str = "format";
 
 impl Input for FormatOf {
@@ -68,7 +68,7 @@ fn choose(
         .ok_or_else(|| none(&accept.join(", ")))
 }
 
-/// The media ranges of `Accept`.
+/// The media ranges in `Accept`.
 pub(super) fn accepted(headers: &HeaderMap) -> Vec<&str> {
     let values = headers.get_all(header::ACCEPT).iter();
     values
@@ -77,8 +77,8 @@ pub(super) fn accepted(headers: &HeaderMap) -> Vec<&str> {
         .collect()
 }
 
-/// How much a media type is preferred: the weight of the most specific range that covers it; how specific that is;
-/// and its place in the list, the first one highest.
+/// How much a media type is preferred: the weight of the most specific range that covers it; how specific that range
+/// is; and its place in the list, the first one highest.
 pub(super) fn weight(accepted: &[&str], media: &str) -> (f32, u8, isize) {
     let group = media.split('/').next().unwrap_or_default();
     let mut found = (0.0, 0, 0);

@@ -1,5 +1,5 @@
-//! The one place where the caller of a request is identified, and where the policy of the operations is applied: for
-//! both protocols, streams, documents and probes alike.
+//! The one place where the caller of a request is identified and the access rules of the operations are applied: for
+//! both protocols, streams, documents and probes.
 
 use std::{collections::BTreeMap, sync::Arc, sync::LazyLock};
 
@@ -27,7 +27,7 @@ use crate::{
     },
 };
 
-/// Puts the caller of a request into its extensions, where handlers and rpcs read it; refuses a request that its caller
+/// Stores the caller of a request in its extensions, where handlers and rpcs read it; refuses a request that the caller
 /// may not make.
 pub(super) async fn authenticate(
     State(service): State<Arc<Service>>,
@@ -53,11 +53,11 @@ pub(super) async fn authenticate(
         }
     };
     let mut answer = answer.unwrap_or_else(|error| refusal(grpc, &path, error));
-    answer.extensions_mut().insert(caller); // for `observe`
+    answer.extensions_mut().insert(caller); // for `request_report`
     answer
 }
 
-/// Who makes a request.
+/// Identifies the caller of a request.
 fn identified(
     service: &Service,
     request: &Request,
@@ -75,7 +75,7 @@ fn identified(
     }
 }
 
-/// The refusal of a caller who does not have the scope that is needed.
+/// The refusal of a caller without the required scope.
 fn lacks(access: Access, caller: &Caller, by: &By) -> Option<ApiError> {
     let Access::Needs(scope) = access else {
         return None;
@@ -95,8 +95,8 @@ fn lacks(access: Access, caller: &Caller, by: &By) -> Option<ApiError> {
     }))
 }
 
-/// Who may make a request. What is no operation is answered by 404, 405 or UNIMPLEMENTED, which says nothing that
-/// `/openapi.json` of any installation does not.
+/// The access rule of a request. Requests that match no operation are answered by 404, 405 or UNIMPLEMENTED, which
+/// reveals only what `/openapi.json` of any installation does.
 fn access(request: &Request) -> Access {
     static OPERATIONS: LazyLock<BTreeMap<(&str, &str), Access>> = LazyLock::new(|| {
         let all = operations::all().into_iter();
@@ -143,7 +143,7 @@ fn access(request: &Request) -> Access {
     }
 }
 
-/// What a request shows of its caller: a token as bearer, or as the password that a browser asks for.
+/// The credentials of a request: a bearer token, or a token as the password that a browser asks for.
 fn credentials(headers: &HeaderMap, user_header: &header::HeaderName) -> Credentials {
     let mut sent = headers.get_all(header::AUTHORIZATION).iter();
     let token = sent.next().map(|value| {

@@ -11,7 +11,7 @@ use futures_util::StreamExt;
 use super::coding;
 use crate::{error::ApiError, transfer::Received};
 
-/// What the headers declare the body to be.
+/// The declared content type of the body.
 pub(super) fn content_type(headers: &HeaderMap) -> &str {
     let value = headers.get(header::CONTENT_TYPE);
     value
@@ -19,7 +19,7 @@ pub(super) fn content_type(headers: &HeaderMap) -> &str {
         .unwrap_or("nothing")
 }
 
-/// The same without parameters.
+/// The content type without parameters.
 fn essence(content_type: &str) -> String {
     let essence = content_type.split(';').next().unwrap_or_default();
     essence.trim().to_ascii_lowercase()
@@ -47,7 +47,7 @@ pub(super) fn is_json(headers: &HeaderMap) -> Result<&HeaderMap, ApiError> {
     Ok(headers)
 }
 
-/// The body as text, if it is not too large, alone and together with those of other requests.
+/// The body as text; an error if it is too large, alone or together with those of other requests.
 pub(super) async fn json_text(
     headers: &HeaderMap,
     body: Body,
@@ -103,8 +103,8 @@ pub(super) fn declared_length(headers: &HeaderMap) -> Option<usize> {
     value.to_str().ok()?.parse().ok()
 }
 
-/// Reads the rest of a refused body for a limited time, and drops it: many clients read the answer only after they
-/// have sent everything, and see a broken connection if the server closes it before.
+/// Reads the rest of a refused body for a limited time, and drops it: many clients read the answer only after they have
+/// sent everything, and would see a broken connection if the server closed it earlier.
 pub(super) async fn discard(mut pieces: BodyDataStream) {
     const MOST_BYTES: usize = 256 << 20;
     const LONGEST: Duration = Duration::from_secs(10);

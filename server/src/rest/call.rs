@@ -25,13 +25,13 @@ pub(super) struct AppState {
     pub(super) openapi: fn() -> &'static Value,
 }
 
-/// A request without its input, which handlers receive as separate arguments.
+/// A request without its parameters, which handlers receive as separate arguments.
 pub(super) struct Call {
     pub(super) service: Arc<Service>,
     pub(super) caller: Caller,
     pub(super) headers: HeaderMap,
     pub(super) body: Body,
-    /// What of the body is in memory.
+    /// The part of the body that is in memory.
     pub(super) received: Received,
     pub(super) openapi: fn() -> &'static Value,
 }
@@ -49,7 +49,7 @@ impl Call {
         .await
     }
 
-    /// The same of a body that is declared as a merge patch.
+    /// The body as text, if it is declared as a merge patch and is not too large.
     pub(super) async fn merge_patch(&mut self) -> Result<String, ApiError> {
         let body = std::mem::take(&mut self.body);
         let limit_bytes = self.service.max_body_bytes;

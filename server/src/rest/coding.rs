@@ -1,4 +1,5 @@
-//! Content codings of bodies, gzip and zstd (RFC 9110, 8.4): chosen for an answer, and undone for a request within limits.
+//! Content codings of bodies, gzip and zstd (RFC 9110, 8.4): chosen for an answer, and decoded for a request within
+//! limits.
 
 use std::{
     io,
@@ -27,29 +28,31 @@ use crate::{
     transfer::{self, Received, Share},
 };
 
-/// A coding that is understood.
+/// A supported coding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Coding {
     Gzip,
     Zstd,
 }
 
-/// What a refused request is told.
+/// The supported codings, as told to a refused request.
 pub(super) const UNDERSTOOD: &str = "gzip, zstd";
 
-/// Bytes that are handed on at once: few, so that one answer of very regular text does not keep a thread for itself.
+/// The number of bytes that are passed on at once: few, so that one answer of very regular text does not occupy a
+/// thread.
 const PIECE_BYTES: usize = 8 << 10;
-/// The window that a frame of zstd may ask for, as a power of two: what RFC 9659 has for HTTP.
+/// The largest window that a frame of zstd may request, as a power of two: the limit of RFC 9659 for HTTP.
 const MOST_WINDOW_LOG: u32 = 23;
-/// Text of a mesh becomes 3 to 20 times smaller. More than this many bytes for one that arrived, beyond the first ones, are
-/// no mesh, and cost their sender nothing.
+/// The largest ratio of decompression. Text of a mesh becomes 3 to 20 times smaller; a body with a higher ratio, apart
+/// from its first bytes, is no mesh, and costs its sender nothing.
 const MOST_RATIO: usize = 32;
-/// The first bytes of a body that is collected, and counted meanwhile: jobs that differ in few numbers become much smaller.
+/// The number of first bytes without a limit on the ratio, for a body that is collected in memory: jobs that differ in
+/// few numbers become much smaller.
 pub(super) const FREE_COLLECTED: usize = 16 << 20;
-/// Those of an upload, which goes to the disk.
+/// The number of first bytes without a limit on the ratio, for an upload, which goes to the disk.
 pub(super) const FREE_UPLOADED: usize = 256 << 10;
 
-/// A body in pieces, as it was before it was encoded.
+/// A decoded body in pieces.
 pub(super) type Pieces<'a> = Pin<Box<dyn Stream<Item = Result<Bytes, ApiError>> + Send + 'a>>;
 
 impl Coding {
@@ -62,7 +65,7 @@ impl Coding {
         }
     }
 
-    /// Its name in headers.
+    /// The name in headers.
     pub(super) fn name(self) -> &'static str {
         match self {
             Coding::Gzip => "gzip",
@@ -70,7 +73,7 @@ impl Coding {
         }
     }
 
-    /// Memory of an encoder, as measured: of an answer of several MB.
+    /// The memory of an encoder, as measured for an answer of several MB.
     pub(super) fn encoder_bytes(self) -> usize {
         match self {
             Coding::Gzip => 280 << 10,
@@ -78,7 +81,7 @@ impl Coding {
         }
     }
 
-    /// Memory of a decoder without its window, as measured.
+    /// The memory of a decoder without its window, as measured.
     fn decoder_bytes(self) -> usize {
         match self {
             Coding::Gzip => 48 << 10,
@@ -86,7 +89,7 @@ impl Coding {
         }
     }
 
-    /// The largest window of a decoder. It takes memory as it fills.
+    /// The largest window of a decoder, whose memory is taken as it fills.
     fn window_bytes(self) -> usize {
         match self {
             Coding::Gzip => 0, // a part of the decoder
@@ -94,7 +97,7 @@ impl Coding {
         }
     }
 
-    /// The coding that the client weighs most, zstd before gzip; `*` is gzip, and the weight 0 refuses (RFC 9110, 12.5.3).
+    /// The coding that the client prefers, zstd before gzip; `*` is gzip, and the weight 0 refuses (RFC 9110, 12.5.3).
     pub(super) fn accepted(headers: &HeaderMap) -> Option<Coding> {
         let (mut gzip, mut zstd, mut any) = (None, None, 0.0);
         let values = headers.get_all(header::ACCEPT_ENCODING).iter();
@@ -118,7 +121,7 @@ impl Coding {
         }
     }
 
-    /// The body in this coding, as fast as it can be made. The share is that of the encoder, and is given back with it.
+    /// The body in this coding, encoded as it is sent. The share is that of the encoder, and is returned with it.
     pub(super) fn encoded(self, body: Body, share: Share) -> Body {
         let reader = StreamReader::new(body.into_data_stream().map_err(io::Error::other));
         match self {
@@ -136,9 +139,9 @@ fn from_reader(reader: impl AsyncRead + Send + 'static, share: Share) -> Body {
     }))
 }
 
-/// The body of a request without its coding. The caller has the limit of its bytes; whatever that is, beyond the `free` ones
-/// they are not many times more than those that arrived. What the decoder needs is counted for the limit of `received` as long
-/// as there is one. An error if the coding is none of these, or several.
+/// The decoded body of a request. The caller limits its bytes; in addition, those beyond the first `free` ones may not
+/// be many times more than those that arrived. The decoder's memory counts for the limit of `received` while it exists.
+/// An error if the coding is not supported, or if there are several.
 pub(super) fn decoded<'a>(
     headers: &HeaderMap,
     body: &'a mut BodyDataStream,
@@ -244,7 +247,7 @@ mod tests {
         assert_eq!(Coding::accepted(&HeaderMap::new()), None);
     }
 
-    /// All that is decoded, of which so many bytes are free.
+    /// Everything that is decoded, with this many free bytes.
     async fn all_of(body: Body, encoding: &str, free: usize) -> Result<Vec<u8>, ApiError> {
         let mut headers = HeaderMap::new();
         headers.insert(header::CONTENT_ENCODING, encoding.parse().unwrap());
@@ -275,7 +278,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn what_is_encoded_is_decoded_also_in_several_members() {
+    async fn an_encoded_body_is_decoded_also_in_several_members() {
         let text: String = (0..20_000).map(|n| format!("{n},")).collect();
         for coding in [Coding::Gzip, Coding::Zstd] {
             let encoded = bytes(encoded(coding, text.clone())).await;
@@ -299,7 +302,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn what_becomes_many_times_larger_is_refused() {
+    async fn a_body_that_decompresses_to_many_times_its_size_is_refused() {
         for coding in [Coding::Gzip, Coding::Zstd] {
             for (kib, free, refused) in [
                 (15 << 10, FREE_COLLECTED, false),
@@ -325,7 +328,8 @@ mod tests {
         }
     }
 
-    /// A frame that refers to its last 8 MiB, as it says, in blocks of four bytes that each repeat one byte 128 KiB times.
+    /// The window of a decoder is counted as it fills: a frame that refers to its last 8 MiB, in blocks of four bytes
+    /// that each repeat one byte 128 KiB times.
     #[tokio::test]
     async fn the_window_of_a_decoder_is_counted_as_it_fills() {
         let block = [&[0x02, 0, 0x10][..], b" "].concat();

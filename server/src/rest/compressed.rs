@@ -1,6 +1,6 @@
-//! Answers as gzip or zstd, where the client takes it and the answer is large text. Streams of events are not compressed, nor is
-//! what is compressed already; a range is one of the bytes as they are. By hand and not by tower-http's layer, which answers 406
-//! after the handler has run, and leaves entity tags strong.
+//! Compresses answers with gzip or zstd, if the client accepts it and the answer is large text. Streams of events are
+//! not compressed, nor is compressed data; a range refers to the uncompressed bytes. Written by hand instead of using
+//! tower-http's layer, which answers 406 after the handler has run, and leaves entity tags strong.
 
 use axum::{
     body::HttpBody,
@@ -13,11 +13,11 @@ use axum::{
 use super::coding::Coding;
 use crate::transfer::{Limit, Share};
 
-/// Smaller answers are sent in a few packets anyway; jobs are among them.
+/// The smallest answer that is compressed; smaller ones, such as jobs, fit into a few packets anyway.
 const SMALLEST: u64 = 16 << 10;
 
-/// Compresses the answer if it should be, and there is room for an encoder among the answers: it is in memory as long as
-/// they are, also if the client reads nothing.
+/// Compresses the answer if that is worth it and there is memory for an encoder: it stays in memory as long as the
+/// answer, also if the client reads nothing.
 pub(super) async fn compressed(
     State(sent): State<Limit>,
     request: Request,
@@ -41,7 +41,7 @@ pub(super) async fn compressed(
     }
 }
 
-/// Whether it is large, text, complete and of known length, which streams of events are not.
+/// Whether the answer is large, text, complete and of known length, which excludes streams of events.
 fn is_worth_it(response: &Response) -> bool {
     let headers = response.headers();
     let declared = headers.get(header::CONTENT_LENGTH);

@@ -22,11 +22,11 @@ use crate::{
 /// The part of a file that is requested.
 pub(super) const PART: PartHeaders = PartHeaders;
 
-/// The headers that request a part of a file, or a file only if the client does not have it.
+/// The headers that request a part of a file, or a file only if the client does not have it yet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PartHeaders;
 
-/// Which part of a file is requested, and what the client has already; as it was sent.
+/// The requested part of a file, and the version that the client has, as sent.
 #[derive(Debug, Default)]
 pub(super) struct Part {
     known: Option<Tags>,
@@ -73,10 +73,10 @@ impl Input for PartHeaders {
 /// The description of a file, known before its bytes are read.
 pub(super) struct File {
     pub(super) format: Format,
-    /// Its name without the extension.
+    /// The name without the extension.
     pub(super) name: String,
     pub(super) bytes: u64,
-    /// SHA-256.
+    /// The SHA-256 of the file.
     pub(super) digest: Vec<u8>,
 }
 
@@ -99,8 +99,7 @@ pub(super) fn whole(
     })
 }
 
-/// Answers with a file or a range of it, or with 304 if the client has it already. `body` gives the
-/// bytes of a range.
+/// Answers with a file or a range of it, or with 304 if the client has it already. `body` returns the bytes of a range.
 pub(super) fn answer(
     part: &Part,
     file: &File,
@@ -161,7 +160,7 @@ pub(super) fn answer(
     ))
 }
 
-/// The answer with the header that says whether the result it is from is all there will be.
+/// The answer with the header that says whether its result is partial or final.
 pub(super) fn marked(response: impl IntoResponse, available: ResultAvailable) -> Response {
     let words: &str = available.into();
     let header = [(RESULT_AVAILABLE, words)];
@@ -182,12 +181,12 @@ fn with<const N: usize>(mut response: Response, headers: [(HeaderName, String); 
 enum Selection {
     All,
     Part(Range<u64>),
-    /// Nothing: the requested range begins after the end.
+    /// Nothing: the requested range begins after the end of the file.
     Nothing,
 }
 
-/// The one range of a request, unless it belongs to another version of the file. Several ranges, and ranges that
-/// cannot be read, are answered with the whole file, as RFC 9110 specifies.
+/// The range that a request selects, unless it belongs to another version of the file. Several ranges, and invalid
+/// ones, select the whole file, as RFC 9110 specifies.
 fn select(part: &Part, tag: &str, length: u64) -> Selection {
     if part.if_range.as_ref().is_some_and(|of| of != tag) {
         return Selection::All;

@@ -1,4 +1,4 @@
-//! `/v1/jobs/{id}/events`: replayed and then live, as server-sent events or as JSON Lines.
+//! The operation `/v1/jobs/{id}/events`: past events, then live ones, as server-sent events or as JSON Lines.
 
 use std::{cmp::Ordering, time::Duration};
 
@@ -29,12 +29,12 @@ use crate::{
 
 /// Interval of the comments that keep the connection open through proxies and clients.
 const PING: Duration = Duration::from_secs(15);
-/// Server-sent events.
+/// The media type of server-sent events.
 const SSE: &str = "text/event-stream";
-/// The media types of JSON Lines, a JSON object per line.
+/// The media types of JSON Lines, a JSON object on each line.
 const LINES: [&str; 2] = ["application/jsonl", "application/x-ndjson"];
 
-/// A browser that reconnects requests the same address again and adds this header.
+/// The header that a browser adds when it reconnects to the same address.
 pub(super) const LAST_EVENT_ID: Parameter<Integers> = Parameter {
     name: "Last-Event-ID",
     meaning: "Same as after_seq; takes precedence over it",
@@ -52,7 +52,7 @@ pub(super) async fn events(
     answer(&call.headers, events)
 }
 
-/// A stream of events in the format that the client asks for, or that there is none.
+/// A stream of events in the format that the client asks for, or the answer that there are none.
 pub(super) fn answer<E: Numbered>(
     headers: &HeaderMap,
     events: Option<impl Stream<Item = Result<E, ApiError>> + Send + 'static>,
@@ -63,7 +63,7 @@ pub(super) fn answer<E: Numbered>(
     Ok(write(events, chosen(headers)?))
 }
 
-/// The format that the client weighs most; of equal ones, and without `Accept`, server-sent events.
+/// The format that the client prefers; of equal ones, and without `Accept`, server-sent events.
 fn chosen(headers: &HeaderMap) -> Result<Encoding, ApiError> {
     let accepted = accepted(headers);
     let most = |media: &[&str]| {
@@ -84,9 +84,9 @@ fn chosen(headers: &HeaderMap) -> Result<Encoding, ApiError> {
 
 /// An event with a number and a type.
 pub(super) trait Numbered: Serialize + Send + 'static {
-    /// Its number.
+    /// The event's number.
     fn seq(&self) -> i64;
-    /// Its type.
+    /// The event's type.
     fn kind(&self) -> &'static str;
 }
 
@@ -113,9 +113,9 @@ impl Numbered for SweepEvent {
 /// The format of a stream of events.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Encoding {
-    /// As server-sent events.
+    /// Server-sent events.
     Stream,
-    /// As JSON Lines.
+    /// JSON Lines.
     Lines,
 }
 
@@ -127,10 +127,10 @@ pub(super) fn preferred(headers: &HeaderMap) -> Option<Encoding> {
     prefers(headers, &LINES).then_some(Encoding::Lines)
 }
 
-/// nginx as a proxy would keep events until it has four kilobytes of them.
+/// A header for nginx, which as a proxy would otherwise hold back events until it has four kilobytes of them.
 const UNBUFFERED: [(&str, &str); 1] = [("x-accel-buffering", "no")];
 
-/// A stream of events. An error ends the stream: without `done` the client knows that it is incomplete.
+/// A stream of events. An error ends the stream without `done`, so that the client knows that it is incomplete.
 pub(super) fn write<E: Numbered>(
     events: impl Stream<Item = Result<E, ApiError>> + Send + 'static,
     encoding: Encoding,

@@ -14,7 +14,7 @@ use crate::{
 /// All filters; without any, every job matches.
 pub(super) const FILTERS: Filters = Filters;
 
-/// The filters.
+/// The input of all filters.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Filters;
 

@@ -1,6 +1,6 @@
-//! What a proxy changes of a request: the path below which clients reach the service, and the host and scheme that they have
-//! named, if the proxy is trusted (RFC 7239, or the older X-Forwarded-Host and X-Forwarded-Proto). Links are paths, so that the
-//! client's address is not needed.
+//! Undoes what a proxy changes in a request: the path below which clients reach the service, and the host and scheme
+//! that they have used, if the proxy is trusted (RFC 7239, or the older X-Forwarded-Host and X-Forwarded-Proto). Links
+//! are paths, so that the client's address is not needed.
 
 use axum::{
     extract::Request,
@@ -13,7 +13,7 @@ use axum::{
 
 use crate::{caller::Peer, config::ProxyTrust, error::ApiError};
 
-/// The request as it would be without this path in front; one whose path does not begin with it stays.
+/// The request without this path in front; unchanged if its path does not begin with it.
 pub(super) fn without_prefix(mut request: Request, prefix: &str) -> Request {
     let rest = request.uri().path_and_query().and_then(|whole| {
         let rest = whole.as_str().strip_prefix(prefix)?;
@@ -33,7 +33,7 @@ pub(super) fn without_prefix(mut request: Request, prefix: &str) -> Request {
     request
 }
 
-/// The host that the client has named, by the account of a trusted proxy; `None` if it gives none.
+/// The host that the client has used, according to a trusted proxy; `None` if it names none.
 pub(super) fn host(request: &Request, trust: &ProxyTrust) -> Result<Option<Authority>, ApiError> {
     const OLDER: HeaderName = HeaderName::from_static("x-forwarded-host");
     if !is_from_proxy(request, trust) {
@@ -55,12 +55,12 @@ pub(super) fn host(request: &Request, trust: &ProxyTrust) -> Result<Option<Autho
     };
     match authority(text.as_bytes()) {
         Some(host) => Ok(Some(host)),
-        None => wrong("the host that the proxy names is not a host"),
+        None => wrong("the proxy gives an invalid host"),
     }
 }
 
-/// A host, and nothing else than a port (RFC 9110, 7.2): `Authority` also takes users, and text behind an address in brackets,
-/// which is no part of its `host`.
+/// Reads a host with an optional port, and nothing else (RFC 9110, 7.2): `Authority` also accepts users, and text after
+/// an address in brackets, which is not part of its `host`.
 pub(super) fn authority(text: &[u8]) -> Option<Authority> {
     let named = Authority::try_from(text).ok()?;
     let rest = named.as_str().strip_prefix(named.host())?;
@@ -69,7 +69,7 @@ pub(super) fn authority(text: &[u8]) -> Option<Authority> {
     (whole && !named.host().is_empty()).then_some(named)
 }
 
-/// Whether the client has used https, by the account of a trusted proxy; `None` if it gives none.
+/// Whether the client has used https, according to a trusted proxy; `None` if it does not say.
 pub(super) fn https(request: &Request, trust: &ProxyTrust) -> Option<bool> {
     const OLDER: HeaderName = HeaderName::from_static("x-forwarded-proto");
     if !is_from_proxy(request, trust) {
@@ -93,7 +93,7 @@ fn last(headers: &HeaderMap, name: &HeaderName) -> Option<String> {
     split(text, ',').last().map(str::to_owned)
 }
 
-/// A parameter of a `Forwarded`, without its quotes.
+/// A parameter of a `Forwarded` header, without its quotes.
 fn parameter(element: &str, wanted: &str) -> Option<String> {
     split(element, ';').find_map(|pair| {
         let (name, value) = pair.split_once('=')?;
@@ -105,7 +105,7 @@ fn parameter(element: &str, wanted: &str) -> Option<String> {
     })
 }
 
-/// Parts between separators that do not stand in quotes. A host has no character that needs a backslash.
+/// The parts of a text between separators outside quotes. A host has no character that needs a backslash.
 fn split(text: &str, separator: char) -> impl Iterator<Item = &str> {
     let mut quoted = false;
     text.split(move |c| {
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn a_trusted_proxy_is_believed_and_nobody_else() {
+    fn only_a_trusted_proxy_is_believed() {
         let proxy = |headers| told("10.0.0.1", headers);
         let lab = Ok(Some("lab.example:8443".to_owned()));
         assert_eq!(proxy(&[("x-forwarded-host", "lab.example:8443")]), lab);

@@ -1,5 +1,5 @@
-//! Hostile queries, headers and bodies: read or refused in words, and nothing else. See `suite::fuzzing`, also for
-//! longer runs.
+//! Tests with hostile queries, headers and bodies: they are read or refused with an error, and nothing else happens.
+//! See `suite::fuzzing`, also for longer runs.
 #![allow(clippy::unwrap_used)]
 
 use axum::http::{HeaderMap, HeaderName, HeaderValue};

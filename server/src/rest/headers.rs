@@ -58,25 +58,25 @@ pub(super) fn text() -> Value {
     json!({ "type": "string" })
 }
 
-/// A text for which a pattern is recommended: preferences and ranges of another form are ignored, not refused.
+/// A text for which a pattern is recommended: preferences and ranges in another form are ignored, not refused.
 pub(super) fn recommended_pattern(pattern: &str) -> Value {
     json!({ "type": "string", "anyOf": [{ "pattern": pattern }, {}] })
 }
 
-/// The job is sent only if it has changed.
+/// The condition that the job has changed.
 pub(super) const IF_NONE_MATCH: Condition = Condition {
     name: "If-None-Match",
     meaning: "ETag that the client has; 304 if it is still current",
 };
 
-/// The change is made only if the job has not changed.
+/// The condition that the job has not changed.
 pub(super) const IF_MATCH: Condition = Condition {
     name: "If-Match",
     meaning: "ETag of the job; the change is made only if it is still current",
 };
 
-/// The entity tag of a version of a job or sweep. It is weak: the version counts changes of the status and edits, and of two
-/// answers with the same one the later may tell of more progress.
+/// The entity tag of a version of a job or sweep. It is weak: the version counts changes of the status and edits, so
+/// that two answers with the same tag may differ in progress.
 pub(super) fn version_tag(version: i64) -> String {
     format!("W/\"{version}\"")
 }
@@ -100,7 +100,7 @@ impl Input for Condition {
     }
 }
 
-/// Entity tags of a conditional request; tags of another form match nothing.
+/// The entity tags of a conditional request; tags in another form match nothing.
 #[derive(Debug)]
 pub(super) struct Tags(Vec<String>);
 
@@ -116,14 +116,14 @@ impl Tags {
         Some(Tags(tags.collect()))
     }
 
-    /// Whether this tag is among them, as `If-None-Match` compares: weakly.
+    /// Whether this tag is among them, compared weakly as for `If-None-Match`.
     pub(super) fn contain(&self, tag: &str) -> bool {
         let same = |own: &String| own == "*" || opaque(own) == opaque(tag);
         self.0.iter().any(same)
     }
 
-    /// The versions among them; `None`: all of them. `If-Match` compares strongly, so that by the RFC the tag of a job would
-    /// match nothing; what is compared here are versions, of which each change makes a new one.
+    /// The versions among them; `None`: all versions. `If-Match` compares strongly, so that by the RFC the weak tag of
+    /// a job would match nothing; versions are compared instead, of which each change makes a new one.
     pub(super) fn versions(&self) -> Option<Vec<i64>> {
         let any = self.0.iter().any(|tag| tag == "*");
         (!any).then(|| self.0.iter().filter_map(|tag| number(tag)).collect())
@@ -148,15 +148,15 @@ fn number(tag: &str) -> Option<i64> {
         .ok()
 }
 
-/// How long to wait for the end of a submitted job, in whole seconds (RFC 7240).
+/// The preference to wait for the end of a submitted job, in whole seconds (RFC 7240).
 pub(super) const PREFER: PreferWait = PreferWait;
 
-/// The `wait` of a `Prefer` header.
+/// The `wait` in a `Prefer` header.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PreferWait;
 
 impl Input for PreferWait {
-    /// Seconds, at most the longest wait allowed.
+    /// The seconds to wait, at most the longest wait allowed.
     type Value = Option<u64>;
 
     fn descriptions(&self) -> Vec<Description> {
@@ -173,7 +173,7 @@ impl Input for PreferWait {
     }
 }
 
-/// The first valid wait.
+/// The first valid `wait`, in seconds.
 fn preferred_wait_s(headers: &HeaderMap) -> Option<u64> {
     headers
         .get_all("prefer")

@@ -1,5 +1,5 @@
-//! The input of operations beside their body: path variables, query parameters, headers. Each describes itself for
-//! the table, and is read and checked before the handler runs.
+//! The inputs of operations apart from the body: path variables, query parameters, headers. Each one describes itself
+//! for the list of operations, and is read and checked before the handler runs.
 
 use axum::{
     RequestPartsExt,
@@ -14,17 +14,17 @@ use crate::{
 
 /// An input of an operation.
 pub(super) trait Input {
-    /// What a handler receives.
+    /// The value that a handler receives.
     type Value;
 
-    /// Its description for the API; several if inputs belong together.
+    /// The description of the input for the API; several if inputs belong together.
     fn descriptions(&self) -> Vec<Description>;
 
-    /// Reads and checks it.
+    /// Reads and checks the input.
     fn extract(&self, raw: &RawInput<'_>) -> Result<Self::Value, ApiError>;
 }
 
-/// A request without its body, as it was sent.
+/// A request without its body, as sent.
 #[derive(Debug)]
 pub(super) struct RawInput<'a> {
     variables: Vec<(String, String)>,
@@ -58,8 +58,8 @@ impl<'a> RawInput<'a> {
         }
     }
 
-    /// Refuses an unknown parameter, and a second value of a parameter that is not repeatable: they would have no
-    /// effect, and the client expects one.
+    /// Refuses an unknown parameter, and a second value of a parameter that is not repeatable: they would be ignored,
+    /// which the client would not notice.
     pub(super) fn check(&self, described: &[Description]) -> Result<(), ApiError> {
         let known = described
             .iter()
@@ -144,7 +144,7 @@ impl<V: Values> Input for Parameter<V> {
     }
 }
 
-/// Several inputs are a tuple.
+/// Makes a tuple of several inputs an input.
 macro_rules! tuples {
     ($(($($T:ident)*))*) => {$(
         #[allow(non_snake_case, clippy::unused_unit)]

@@ -1,4 +1,4 @@
-//! `/v1/jobs` as a list, `/v1/jobs/{id}`, `…/problem` and `…/cancel`.
+//! The operations `/v1/jobs` (list), `/v1/jobs/{id}`, `…/problem` and `…/cancel`.
 
 use axum::{
     Json,

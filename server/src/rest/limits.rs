@@ -1,4 +1,4 @@
-//! What holds for every request of either protocol: a body that keeps arriving, and bytes of bodies and answers that are
+//! Limits for every request of either protocol: a body must keep arriving, and the bytes of bodies and answers are
 //! counted over all requests.
 
 use std::sync::Arc;
@@ -24,7 +24,7 @@ use crate::{
     verbs::Service,
 };
 
-/// Uploads are written to a file as they arrive, so that their bytes are not kept in memory.
+/// The path of uploads, whose bytes are written to a file as they arrive and not kept in memory.
 const UPLOAD: &str = "/signorini.v1.JobService/UploadMesh";
 
 pub(super) async fn limits(
@@ -71,14 +71,14 @@ pub(super) async fn limits(
     }
 }
 
-/// Whether a path is one of the services of gRPC.
+/// Whether a path belongs to one of the gRPC services.
 fn is_of_grpc(path: &str) -> bool {
     ["/signorini.v1.", "/grpc."]
         .iter()
         .any(|start| path.starts_with(start))
 }
 
-/// Whether a request changes nothing, so that it may be made again.
+/// Whether a request changes nothing, so that it may be repeated.
 fn only_reads(grpc: bool, method: &Method, path: &str) -> bool {
     const READING: [&str; 7] = [
         "Get", "List", "Count", "Wait", "Watch", "Stream", "Validate",
@@ -89,7 +89,7 @@ fn only_reads(grpc: bool, method: &Method, path: &str) -> bool {
     }
 }
 
-/// A refusal over gRPC that answered before any message.
+/// Records a gRPC refusal that was answered before any message.
 fn note_status(status: &tonic::Status, path: &str) {
     if status.code() != tonic::Code::Ok {
         let kind = status.get_details_error_info().map(|info| info.reason);

@@ -1,4 +1,4 @@
-//! `/v1/meshes`.
+//! The operations on `/v1/meshes`.
 
 use axum::{
     Json,
@@ -20,7 +20,7 @@ use crate::{
     verbs::{meshes as verbs, page::Paging},
 };
 
-/// The file is the body, of any media type: its format is recognized from its first bytes.
+/// Stores the body as a mesh file, whatever its media type: its format is recognised from its first bytes.
 pub(super) async fn upload(call: Call) -> Result<Response, ApiError> {
     let limit_bytes = call.service.max_mesh_bytes;
     let mut body = call.body.into_data_stream();

@@ -1,4 +1,4 @@
-//! REST. The whole API is one list, `operations`. Handlers only translate; see `verbs`.
+//! REST. The whole API is one list, `operations`. Handlers only translate; the operations themselves are in `verbs`.
 //!
 //! # Where to look
 //!
@@ -15,13 +15,13 @@
 //! | bodies as bytes, as JSON with all violations | `body`, `bodies`, `object` |
 //! | content codings | `coding`, `compressed` |
 //! | the caller and what they may do | `authenticate` |
-//! | a token that ends while it is used | `revocation` |
+//! | a token that is revoked while it is used | `revocation` |
 //! | hosts and origins | `origin` |
 //! | proxies | `forwarded` |
 //! | limits that hold for every request | `limits` |
 //! | answers: errors | `reply` |
 //! | answers: entity tags, digests, ranges | `data` |
-//! | log line, metrics and span of a request | `observe`, `request_target` |
+//! | log line, metrics and span of a request | `request_report`, `request_target` |
 //! | refused requests in the log | `refused` |
 //! | handlers by subject | `jobs`, `submit`, `events`, `results`, `plots`, `sweeps`, `meshes`, `tokens`, `service` |
 //! | the page at /docs | `docs` |
@@ -44,9 +44,9 @@ mod origin;
 // Answers.
 mod compressed;
 mod data;
-mod observe;
 mod refused;
 mod reply;
+mod request_report;
 mod request_target;
 mod revocation;
 

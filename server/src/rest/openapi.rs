@@ -1,5 +1,5 @@
-//! `/openapi.json`: the list of operations as an OpenAPI document. The schemas of bodies are derived from the types
-//! that are read and written, so that a renamed field changes the document automatically.
+//! The operation `/openapi.json`: the list of operations as an OpenAPI document. The schemas of bodies are derived from
+//! the types that are read and written, so that a renamed field changes the document automatically.
 
 use std::{collections::BTreeMap, sync::LazyLock};
 
@@ -24,7 +24,7 @@ pub fn openapi() -> &'static Value {
     &DOCUMENT
 }
 
-/// Media type of errors, RFC 9457.
+/// The media type of errors, RFC 9457.
 const PROBLEM: &str = "application/problem+json";
 
 fn document() -> Value {
@@ -58,7 +58,7 @@ fn document() -> Value {
 }
 
 const INTRODUCTION: &str = "The same operations, names and numbers as over gRPC \
-([/proto/signorini.proto](proto/signorini.proto)), on one port. A problem by itself: \
+([/proto/signorini.proto](proto/signorini.proto)), on one port. The schema of a problem: \
 [/v1/schema/problem.json](v1/schema/problem.json). \
 Units are chosen by the client and must be consistent; stresses are negative in compression; times are RFC 3339 in UTC. \
 Unknown names are refused, in bodies and in queries. Every error is a document of RFC 9457; its `code` \
@@ -66,9 +66,9 @@ is stable, and its `type` is the address of an explanation.";
 
 /// Collects the schemas that operations refer to.
 struct Schemas {
-    /// For bodies that are read: fields with a default may be left out.
+    /// Schemas for bodies that are read: fields with a default may be left out.
     requests: SchemaGenerator,
-    /// For bodies that are written: fields that are always written are required.
+    /// Schemas for bodies that are written: fields that are always written are required.
     answers: SchemaGenerator,
 }
 
@@ -237,7 +237,7 @@ mod tests {
         fields.map(|(name, _)| name.clone()).collect()
     }
 
-    /// Two lists of schemas are merged into one, and may use the same name.
+    /// Two types do not share a name, since two lists of schemas are merged into one.
     #[test]
     fn two_types_do_not_share_a_name() {
         let mut schemas = Schemas::new();

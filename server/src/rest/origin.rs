@@ -1,6 +1,6 @@
-//! Where a request may come from, as far as a browser says: it names one host that this service answers for, and is
-//! made by no page of another site. Otherwise any page that a user of the lab opens could submit, cancel and read with
-//! that user's reach: by a form or a script, or after leading its own name to this address (DNS rebinding).
+//! Checks where a browser's request comes from: it must name a host that this service answers for, and not come from a
+//! page of another site. Otherwise any page that a user opens could submit, cancel and read jobs with that user's
+//! access: by a form or a script, or after leading its own name to this address (DNS rebinding).
 
 use std::{
     net::{Ipv4Addr, Ipv6Addr},
@@ -38,7 +38,7 @@ pub(super) async fn own_site(
     }
 }
 
-/// An error if the request is one of those. `tls`: the service itself speaks it.
+/// Refuses such requests. `tls`: whether the service itself uses TLS.
 fn check(request: &Request, web: &Web, trust: &ProxyTrust, tls: bool) -> Result<(), ApiError> {
     // the one that is believed has talked to the browser: its account replaces the name that it calls us by
     let named = host_of(request)?;
@@ -62,7 +62,8 @@ fn check(request: &Request, web: &Web, trust: &ProxyTrust, tls: bool) -> Result<
     check_origin(request.headers(), (https, &host), web)
 }
 
-/// RFC 9112, 3.2: a request over HTTP/1.1 has exactly one Host; two could mean different things to a proxy and to us.
+/// The host of a request. By RFC 9112, 3.2 a request over HTTP/1.1 has exactly one Host; two could mean different
+/// things to a proxy and to this service.
 fn host_of(request: &Request) -> Result<Option<Authority>, ApiError> {
     let hosts: Vec<_> = request.headers().get_all(header::HOST).iter().collect();
     let authority = request.uri().authority();
@@ -91,7 +92,8 @@ fn host_of(request: &Request) -> Result<Option<Authority>, ApiError> {
     }
 }
 
-/// A number cannot be led elsewhere, and neither can the names that this machine has for itself.
+/// Whether a host is this service's own: numeric addresses cannot be led elsewhere, nor can the names that this machine
+/// has for itself.
 fn is_own_host(host: &Authority, web: &Web) -> bool {
     static MACHINE: LazyLock<String> = LazyLock::new(|| {
         let system = rustix::system::uname();
@@ -109,8 +111,8 @@ fn is_own_host(host: &Authority, web: &Web) -> bool {
         })
 }
 
-/// A browser adds the origin of the page to all requests but the safest. Where clients reach the service by https, a page that
-/// came by http is not its own: anyone on the way may have written it.
+/// Checks the origin of a page, which a browser adds to all but the safest requests. If clients reach the service by
+/// https, a page from http is not its own: anyone on the way may have changed it.
 fn check_origin(
     headers: &HeaderMap,
     (https, host): (bool, &Authority),
@@ -133,7 +135,7 @@ fn check_origin(
     Ok(())
 }
 
-/// Headers that pages of the allowed origins may send.
+/// The headers that pages of the allowed origins may send.
 const SENT: [&str; 13] = [
     "accept",
     "authorization",
@@ -149,7 +151,7 @@ const SENT: [&str; 13] = [
     "traceparent",
     "x-request-id",
 ];
-/// Headers that they may read.
+/// The headers that pages of the allowed origins may read.
 const READ: [&str; 12] = [
     "accept-ranges",
     "content-digest",
@@ -165,7 +167,7 @@ const READ: [&str; 12] = [
     "x-request-id",
 ];
 
-/// What tells browsers to show answers to pages of the allowed origins; `None` if there are none.
+/// The headers that make browsers show answers to pages of the allowed origins; `None` if there are none.
 pub(super) fn cors(web: &Web) -> Option<CorsLayer> {
     const LASTS: Duration = Duration::from_secs(3600);
     let names = |names: &[&'static str]| -> Vec<HeaderName> {
@@ -340,7 +342,8 @@ mod tests {
         ));
     }
 
-    /// Those that browsers send and show anyway are not listed.
+    /// Pages of allowed origins may use every header of the operations, except those that browsers send and show
+    /// anyway.
     #[test]
     fn pages_of_allowed_origins_may_use_every_header_of_the_operations() {
         const ALWAYS: [&str; 3] = ["cache-control", "content-type", "content-length"];

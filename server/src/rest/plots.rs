@@ -1,4 +1,4 @@
-//! `/v1/jobs/{id}/plots/{plot}.svg`, `.png`, `.pdf`.
+//! The operations `/v1/jobs/{id}/plots/{plot}.svg`, `.png`, `.pdf`.
 
 use axum::{
     http::{HeaderName, HeaderValue, header},
@@ -82,7 +82,7 @@ fn inline(saved: &HeaderValue) -> Option<HeaderValue> {
     HeaderValue::from_str(&shown).ok()
 }
 
-/// A figure may not run scripts or load anything: its texts come from clients.
+/// Headers of a figure, which may not run scripts or load anything, since its texts come from clients.
 const HEADERS: [(HeaderName, HeaderValue); 1] = [(
     header::CONTENT_SECURITY_POLICY,
     HeaderValue::from_static("default-src 'none'; style-src 'unsafe-inline'"),

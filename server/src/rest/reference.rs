@@ -1,4 +1,4 @@
-//! `docs/api.md`: the list of operations for people.
+//! Writes `docs/api.md`: the list of operations for people.
 
 use std::fmt::Write;
 
@@ -127,7 +127,7 @@ fn statuses(operation: &Operation) -> String {
     words.join(" ")
 }
 
-/// As GitHub makes it from the heading: lower case, spaces to hyphens, punctuation dropped.
+/// The anchor that GitHub makes from a heading: lower case, spaces to hyphens, punctuation dropped.
 fn anchor(operation: &Operation) -> String {
     let heading = format!("{} {}", operation.method, operation.path);
     heading

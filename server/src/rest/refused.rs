@@ -1,4 +1,4 @@
-//! Refused requests in the log: a line for each kind every ten seconds at most, however many there are.
+//! Logs refused requests: at most one line for each kind every ten seconds, however many there are.
 
 use std::{
     collections::BTreeMap,
@@ -10,10 +10,10 @@ use tracing::info;
 
 /// How often a kind is logged.
 const INTERVAL: Duration = Duration::from_secs(10);
-/// A client chooses the path.
+/// The longest path that is logged, since a client chooses it.
 const LONGEST_PATH: usize = 100;
 
-/// By kind: when it was last logged, and how many requests were refused since. There are as many kinds as errors.
+/// By kind: when it was last logged, and how many requests were refused since then. There are as many kinds as errors.
 static KINDS: LazyLock<Mutex<BTreeMap<String, Kind>>> = LazyLock::new(Mutex::default);
 
 struct Kind {
@@ -21,7 +21,7 @@ struct Kind {
     since: u64,
 }
 
-/// A request was refused for this kind of error.
+/// Records that a request was refused with this kind of error.
 pub(super) fn note(kind: &str, path: &str) {
     let Some(count) = due(kind, Instant::now()) else {
         return;
@@ -40,7 +40,8 @@ pub(super) fn note(kind: &str, path: &str) {
     }
 }
 
-/// After a line, tells of those that were refused since, until there are none: no further one may come that would.
+/// After a line, logs the requests that were refused since then, until there are none: no later request may come that
+/// would do so.
 async fn tell_the_rest(kind: String) {
     loop {
         tokio::time::sleep(INTERVAL).await;
@@ -55,7 +56,7 @@ async fn tell_the_rest(kind: String) {
     }
 }
 
-/// How many requests were refused since the last line; from now on they are counted anew.
+/// The number of requests that were refused since the last line, which is reset.
 fn rest(kind: &str, now: Instant) -> u64 {
     let mut kinds = KINDS.lock().unwrap_or_else(PoisonError::into_inner);
     match kinds.get_mut(kind) {
@@ -67,7 +68,7 @@ fn rest(kind: &str, now: Instant) -> u64 {
     }
 }
 
-/// How many requests a line is due for.
+/// The number of requests for which a line is due.
 fn due(kind: &str, now: Instant) -> Option<u64> {
     let mut kinds = KINDS.lock().unwrap_or_else(PoisonError::into_inner);
     match kinds.get_mut(kind) {

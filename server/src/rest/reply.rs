@@ -1,4 +1,4 @@
-//! Errors over REST: always sent as `application/problem+json`.
+//! Errors over REST, which are always sent as `application/problem+json`.
 
 use std::any::Any;
 
@@ -17,7 +17,8 @@ use crate::{
 };
 
 impl IntoResponse for ApiError {
-    /// Only the status and the error itself; `errors_as_documents` writes the document, since it knows the path.
+    /// An answer with only the status and the error itself; `errors_as_documents` writes the document, since it knows
+    /// the path.
     fn into_response(self) -> Response {
         let mut response = self.http_status().into_response();
         if let Some(seconds) = self.retry_after_s() {
@@ -57,7 +58,7 @@ pub(super) async fn errors_as_documents(request: Request, next: Next) -> Respons
     with_document(response, &path)
 }
 
-/// An error with its document; any other answer as it is.
+/// An error with its document; any other answer unchanged.
 fn with_document(mut response: Response, path: &str) -> Response {
     let Some(error) = response.extensions_mut().remove::<ApiError>() else {
         return response;
@@ -74,7 +75,7 @@ fn with_document(mut response: Response, path: &str) -> Response {
     Response::from_parts(parts, Body::from(document))
 }
 
-/// Whether the client speaks gRPC.
+/// Whether the client uses gRPC.
 pub(super) fn is_grpc(request: &Request) -> bool {
     let content_type = request.headers().get(header::CONTENT_TYPE);
     content_type.is_some_and(|value| value.as_bytes().starts_with(b"application/grpc"))
@@ -91,7 +92,7 @@ pub(super) fn refusal(grpc: bool, path: &str, error: ApiError) -> Response {
     }
 }
 
-/// The same for a request that is not routed.
+/// Refuses a request before it is routed.
 pub fn refuse(request: &Request, error: ApiError) -> Response {
     let path = address::without_prefix(request.uri().path());
     refusal(is_grpc(request), path, error)
@@ -106,7 +107,7 @@ pub(super) async fn not_found(request: Request) -> Response {
     ApiError::NotFound(format!("there is no resource at {}", request.uri().path())).into_response()
 }
 
-/// A handler panicked: an incident like any other unexpected error.
+/// The answer when a handler has panicked: an incident like any other unexpected error.
 pub(super) fn panicked(panic: Box<dyn Any + Send>) -> Response {
     let text = panic
         .downcast_ref::<String>()

@@ -1,4 +1,4 @@
-//! `/v1/jobs/{id}/result`, `/history`, `/profiles/{boundary}` and `/fields`.
+//! The operations `/v1/jobs/{id}/result`, `/history`, `/profiles/{boundary}` and `/fields`.
 
 use axum::{
     Extension, Json,

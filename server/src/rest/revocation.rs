@@ -56,7 +56,8 @@ pub(super) async fn end_when_revoked(
     }))
 }
 
-/// Returns when the token has been invalid for a while: a caller who revokes their own token is answered in that time.
+/// Returns when the token has been invalid for a short time, in which a caller who revokes their own token receives the
+/// answer.
 async fn invalid(store: &Store, by: &By) {
     loop {
         sleep(INTERVAL).await;
@@ -73,7 +74,7 @@ struct UntilRevoked {
     by: By,
     /// When the token was last checked.
     checked: Instant,
-    /// Wakes the task for the next check; made when the body has to wait for the first time, which most never do.
+    /// Wakes the task for the next check; made when the body must wait for the first time, which is rare.
     ticks: Option<Interval>,
 }
 

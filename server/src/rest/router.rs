@@ -11,7 +11,7 @@ use tower_http::catch_panic::CatchPanicLayer;
 
 use super::{
     authenticate::authenticate, call::AppState, compressed::compressed, forwarded, limits::limits,
-    observe, openapi::openapi, operations, origin, reply,
+    openapi::openapi, operations, origin, reply, request_report,
 };
 use crate::{error::ApiError, verbs::Service};
 
@@ -43,7 +43,7 @@ pub fn router(service: Arc<Service>, grpc: Router) -> Router {
         .layer(option_layer(origin::cors(&service.web)))
         .layer(middleware::from_fn_with_state(service, origin::own_site))
         // outermost: it sees what the client is answered
-        .layer(middleware::from_fn(observe::observe));
+        .layer(middleware::from_fn(request_report::observe));
     match prefix.is_empty() {
         true => routes,
         // outside of the routes, which are found by the rest of the path

@@ -1,4 +1,4 @@
-//! The service itself: queue, info, caller, errors, descriptions, probes.
+//! Operations on the service itself: queue, info, caller, errors, descriptions, probes.
 
 use axum::{
     Json,
@@ -42,10 +42,10 @@ pub(super) async fn me(call: Call) -> Result<Json<Me>, ApiError> {
     Ok(Json(about::me(&call.service, &call.caller).await?))
 }
 
-/// What the owners have.
+/// The owners and their use of the service.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct Owners {
-    /// Who keeps most first.
+    /// The owners, those with the most stored bytes first.
     owners: Vec<OwnerUse>,
 }
 
@@ -114,23 +114,23 @@ pub(super) async fn warning(_: Call, code: WarningCode) -> Result<Json<WarningKi
     Ok(Json(catalog::warning(code)))
 }
 
-/// The JSON Schema of a problem.
+/// Returns the JSON Schema of a problem.
 pub(super) async fn schema(_: Call) -> Result<Json<Value>, ApiError> {
     Ok(Json(files::schema()))
 }
 
-/// The API over REST.
+/// Returns the description of the API over REST.
 pub(super) async fn openapi(call: Call) -> Result<Json<&'static Value>, ApiError> {
     Ok(Json((call.openapi)()))
 }
 
-/// The API over gRPC.
+/// Returns the description of the API over gRPC.
 pub(super) async fn proto(_: Call) -> Result<impl IntoResponse, ApiError> {
     const TEXT: &str = include_str!("../../../proto/signorini/v1/signorini.proto");
     Ok(([(header::CONTENT_TYPE, "text/plain; charset=utf-8")], TEXT))
 }
 
-/// Whether a request asks for one of the probes, or for metrics, which are answered even if all connections are busy.
+/// Whether a request is for one of the probes or for metrics, which are answered even if all connections are busy.
 pub fn is_probe(path: &str) -> bool {
     matches!(
         path,
@@ -138,22 +138,22 @@ pub fn is_probe(path: &str) -> bool {
     )
 }
 
-/// Metrics, in the text format of OpenMetrics, which Prometheus and others read whatever they ask for.
+/// Returns metrics in the text format of OpenMetrics, which Prometheus and others read whatever format they request.
 pub(super) async fn metrics(call: Call) -> Result<impl IntoResponse, ApiError> {
     let text = all_metrics(&call.service, &call.caller).await?;
     Ok(([(header::CONTENT_TYPE, OPENMETRICS)], text))
 }
 
-/// The text format of metrics.
+/// The media type of metrics.
 pub(super) const OPENMETRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
-/// The process is alive.
+/// Answers that the process is alive.
 pub(super) async fn livez(_: Call) -> Result<&'static str, ApiError> {
     Ok("ok\n")
 }
 
-/// The service works; a second line and further ones say what does not. A damaged record does not make the answer an
-/// error: a proxy would send no requests any more for all the records that are intact.
+/// Answers whether the service works; further lines say what does not. A damaged record is not an error here, since a
+/// proxy would then send no more requests, not even for intact records.
 pub(super) async fn readyz(call: Call) -> Result<String, ApiError> {
     let health = call.service.health().await?;
     let mut text = String::from(if health.is_whole() {

@@ -1,4 +1,5 @@
-//! `POST /v1/jobs`, `PUT /v1/jobs/{id}`, `POST /v1/jobs/batch` and `…/{id}/retry`; `/v1/problems/validate`.
+//! The operations `POST /v1/jobs`, `PUT /v1/jobs/{id}`, `POST /v1/jobs/batch` and `…/{id}/retry`;
+//! `/v1/problems/validate`.
 
 use axum::{
     Json,
@@ -76,7 +77,7 @@ pub(super) async fn retry(
     answer(call, submitted, wait_s, false).await
 }
 
-/// The job: at once, or when it has ended, or as a stream of its events.
+/// Answers with the job: at once, or when it has ended, or as a stream of its events.
 pub(super) async fn answer(
     call: Call,
     submitted: Submitted<Job>,

@@ -1,4 +1,4 @@
-//! `/v1/sweeps`.
+//! The operations on `/v1/sweeps`.
 
 use axum::{
     Json,
@@ -147,7 +147,7 @@ pub(super) async fn results(
     }
 }
 
-/// A browser that reconnects requests the same address again and adds this header.
+/// The header that a browser adds when it reconnects to the same address.
 pub(super) const LAST_EVENT_ID: Parameter<Integers> = events::LAST_EVENT_ID;
 
 pub(super) async fn events(

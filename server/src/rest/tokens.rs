@@ -1,4 +1,4 @@
-//! `/v1/tokens`.
+//! The operations on `/v1/tokens`.
 
 use axum::{
     Extension, Json,
@@ -20,7 +20,7 @@ use crate::{
 #[derive(Serialize, JsonSchema)]
 #[schemars(rename = "TokenList")]
 pub(super) struct List {
-    /// The oldest first, those that are no longer valid among them.
+    /// The tokens, the oldest first, including those that are no longer valid.
     tokens: Vec<Token>,
 }
 
@@ -47,7 +47,7 @@ pub(super) async fn rotate(call: Call, id: String) -> Result<Response, ApiError>
     Ok(shown_once(new).into_response())
 }
 
-/// No cache on the way may keep it.
+/// Answers with a secret that no cache on the way may store.
 fn shown_once(new: NewToken) -> impl IntoResponse {
     let headers = [(header::CACHE_CONTROL, "no-store")];
     (Extension(TokensChanged), headers, Json(new))

@@ -1,4 +1,4 @@
-//! What a solved problem is stored, served and written as.
+//! The document of a solved problem, as it is stored, served and written.
 
 use std::collections::BTreeMap;
 
@@ -14,26 +14,27 @@ use solver::{
 use super::stopwatch::{Times, Timings};
 use crate::{digest, event::TimedIteration};
 
-/// What a solved problem is stored, served and written as.
+/// A solved problem, as it is stored, served and written.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Document {
     /// Scalars, extents, warnings, timings and fingerprints.
     pub summary: Summary,
-    /// One row per iteration.
+    /// The iterations, one row each.
     pub history: Vec<TimedIteration>,
     /// Columns along each contact boundary, at all points where the solution is known, peaks included.
     pub profiles: BTreeMap<String, ContactProfile>,
-    /// The same at the nodes; served by itself, and no part of a written document.
+    /// Columns along each contact boundary at the nodes only; served separately, and not part of a written document.
     #[serde(skip)]
     pub node_profiles: BTreeMap<String, ContactProfile>,
-    /// The same at the points where friction acts; as `node_profiles`.
+    /// Columns along each contact boundary at the points where friction acts only; served separately, and not part of a
+    /// written document.
     #[serde(skip)]
     pub friction_profiles: BTreeMap<String, ContactProfile>,
-    /// One entry per load step of the problem.
+    /// One entry for each load step of the problem.
     pub steps: Vec<Step>,
     /// Displacements and stresses at all nodes.
     pub fields: Fields,
-    /// By which stresses follow from displacements: fields are stored compactly with it.
+    /// The law by which stresses follow from displacements, with which fields are stored compactly.
     #[serde(skip)]
     pub law: Law,
 }
@@ -41,35 +42,35 @@ pub struct Document {
 /// The end of one load step.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Step {
-    /// Its name in the problem, or its number from 0.
+    /// The step's name in the problem, or its number from 0.
     pub name: String,
-    /// As of a whole solution.
+    /// Scalars, extents and warnings at the end of the step.
     pub summary: solver::solution::Summary,
-    /// Rows of this step.
+    /// The iterations of this step.
     pub history: Vec<TimedIteration>,
     /// Columns along each contact boundary.
     pub profiles: BTreeMap<String, ContactProfile>,
-    /// As of a whole document; no part of a written one here either.
+    /// Columns along each contact boundary at the nodes only; not part of a written document.
     #[serde(skip)]
     pub node_profiles: BTreeMap<String, ContactProfile>,
-    /// As of a whole document; no part of a written one here either.
+    /// Columns along each contact boundary at the points where friction acts only; not part of a written document.
     #[serde(skip)]
     pub friction_profiles: BTreeMap<String, ContactProfile>,
 }
 
-/// The solver's summary, and what only its caller knows.
+/// The solver's summary, with timings and fingerprints.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Summary {
-    /// What the solver says.
+    /// The solver's summary.
     #[serde(flatten)]
     pub solution: solver::solution::Summary,
     /// Seconds by phase.
     pub timings: Timings,
-    /// Its body was kept from an earlier job with the same mesh, materials, supports, loads and contact boundaries: it was
-    /// not assembled and factored again, which changes no number.
+    /// Whether the body was kept from an earlier job with the same mesh, materials, supports, loads and contact
+    /// boundaries: it was then not assembled and factored again, which changes no number.
     #[serde(default)]
     pub body_reused: bool,
-    /// The program that solved it.
+    /// The version of the program that solved it.
     pub solver_version: String,
     /// Fingerprint of the problem.
     pub input_hash: String,
@@ -78,7 +79,7 @@ pub struct Summary {
 }
 
 impl Document {
-    /// A solution with what only its caller knows; [`SolveError::Stopped`] if `go_on` says no.
+    /// The document of a solution; [`SolveError::Stopped`] if `go_on` returns false.
     pub(super) fn new(
         problem: &Problem,
         solution: Solution,

@@ -1,5 +1,5 @@
-//! Solves members of a sweep that share a body, one after the other: for the worker and for `signorini sweep` alike.
-//! A later attempt does not store a row again, and solves its member again only if others begin from it.
+//! Solves members of a sweep that share a body, one after another, both for the worker and for `signorini sweep`. A
+//! later attempt does not store a row again, and solves its member again only if others start from it.
 
 use std::ops::ControlFlow;
 
@@ -15,15 +15,15 @@ use solver::{
 
 use crate::{job::Reason, sweep::MemberRow};
 
-/// What solving members tells; the answer is whether to go on.
+/// A report while members are solved; the answer is whether to continue.
 pub enum Step<'a> {
-    /// The solver is at work.
+    /// Progress of the solver.
     Progress(Progress<'a>),
-    /// A member is solved, or cannot be.
+    /// The row of a member that is solved, or cannot be.
     Row(Box<MemberRow>),
 }
 
-/// Checks a problem, and factors and condenses its body or finds it: [`solver::prepare`].
+/// Checks a problem and prepares its body, which is made or reused: see [`solver::prepare`].
 pub type Prepare<'a> =
     dyn Fn(&Problem, Option<External>, &mut Observer<'_>) -> Result<Prepared, SolveError> + 'a;
 
@@ -31,22 +31,23 @@ pub type Prepare<'a> =
 pub struct Members<'a> {
     plan: &'a Plan,
     problems: Problems<'a>,
-    /// All of them, in order.
+    /// All members of the group, in order.
     group: &'a Group,
-    /// The mesh of the base, for those without one of their own.
+    /// The mesh of the base, for members without a mesh of their own.
     mesh: &'a MeshInput,
-    /// The mesh that a problem only names or quotes.
+    /// Reads the mesh that a problem only names or contains as text.
     external: &'a dyn Fn(&Problem) -> Option<External>,
-    /// Prepares the first of them.
+    /// Prepares the first member.
     prepare: &'a Prepare<'a>,
-    /// Their body, once a member was found that has one.
+    /// The common body, once a member that has one was solved.
     family: Option<Family>,
-    /// By line, the last member that was solved on it and its end; that of its neighbour if it has none.
+    /// By line: the last member that was solved on it, with its end, or that of its neighbour if it has none.
     lines: Vec<Option<(usize, Option<End>)>>,
 }
 
 impl<'a> Members<'a> {
-    /// Of a plan, with the mesh of its base and the meshes that problems name; `family`: their body, if it is known.
+    /// The members of a plan, with the mesh of its base and the meshes that problems name; `family`: their common body,
+    /// if it is known.
     pub fn new(
         plan: &'a Plan,
         group: &'a Group,
@@ -67,7 +68,8 @@ impl<'a> Members<'a> {
         }
     }
 
-    /// Solves some of the members, and tells each row; a failure is a row. An error ends all: the solver was stopped.
+    /// Solves some of the members, and reports each row; a failure is a row, too. The error means that the solver was
+    /// stopped.
     pub fn solve(
         &mut self,
         numbers: &[usize],
@@ -132,7 +134,8 @@ impl<'a> Members<'a> {
         self.member(number, observe)
     }
 
-    /// The members that one begins from, directly or not, as far as their ends are not known: the first of them first.
+    /// The members that a member starts from, directly or not, whose ends are not known, in the order in which they
+    /// must be solved.
     fn missing(&self, number: usize) -> Vec<usize> {
         let mut missing = Vec::new();
         let mut next = self.neighbour(number);
@@ -153,7 +156,7 @@ impl<'a> Members<'a> {
         self.plan.neighbour(self.group, place)
     }
 
-    /// Solves a member on the body of the others, from its neighbour, whose end is known.
+    /// Solves a member on the common body, from its neighbour, whose end is known.
     fn on_body(&mut self, number: usize, observe: &mut Observer<'_>) -> Result<Member, SolveError> {
         let neighbour = self.neighbour(number);
         let Some(family) = &mut self.family else {
@@ -185,15 +188,15 @@ impl<'a> Members<'a> {
     }
 }
 
-/// Whether a problem shares no body with others: it is solved on meshes of its own.
+/// Whether a problem shares no body with others, since it is solved on meshes of its own.
 pub fn is_alone(problem: &Problem) -> bool {
     has_own_meshes(problem, &problem.mesh.refine)
 }
 
-/// Why a member has no numbers.
+/// Why a member has no results.
 enum Failed {
     Member(SolveError),
-    /// The body that it shares with the others cannot be factored.
+    /// The common body cannot be factored.
     Body(SolveError),
 }
 
@@ -203,7 +206,7 @@ impl From<SolveError> for Failed {
     }
 }
 
-/// The row of a member without numbers; an error if the solver was stopped.
+/// The row of a member without results; an error if the solver was stopped.
 pub fn row_of(number: usize, error: SolveError) -> Result<MemberRow, SolveError> {
     let reason = match error {
         SolveError::Stopped => return Err(error),
@@ -224,7 +227,8 @@ mod tests {
 
     use super::*;
 
-    /// After a restart of the service the members that are left have the bits that they would have had.
+    /// Rows do not depend on which members were solved before: after a restart of the service, the remaining members
+    /// have the same bits.
     #[test]
     fn rows_do_not_depend_on_which_members_were_solved_before() {
         let base = json!({

@@ -1,5 +1,5 @@
-//! Solves one problem and measures it: the one place with a clock, used by the worker and by
-//! `signorini solve` alike, so that both write the same document.
+//! Solves one problem and measures the times: the only place with a clock, used by the worker and by `signorini solve`,
+//! so that both write the same document.
 
 mod document;
 pub mod members;
@@ -27,54 +27,56 @@ use stopwatch::{Stopwatch, Times};
 /// The solver, or its substitute in a test.
 pub type Solve = fn(&Problem, Option<External>, &mut Observer<'_>) -> Result<Solution, SolveError>;
 
-/// What a run reports while it goes on.
+/// A report of a run while it is solved.
 #[derive(Debug)]
 pub enum Update<'a> {
     /// A phase begins.
     Phase(Phase),
     /// Adaptive refinement begins to solve on a mesh, or returns to the one before.
     Mesh {
-        /// Number of the mesh, from 1.
+        /// The number of the mesh, from 1.
         number: u32,
-        /// Its elements.
+        /// The number of its elements.
         elements: u64,
-        /// Largest relative error on the mesh before.
+        /// The largest relative error on the mesh before.
         error: Option<f64>,
     },
     /// An iteration of the solution.
     Iteration(TimedIteration),
-    /// A finding.
+    /// A warning about the problem or its solution.
     Warning(&'a Warning),
-    /// A load step has ended, while others are to come.
+    /// A load step has ended, and others follow.
     Step(PartialSolution<'a>),
-    /// Nothing new: the solver is at work, and asks whether to go on.
+    /// No news: the solver is working, and asks whether to continue.
     Pulse,
     /// The solver is about to take more memory, and asks whether it may.
     Needs {
-        /// Bytes.
+        /// The number of bytes.
         bytes: u64,
     },
-    /// The solver could go on with more memory, and asks whether there is room; if not it ends with what it has.
+    /// The solver could continue with more memory, and asks whether it is available; if not, it ends with its results
+    /// so far.
     Room {
-        /// Bytes.
+        /// The number of bytes.
         bytes: u64,
     },
     /// The solver could share its next work with a second thread, and asks whether there is a processor for it.
     SecondThread,
-    /// There was not so much memory.
+    /// There was not enough memory.
     OutOfMemory {
-        /// Bytes that the solver needed.
+        /// The number of bytes that the solver needed.
         bytes: u64,
     },
 }
 
-/// What a profile takes beside its points, in points.
+/// The size of a profile apart from its points, in points.
 const OF_A_PROFILE: usize = 5;
 
-/// How long what a stopped job has left may take to be written: a worker is not to be held by what nobody waits for.
+/// How long writing the results of a stopped job may take, so that a worker is not occupied by a result that nobody
+/// waits for.
 const WRITING: Duration = Duration::from_millis(250);
 
-/// Goes on for [`WRITING`] after the first no.
+/// A function that still returns true for [`WRITING`] after the first refusal.
 pub(crate) fn patient(mut asked: impl FnMut() -> ControlFlow<()>) -> impl FnMut() -> bool {
     let mut stopped: Option<Instant> = None;
     move || asked().is_continue() || stopped.get_or_insert_with(Instant::now).elapsed() < WRITING
@@ -89,7 +91,8 @@ pub struct PartialSolution<'a> {
 }
 
 impl PartialSolution<'_> {
-    /// As a document without fields. It costs as much as all that it holds: not for every one of many steps.
+    /// The document of these results without fields. Making it costs as much as all its data, so it is not made for
+    /// every step.
     pub fn document(&self) -> Result<Document, SolveError> {
         Document::new(
             self.problem,
@@ -99,7 +102,7 @@ impl PartialSolution<'_> {
         )
     }
 
-    /// Points of all profiles of all load steps: the size of the document.
+    /// The number of points of all profiles of all load steps: the size of the document.
     pub fn points(&self) -> usize {
         let of_step = |step: &StepSolution| -> usize {
             let profiles = [&step.profiles, &step.node_profiles, &step.friction_profiles];
@@ -110,11 +113,11 @@ impl PartialSolution<'_> {
     }
 }
 
-/// Solves `problem` by `solve`, notes when each iteration was done and measures the phases. `parse_s`: seconds that
-/// reading the problem took, the caller's own phase.
+/// Solves `problem` by `solve`, and records the time of each iteration and phase. `parse_s`: seconds for reading the
+/// problem, which the caller has done.
 ///
-/// `solve` is [`solver::solve_on`] for one problem on its own; problems that share a condensed body are each solved
-/// by [`solver::Prepared::solve_other`]. What a stopped solution has left is given up if it is much.
+/// `solve` is [`solver::solve_on`] for a single problem; problems that share a condensed body are each solved by
+/// [`solver::Prepared::solve_other`]. The results of a stopped solution are given up if writing them takes too long.
 pub fn run(
     problem: &Problem,
     parse_s: f64,
@@ -211,7 +214,7 @@ mod tests {
         assert_eq!(document.summary.timings["parse"], 0.5);
     }
 
-    /// On the meshes of adaptive refinement, and in load steps, as anywhere else.
+    /// Every row has the time at which it was computed, also on the meshes of adaptive refinement and in load steps.
     #[test]
     fn every_row_has_the_time_at_which_it_was_computed() {
         let mut problem = fake::problem();
@@ -250,7 +253,7 @@ mod tests {
         assert!(by_step.eq(history) && document.steps.len() == 2);
     }
 
-    /// The history of the mesh before, where the next one finds no room on the way.
+    /// Rows of the mesh before keep their times if there is no memory for the next mesh.
     #[test]
     fn rows_of_the_mesh_before_keep_their_times() {
         let mut problem = fake::problem();
@@ -290,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn what_finished_steps_have_found_has_the_times_of_the_whole() {
+    fn results_of_finished_steps_have_the_times_of_the_whole() {
         let mut problem = fake::problem();
         problem.steps = vec![Step::whole(); 2];
         let mut first = None;

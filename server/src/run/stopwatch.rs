@@ -1,4 +1,4 @@
-//! How long each phase took, and when each iteration was done.
+//! Measures the time of each phase and iteration.
 
 use std::{collections::BTreeMap, time::Instant};
 
@@ -7,28 +7,28 @@ use strum::VariantArray;
 
 use crate::event::TimedIteration;
 
-/// Seconds by phase.
+/// The seconds of each phase.
 pub type Timings = BTreeMap<String, f64>;
 
-/// Runs from the start of the solver.
+/// A stopwatch from the start of the solver.
 pub(super) struct Stopwatch {
     start: Instant,
     current: Option<(Phase, Instant)>,
     times: Times,
-    /// The mesh of adaptive refinement that `times` are of; 0 without it.
+    /// The number of the mesh of adaptive refinement that `times` are for; 0 without it.
     mesh: u32,
-    /// The iterations on the mesh before it.
+    /// The times of the iterations on the mesh before.
     before: Vec<f64>,
 }
 
-/// What it shows.
+/// The measured times.
 #[derive(Clone, Debug)]
 pub(super) struct Times {
-    /// Every phase, also one that was not reached; a verification only if it was.
+    /// The time of every phase, also of those not reached; verification only if it was reached.
     pub(super) phases: Timings,
-    /// A body was factored.
+    /// Whether a body was factored.
     pub(super) factored: bool,
-    /// Seconds from the start to the end of each iteration, in the order of their numbers.
+    /// The seconds from the start to the end of each iteration, in the order of their numbers.
     iterations: Vec<f64>,
 }
 
@@ -51,7 +51,7 @@ impl Stopwatch {
         }
     }
 
-    /// Adaptive refinement begins on a mesh of this number, or returns to the one before.
+    /// Records that adaptive refinement begins on a mesh with this number, or returns to the one before.
     pub(super) fn on_mesh(&mut self, number: u32) {
         let iterations = &mut self.times.iterations;
         match number > self.mesh {
@@ -61,7 +61,7 @@ impl Stopwatch {
         self.mesh = number;
     }
 
-    /// A phase begins, and with it the one before ends.
+    /// Records that a phase begins, which ends the phase before.
     pub(super) fn enter(&mut self, phase: Phase) {
         let now = Instant::now();
         self.times.factored |= phase == Phase::Factor;
@@ -71,13 +71,13 @@ impl Stopwatch {
         }
     }
 
-    /// An iteration is done that may yet be repeated on another mesh, under the same number.
+    /// Records an iteration that may be repeated on another mesh under the same number.
     pub(super) fn done_tentatively(&mut self, row: &Iteration) {
         self.times.iterations.truncate(place(row));
         self.done(row);
     }
 
-    /// An iteration is done: when that was, which is now if it was not known before.
+    /// Records an iteration; returns its time, which is now if it was not recorded before.
     pub(super) fn done(&mut self, row: &Iteration) -> f64 {
         let known = self.times.iterations.get(place(row));
         known.copied().unwrap_or_else(|| {
@@ -87,7 +87,7 @@ impl Stopwatch {
         })
     }
 
-    /// What it shows now.
+    /// The times so far.
     pub(super) fn times(&mut self) -> Times {
         if let Some((phase, _)) = self.current {
             self.enter(phase);
@@ -97,7 +97,7 @@ impl Stopwatch {
 }
 
 impl Times {
-    /// Rows with their times.
+    /// Rows of the history with their times.
     pub(super) fn of(&self, rows: Vec<Iteration>) -> Vec<TimedIteration> {
         let timed = |row: Iteration| {
             let wall_s = self.iterations.get(place(&row)).copied();
@@ -110,7 +110,7 @@ impl Times {
     }
 }
 
-/// Rows are numbered from 1.
+/// The index of a row, since rows are numbered from 1.
 fn place(row: &Iteration) -> usize {
     (row.k as usize).saturating_sub(1)
 }

@@ -176,7 +176,7 @@ impl Partial {
             .file_name()
             .ok_or_else(|| refused(&"it has no name"))?;
         if fs::symlink_metadata(&target).is_ok() {
-            return Err(refused(&"it exists; name a new folder"));
+            return Err(refused(&"it exists already; name a new folder"));
         }
         let parent = target.parent().unwrap_or(Path::new("/"));
         let parent = parent
@@ -185,7 +185,7 @@ impl Partial {
         let within = data.canonicalize().map_err(named)?;
         if parent.starts_with(&within) {
             return Err(refused(&format!(
-                "it is in the folder of the store, {}, and would be lost with it",
+                "it is inside the folder of the store, {}, and would be lost with it",
                 within.display()
             )));
         }
@@ -212,7 +212,7 @@ impl Partial {
         let foreign = fs::read_dir(&made.path).map_err(named)?.next().is_some();
         match foreign {
             true => Err(refused(&format!(
-                "{} exists, and not only with what an interrupted backup leaves",
+                "{} exists, and contains more than the remains of an interrupted backup",
                 made.path.display()
             ))),
             false => Ok(made),
@@ -236,7 +236,7 @@ impl Partial {
         match bytes.saturating_add(SPARE_BYTES) <= free {
             true => Ok(()),
             false => Err(self.unwritable(format!(
-                "the store takes {}, and {} is to stay free, but there is {}",
+                "the store takes {}, and {} must stay free, but there is only {}",
                 size(bytes),
                 size(SPARE_BYTES),
                 size(free)

@@ -80,7 +80,7 @@ impl Checksum {
     pub(super) fn verify(self, stored: Option<i64>, what: impl FnOnce() -> Record) -> Result<()> {
         match stored {
             Some(stored) if stored != self.stored() => {
-                Err(what().damaged("its checksum is not that of its content"))
+                Err(what().damaged("its checksum does not match its content"))
             }
             _ => Ok(()),
         }

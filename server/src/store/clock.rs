@@ -34,8 +34,8 @@ impl Store {
         let ahead = latest.map_or(0, |latest| latest - Time::now().micros());
         if ahead > 0 {
             tracing::warn!(
-                "the clock is {:.0} s behind the latest time in the store: it has been set back, or was wrong; until \
-                 the next start times are later by that much, so that jobs stay in their order",
+                "the clock is {:.0} s behind the latest time in the store: it has been set back, or was wrong before; until \
+                 the next start, times are later by that much, so that jobs stay in their order",
                 ahead as f64 / 1e6
             );
             self.ahead.store(ahead, Ordering::Relaxed);
@@ -98,8 +98,8 @@ impl Store {
         let text = serde_json::to_string(&pauses)?;
         if pause >= LONG_MICROS {
             tracing::warn!(
-                "the clock is {:.1} days ahead of the last moment that this store has seen: no service ran for so long, or \
-                 a clock was wrong, then or now; this time does not count for what is removed for its age or expires in the \
+                "the clock is {:.1} days ahead of the latest time in the store: no service ran for that long, or \
+                 a clock was wrong, then or now; this time does not count for jobs that are removed for their age or expire in the \
                  queue",
                 pause as f64 / LONG_MICROS as f64
             );
@@ -124,7 +124,7 @@ impl Store {
         }
         let now = self.now().micros().to_string();
         if let Err(cause) = self.writing(self.write_sealed(SEEN, &now)).await {
-            tracing::debug!(%cause, "the time could not be noted: {cause}");
+            tracing::debug!(%cause, "the time could not be stored: {cause}");
         }
     }
 

@@ -27,8 +27,8 @@ pub(super) async fn enable_giving_back(
     let bytes = pages.bytes_of(pages.count);
     if bytes > REBUILT_BYTES {
         tracing::warn!(
-            "the database is of an earlier version and keeps the space of what is deleted for itself; to have it given back to the \
-             file system, stop the service and run `signorini doctor --compact`, which takes as much space again for a while"
+            "the database is of an earlier version and does not return the space of deleted data to the file system; to change \
+             that, stop the service and run `signorini doctor --compact`, which temporarily takes as much space again"
         );
         return Ok(());
     }
@@ -39,7 +39,7 @@ pub(super) async fn enable_giving_back(
     if let Err(cause) = rebuilt {
         tracing::warn!(
             %cause,
-            "the database is of an earlier version, and could not be rebuilt so that it gives space back to the file system, for \
+            "the database is of an earlier version, and could not be rebuilt so that it returns space to the file system, for \
              which it needs {} of space and no other reader; this is tried again at the next start: {cause}",
             size(bytes.saturating_mul(2))
         );

@@ -382,7 +382,7 @@ fn attached(row: &SqliteRow, holder: Holder) -> Result<Content> {
         fingerprint.checksum(),
     );
     if sums != expected {
-        return Err(record.damaged("its checksum is not that of its content"));
+        return Err(record.damaged("its checksum does not match its content"));
     }
     Ok(Content {
         id: row.try_get("content")?,
@@ -448,7 +448,7 @@ impl Content {
             false => Err(self
                 .record
                 .clone()
-                .damaged("it is stored with another hash")),
+                .damaged("its hash does not match its content")),
         }
     }
 

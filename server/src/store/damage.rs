@@ -79,7 +79,7 @@ impl Damages {
     pub(super) fn stop_writing(&self, damage: &Damage) -> StoreError {
         let incident = damage.incident.unwrap_or_default();
         let text = format!(
-            "{damage}, incident {incident}: nothing is stored and no job is started any more; stop the service and run \
+            "{damage}, incident {incident}: no more data are stored and no more jobs are started; stop the service and run \
              `signorini doctor`"
         );
         if self.broken.set(text.clone()).is_ok() {

@@ -254,7 +254,7 @@ impl Store {
         let checkpoint =
             sqlx::raw_sql("pragma busy_timeout = 100; pragma wal_checkpoint(truncate)");
         if let Err(error) = checkpoint.execute(&self.writer).await {
-            tracing::warn!(%error, "the write-ahead log stays and is read at the next start: {error}");
+            tracing::warn!(%error, "the write-ahead log could not be merged; the next start will read it: {error}");
         }
         self.writer.close().await;
         self.reserve.keep_for_a_start();
@@ -331,7 +331,7 @@ pub(super) async fn compare_with_the_past(
         return match known {
             Known::Last(_) => Err(StoreError::Lost("it is missing or empty".into())),
             _ if progress::has_content(&path.join(LOG)) => Err(StoreError::Lost(
-                "it is missing or empty, and only its write-ahead log is there".into(),
+                "it is missing or empty, and only its write-ahead log exists".into(),
             )),
             _ => Ok(None),
         };
@@ -362,8 +362,8 @@ pub fn with_advice(error: StoreError, path: &Path) -> StoreError {
     };
     match error {
         StoreError::Lost(what) => StoreError::Lost(format!(
-            "the database {} is not as it was left: {what}; put back {} and {LOG} as they were, or, if you mean to go \
-             on with what is there, run `signorini doctor --accept --data {}`",
+            "the database {} was changed since the service last used it: {what}; restore {} and {LOG}, or, if you want to continue \
+             with the present files, run `signorini doctor --accept --data {}`",
             database.display(),
             super::folder::DATABASE,
             path.display()

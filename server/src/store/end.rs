@@ -163,7 +163,7 @@ impl Store {
                 continue; // damaged: others still end
             };
             let detail = format!(
-                "it was not started within {} s; see limits.queue_ttl_s",
+                "the job was not started within {} s; see limits.queue_ttl_s",
                 job.limits.queue_ttl_s
             );
             end(

@@ -22,7 +22,7 @@ pub enum StoreError {
     /// Something that was stored is missing.
     #[error("{0}")]
     Lost(String),
-    /// The queue holds as many jobs as it may.
+    /// The queue has reached its largest number of jobs.
     #[error("the queue is full")]
     QueueFull,
     /// This owner already has the maximum number of waiting jobs.

@@ -74,7 +74,7 @@ impl Folder {
         for file in &locks {
             file.try_lock().map_err(|error| match error {
                 TryLockError::WouldBlock => StoreError::Locked(format!(
-                    "another server is using the folder {} (one that is stopping releases it within seconds)",
+                    "another server is using the folder {} (a stopping server releases it within seconds)",
                     path.display()
                 )),
                 TryLockError::Error(error) => named(error),
@@ -101,7 +101,7 @@ impl Folder {
         };
         file.try_lock().map_err(|error| match error {
             TryLockError::WouldBlock => StoreError::Locked(format!(
-                "another server is using the database {}, to which there is a link in another folder",
+                "another server is using the database {} through a link in another folder",
                 self.database().display()
             )),
             TryLockError::Error(error) => unusable(&self.path, error),
@@ -174,11 +174,11 @@ impl Folder {
             }
             match fs::set_permissions(path, Permissions::from_mode(own)) {
                 Ok(()) => tracing::info!(
-                    "{} was open to others (mode {mode:04o}), now it is not ({own:04o})",
+                    "{} was readable by other users (mode {mode:04o}), which was corrected (mode {own:04o})",
                     path.display()
                 ),
                 Err(error) => tracing::warn!(
-                    %error, "{} is open to others (mode {mode:04o}): {error}", path.display()
+                    %error, "{} is readable by other users (mode {mode:04o}): {error}", path.display()
                 ),
             }
         }
@@ -234,9 +234,9 @@ impl Identity {
         if wrong != seen.wrong {
             match &wrong {
                 Some(what) => tracing::error!(
-                    "{what}; nothing is stored until the service is started on a whole store"
+                    "{what}; no data are stored until the service is started on a complete store"
                 ),
-                None => tracing::info!("the files of the store are back"),
+                None => tracing::info!("the files of the store are available again"),
             }
             seen.wrong.clone_from(&wrong);
         }

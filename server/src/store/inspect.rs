@@ -110,7 +110,7 @@ pub(super) async fn check_copy(folder: &Path) -> Result<Vec<String>> {
 /// Why there is nothing to inspect.
 pub(super) fn absent(folder: &Path) -> String {
     match progress::read(folder) {
-        Ok(Known::Missing) => format!("there is no {DATABASE} in it"),
+        Ok(Known::Missing) => format!("it contains no {DATABASE}"),
         _ => format!(
             "there is no {DATABASE} in it, although there was one: put it back, or restore it from a backup"
         ),
@@ -375,7 +375,7 @@ async fn check_parts(source: &mut SqliteConnection, job: &Job) -> Result<()> {
     }
     if ended != job.status.is_terminal() {
         return Err(
-            Record::of_job(job.key, "events").damaged("the last one is not that of its end")
+            Record::of_job(job.key, "events").damaged("the last event is not the end of the job")
         );
     }
     match job.result_available {

@@ -50,7 +50,7 @@ impl Store {
         Ok(status.map(|word| word.parse().is_ok_and(Status::is_terminal)))
     }
 
-    /// How long the job has waited that was accepted first of those that wait for a worker.
+    /// The age of the oldest job that waits for a worker (seconds).
     pub async fn oldest_wait_s(&self) -> Result<Option<f64>> {
         let Some(key) = self.waiting_jobs().oldest() else {
             return Ok(None);

@@ -247,7 +247,7 @@ pub(super) fn described(row: &SqliteRow) -> Result<StoredMesh> {
     let hash: String = row.try_get("hash")?;
     let record = || Record::named(format!("description of mesh {hash}"));
     if !checksum::row_is_intact(row)? {
-        return Err(record().damaged("its checksum is not that of its content"));
+        return Err(record().damaged("its checksum does not match its content"));
     }
     let info =
         serde_json::from_str(row.try_get("info")?).map_err(|error| record().damaged(error))?;

@@ -121,7 +121,7 @@ pub(super) async fn run(database: &SqlitePool, folder: &Path) -> Result<()> {
     for (name, sql) in &expected {
         if found.get(name) != Some(sql) {
             return Err(StoreError::Schema(format!(
-                "the store is not one of this program, or is damaged: {name} is missing or another"
+                "the store does not belong to this program, or is damaged: {name} is missing or different"
             )));
         }
     }
@@ -138,7 +138,7 @@ pub(super) async fn check(connection: &mut SqliteConnection) -> Result<()> {
     .await?;
     if !ours {
         return Err(StoreError::Schema(
-            "the database is not one of this program".into(),
+            "the database does not belong to this program".into(),
         ));
     }
     let applied = "select exists (select 1 from sqlite_schema where name = '_sqlx_migrations')";
@@ -164,7 +164,7 @@ pub(super) async fn check(connection: &mut SqliteConnection) -> Result<()> {
             }
             Some(step) if step.checksum[..] != checksum[..] => {
                 return Err(StoreError::Schema(format!(
-                    "the store is not one of this program, or is damaged: step {version} of its tables is another"
+                    "the store does not belong to this program, or is damaged: step {version} of its tables is different"
                 )));
             }
             Some(_) => {}
@@ -181,7 +181,7 @@ pub(super) async fn are_current(connection: &mut SqliteConnection) -> Result<()>
     match steps == STEPS.len() as i64 {
         true => Ok(()),
         false => Err(StoreError::Schema(
-            "the store is of an earlier version of this program: start the service on it once, which brings it up to date".into(),
+            "the store is of an earlier version of this program: start the service on it once to update it".into(),
         )),
     }
 }

@@ -38,7 +38,7 @@
 //! | what a disk has changed: checksums of rows | `checksum` |
 //! | what a disk has changed: content that was found intact | `intact` |
 //! | what a disk has changed: what was found so far | `damage` |
-//! | what a disk has changed: whether the database still takes a job | `trial` |
+//! | what a disk has changed: whether the database still takes a job | `write_check` |
 //! | what a disk has changed: reading all keys in the background | `scrub` |
 //! | the folder and its lock | `folder` |
 //! | how far the store had come | `progress` |
@@ -63,11 +63,11 @@
 
 // Input and output types, and errors.
 mod checksum;
-mod complaint;
 mod encoding;
 mod entries;
 mod error;
 mod filter;
+mod repeated_error;
 mod submission;
 
 // Bytes by their hash, and what has them.
@@ -124,7 +124,7 @@ mod forget;
 mod keys;
 mod retention;
 mod submit;
-mod trial;
+mod write_check;
 
 // Read: its queue position, its result; many jobs.
 mod health;
@@ -156,7 +156,6 @@ use self::database::Rebuild;
 
 pub use self::{
     backup::{Backup, Manifest, back_up},
-    complaint::Complaint,
     content::{Fingerprint, PIECE_BYTES, PIECES_PER_COMMIT},
     database::Store,
     database::with_advice,
@@ -173,6 +172,7 @@ pub use self::{
     meshes::{Removal, StoredMesh},
     parts::{Part, Parts, ProfilePoints},
     progress::accept,
+    repeated_error::RepeatedError,
     restore::{Restored, restore},
     retention::{Retention, Retired, keep_within},
     rules::Ending,

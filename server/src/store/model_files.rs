@@ -72,7 +72,7 @@ pub(super) async fn write(connection: &mut SqliteConnection, store: &Path) -> Re
                 written += 1;
             }
             Err(StoreError::Damaged(damage)) => tracing::warn!(
-                "{} is damaged, and is not kept: {}",
+                "{} is damaged and was not kept: {}",
                 damage.record.name,
                 damage.cause
             ),
@@ -117,7 +117,7 @@ async fn definition(
     // of the first versions some have none
     let sealed = row.try_get::<Option<i64>, _>("checksum")?.is_some();
     if sealed && !checksum::row_is_intact(row)? {
-        return Err(record().damaged("its checksum is not that of its content"));
+        return Err(record().damaged("its checksum does not match its content"));
     }
     let problem = sqlx::query("select body, checksum from model_problem where model = ?").bind(key);
     let problem = problem.fetch_optional(connection).await?;

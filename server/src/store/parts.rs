@@ -240,7 +240,7 @@ pub(super) fn write_index(entries: &[Entry]) -> Vec<u8> {
 pub(super) fn index_bytes(stored: &[u8]) -> std::result::Result<usize, String> {
     match stored.first_chunk::<5>() {
         Some([VERSION, length @ ..]) => Ok(u32::from_le_bytes(*length) as usize),
-        Some(_) => Err("it is stored in a way that this program does not know".into()),
+        Some(_) => Err("it is stored in a form that this program does not know".into()),
         None => Err("it is too short".into()),
     }
 }
@@ -252,7 +252,7 @@ pub(super) fn read_index(stored: &[u8]) -> std::result::Result<Vec<Entry>, Strin
         .get(HEADER_BYTES..end)
         .ok_or("its index is cut off")?;
     if stored[HEADER_BYTES - 4..HEADER_BYTES] != crc32fast::hash(index).to_le_bytes() {
-        return Err("the checksum of its index is not that of its content".into());
+        return Err("the checksum of its index does not match its content".into());
     }
     postcard::from_bytes(index).map_err(|error| error.to_string())
 }

@@ -84,7 +84,7 @@ impl Store {
             match owner.await {
                 Ok(owner) => found.push((priority, owner, key)),
                 Err(error) => {
-                    tracing::error!(job.key = key, %error, "a waiting job cannot be read, and is not started: {error}");
+                    tracing::error!(job.key = key, %error, "a waiting job cannot be read and will not be started: {error}");
                 }
             }
         }

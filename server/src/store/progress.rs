@@ -93,9 +93,8 @@ pub(super) async fn in_database(connection: &mut SqliteConnection) -> Result<Opt
 pub(super) fn compare(known: &Known, database: Option<&LastCommit>) -> Result<Option<String>> {
     let doubt = |how: &str| {
         // a version that did not count had no file
-        let counted = database.map(|_| {
-            format!("{FILE} is {how}: whether all that was stored is still there is not known")
-        });
+        let counted =
+            database.map(|_| format!("{FILE} is {how}, so lost data cannot be ruled out"));
         Ok(counted)
     };
     let file = match known {
@@ -105,7 +104,7 @@ pub(super) fn compare(known: &Known, database: Option<&LastCommit>) -> Result<Op
     };
     let lost = |what: String| Err(StoreError::Lost(what));
     match database {
-        None => lost("it is of an older version than the store that was here last".into()),
+        None => lost("it is older than the last store in this folder".into()),
         Some(found) if found.store != file.store => lost("it belongs to another store".into()),
         Some(found) if found.commits < file.commits => lost(format!(
             "its last {} transactions are missing",

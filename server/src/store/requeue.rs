@@ -118,7 +118,7 @@ async fn interrupt(
         Interrupted::Fail => {
             let deaths = count_deaths(change.sql().await?, job.key).await? + 1;
             let detail = format!(
-                "the process died during {deaths} attempts at this job; the last time {how}"
+                "the process died during {deaths} attempts to solve this job; the last time {how}"
             );
             end(change, job.key, &Ending::failed(Reason::WorkerLost, detail)).await
         }

@@ -40,7 +40,7 @@ pub async fn restore(backup: &Path, data: &Path, replace: bool) -> Result<Restor
     let occupied = is_occupied(data).map_err(unusable)?;
     if occupied && !replace {
         return Err(StoreError::Folder(format!(
-            "{} is not empty; name a new folder, or put the store in it aside with --replace",
+            "{} is not empty; name a new folder, or move its store aside with --replace",
             data.display()
         )));
     }
@@ -68,7 +68,7 @@ fn read_manifest(backup: &Path) -> Result<Manifest> {
     let text = fs::read(&path).map_err(|error| {
         let why = match error.kind() {
             ErrorKind::NotFound => {
-                format!("there is no {MANIFEST} in it: it is none, or was not completed")
+                format!("it contains no {MANIFEST}: it is not a backup, or was not completed")
             }
             _ => format!("{}: {error}", path.display()),
         };
@@ -133,7 +133,7 @@ async fn copy(
     })?;
     if (&digest, bytes) != (&manifest.digest, manifest.bytes) {
         return Err(StoreError::Lost(format!(
-            "{} is not as it was written: it has {bytes} bytes with {digest}, and {MANIFEST} tells of {} with {}; use \
+            "{} was changed: it has {bytes} bytes with {digest}, but {MANIFEST} says {} with {}; use \
              another backup, or save what is intact with `signorini doctor --data {} --salvage NEW_FOLDER`",
             source.display(),
             manifest.bytes,

@@ -9,11 +9,11 @@ use std::{collections::HashSet, num::ParseIntError, sync::Weak, time::Duration};
 use super::{
     bulk::{Batch, Discard},
     clock::NOTED_MICROS,
-    complaint::Complaint,
     database::Store,
     delete::PAUSE,
     error::{Record, Result, StoreError},
     forget::MOST_REMEMBERED,
+    repeated_error::RepeatedError,
 };
 use crate::{error::size, time::Time};
 
@@ -96,7 +96,7 @@ const MUCH: i64 = 10;
 
 /// Keeps a store within its limits, and gives space back to the file system, until the store is dropped or closed.
 pub async fn keep_within(store: Weak<Store>, retention: Retention) {
-    let mut retiring = Complaint::new("retention");
+    let mut retiring = RepeatedError::new("retention");
     if let Some(store) = store.upgrade() {
         retiring.note(store.announce(&retention).await);
     }
@@ -124,10 +124,12 @@ pub async fn keep_within(store: Weak<Store>, retention: Retention) {
         }
         match store.give_space_back().await {
             Ok(pages) if pages > 0 => {
-                tracing::debug!(pages, "{pages} pages were given back to the file system");
+                tracing::debug!(pages, "{pages} pages were returned to the file system");
             }
             Ok(_) => {}
-            Err(cause) => tracing::debug!(%cause, "space could not be given back: {cause}"),
+            Err(cause) => {
+                tracing::debug!(%cause, "space could not be returned to the file system: {cause}")
+            }
         }
     }
 }
@@ -370,7 +372,7 @@ impl Store {
         match differ {
             false => Ok(()),
             true => Err(Record::named("sum of what owners keep").damaged(
-                "it is not that of their jobs: nothing is removed for being too much; `signorini doctor --salvage` counts anew",
+                "it does not match their jobs, so no jobs are removed for their size; `signorini doctor --salvage` counts again",
             )),
         }
     }

@@ -92,7 +92,7 @@ pub(super) async fn read_once(store: &Weak<Store>) {
             Err(StoreError::Damaged(damage)) => drop(store.damages.note(*damage).await),
             Err(cause) => tracing::warn!(
                 %cause,
-                "the table {name} could not be read, {TRIES} times: {cause}; what a disk has changed in it is noticed tomorrow"
+                "the table {name} could not be read {TRIES} times: {cause}; damage by the disk in it will be detected tomorrow"
             ),
             Ok(()) => {}
         }

@@ -613,7 +613,7 @@ async fn row_of(tx: &mut SqliteConnection, key: i64) -> Result<Option<i64>> {
 pub(super) fn intact(row: &SqliteRow, key: i64) -> Result<()> {
     match checksum::row_is_intact(row)? {
         true => Ok(()),
-        false => Err(record(key, "record").damaged("its checksum is not that of its content")),
+        false => Err(record(key, "record").damaged("its checksum does not match its content")),
     }
 }
 

@@ -169,7 +169,7 @@ pub(super) fn read(row: &SqliteRow) -> Result<(Token, SecretHash)> {
     let id: String = row.try_get("id")?;
     let record = || Record::named(format!("token {id}"));
     if !checksum::row_is_intact(row)? {
-        return Err(record().damaged("its checksum is not that of its content"));
+        return Err(record().damaged("its checksum does not match its content"));
     }
     let scopes = serde_json::from_str(row.try_get("scopes")?);
     let scopes = scopes.map_err(|error| record().damaged(error))?;

@@ -1,4 +1,4 @@
-//! Admission of a job that was read: it is fingerprinted, checked in depth, and stored in the queue.
+//! Admits a job that was read: it is fingerprinted, checked in depth, and stored in the queue.
 
 use solver::{
     error::{Findings, Reason, Violation},
@@ -25,16 +25,16 @@ use crate::{
 /// A job that was read, but not yet checked in depth.
 pub(super) struct Prepared {
     envelope: Envelope,
-    /// With its fingerprint.
+    /// The problem with its fingerprint, or its violations.
     problem: Result<(Problem, String), Vec<Violation>>,
     violations: Findings,
     pub(super) id: Option<JobId>,
-    /// Fingerprint of everything that was submitted. Empty if the problem cannot be read: then the job is refused before
-    /// fingerprints are compared.
+    /// The fingerprint of everything that was submitted. Empty if the problem cannot be read: the job is then refused
+    /// before fingerprints are compared.
     pub(super) payload: String,
 }
 
-/// Takes the fingerprints of a job and of its problem, once: that of a large mesh takes half a second.
+/// Computes the fingerprints of a job and of its problem once, since that of a large mesh takes half a second.
 pub(super) async fn prepare(
     service: &Service,
     JobRequest { envelope, problem }: JobRequest,
@@ -78,11 +78,11 @@ pub(super) async fn replayed(
     }
 }
 
-/// How many times its time limit a job may be estimated to take: what is refused must not be solvable, and a fast machine takes
-/// a third of the estimate or less (`tests/bench/estimates.py`).
+/// How many times its time limit a job may be estimated to take: a solvable job must not be refused, and a fast machine
+/// takes a third of the estimate or less (`tests/bench/estimates.py`).
 const MOST_OVER: f64 = 10.0;
 
-/// What is wrong with a job that is estimated to take this time (seconds) and would only run into its time limit.
+/// The violation of a job whose estimated time (seconds) is so long that it would only reach its time limit.
 pub(super) fn time_violation(run_s: Option<f64>, limits: &Limits) -> Option<Violation> {
     let run_s = run_s?;
     (run_s > MOST_OVER * limits.timeout_s).then(|| {
@@ -91,7 +91,7 @@ pub(super) fn time_violation(run_s: Option<f64>, limits: &Limits) -> Option<Viol
             Reason::OutOfRange,
             format!("{} s", limits.timeout_s),
             format!("at least {:.0} s: the job is estimated to take {run_s:.0} s", run_s / MOST_OVER),
-            "Raise it to what the estimate says, or solve on a coarser mesh, with less refinement or fewer increments.",
+            "Raise it to the estimated time, or use a coarser mesh, less refinement or fewer increments.",
         )
     })
 }
@@ -159,8 +159,7 @@ pub(super) async fn admit(
     }
 }
 
-/// An error if one of these priorities is above 0, which puts a job before those of all other owners, and the caller is
-/// no administrator.
+/// Refuses priorities above 0, which put a job before those of all other owners, unless the caller is an administrator.
 pub(super) fn may_have_priorities(
     caller: &Caller,
     mut priorities: impl Iterator<Item = i32>,
@@ -174,8 +173,9 @@ pub(super) fn may_have_priorities(
     }
 }
 
-/// An error if the share of the caller does not hold so many jobs more: before they are meshed and checked, which takes
-/// processors from others. Their place in the queue is not asked for: an earlier result needs none.
+/// Refuses a caller whose limits do not permit this many more jobs, before they are meshed and checked, which takes
+/// processor time from others. The limit of queued jobs is not checked here, since a job with an earlier result does
+/// not wait.
 pub(super) async fn has_share(
     service: &Service,
     caller: &Caller,
@@ -189,7 +189,7 @@ pub(super) async fn has_share(
     }
 }
 
-/// The caller has submitted as many jobs in this minute as they may.
+/// The error of a caller who has submitted too many jobs in this minute.
 fn too_often(service: &Service, caller: &Caller, left: u64, asked: u64) -> ApiError {
     let per_minute = service.rates().and_then(|rates| rates.per_minute);
     let limit = u64::from(per_minute.unwrap_or_default());
@@ -212,7 +212,7 @@ pub(super) async fn enqueue(
     enqueue_sweep(service, caller, jobs, None, key).await
 }
 
-/// The same with the sweep that the jobs solve.
+/// Stores the jobs of a sweep in the queue with the sweep, all or none.
 pub(super) async fn enqueue_sweep(
     service: &Service,
     caller: &Caller,
@@ -283,7 +283,7 @@ pub(super) async fn enqueue_sweep(
     Ok(accepted)
 }
 
-/// Tells of jobs that were accepted.
+/// Logs jobs that were accepted.
 fn log(jobs: &[Job], caller: &Caller) {
     let (owner, request_id) = (caller.owner(), caller.request_id());
     if let Some(id) = jobs.iter().find_map(|job| job.sweep) {

@@ -21,7 +21,7 @@ pub struct BulkResult {
     pub changed: u64,
 }
 
-/// Asks all jobs that match a filter to stop; later jobs are not affected.
+/// Asks all jobs that match a filter to stop; jobs submitted later are not affected.
 pub async fn cancel_many(
     service: &Arc<Service>,
     caller: &Caller,
@@ -39,7 +39,7 @@ pub async fn delete_many(
     for_each(service, caller, filter, Action::Delete).await
 }
 
-/// What a bulk operation does to each job.
+/// The action of a bulk operation on each job.
 #[derive(Clone, Copy, Debug)]
 enum Action {
     Cancel,
@@ -89,7 +89,7 @@ async fn for_each(
     .await
 }
 
-/// Does it to the first of these jobs. Returns how many these were, and how many of them it changed.
+/// Applies the action to the first of these jobs. Returns their number, and how many of them it changed.
 async fn act(
     service: &Service,
     caller: &Caller,

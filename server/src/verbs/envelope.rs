@@ -1,4 +1,4 @@
-//! What is submitted beside a problem, and its violations.
+//! The fields of a submission other than the problem, and their violations.
 
 use std::collections::BTreeMap;
 
@@ -13,20 +13,20 @@ use crate::{
     parameters::{Integers, Values},
 };
 
-/// Characters of the longest name.
+/// The largest number of characters of a name.
 pub const MAX_NAME: usize = 256;
-/// Most labels of a job.
+/// The largest number of labels of a job.
 pub const MAX_LABELS: usize = 64;
-/// Characters of the longest key or value of a label.
+/// The largest number of characters of a label's key or value.
 pub const MAX_LABEL: usize = 256;
-/// All priorities.
+/// All allowed priorities.
 pub const PRIORITIES: Integers = Integers(MIN_PRIORITY as i64..=MAX_PRIORITY as i64);
-/// Longest time that a job may run, in seconds: a week.
+/// The longest time that a job may run, in seconds: a week.
 const MAX_TIMEOUT_S: f64 = 7.0 * 86_400.0;
-/// Longest time that it may wait: thirty days.
+/// The longest time that a job may wait, in seconds: thirty days.
 const MAX_QUEUE_TTL_S: f64 = 30.0 * 86_400.0;
 
-/// What a client submits beside the problem.
+/// The fields that a client submits in addition to the problem.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Envelope {
     /// A name for people.
@@ -44,14 +44,14 @@ pub struct Envelope {
 /// A request for a job.
 #[derive(Clone, Debug)]
 pub struct JobRequest {
-    /// What comes beside the problem.
+    /// The fields other than the problem.
     pub envelope: Envelope,
-    /// The problem, or all that is wrong with it.
+    /// The problem, or all its violations.
     pub problem: Result<Problem, Vec<Violation>>,
 }
 
 impl Envelope {
-    /// What is out of bounds.
+    /// The violations of these fields.
     pub(super) fn violations(&self) -> Findings {
         let mut found = Findings::default();
         found.extend(self.name.as_deref().and_then(name_violation));
@@ -71,7 +71,7 @@ impl Envelope {
                     reason: Reason::OutOfRange,
                     got: seconds.to_string(),
                     expected: format!("more than 0, at most {most} seconds"),
-                    hint: "Leave it out for the default.".into(),
+                    hint: "Remove it for the default.".into(),
                 });
             }
         }
@@ -79,7 +79,7 @@ impl Envelope {
     }
 }
 
-/// What is wrong with a name, as an envelope and an edit have one.
+/// The violation of an invalid name, for submissions and edits.
 pub(super) fn name_violation(name: &str) -> Option<Violation> {
     let length = name.chars().count();
     (length > MAX_NAME).then(|| Violation {
@@ -91,7 +91,7 @@ pub(super) fn name_violation(name: &str) -> Option<Violation> {
     })
 }
 
-/// What is wrong with a priority.
+/// The violation of an invalid priority.
 pub(super) fn priority_violation(priority: i32) -> Option<Violation> {
     (!PRIORITIES.0.contains(&priority.into())).then(|| Violation {
         pointer: "/priority".into(),
@@ -102,7 +102,7 @@ pub(super) fn priority_violation(priority: i32) -> Option<Violation> {
     })
 }
 
-/// What is wrong with labels.
+/// The violations of invalid labels.
 pub(super) fn label_violations(labels: &BTreeMap<String, String>) -> Vec<Violation> {
     let violation = |pointer: String, got: String, expected: String, hint: &str| Violation {
         pointer,
@@ -117,7 +117,7 @@ pub(super) fn label_violations(labels: &BTreeMap<String, String>) -> Vec<Violati
             "/labels".into(),
             labels.len().to_string(),
             format!("at most {MAX_LABELS} labels"),
-            "Leave some out.",
+            "Remove some.",
         ));
     }
     for (key, value) in labels.iter().take(MAX_LABELS) {

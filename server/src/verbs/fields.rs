@@ -1,4 +1,4 @@
-//! Mesh, displacements and stresses: as JSON in pieces, or in another format.
+//! Returns mesh, displacements and stresses, as JSON in pieces or in another format.
 
 use std::sync::Arc;
 
@@ -22,11 +22,11 @@ use crate::{
 /// The fields of a job: JSON of known length and fingerprint, in pieces.
 #[derive(Debug)]
 pub struct StoredFields {
-    /// Length and fingerprint.
+    /// The length and fingerprint of the JSON.
     pub info: PartInfo,
     id: JobId,
     key: i64,
-    /// If they had to be read to know that they are intact.
+    /// The fields, if they had to be read to check that they are intact.
     loaded: Option<Arc<LoadedFields>>,
 }
 
@@ -57,7 +57,7 @@ pub async fn fields(
     Ok(Found::new(job.result_available, content))
 }
 
-/// An error if the fields of a job that has ended were deleted.
+/// Fails if the fields of a job that has ended were deleted.
 pub(super) async fn are_kept(service: &Service, job: &Job) -> Result<(), ApiError> {
     let lost = job.status.is_terminal() && service.store.lost_fields(job.key).await?;
     match lost {
@@ -66,7 +66,7 @@ pub(super) async fn are_kept(service: &Service, job: &Job) -> Result<(), ApiErro
     }
 }
 
-/// Fields in memory, once there is room for them; `None` if there are none.
+/// Loads fields once there is memory for them; `None` if there are none.
 pub(super) async fn load(
     service: &Service,
     key: i64,
@@ -96,8 +96,8 @@ pub(super) async fn load(
 }
 
 impl StoredFields {
-    /// The bytes from `start` to before `end`, in pieces, since there may be many. What comes before is written and left out:
-    /// a millisecond for each megabyte.
+    /// The bytes from `start` to before `end`, in pieces, since there may be many. The bytes before `start` are
+    /// computed and skipped: a millisecond for each megabyte.
     pub fn bytes(
         &self,
         service: &Arc<Service>,

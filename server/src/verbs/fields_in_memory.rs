@@ -1,4 +1,4 @@
-//! Fields that are kept in memory while they are sent, shared by all requests for the same ones.
+//! Fields that are held in memory while they are sent, shared by all requests for them.
 
 use std::{
     collections::HashMap,
@@ -13,7 +13,7 @@ use crate::{store::PartInfo, transfer::Share};
 /// The fields of one result in memory, with their share of the limit on answers.
 #[derive(Debug)]
 pub(super) struct LoadedFields {
-    /// Size and hash of their JSON.
+    /// The size and hash of the fields' JSON.
     pub(super) info: PartInfo,
     pub(super) fields: Fields,
     pub(super) _share: Share,

@@ -1,4 +1,4 @@
-//! The filters of jobs, for lists, counts and bulk operations. One list for both protocols.
+//! The filters of jobs for lists, counts and bulk operations, the same for both protocols.
 
 use serde_json::json;
 
@@ -9,49 +9,49 @@ use crate::{
     store::Filter,
 };
 
-/// By status; several may be given.
+/// The filter by status; several may be given.
 pub const STATUS: Parameter<Words<Status>> = Parameter {
     name: "status",
     meaning: "Only jobs with this status; several may be given",
     values: Words::all(),
 };
 
-/// By owner.
+/// The filter by owner.
 pub const OWNER: Parameter<Text> = Parameter {
     name: "owner",
     meaning: "Only jobs of this owner",
     values: Text,
 };
 
-/// By label: `label.{key}` is a name for each key.
+/// The filter by label: `label.{key}` is a name for each key.
 pub const LABEL: Parameter<Text> = Parameter {
     name: "label.{key}",
     meaning: "label.KEY=VALUE: only jobs with this label; several may be given",
     values: Text,
 };
 
-/// By name.
+/// The filter by name.
 pub const NAME: Parameter<Text> = Parameter {
     name: "name",
     meaning: "Only jobs with this name",
     values: Text,
 };
 
-/// By the fingerprint of the problem.
+/// The filter by the fingerprint of the problem.
 pub const INPUT_HASH: Parameter<Text> = Parameter {
     name: "input_hash",
     meaning: "Only jobs with this input",
     values: Text,
 };
 
-/// By the sweep.
+/// The filter by sweep.
 pub const SWEEP: Parameter<SweepIds> = Parameter {
     name: "sweep",
     meaning: "Only jobs of this sweep",
     values: SweepIds,
 };
 
-/// The ids of sweeps.
+/// The ids of sweeps, as values.
 #[derive(Clone, Copy, Debug)]
 pub struct SweepIds;
 
@@ -71,28 +71,28 @@ impl Values for SweepIds {
     }
 }
 
-/// By the time of acceptance, from.
+/// The filter by the earliest time of acceptance.
 pub const CREATED_AFTER: Parameter<Times> = Parameter {
     name: "created_after",
     meaning: "Only jobs accepted at this time or later",
     values: Times,
 };
 
-/// By the time of acceptance, to.
+/// The filter by the latest time of acceptance.
 pub const CREATED_BEFORE: Parameter<Times> = Parameter {
     name: "created_before",
     meaning: "Only jobs accepted earlier",
     values: Times,
 };
 
-/// By the time of the end, from.
+/// The filter by the earliest time of the end.
 pub const FINISHED_AFTER: Parameter<Times> = Parameter {
     name: "finished_after",
     meaning: "Only jobs that ended at this time or later",
     values: Times,
 };
 
-/// By the time of the end, to.
+/// The filter by the latest time of the end.
 pub const FINISHED_BEFORE: Parameter<Times> = Parameter {
     name: "finished_before",
     meaning: "Only jobs that ended earlier",
@@ -115,7 +115,7 @@ pub fn describe() -> [Description; 10] {
     ]
 }
 
-/// In OpenAPI the labels are the members of an object, each of which is a parameter (style form, exploded: the
+/// The description of labels for OpenAPI: members of an object, each of which is a parameter (style form, exploded: the
 /// default). Their values have no type: in a query all are text.
 fn labels() -> Description {
     let keys = json!({ "^label\\.": {} });
@@ -125,7 +125,7 @@ fn labels() -> Description {
     }
 }
 
-/// A filter within the limits, each status and label once.
+/// Checks a filter against its limits; removes duplicate statuses and labels.
 pub fn checked(filter: Filter) -> Result<Filter, ApiError> {
     let filter = filter.tidied();
     if filter.labels.len() > Filter::MOST_LABELS {
@@ -138,7 +138,7 @@ pub fn checked(filter: Filter) -> Result<Filter, ApiError> {
     Ok(filter)
 }
 
-/// A filter that is not empty, for bulk operations, so that none is applied to all jobs by accident.
+/// Checks that a filter is not empty, so that a bulk operation is not applied to all jobs by accident.
 pub(super) fn required(filter: Filter) -> Result<Filter, ApiError> {
     match filter.is_empty() {
         true => Err(ApiError::MissingFilter(

@@ -1,4 +1,4 @@
-//! The iterations of a job, a row each.
+//! Returns the iterations of a job, one row each.
 
 use super::{
     jobs,
@@ -21,8 +21,8 @@ pub const MAX_POINTS: Parameter<Integers> = Parameter {
     values: Integers(2..=i64::MAX),
 };
 
-/// The rows of the last start of a job, reduced to a maximum number: those of its result, or those of its events as
-/// long as there is no result.
+/// The rows of the last attempt of a job, reduced to a maximum number: those of its result or, while there is none,
+/// those of its events.
 pub async fn history(
     service: &Service,
     caller: &Caller,
@@ -65,9 +65,9 @@ pub async fn history(
 
 /// The stored form of a history.
 pub(super) enum StoredHistory {
-    /// With the result.
+    /// A history that is stored with the result.
     Whole(Vec<u8>),
-    /// Row by row, as events.
+    /// Rows that are stored one by one, as events.
     Events(Vec<String>),
 }
 
@@ -108,7 +108,7 @@ fn row(line: &str) -> serde_json::Result<TimedIteration> {
     }
 }
 
-/// Keeps at most `most` rows (2 or more), evenly spread, with the first and the last.
+/// Keeps at most `most` rows (2 or more), evenly distributed, including the first and the last.
 fn downsample(rows: &mut Vec<TimedIteration>, most: usize) {
     let count = rows.len();
     if count <= most || most < 2 {

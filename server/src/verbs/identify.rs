@@ -1,4 +1,5 @@
-//! Who makes a request: by a token, by what a proxy says that is trusted, or, without either, everyone is the same.
+//! Identifies the caller of a request: by a token, or by the user header of a trusted proxy; without either, all
+//! callers are the same.
 
 use crate::{
     caller::{Caller, LOCAL, Peer, is_owner},
@@ -9,25 +10,25 @@ use crate::{
     token::Presented,
 };
 
-/// What a request shows of its caller.
+/// The credentials of a request.
 #[derive(Clone, Debug, Default)]
 pub struct Credentials {
-    /// The token that it sends; an `Err` if what it sends is not one.
+    /// The token; an `Err` if the text sent is not a token.
     pub token: Option<Result<Presented, ()>>,
-    /// Users named by the header of a proxy; more than one is wrong.
+    /// The users named by the header of a proxy; more than one is an error.
     pub users: Vec<String>,
 }
 
-/// A caller, and what identified them.
+/// A caller, and the kind of identification.
 #[derive(Clone, Debug)]
 pub struct Identified {
     /// The caller.
     pub caller: Caller,
-    /// By what.
+    /// The kind of identification.
     pub by: By,
 }
 
-/// What identifies a caller.
+/// The kind of identification of a caller.
 #[derive(Clone, Debug)]
 pub enum By {
     /// A token.
@@ -41,7 +42,7 @@ pub enum By {
 }
 
 impl By {
-    /// Whether it still allows what it has allowed.
+    /// Whether the identification is still valid.
     pub fn is_valid(&self, store: &Store) -> bool {
         match self {
             By::Token(Presented { id, hash }) => {
@@ -53,7 +54,7 @@ impl By {
     }
 }
 
-/// The caller of a request from `peer`, or why there is none.
+/// Identifies the caller of a request from `peer`; the error says why there is none.
 pub fn identify(
     store: &Store,
     trust: &ProxyTrust,

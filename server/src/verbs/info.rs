@@ -1,4 +1,4 @@
-//! Version and limits of the service.
+//! Returns version and limits of the service.
 
 use std::collections::BTreeSet;
 
@@ -26,123 +26,123 @@ use crate::{
 pub struct Info {
     /// Its name.
     pub name: String,
-    /// The version of the program, and so of the solver.
+    /// The version of the program, which is also that of the solver.
     pub version: String,
     /// The version of the API.
     pub api_version: String,
-    /// Jobs that can run at the same time.
+    /// The number of jobs that can run at the same time.
     pub workers: u32,
-    /// Where they run: on threads of the service, or in processes of their own.
+    /// Where jobs run: on threads of the service, or in processes of their own.
     pub isolation: Isolation,
-    /// Its limits.
+    /// The limits of the service.
     pub limits: ServiceLimits,
     /// Condensed bodies that are kept for later jobs; all 0 with isolation `process`.
     pub body_cache: BodyCache,
     /// The disk.
     pub disk: Disk,
-    /// Formats of rows (profiles, history), the default first.
+    /// The formats of rows (profiles, history), the default first.
     pub table_formats: Vec<String>,
-    /// Formats of fields, the default first.
+    /// The formats of fields, the default first.
     pub field_formats: Vec<String>,
 }
 
-/// The disk.
+/// The use of the disk.
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct Disk {
-    /// Bytes of the database and its write-ahead log.
+    /// The bytes of the database and its write-ahead log.
     pub used_bytes: u64,
-    /// Bytes of it without content, for what comes next; more than some are given back to the file system.
+    /// The bytes of it that are unused and reserved for new data; beyond some, they are returned to the file system.
     pub unused_bytes: u64,
-    /// Bytes that the file system has left.
+    /// The bytes that the file system has left.
     pub free_bytes: u64,
 }
 
 /// Limits of the service.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct ServiceLimits {
-    /// Bytes of a request over REST.
+    /// The largest number of bytes of a request over REST.
     pub max_body_bytes: u64,
-    /// Bytes of a message over gRPC, in either direction.
+    /// The largest number of bytes of a message over gRPC, in either direction.
     pub max_message_bytes: u64,
-    /// Bytes of a mesh file.
+    /// The largest number of bytes of a mesh file.
     pub max_mesh_bytes: u64,
-    /// Bytes of memory that one job may need, by the estimate.
+    /// The largest number of bytes of memory that one job may need, by the estimate.
     pub memory_budget_bytes: u64,
-    /// Bytes of it for bodies that are kept; 0: none is kept, as with isolation `process`.
+    /// The bytes of it for kept bodies; 0: none are kept, as with isolation `process`.
     pub body_cache_bytes: u64,
-    /// Jobs that may wait.
+    /// The largest number of waiting jobs.
     pub max_queued: u32,
-    /// Jobs of a batch.
+    /// The largest number of jobs in a batch.
     pub max_batch: u32,
-    /// Jobs of a page.
+    /// The largest number of jobs on a page.
     pub max_page_size: u32,
-    /// Seconds that a request may wait for a job.
+    /// The largest number of seconds that a request may wait for a job.
     pub max_wait_s: f64,
 }
 
-/// Who the caller is, what they may do, and their share of the service.
+/// The caller: their name, scopes and limits.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Me {
     /// The owner of the jobs that they submit.
     pub owner: String,
-    /// What they may do.
+    /// The scopes of the caller.
     pub scopes: BTreeSet<Scope>,
-    /// Jobs that wait.
+    /// The waiting jobs of the caller.
     pub queued: Share,
-    /// Jobs that run.
+    /// The running jobs of the caller.
     pub running: Share,
-    /// Bytes of jobs that have ended, of the problems of those that wait, and of meshes.
+    /// The bytes of jobs that have ended, of the problems of waiting jobs, and of meshes.
     pub stored_bytes: Kept,
-    /// Jobs submitted; absent: as many as they like.
+    /// The jobs submitted in a minute; absent: no limit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub submissions: Option<Rate>,
 }
 
-/// What an owner keeps.
+/// The stored bytes of an owner.
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct Kept {
-    /// Counted now.
+    /// The present number.
     pub used: u64,
-    /// The most that is allowed; `null`: there is no limit.
+    /// The limit; `null`: no limit.
     pub limit: Option<u64>,
 }
 
-/// How often something may be done.
+/// A limit per minute.
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct Rate {
-    /// In a minute.
+    /// The number in a minute.
     pub per_minute: u64,
-    /// At once, now.
+    /// The number left at this moment.
     pub left: u64,
 }
 
-/// What an owner has in the service.
+/// The use of the service by an owner.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct OwnerUse {
-    /// Their name.
+    /// The owner's name.
     pub owner: String,
-    /// Jobs that have ended.
+    /// The number of jobs that have ended.
     pub jobs: u64,
-    /// Bytes of these: results and events.
+    /// The bytes of these jobs: results and events.
     pub job_bytes: u64,
-    /// Bytes of uploaded meshes.
+    /// The bytes of uploaded meshes.
     pub mesh_bytes: u64,
-    /// Jobs that wait.
+    /// The number of waiting jobs.
     pub queued: u64,
-    /// Jobs that run.
+    /// The number of running jobs.
     pub running: u64,
 }
 
-/// How much of something an owner has, and may have.
+/// The present number of something that an owner has, and its limit.
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct Share {
-    /// Counted now.
+    /// The present number.
     pub used: u64,
-    /// The most that is allowed.
+    /// The limit.
     pub limit: u64,
 }
 
-/// Who the caller is.
+/// The caller: their name, scopes and limits.
 pub async fn me(service: &Service, caller: &Caller) -> Result<Me, ApiError> {
     let stored = service.bytes_of(caller.owner()).await?;
     let rate = |rates: &Rates| {
@@ -174,7 +174,8 @@ pub async fn me(service: &Service, caller: &Caller) -> Result<Me, ApiError> {
     })
 }
 
-/// What the owners have in the service: who keeps most first, a thousand of them at most, then those who keep nothing yet.
+/// The use of the service by each owner: those with the most stored bytes first, at most a thousand of them, followed
+/// by those who store nothing yet.
 pub async fn owners(service: &Service, _caller: &Caller) -> Result<Vec<OwnerUse>, ApiError> {
     const MOST: i64 = 1000;
     let mut sizes = service.store.sizes_of_owners(MOST).await?;

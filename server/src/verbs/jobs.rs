@@ -1,4 +1,4 @@
-//! One job: get, edit, cancel, delete; and its problem.
+//! Operations on one job: get, edit, cancel, delete; and its problem.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -19,7 +19,7 @@ use crate::{
     store::{CancelOutcome, Deletion, Edit, Snapshot},
 };
 
-/// A job in a path.
+/// The id of a job in a path.
 pub const ID: Variable<JobIds> = Variable {
     name: "id",
     kind: "job",
@@ -27,7 +27,7 @@ pub const ID: Variable<JobIds> = Variable {
     values: JobIds,
 };
 
-/// The ids of jobs.
+/// The ids of jobs, as values.
 #[derive(Clone, Copy, Debug)]
 pub struct JobIds;
 
@@ -47,7 +47,7 @@ impl Values for JobIds {
     }
 }
 
-/// The job as it is now.
+/// The job in its present state.
 pub async fn get(service: &Service, caller: &Caller, id: JobId) -> Result<Job, ApiError> {
     match service.store.job(caller.visible_owners(), id).await? {
         Some(job) => Ok(job),
@@ -55,7 +55,7 @@ pub async fn get(service: &Service, caller: &Caller, id: JobId) -> Result<Job, A
     }
 }
 
-/// The job with its result so far, at one moment.
+/// The job with its result so far, read at one moment.
 pub(super) async fn snapshot(
     service: &Service,
     caller: &Caller,
@@ -90,7 +90,7 @@ pub async fn problem(service: &Service, caller: &Caller, id: JobId) -> Result<Pr
     Ok(Problem { title, ..problem })
 }
 
-/// Changes the editable fields of a job, if it has one of these versions; `None`: whatever its version.
+/// Changes the editable fields of a job, if it has one of these versions; `None`: any version.
 pub async fn update(
     service: &Arc<Service>,
     caller: &Caller,
@@ -132,7 +132,7 @@ pub async fn update(
     }
 }
 
-/// Labels that are set, or removed.
+/// Labels to be set, or removed if they are `None`.
 pub type LabelChanges = BTreeMap<String, Option<String>>;
 
 async fn replace(
@@ -193,11 +193,11 @@ pub async fn cancel(
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Cancellation {
-    /// It was queued, and will not run.
+    /// The job was queued, and will not run.
     Canceled,
-    /// It was running, and ends within half a second.
+    /// The job was running, and ends within half a second.
     CancelRequested,
-    /// It had ended already.
+    /// The job had ended already.
     AlreadyTerminal,
 }
 
@@ -217,7 +217,7 @@ pub async fn delete(service: &Arc<Service>, caller: &Caller, id: JobId) -> Resul
     .await
 }
 
-/// Deletes mesh, displacements and stresses of a job that has ended; summary, history and profiles stay.
+/// Deletes mesh, displacements and stresses of a job that has ended; summary, history and profiles remain.
 pub async fn delete_fields(
     service: &Arc<Service>,
     caller: &Caller,
@@ -233,7 +233,7 @@ pub async fn delete_fields(
     .await
 }
 
-/// An error if a job was not deleted.
+/// The error if a job was not deleted.
 async fn answer(
     service: &Service,
     caller: &Caller,

@@ -1,11 +1,11 @@
-//! The client's key for a request that it may repeat.
+//! The idempotency key: the client's key for a request that it may repeat.
 
 use crate::parameters::{Parameter, Values};
 
 /// The key; over gRPC the field `request_id`.
 pub const IDEMPOTENCY_KEY: Parameter<Keys> = Parameter {
     name: "Idempotency-Key",
-    meaning: "Key chosen by the client for this request: if it is repeated with the same key, the answer is what the first one created",
+    meaning: "Key chosen by the client for this request: a repetition with the same key returns what the first request created",
     values: Keys,
 };
 
@@ -13,17 +13,17 @@ pub const IDEMPOTENCY_KEY: Parameter<Keys> = Parameter {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Key(pub(super) String);
 
-/// The valid keys.
+/// The valid keys, as values.
 #[derive(Clone, Copy, Debug)]
 pub struct Keys;
 
-/// Characters of the longest key.
+/// The largest number of characters of a key.
 const MAX_LENGTH: usize = 255;
 
 impl Values for Keys {
     type Value = Key;
 
-    /// As HTTP allows them in a header, without spaces at the ends.
+    /// The schema of keys: characters that HTTP allows in a header, without spaces at the ends.
     fn schema(&self) -> serde_json::Value {
         let inner = MAX_LENGTH - 2;
         let pattern = format!("^[!-~]([ -~]{{0,{inner}}}[!-~])?$");

@@ -1,4 +1,4 @@
-//! Lists of jobs, and how many there are.
+//! Lists and counts jobs.
 
 use std::collections::BTreeMap;
 
@@ -21,11 +21,11 @@ use crate::{
 /// The order of a list.
 pub const ORDER_BY: Parameter<Orders> = Parameter {
     name: "order_by",
-    meaning: "Sorts by this time; by finished_at only jobs that have ended are listed",
+    meaning: "Order of the list by this time; with finished_at only jobs that have ended are listed",
     values: Orders,
 };
 
-/// The possible orders.
+/// The possible orders, as values.
 #[derive(Clone, Copy, Debug)]
 pub struct Orders;
 
@@ -101,7 +101,7 @@ pub const GROUP_BY: Parameter<Words<GroupBy>> = Parameter {
 /// The number of jobs, in total and by group.
 #[derive(Clone, Debug, serde::Serialize, JsonSchema)]
 pub struct Count {
-    /// All that match the filters.
+    /// The number of all jobs that match the filters.
     pub total: i64,
     /// The number in each group, by its name; empty if no groups were requested.
     pub groups: BTreeMap<String, i64>,

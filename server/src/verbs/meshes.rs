@@ -1,4 +1,4 @@
-//! Meshes that are stored once, and referred to by jobs.
+//! Operations on meshes, which are stored once and referred to by jobs.
 
 use std::{
     fs::File,
@@ -31,7 +31,7 @@ use crate::{
     violations,
 };
 
-/// A stored mesh in a path.
+/// The hash of a stored mesh in a path.
 pub const HASH: Variable<Hashes> = Variable {
     name: "hash",
     kind: "mesh",
@@ -39,7 +39,7 @@ pub const HASH: Variable<Hashes> = Variable {
     values: Hashes,
 };
 
-/// The names of meshes: the hashes of their files.
+/// The names of meshes, as values: the hashes of their files.
 #[derive(Clone, Copy, Debug)]
 pub struct Hashes;
 
@@ -125,7 +125,7 @@ pub async fn upload(
         if stored.is_err()
             && let Err(cause) = service.store.discard_content(&[&body]).await
         {
-            warn!(%cause, "what was stored of mesh {} stays until the next start: {cause}", info.hash);
+            warn!(%cause, "the stored pieces of mesh {} remain until the next start: {cause}", info.hash);
         }
         let new = stored?;
         info!(
@@ -171,7 +171,7 @@ fn parse(
     Ok((info, body, encoded))
 }
 
-/// A file with the hash of what is written, and the error that has ended its writing.
+/// A file with the hash of what was written, and the error that ended writing it.
 struct Kept {
     out: BufWriter<File>,
     hash: Sha256,
@@ -203,7 +203,7 @@ fn refused(error: ReadError) -> ApiError {
     }
 }
 
-/// Stores a mesh; whether it is new to its owner.
+/// Stores a mesh; returns whether it is new to its owner.
 async fn store(
     service: &Service,
     owner: &str,

@@ -1,4 +1,4 @@
-//! Figures of the service for monitoring.
+//! Adds the present figures of the service to the metrics.
 
 use std::{fs, path::Path};
 
@@ -11,7 +11,8 @@ use crate::{
     metrics::{METRICS, Snapshot},
 };
 
-/// All metrics, in the text format of OpenMetrics. They have no names of owners and no ids: whoever may read may read them.
+/// All metrics, in the text format of OpenMetrics. They contain no names of owners and no ids, so that every reader may
+/// see them.
 pub async fn metrics(service: &Service, _caller: &Caller) -> Result<String, ApiError> {
     let mut now = Snapshot::default();
     let state = service.queue.state();
@@ -23,12 +24,12 @@ pub async fn metrics(service: &Service, _caller: &Caller) -> Result<String, ApiE
     // a database that cannot be read is told by /readyz, and must not hide the other figures
     let wait_s = service.store.oldest_wait_s().await;
     let wait_s = wait_s.ok().flatten().unwrap_or(0.0);
-    let help = "How long the job has waited that was accepted first of those that wait";
+    let help = "Age of the oldest queued job, in seconds";
     now.gauge("signorini_oldest_wait_seconds", help, wait_s);
     let flag = |flag: bool| f64::from(u8::from(flag));
     now.gauge(
         "signorini_queue_paused",
-        "1 if no job is started",
+        "1 if the queue is paused",
         flag(state.paused),
     );
     now.gauge(
@@ -36,16 +37,12 @@ pub async fn metrics(service: &Service, _caller: &Caller) -> Result<String, ApiE
         "Jobs that can run at the same time",
         state.workers.into(),
     );
-    now.gauge(
-        "signorini_workers_idle",
-        "Workers that are idle",
-        state.idle as f64,
-    );
+    now.gauge("signorini_workers_idle", "Idle workers", state.idle as f64);
 
     let budget = service.store.budget();
-    let help = "Memory that running jobs share";
+    let help = "Memory budget that running jobs share, in bytes";
     now.gauge("signorini_memory_budget_bytes", help, budget.bytes() as f64);
-    let help = "Memory of it that running jobs have reserved";
+    let help = "Memory that running jobs have reserved, in bytes";
     now.gauge(
         "signorini_memory_reserved_bytes",
         help,
@@ -54,19 +51,19 @@ pub async fn metrics(service: &Service, _caller: &Caller) -> Result<String, ApiE
     let cache = budget.body_cache();
     now.gauge(
         "signorini_body_cache_bytes",
-        "Condensed bodies that are kept",
+        "Size of the condensed bodies kept for later jobs, in bytes",
         cache.bytes as f64,
     );
     now.gauge(
         "signorini_body_cache_bodies",
-        "How many are kept",
+        "Number of condensed bodies kept for later jobs",
         cache.bodies as f64,
     );
-    let help = "Jobs and members that found their body";
+    let help = "Jobs and members of sweeps whose condensed body was kept";
     now.counter("signorini_body_cache_hits", help, cache.hits);
-    let help = "Jobs and members that had to make it";
+    let help = "Jobs and members of sweeps whose condensed body had to be made";
     now.counter("signorini_body_cache_misses", help, cache.misses);
-    let help = "Bodies that gave way";
+    let help = "Condensed bodies dropped to make room";
     now.counter("signorini_body_cache_evictions", help, cache.evictions);
 
     let health = service.health().await;
@@ -79,10 +76,10 @@ pub async fn metrics(service: &Service, _caller: &Caller) -> Result<String, ApiE
     let health = health.unwrap_or_default();
     now.gauge(
         "signorini_disk_full",
-        "1 if the store cannot take jobs",
+        "1 if the disk of the store is full, so that no jobs are accepted",
         flag(health.full),
     );
-    let help = "Records that were found damaged since the start";
+    let help = "Records found damaged since the start of the service";
     now.gauge("signorini_damaged_records", help, health.damaged as f64);
 
     let data = service.data.clone();
@@ -99,14 +96,18 @@ fn add_disk(now: &mut Snapshot, folder: &Path) {
     let disk = disk(folder);
     now.gauges(
         "signorini_store_bytes",
-        "Files of the store",
+        "Size of the files of the store, in bytes",
         "file",
         disk.files,
     );
     if let Some((free, size)) = disk.free_and_size {
-        let help = "Space on its disk that the service may still use";
+        let help = "Free space on the disk of the store, in bytes";
         now.gauge("signorini_disk_free_bytes", help, free);
-        now.gauge("signorini_disk_size_bytes", "The size of its disk", size);
+        now.gauge(
+            "signorini_disk_size_bytes",
+            "Size of the disk of the store, in bytes",
+            size,
+        );
     }
 }
 

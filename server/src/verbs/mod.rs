@@ -1,6 +1,6 @@
-//! The operations of the service, called verbs, each defined once for both protocols; `rest` and `grpc` only
-//! translate. A verb takes the service, the caller, and then the arguments of the request. The parameters of requests
-//! are defined beside the verb that they belong to.
+//! The operations of the service, called verbs, each defined once for both protocols; `rest` and `grpc` only translate.
+//! A verb takes the service, the caller, and then the arguments of the request. The parameters of requests are defined
+//! next to their verb.
 //!
 //! # Where to look
 //!
@@ -18,7 +18,7 @@
 //! | sweeps | `sweeps` |
 //! | results: summary, iterations, profiles, fields, figures | `results`, `history`, `profiles`, `fields` with `fields_in_memory`, `plots` |
 //! | meshes and their uploads | `meshes`, `uploads` |
-//! | who a caller is | `identify` |
+//! | identifying the caller | `identify` |
 //! | tokens | `tokens` |
 //! | the queue | `queue` |
 //! | version, limits and shares | `info` |

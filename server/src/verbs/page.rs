@@ -19,10 +19,10 @@ pub const PAGE_SIZE: Parameter<Integers> = Parameter {
 };
 /// Largest number of entries on a page.
 pub const MAX_PAGE_SIZE: i64 = 1000;
-/// A unit test compares this with the meaning of `PAGE_SIZE`.
+/// The default size of a page; a unit test compares it with the text of `PAGE_SIZE`.
 const DEFAULT_PAGE_SIZE: i64 = 50;
 
-/// The page of a list.
+/// The token of the page to return.
 pub const PAGE_TOKEN: Parameter<Text> = Parameter {
     name: "page_token",
     meaning: "The next_page_token of the previous page",
@@ -32,25 +32,25 @@ pub const PAGE_TOKEN: Parameter<Text> = Parameter {
 /// The requested part of a list.
 #[derive(Clone, Debug, Default)]
 pub struct Paging {
-    /// Maximum number of entries on the page.
+    /// The maximum number of entries on the page.
     pub size: Option<i64>,
-    /// Where it begins; absent or empty: at the start of the list.
+    /// The token of the page; absent or empty: the first page.
     pub token: Option<String>,
 }
 
 /// A part of a list.
 #[derive(Debug)]
 pub struct Page<T> {
-    /// Its entries.
+    /// The entries of the page.
     pub items: Vec<T>,
-    /// Where the next page begins; none after the last.
+    /// The token of the next page; none after the last.
     pub next: Option<String>,
 }
 
-/// What the store has found for a page.
+/// The entries that the store has found for a page.
 pub(super) struct Found<T> {
     items: Vec<T>,
-    /// There are more, whatever the size of the page is.
+    /// Whether there are more entries, whatever the size of the page is.
     cut: bool,
 }
 
@@ -67,7 +67,7 @@ impl<T> From<Entries<T>> for Found<T> {
 }
 
 impl Paging {
-    /// Where the page of this list begins.
+    /// The place where the page of this list begins.
     pub(super) fn cursor(&self, list: &str) -> Result<Option<Cursor>, ApiError> {
         let token = self.token.as_deref().filter(|token| !token.is_empty());
         token
@@ -103,13 +103,13 @@ impl Paging {
     }
 }
 
-/// Identifies a list of jobs: its filters and its order. The order of statuses and labels does not matter.
+/// A name for a list of jobs, from its filters and its order. The order of statuses and labels does not matter.
 pub(super) fn list_of_jobs(filter: &Filter, order: Order) -> String {
     let filter = filter.clone().tidied();
     format!("jobs {filter:?} {order:?}")
 }
 
-/// The place right after a job in a list of that order.
+/// The place right after a job in a list with this order.
 pub(super) fn after(job: &Job, order: Order) -> Cursor {
     let time = match order.by {
         OrderBy::CreatedAt => Some(job.created_at),

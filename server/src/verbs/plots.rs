@@ -1,4 +1,4 @@
-//! Figures of a job's problem and result.
+//! Draws figures of a job's problem and result.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -26,11 +26,11 @@ use crate::{
     store::Snapshot,
 };
 
-/// A figure in a path, and its format.
+/// A figure with its format in a path.
 pub const PLOT: Variable<Words<(Plot, Format)>> = Variable {
     name: "plot",
     kind: "plot",
-    meaning: "Which figure, as which kind of file",
+    meaning: "The figure and its file format",
     values: Words(|| {
         vec![
             ("mesh.svg", (Plot::Mesh, Format::Svg)),
@@ -56,10 +56,10 @@ pub const THEME: Parameter<Words<Theme>> = Parameter {
     values: Words(|| vec![("light", Theme::Light), ("dark", Theme::Dark)]),
 };
 
-/// What a figure is for.
+/// The use of a figure, which determines its size.
 pub const SIZE: Parameter<Words<Size>> = Parameter {
     name: "size",
-    meaning: "What the figure is for, and so how large its letters are beside it: a column of 88 mm, a page of 160 mm, a slide of 254 mm; PNG and PDF have that width; default page",
+    meaning: "Use of the figure, which sets its width and the size of its letters: a column of 88 mm, a page of 160 mm, a slide of 254 mm; default page",
     values: Words(|| {
         vec![
             ("column", Size::Column),
@@ -72,7 +72,7 @@ pub const SIZE: Parameter<Words<Size>> = Parameter {
 /// The stress shown on a deformed body.
 pub const STRESS: Parameter<Words<Stress>> = Parameter {
     name: "stress",
-    meaning: "Stress shown in the figure `deformed` (no other); default von_mises",
+    meaning: "Stress shown in the figure `deformed` only; default von_mises",
     values: Words(|| {
         vec![
             ("von_mises", Stress::VonMises),
@@ -84,16 +84,16 @@ pub const STRESS: Parameter<Words<Stress>> = Parameter {
     }),
 };
 
-/// What is asked for.
+/// A requested figure.
 #[derive(Clone, Debug)]
 pub struct Figure {
-    /// Which figure.
+    /// The kind of figure.
     pub plot: Plot,
-    /// As which kind of file.
+    /// The file format.
     pub format: Format,
-    /// How it looks.
+    /// The style.
     pub style: Style,
-    /// At the end of this load step, by its name or its number from 0, instead of the last one.
+    /// The load step at whose end the figure is drawn, by its name or its number from 0; absent: the last one.
     pub step: Option<String>,
 }
 
@@ -186,7 +186,7 @@ pub async fn plot(
     service.work_on(load, draw).await?
 }
 
-/// What a figure is drawn from, as it is now.
+/// The data that a figure is drawn from, at this moment.
 async fn snapshot(
     service: &Service,
     caller: &Caller,
@@ -218,11 +218,11 @@ async fn fields_of(
     }
 }
 
-/// What figures are drawn from, most in its stored form; the parts that a figure does not need are absent.
+/// The data that figures are drawn from, mostly in their stored form; parts that a figure does not need are absent.
 struct Loaded {
     job: Job,
     problem: Problem,
-    /// The load step that was asked for, and its number.
+    /// The requested load step, and its number.
     step: Option<(usize, StepResult)>,
     columns: Vec<(String, Vec<u8>)>,
     summary: Option<Vec<u8>>,
@@ -232,7 +232,7 @@ struct Loaded {
 }
 
 impl Loaded {
-    /// As SVG; the inner `Err` is the reason why there is no such figure.
+    /// Draws the figure as SVG; the inner `Err` is the reason why there is no such figure.
     fn draw(self, plot: Plot, style: Style) -> Result<Result<String, String>, ApiError> {
         let summary: Option<Summary> = self.summary.map(|bytes| read(&bytes)).transpose()?;
         let mut profiles: BTreeMap<String, ContactProfile> = BTreeMap::new();

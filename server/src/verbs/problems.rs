@@ -1,4 +1,4 @@
-//! Checking a problem before it becomes a job.
+//! Checks a problem before it becomes a job.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -22,15 +22,15 @@ use crate::{
 /// The result of checking a problem.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Validation {
-    /// Whether a job of it would be accepted, with a time limit that is not far below the estimate.
+    /// Whether it would be accepted as a job, with a time limit that is not far below the estimate.
     pub valid: bool,
-    /// All its violations.
+    /// All violations of the problem.
     pub violations: Vec<Violation>,
-    /// What to consider before relying on its result.
+    /// The warnings to consider before relying on its result.
     pub warnings: Vec<Warning>,
-    /// Its estimated cost, given even if it is invalid; absent if it, or the stored mesh that it names, cannot be read.
+    /// Its estimated cost, also for an invalid problem; absent if it, or the stored mesh that it names, cannot be read.
     pub estimate: Option<Estimate>,
-    /// Its fingerprint; absent as `estimate` is.
+    /// Its fingerprint; absent if `estimate` is.
     pub input_hash: Option<String>,
 }
 
@@ -107,7 +107,7 @@ fn too_large(problem: &Problem, estimate: &Estimate, budget_bytes: u64) -> Viola
     too_large_at(pointer, estimate, budget_bytes)
 }
 
-/// The same, at this place of a request.
+/// The violation of a problem that exceeds the memory budget, at this place of a request.
 pub(super) fn too_large_at(pointer: String, estimate: &Estimate, budget_bytes: u64) -> Violation {
     let (unknowns, memory) = (count(estimate.dofs), size(estimate.memory_bytes));
     Violation {
@@ -115,12 +115,13 @@ pub(super) fn too_large_at(pointer: String, estimate: &Estimate, budget_bytes: u
         reason: Reason::TooLarge,
         got: format!("{unknowns} unknowns, which need about {memory}"),
         expected: format!("at most {} of memory", size(budget_bytes)),
-        hint: "Take a coarser mesh or refine less, or ask the operator for a larger budget.".into(),
+        hint: "Use a coarser mesh or less refinement, or ask the operator for a larger budget."
+            .into(),
     }
 }
 
-/// The time (seconds) that a problem is estimated to take, if that is more than a bound: of adaptive refinement it is the time
-/// of the largest mesh that is allowed, which few problems need.
+/// The time (seconds) that a problem is estimated to take, if that is a real estimate: for adaptive refinement it is
+/// only the time of the largest allowed mesh, which few problems need, so that there is none.
 pub(super) fn expected_run_s(problem: &Problem, run_s: f64) -> Option<f64> {
     (!matches!(problem.mesh.refine, Refine::Adaptive(_))).then_some(run_s)
 }
@@ -128,15 +129,15 @@ pub(super) fn expected_run_s(problem: &Problem, run_s: f64) -> Option<f64> {
 /// A problem that was found valid, as it is stored.
 #[derive(Debug)]
 pub(super) struct Admitted {
-    /// The title, which is the job's.
+    /// The title, which becomes that of the job.
     pub title: Option<String>,
     /// The rest as JSON.
     pub json: String,
     /// The stored mesh that it refers to.
     pub mesh: Option<String>,
-    /// Memory that it is estimated to need (bytes).
+    /// The estimated memory (bytes).
     pub memory_bytes: u64,
-    /// Time that it is estimated to take (seconds), if more than a bound is known.
+    /// The estimated time (seconds), if there is a real estimate.
     pub run_s: Option<f64>,
 }
 
@@ -189,7 +190,7 @@ pub(super) async fn admit(
     service.work(admit).await?
 }
 
-/// The estimate is made before meshing, since the mesh itself may need too much memory.
+/// Estimates the memory before meshing, since the mesh itself may need too much.
 fn estimate(problem: &Problem, stored: Option<&(MeshInfo, Mesh)>) -> Result<Estimate, Violation> {
     let size = stored.map(|(info, _)| info.size());
     let within = |violation| prefixed(PROBLEM, vec![violation]).remove(0);
@@ -203,8 +204,8 @@ fn check(problem: &Problem, stored: Option<(MeshInfo, Mesh)>) -> Result<Checked,
         let violation = Violation::new(
             "/mesh/stored",
             Reason::UnknownMesh,
-            "a mesh that an earlier version has stored, with added midsides in its sets of nodes",
-            "one whose sets have the nodes of its file, for a force on each of them",
+            "a mesh stored by an earlier version, with added midsides in its sets of nodes",
+            "a mesh whose sets have only the nodes of its file, for a force on each of them",
             "Delete the mesh, and upload its file again.",
         );
         return Err(prefixed(PROBLEM, vec![violation]));

@@ -1,4 +1,4 @@
-//! Columns along a contact boundary.
+//! Returns columns along a contact boundary.
 
 use serde::Deserialize;
 use serde_json::{json, value::RawValue};
@@ -27,11 +27,11 @@ pub enum Points {
     Nodes,
     /// At the points where friction acts, from which forces and peaks are computed.
     Friction,
-    /// At this number of points, equally spaced in arc length, with the ends.
+    /// At this number of points, equally spaced in arc length, including the ends.
     Spaced(usize),
 }
 
-/// A contact boundary in a path.
+/// The name of a contact boundary in a path.
 pub const BOUNDARY: Variable<Text> = Variable {
     name: "boundary",
     kind: "boundary",
@@ -39,7 +39,7 @@ pub const BOUNDARY: Variable<Text> = Variable {
     values: Text,
 };
 
-/// A load step.
+/// The load step of a profile.
 pub const STEP: Parameter<Text> = Parameter {
     name: "step",
     meaning: "Load step, by its name or its number from 0; default: the last",
@@ -55,7 +55,7 @@ pub const POINTS: Parameter<Places> = Parameter {
     },
 };
 
-/// The points that can be requested.
+/// The points that can be requested, as values.
 #[derive(Clone, Debug)]
 pub struct Places {
     /// The possible numbers of evenly spaced points.
@@ -87,8 +87,8 @@ impl Values for Places {
     }
 }
 
-/// The profile of one contact boundary: at the end, or at the end of a load step, by its name or its
-/// number from 0.
+/// The profile of one contact boundary: at the end of the solution, or at the end of a load step, given by its name or
+/// its number from 0.
 pub async fn profile(
     service: &Service,
     caller: &Caller,
@@ -128,7 +128,7 @@ pub async fn profile(
         let known = found.profiled_boundaries().await?;
         if known.iter().any(|name| name == boundary) {
             return Err(ApiError::NotFound(format!(
-                "{id} was solved before profiles at friction points were kept; try points=nodes"
+                "{id} was solved by an earlier version, which did not store profiles at friction points; try points=nodes"
             )));
         }
         return Err(ApiError::NotFound(format!(
@@ -151,7 +151,7 @@ pub async fn profile(
     content.map(|content| Found::new(available, content))
 }
 
-/// The stored profile at all points; in results of older versions, that at nodes.
+/// The stored profile at all points; in results of older versions, the profile at nodes.
 pub(super) async fn at_all_points(
     found: &mut Snapshot,
     boundary: &str,
@@ -164,8 +164,8 @@ pub(super) async fn at_all_points(
     }
 }
 
-/// A finished load step and its number, by its name or that number. `None`: the only step of a problem that has none, which is
-/// the last.
+/// A finished load step and its number, found by its name or that number. `None`: the only step of a problem without
+/// load steps.
 pub(super) async fn find_step(
     found: &mut Snapshot,
     wanted: &str,
@@ -184,7 +184,7 @@ pub(super) async fn find_step(
     Ok(Some((number, read(step.as_bytes())?)))
 }
 
-/// A step, of which the name is read alone.
+/// A step, of which only the name is read.
 #[derive(Deserialize)]
 struct Named {
     name: String,
@@ -195,7 +195,7 @@ fn step_number(steps: &[Named], wanted: &str, id: JobId) -> Result<usize, ApiErr
     let numbered = wanted.parse().ok().filter(|n| *n < steps.len());
     named.or(numbered).ok_or_else(|| {
         if steps.is_empty() {
-            return ApiError::NotFound(format!("{id} has no load steps; leave `step` out"));
+            return ApiError::NotFound(format!("{id} has no load steps; remove `step`"));
         }
         let names: Vec<_> = steps
             .iter()

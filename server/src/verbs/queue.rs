@@ -1,4 +1,4 @@
-//! The queue as a whole.
+//! Operations on the queue as a whole.
 
 use std::sync::Arc;
 
@@ -11,17 +11,17 @@ use crate::{caller::Caller, error::ApiError};
 /// The state of the queue.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct QueueState {
-    /// Whether the queue is paused: no new job is started.
+    /// Whether the queue is paused, so that no new job is started.
     pub paused: bool,
-    /// Jobs that wait for a worker, or for another job with the same input.
+    /// The number of jobs that wait for a worker, or for another job with the same input.
     pub queued: u64,
-    /// Jobs that run.
+    /// The number of running jobs.
     pub running: u64,
-    /// Jobs that can run at the same time.
+    /// The number of jobs that can run at the same time.
     pub workers: u32,
-    /// Workers without a job.
+    /// The number of idle workers.
     pub idle: u32,
-    /// Maximum number of waiting jobs; further ones are refused.
+    /// The maximum number of waiting jobs; further ones are refused.
     pub max_queued: u32,
 }
 
@@ -38,8 +38,8 @@ pub fn state(service: &Service, _caller: &Caller) -> QueueState {
     }
 }
 
-/// Starts no more jobs until the queue is resumed, also after a restart. Running jobs continue, and new ones are
-/// accepted.
+/// Pauses the queue: no more jobs are started until it is resumed, also after a restart. Running jobs continue, and new
+/// ones are accepted.
 pub async fn pause(service: &Arc<Service>, caller: &Caller) -> Result<QueueState, ApiError> {
     let (service, caller) = (service.clone(), caller.clone());
     detached(async move {
@@ -49,7 +49,7 @@ pub async fn pause(service: &Arc<Service>, caller: &Caller) -> Result<QueueState
     .await
 }
 
-/// Starts jobs again.
+/// Resumes the queue: jobs are started again.
 pub async fn resume(service: &Arc<Service>, caller: &Caller) -> Result<QueueState, ApiError> {
     let (service, caller) = (service.clone(), caller.clone());
     detached(async move {

@@ -1,4 +1,4 @@
-//! The summary of a result, and whether there is a result.
+//! Returns the summary of a result, and says whether there is a result.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -16,13 +16,13 @@ use crate::{
 /// The summary of one load step.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct StepResult {
-    /// Its name in the problem, or its number from 0.
+    /// The step's name in the problem, or its number from 0.
     pub name: String,
-    /// Its summary, at its end.
+    /// The summary at the end of the step.
     pub summary: solver::solution::Summary,
 }
 
-/// The scalars of a result, whole and by load step.
+/// The scalars of a result, as a whole and by load step.
 #[derive(Debug, Serialize, JsonSchema)]
 #[schemars(rename = "Result")]
 pub struct JobResult {
@@ -35,19 +35,19 @@ pub struct JobResult {
     pub steps: Vec<StepResult>,
 }
 
-/// Something of a job's result, and whether that result is all there will be.
+/// A part of a job's result, and whether that result is partial or final.
 #[derive(Debug)]
 pub struct Found<T> {
-    /// As in the job, at the time at which this was read.
+    /// Whether the result is partial or final, at the time at which it was read.
     pub available: ResultAvailable,
-    /// What was asked for.
+    /// The requested part.
     pub content: T,
-    /// The share of the memory for answers that it has, if it is large.
+    /// Its share of the memory for answers, if it is large.
     pub share: Option<Share>,
 }
 
 impl<T> Found<T> {
-    /// Something small.
+    /// A small part, without a share.
     pub(super) fn new(available: ResultAvailable, content: T) -> Found<T> {
         Found {
             available,
@@ -57,11 +57,11 @@ impl<T> Found<T> {
     }
 }
 
-/// Parts of a result that take so many bytes to read are read without asking for room.
+/// The largest size of parts of a result that are read without reserving memory (bytes).
 const SMALL: usize = 4 << 20;
 
-/// Room in memory for parts of a result, before they are read: none if they are small. A job of many contacts and steps has
-/// summaries of a hundred megabytes, and many may ask for them at once.
+/// Reserves memory for parts of a result before they are read; none if they are small. A job of many contacts and steps
+/// has summaries of a hundred megabytes, and many clients may request them at once.
 pub(super) async fn room_for(
     service: &Service,
     caller: &Caller,
@@ -80,7 +80,7 @@ pub(super) async fn room_for(
     }
 }
 
-/// The header, and over gRPC the metadata, of answers with it.
+/// The name of the header, and over gRPC of the metadata, that says whether a result is partial or final.
 pub const RESULT_AVAILABLE: &str = "result-available";
 
 /// The scalars of a job that has a result.
@@ -113,7 +113,7 @@ pub async fn result(
     service.work_on(load, read).await?
 }
 
-/// The job, if it has a result: at its end, or that of finished load steps while it runs.
+/// The job, if it has a result: a final one, or that of finished load steps while it runs.
 pub(super) async fn with_result(
     service: &Service,
     caller: &Caller,
@@ -126,7 +126,7 @@ pub(super) async fn with_result(
     }
 }
 
-/// A stored part.
+/// Reads a stored part.
 pub(super) fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, ApiError> {
     serde_json::from_slice(bytes).map_err(ApiError::internal)
 }

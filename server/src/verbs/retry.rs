@@ -1,4 +1,4 @@
-//! Retrying a job that has ended.
+//! Retries a job that has ended.
 
 use std::sync::Arc;
 
@@ -24,9 +24,9 @@ use crate::{
 /// Changes for the new job; absent fields stay unchanged.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Changes {
-    /// Seconds from a start to the end.
+    /// The seconds from the start of an attempt to its end.
     pub timeout_s: Option<f64>,
-    /// Seconds that it may wait in the queue.
+    /// The seconds that the job may wait in the queue.
     pub queue_ttl_s: Option<f64>,
     /// Jobs of higher priority run first.
     pub priority: Option<i32>,

@@ -28,9 +28,9 @@ pub const MAX_MESSAGE_BYTES: usize = 1 << 20;
 pub struct Service {
     /// The durable data.
     pub store: Arc<Store>,
-    /// Runs the jobs.
+    /// The queue, which runs the jobs.
     pub queue: Arc<Queue>,
-    /// Limits how many problems are checked and results converted at the same time: each takes a core.
+    /// Limits how many problems are checked and results converted at the same time, since each takes a core.
     checks: Arc<Semaphore>,
     /// Maximum number of waiting jobs; further ones are refused.
     pub(super) max_queued: u32,
@@ -38,9 +38,9 @@ pub struct Service {
     max_queued_per_owner: u32,
     /// Maximum number of running jobs of one owner.
     pub(super) max_running_per_owner: Option<u16>,
-    /// Maximum number of bytes that one owner keeps.
+    /// Maximum number of bytes that one owner may store.
     max_bytes_per_owner: Option<u64>,
-    /// How many jobs each owner submits.
+    /// Limits how many jobs each owner submits.
     rates: Rates,
     /// Memory that one job may need, by the estimate.
     pub(super) memory_budget_bytes: u64,
@@ -57,27 +57,27 @@ pub struct Service {
     pub(super) fields_in_memory: FieldsInMemory,
     /// The proxies that identify users.
     pub trust: ProxyTrust,
-    /// What requests from browsers may name.
+    /// The hosts and origins that requests from browsers may name.
     pub web: Web,
-    /// It speaks TLS itself.
+    /// Whether the service itself uses TLS.
     pub tls: bool,
     /// The folder for uploads until they are read.
     pub(super) data: PathBuf,
-    /// Those that are arriving.
+    /// The uploads that are arriving.
     uploads: Arc<Uploads>,
 }
 
-/// What an owner keeps, and may keep.
+/// The stored bytes of an owner, and their limit.
 #[derive(Debug)]
 pub(super) struct Room {
     owner: String,
-    /// `None` without limit.
+    /// The limit; `None` without limit.
     limit: Option<u64>,
     used: u64,
 }
 
 impl Room {
-    /// An error if it is used up, or does not hold these bytes more.
+    /// Fails if the limit is reached, or does not permit these additional bytes.
     pub(super) fn holds(&self, more: u64) -> Result<(), ApiError> {
         match self.limit {
             Some(limit) if self.used >= limit || self.used.saturating_add(more) > limit => {
@@ -87,7 +87,7 @@ impl Room {
         }
     }
 
-    /// An error if these bytes are more than the owner may ever keep.
+    /// Fails if these bytes alone exceed the limit.
     pub(super) fn would_hold(&self, bytes: u64) -> Result<(), ApiError> {
         match self.limit {
             Some(limit) if bytes > limit => Err(self.refusal(limit, bytes)),
@@ -133,39 +133,39 @@ impl Service {
         }
     }
 
-    /// How many jobs of one owner may wait; `None`: as many as of all. The only user of a service without authentication
-    /// shares it with nobody.
+    /// How many jobs of one owner may wait; `None`: no separate limit, because a service without authentication has
+    /// only one owner.
     pub(super) fn max_queued_of_owner(&self) -> Option<u32> {
         self.is_shared().then_some(self.max_queued_per_owner)
     }
 
-    /// Whether it tells owners apart.
+    /// Whether the service distinguishes owners.
     fn is_shared(&self) -> bool {
         self.store.has_tokens() || self.trust.is_on()
     }
 
-    /// How many bytes one owner may keep.
+    /// How many bytes one owner may store.
     pub(super) fn max_bytes_of_owner(&self) -> Option<u64> {
         self.max_bytes_per_owner.filter(|_| self.is_shared())
     }
 
-    /// How many jobs each owner may submit.
+    /// The limit of jobs that each owner may submit.
     pub(super) fn rates(&self) -> Option<&Rates> {
         Some(&self.rates).filter(|rates| rates.per_minute.is_some() && self.is_shared())
     }
 
-    /// What an owner keeps, and the problems of their jobs that wait.
+    /// The stored bytes of an owner, including the problems of their waiting jobs.
     pub(super) async fn bytes_of(&self, owner: &str) -> Result<u64, ApiError> {
         let kept = self.store.size_of_owner(owner).await?.bytes();
         Ok(kept.saturating_add(self.store.waiting_bytes_of(owner).await?))
     }
 
-    /// An error if the owner keeps as much as they may.
+    /// Fails if the owner has reached the limit of stored bytes.
     pub(super) async fn may_keep_more(&self, owner: &str) -> Result<(), ApiError> {
         self.room_of(owner).await?.holds(0)
     }
 
-    /// What an owner keeps now, and may keep.
+    /// The stored bytes of an owner, and their limit.
     pub(super) async fn room_of(&self, owner: &str) -> Result<Room, ApiError> {
         let limit = self.max_bytes_of_owner();
         let used = match limit {
@@ -181,7 +181,7 @@ impl Service {
         self.uploads.begin(owner, self.is_shared())
     }
 
-    /// An error once the service is about to stop.
+    /// Fails once the service is about to stop.
     pub fn accepting(&self) -> Result<(), ApiError> {
         if self.queue.stopping().is_cancelled() {
             Err(ApiError::Draining)
@@ -190,7 +190,7 @@ impl Service {
         }
     }
 
-    /// How well the service works; an error if it accepts no jobs, or cannot read those that it has.
+    /// The health of the service; an error if it accepts no jobs, or cannot read existing ones.
     pub async fn health(&self) -> Result<Health, ApiError> {
         self.accepting()?;
         let health = timeout(HEALTH_PATIENCE, self.store.health()).await;
@@ -211,7 +211,7 @@ impl Service {
         self.work_on(async { Ok(()) }, |()| work()).await
     }
 
-    /// The same with data that is loaded first, once there is a permit, so that waiting requests use no memory.
+    /// Runs work on data that are loaded first, once there is a permit, so that waiting requests use no memory.
     pub async fn work_on<L: Send + 'static, T: Send + 'static>(
         &self,
         load: impl Future<Output = Result<L, ApiError>>,
@@ -267,7 +267,7 @@ mod tests {
 
     use crate::verbs::tests::service;
 
-    /// This test has one thread: work that blocked it would never end.
+    /// Work leaves the async threads free: this test has one thread, which blocking work would stop for ever.
     #[tokio::test]
     async fn work_leaves_the_async_threads_free() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! Submitting jobs: one, one with an id chosen by the client, many at once. Each submission works in a task of its own, so that
-//! a client that disconnects changes nothing.
+//! Submits jobs: one, one with an id chosen by the client, or many at once. Each submission runs in a task of its own,
+//! so that a client that disconnects changes nothing.
 
 use std::sync::Arc;
 
@@ -27,9 +27,9 @@ pub const MAX_BATCH: usize = 1000;
 /// The result of a submission.
 #[derive(Debug)]
 pub struct Submitted<T> {
-    /// The job or jobs.
+    /// The accepted job or jobs.
     pub accepted: T,
-    /// They existed already, under the key or the id.
+    /// Whether they existed already, under the key or the id.
     pub replayed: bool,
 }
 
@@ -123,7 +123,7 @@ pub(super) fn single(jobs: Vec<Job>, replayed: bool) -> Result<Submitted<Job>, A
     Ok(Submitted { accepted, replayed })
 }
 
-/// Does the same with each item, a few at a time, in order; the violations of all are reported together.
+/// Applies a function to each item, a few at a time, in order; the violations of all are reported together.
 async fn each<A, B, F: Future<Output = Result<B, ApiError>>>(
     many: Vec<A>,
     work: impl Fn(A) -> F,

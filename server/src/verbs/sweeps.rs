@@ -1,4 +1,5 @@
-//! Sweeps: submitted as jobs of their members; listed, watched, canceled, deleted; and the rows of their members.
+//! Operations on sweeps, which are submitted as jobs for their members: submit, list, watch, cancel, delete; and the
+//! rows of their members.
 
 use std::{sync::Arc, time::Duration};
 
@@ -37,7 +38,7 @@ use crate::{
     violations::{PROBLEM, prefixed},
 };
 
-/// A sweep in a path.
+/// The id of a sweep in a path.
 pub const ID: Variable<SweepIds> = Variable {
     name: "id",
     kind: "sweep",
@@ -45,7 +46,7 @@ pub const ID: Variable<SweepIds> = Variable {
     values: SweepIds,
 };
 
-/// A member in a path.
+/// The number of a member in a path.
 pub const NUMBER: Variable<Integers> = Variable {
     name: "number",
     kind: "member",
@@ -60,33 +61,34 @@ pub const WAIT: Parameter<Seconds> = Parameter {
     values: super::watch::WAIT.values,
 };
 
-/// Bytes of the problems of all jobs of a sweep together: each stores its own, with its mesh.
+/// The largest size of the problems of all jobs of a sweep together (bytes): each job stores its own, with its mesh.
 const MOST_STORED: usize = 64 << 20;
 
-/// What the problem of a further member takes beside the body, for each unknown (bytes): its mesh, supports and loads.
+/// The size of the problem of a further member apart from the body, for each unknown (bytes): its mesh, supports and
+/// loads.
 const BYTES_PER_UNKNOWN: u64 = 64;
 
-/// How long to wait for news before the store is asked whether the jobs have ended, which is not announced.
+/// How long to wait for news before checking in the store whether the jobs have ended, which is not announced.
 const PULSE: Duration = Duration::from_millis(250);
 
-/// Events and rows that are read at a time.
+/// The number of events and rows that are read at a time.
 const AT_ONCE: i64 = 500;
 
-/// Bytes of values of the events that are read at a time; of one event more, if it alone has more.
+/// The largest size of the values of events that are read at a time (bytes); one event alone may have more.
 const MOST_EVENT_BYTES: usize = 64 << 10;
 
 /// A request for a sweep.
 #[derive(Debug)]
 pub struct SweepRequest {
-    /// What comes beside the definition; limits that are absent depend on the number of members.
+    /// The fields other than the definition; absent limits depend on the number of members.
     pub envelope: Envelope,
     /// The time limits, if they are given.
     pub limits: Option<Limits>,
-    /// The definition, or all that is wrong with it.
+    /// The definition, or all its violations.
     pub definition: Result<Definition, Vec<Violation>>,
 }
 
-/// What a repeated request must have in common with the first one.
+/// The data in which a repeated request must equal the first one.
 #[derive(Serialize)]
 struct Payload<'a>(
     &'static str,
@@ -96,14 +98,14 @@ struct Payload<'a>(
     &'a Plan,
 );
 
-/// A sweep whose members were checked, but for their meshes.
+/// A sweep whose members were checked, except for their meshes.
 struct Checked {
     definition: Definition,
     groups: Result<Vec<Vec<usize>>, Vec<Violation>>,
 }
 
 /// Accepts a sweep: all of its jobs or none. It is durable when this returns. Violations of the base, of the axes, of
-/// members and of what comes beside them are reported together.
+/// members and of the other fields are reported together.
 pub async fn create(
     service: &Arc<Service>,
     caller: &Caller,
@@ -163,7 +165,7 @@ pub async fn create(
     .await
 }
 
-/// Checks the base as a job's problem is checked; the memory that it needs, if nothing is wrong with it.
+/// Checks the base like a job's problem; returns its estimated memory if it is valid.
 async fn admit_base(
     service: &Arc<Service>,
     caller: &Caller,
@@ -317,7 +319,7 @@ async fn of_jobs(
     })
 }
 
-/// The sweep as it is now.
+/// The sweep in its present state.
 pub async fn get(service: &Service, caller: &Caller, id: SweepId) -> Result<Sweep, ApiError> {
     let owners = caller.visible_owners();
     match service.store.sweep(owners, id).await? {
@@ -329,7 +331,7 @@ pub async fn get(service: &Service, caller: &Caller, id: SweepId) -> Result<Swee
     }
 }
 
-/// The sweep when it has ended, or as it is after so many seconds or when the service stops.
+/// The sweep when it has ended, or in its state after this many seconds or when the service stops.
 pub async fn wait(
     service: &Service,
     caller: &Caller,
@@ -393,7 +395,7 @@ pub async fn rows(
     Ok(paging.page(&list, found, at))
 }
 
-/// All members of a sweep as a table in this format, in the order of their numbers. Its memory is a share of that for
+/// All members of a sweep as a table in this format, in the order of their numbers. Its memory counts for the limit on
 /// answers from before it is made until it is sent.
 pub async fn table(
     service: &Service,
@@ -423,7 +425,7 @@ pub async fn table(
     service.work_on(load, write).await?
 }
 
-/// Members from this number on, without their values, and the definition that has these.
+/// Members from this number on, without their values, and the definition that contains these.
 async fn load_members(
     service: &Service,
     (id, key): (SweepId, i64),
@@ -460,7 +462,7 @@ fn plan_of(definition: &str) -> Result<Plan, ApiError> {
 }
 
 /// Events after number `after`, past ones first, then live ones; the stream ends after `done`. `None`: the sweep has
-/// ended, and there are none after that number. When the service stops the stream ends with an error.
+/// ended, and there are no events after that number. When the service stops the stream ends with an error.
 pub async fn watch(
     service: &Arc<Service>,
     caller: &Caller,
@@ -527,7 +529,7 @@ fn follow(
     }
 }
 
-/// Adds the values of the members. The definition is read each time: hundreds of watchers that kept it would keep as many
+/// Adds the values of the members. The definition is read each time: otherwise hundreds of watchers would hold as many
 /// copies.
 async fn with_parameters(
     service: &Service,
@@ -562,7 +564,7 @@ async fn with_parameters(
     service.work_on(load, add).await?
 }
 
-/// Asks all jobs of a sweep to stop; members that have a row keep it.
+/// Asks all jobs of a sweep to stop; finished rows of members are kept.
 pub async fn cancel(
     service: &Arc<Service>,
     caller: &Caller,

@@ -1,4 +1,4 @@
-//! Two callers of one service: each finds only their own jobs, by every verb.
+//! Tests with two callers of one service: each finds only their own jobs, with every verb.
 #![allow(clippy::unwrap_used)]
 
 use std::{path::Path, sync::Arc};
@@ -286,7 +286,7 @@ async fn a_sweep_of_another_owner_does_not_exist() {
     unknown("get", sweeps::get(service, bob, id).await);
 }
 
-/// Clients name any number.
+/// A sweep may be watched from any event on, since clients choose the number.
 #[tokio::test]
 async fn a_sweep_may_be_watched_from_any_event_on() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Tokens: made, listed, revoked, and given another secret, by administrators.
+//! Operations on tokens by administrators: create, list, revoke, and replace the secret.
 
 use std::{collections::BTreeSet, fmt, sync::Arc};
 
@@ -17,16 +17,16 @@ use crate::{
     token::{Secret, Token, new_id},
 };
 
-/// Longest name of a token, in characters.
+/// The largest number of characters of a token's name.
 pub const MAX_NAME: usize = 64;
-/// Most tokens that are valid at the same time.
+/// The largest number of tokens that are valid at the same time.
 pub const MAX_TOKENS: usize = 10_000;
-/// Shortest time until a token expires.
+/// The shortest time until a token expires (seconds).
 pub const MIN_EXPIRES_IN_S: f64 = 60.0;
-/// Longest time until a token expires: ten years.
+/// The longest time until a token expires (seconds): ten years.
 pub const MAX_EXPIRES_IN_S: f64 = 10.0 * 366.0 * 86400.0;
 
-/// A token in a path.
+/// The id of a token in a path.
 pub const TOKEN: Variable<TokenIds> = Variable {
     name: "token",
     kind: "token",
@@ -34,7 +34,7 @@ pub const TOKEN: Variable<TokenIds> = Variable {
     values: TokenIds,
 };
 
-/// The ids of tokens.
+/// The ids of tokens, as values.
 #[derive(Clone, Copy, Debug)]
 pub struct TokenIds;
 
@@ -55,41 +55,41 @@ impl Values for TokenIds {
     }
 }
 
-/// What a new token is to be.
+/// The request for a new token.
 #[derive(Clone, Debug, Default)]
 pub struct TokenRequest {
-    /// For people: where it is used.
+    /// A name for people, such as where the token is used.
     pub name: String,
-    /// Whose jobs it submits.
+    /// The owner of the jobs that it submits.
     pub owner: String,
-    /// What it allows.
+    /// The scopes of the token.
     pub scopes: Vec<String>,
-    /// Seconds until it expires; absent: never.
+    /// The seconds until it expires; absent: never.
     pub expires_in_s: Option<f64>,
 }
 
-/// A token whose secret is shown, this once.
+/// A new token with its secret, which is shown only this once.
 #[derive(Clone, Serialize, JsonSchema)]
 pub struct NewToken {
     /// The token.
     pub token: Token,
-    /// What clients send, as `Authorization: Bearer SECRET`. It is not stored, and cannot be shown again.
+    /// The secret that clients send as `Authorization: Bearer SECRET`. It is not stored, and cannot be shown again.
     pub secret: String,
 }
 
 impl fmt::Debug for NewToken {
-    /// Without the secret.
+    /// Formats the token without the secret.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "NewToken({:?})", self.token)
     }
 }
 
-/// In the extensions of an answer: its request has changed the tokens, that of its own caller perhaps. It is sent all the same:
-/// it may have the only copy of a secret.
+/// A mark in the extensions of an answer whose request has changed the tokens, perhaps that of its own caller. The
+/// answer is sent anyway, since it may have the only copy of a secret.
 #[derive(Clone, Copy, Debug)]
 pub struct TokensChanged;
 
-/// The checked content of a request, or all that is wrong with it. `first`: there is no token yet.
+/// Checks the content of a request; the error has all violations. `first`: there is no token yet.
 fn checked(request: &TokenRequest, first: bool) -> Result<BTreeSet<Scope>, ApiError> {
     let mut found = Findings::default();
     let mut wrong = |pointer: &str, reason, got: &str, expected: String, hint: &str| {
@@ -102,7 +102,7 @@ fn checked(request: &TokenRequest, first: bool) -> Result<BTreeSet<Scope>, ApiEr
             Reason::OutOfRange,
             &format!("{length} characters"),
             format!("1 … {MAX_NAME} characters, none of them a control character"),
-            "Say where the token is used: laptop, nightly study.",
+            "Name the place where the token is used, such as laptop or nightly study.",
         );
     }
     if !is_owner(&request.owner) {
@@ -143,7 +143,7 @@ fn checked(request: &TokenRequest, first: bool) -> Result<BTreeSet<Scope>, ApiEr
             Reason::Missing,
             &request.scopes.join(", "),
             "admin, since this is the first token".into(),
-            "Once there is a token every request needs one, and without an administrator nobody could create another.",
+            "Once there is a token every request needs one, and without the scope admin nobody could create another.",
         );
     }
     if let Some(seconds) = request.expires_in_s
@@ -154,13 +154,13 @@ fn checked(request: &TokenRequest, first: bool) -> Result<BTreeSet<Scope>, ApiEr
             Reason::OutOfRange,
             &seconds.to_string(),
             format!("{MIN_EXPIRES_IN_S} … {MAX_EXPIRES_IN_S} seconds"),
-            "Leave it out for a token that does not expire.",
+            "Remove it for a token that does not expire.",
         );
     }
     found.into_result(scopes).map_err(ApiError::InvalidProblem)
 }
 
-/// Makes a token. The first one closes the service to requests without one.
+/// Creates a token. After the first one, the service refuses requests without a token.
 pub async fn create(
     store: &Arc<Store>,
     caller: &Caller,
@@ -205,12 +205,12 @@ pub async fn create(
     .await
 }
 
-/// All tokens, the oldest first, those that are no longer valid among them.
+/// All tokens, the oldest first, including those that are no longer valid.
 pub fn list(store: &Store, _caller: &Caller) -> Vec<Token> {
     store.tokens()
 }
 
-/// Revokes a token: from now on it is refused, and streams that it has opened end.
+/// Revokes a token, which is refused from now on; streams that it has opened end.
 pub async fn revoke(store: &Arc<Store>, caller: &Caller, id: &str) -> Result<Token, ApiError> {
     let (store, by, id) = (store.clone(), caller.owner().to_owned(), id.to_owned());
     detached(async move {
@@ -222,7 +222,7 @@ pub async fn revoke(store: &Arc<Store>, caller: &Caller, id: &str) -> Result<Tok
     .await
 }
 
-/// Gives a token another secret: from now on the old one is refused.
+/// Gives a token a new secret; the old one is refused from now on.
 pub async fn rotate(store: &Arc<Store>, caller: &Caller, id: &str) -> Result<NewToken, ApiError> {
     let (store, by, id) = (store.clone(), caller.owner().to_owned(), id.to_owned());
     let (secret, hash) = Secret::new(&id).map_err(ApiError::internal)?;

@@ -1,4 +1,4 @@
-//! Uploads that are arriving: how many at once, of all owners and of each, and their bytes, which are in no table yet.
+//! Counts uploads that are arriving, of all owners and of each, and their bytes, which are in no table yet.
 
 use std::{
     collections::BTreeMap,
@@ -7,26 +7,27 @@ use std::{
 
 use crate::error::ApiError;
 
-/// Uploads at once. Each has up to two files without a name, of those that `listener/files` keeps free, and a buffer.
+/// The largest number of simultaneous uploads. Each has up to two files without a name, among those that
+/// `listener/files` reserves, and a buffer.
 const MOST: usize = 32;
-/// Of one owner, where there are several.
+/// The largest number of simultaneous uploads of one owner, if there are several owners.
 const MOST_OF_OWNER: usize = 8;
 
 /// The uploads that are arriving, by owner.
 #[derive(Debug, Default)]
 pub(super) struct Uploads(Mutex<BTreeMap<String, Arriving>>);
 
-/// Those of one owner.
+/// The uploads of one owner.
 #[derive(Debug, Default)]
 struct Arriving {
     number: usize,
-    /// Of files that arrive.
+    /// The bytes of files that arrive.
     file_bytes: u64,
-    /// Of meshes that were read from such files, and are about to be stored.
+    /// The bytes of meshes that were read from such files, and are about to be stored.
     mesh_bytes: u64,
 }
 
-/// One of them, until it is stored or given up.
+/// One upload, until it is stored or given up.
 #[derive(Debug)]
 pub(super) struct Upload {
     uploads: Arc<Uploads>,
@@ -36,7 +37,7 @@ pub(super) struct Upload {
 }
 
 impl Uploads {
-    /// Counts an upload that begins; an error if there are as many as there may be.
+    /// Counts an upload that begins; an error if the limit is reached.
     pub(super) fn begin(
         self: &Arc<Uploads>,
         owner: &str,
@@ -69,7 +70,7 @@ impl Uploads {
 }
 
 impl Upload {
-    /// Counts bytes of its file; returns those of all files of its owner that are arriving.
+    /// Counts bytes of its file; returns the bytes of all files of its owner that are arriving.
     pub(super) fn arrived(&mut self, bytes: usize) -> u64 {
         self.file_bytes += bytes as u64;
         let mut all = self.uploads.all();
@@ -78,7 +79,8 @@ impl Upload {
         of_owner.file_bytes
     }
 
-    /// Counts the mesh that was read from it, once; returns the bytes of all meshes of its owner that are about to be stored.
+    /// Counts the mesh that was read from it, once; returns the bytes of all meshes of its owner that are about to be
+    /// stored.
     pub(super) fn read(&mut self, mesh_bytes: u64) -> u64 {
         self.mesh_bytes += mesh_bytes;
         let mut all = self.uploads.all();

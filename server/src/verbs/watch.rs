@@ -1,4 +1,4 @@
-//! Watching a job: to its next version, to its end, event by event.
+//! Waits for a job to change or to end, and streams its events.
 
 use std::{sync::Arc, time::Duration};
 
@@ -19,7 +19,7 @@ use crate::{
 /// How long to wait for a job.
 pub const WAIT: Parameter<Seconds> = Parameter {
     name: "wait",
-    meaning: "Seconds to wait until the version differs from If-None-Match or, without it, from the current one",
+    meaning: "Seconds to wait until the job's version differs from If-None-Match or, without that header, from the current version",
     values: Seconds(0.0..=MAX_WAIT_S),
 };
 /// Longest time that a request may wait for a job, in seconds.
@@ -32,18 +32,18 @@ pub const UNTIL: Parameter<Words<Until>> = Parameter {
     values: Words(|| vec![("terminal", Until::Terminal)]),
 };
 
-/// Where a stream of events begins.
+/// The number of the event after which a stream begins.
 pub const AFTER_SEQ: Parameter<Integers> = Parameter {
     name: "after_seq",
     meaning: "Number of the last event already received; default 0: all events",
     values: Integers(0..=i64::MAX),
 };
 
-/// Events that are read before the stream of a watcher begins.
+/// The number of events that are read before the stream of a watcher begins.
 const FIRST_EVENTS: i64 = 64;
 
-/// How long each of many watchers of one job waits between two looks for news. As long as the recorder may wait before
-/// it commits events: news are at most twice as late.
+/// The pause of each of many watchers of one job between two reads. It equals the time that the recorder may wait
+/// before it commits events, so that events are at most twice as late.
 const CROWDED_PAUSE: Duration = Duration::from_millis(50);
 
 /// The condition that a client waits for.
@@ -51,14 +51,14 @@ const CROWDED_PAUSE: Duration = Duration::from_millis(50);
 pub enum Until {
     /// The job has ended.
     Terminal,
-    /// Its version differs from this one.
+    /// The version differs from this one.
     Changed(i64),
-    /// Its version has changed since the request, or it has ended, since no further change will come: for a client that
-    /// knows no version.
+    /// The version has changed since the request, or the job has ended, after which no change will come: for a client
+    /// that knows no version.
     NextChange,
 }
 
-/// The job when the condition is met, or as it is after `seconds` or when the service stops; and whether the
+/// The job when the condition is met, or in its state after `seconds` or when the service stops; and whether the
 /// condition is met.
 pub async fn wait(
     service: &Service,
@@ -92,9 +92,10 @@ pub async fn wait(
     }
 }
 
-/// Stored events after number `after`, then live ones; the stream ends after `done`, or when the job ends if `after`
-/// is beyond that. `None`: the job has ended, and there are no events after that number. When the service stops, or
-/// the job is deleted before, the stream ends with an error, so that it is not mistaken for the end of the job.
+/// Streams the stored events after number `after`, then live ones; the stream ends after `done`, or when the job ends
+/// if `after` is beyond that. `None`: the job has ended, and there are no events after that number. When the service
+/// stops, or the job is deleted before, the stream ends with an error, so that it is not mistaken for the end of the
+/// job.
 pub async fn watch(
     service: &Arc<Service>,
     caller: &Caller,

@@ -1,24 +1,26 @@
-//! Errors of quantities by the mesh split in two.
+//! Errors of quantities by comparison with a refined mesh, on which every element is split in two.
 //!
-//! With q_h on the mesh of the solution and q_h/2 on the finer one, a quantity of order p is off by
+//! With q_h on the mesh of the solution and q_h/2 on the refined one, a quantity that converges with order p has the
+//! error
 //!
 //!   |q_h − q| = |q_h − q_h/2| / (1 − 2⁻ᵖ)
 //!
-//! p is taken as 1 for forces, 0.74 for peaks and 0.58 for ends of stick, which covers what is smoother, and where q_2h is
-//! known and shows less, as that, but at least ½. Two values may agree by chance, so that the bound is never below a part
-//! of the estimate on one mesh. The factors are calibrated on random problems by `tests/verification/calibration.rs`.
+//! p is taken as 1 for forces, 0.74 for peaks and 0.58 for ends of stick; smoother quantities are covered by this.
+//! Where q_2h is known and shows a lower order, that order is taken, but at least ½. Two values may agree by chance, so
+//! the bound is never below a part of the estimate from one mesh. The factors are calibrated on random problems by
+//! `tests/verification/calibration.rs`.
 
 use super::verdict::{Doubt, Unpaired, conclude, relative, scale};
 use crate::algorithm::{Estimable, Quantity};
 use crate::solution::{Accuracy, ErrorMethod, EstimatedQuantity, Outcome, QuantityName};
 
-/// The least order that is assumed, of a peak at an edge of its neighbourhood, say.
+/// The lowest order of convergence that is assumed, for example of a peak at an edge of its neighbourhood.
 const LEAST_ORDER: f64 = 0.5;
 
-/// Differences below this part of what a quantity is compared with are those of the iterations, and have no order.
+/// A difference below this part of the reference size of its quantity is an error of the iterations and shows no order.
 const ROUNDING: f64 = 1e-9;
 
-/// Factors on the difference, and on the estimate as the least error: calibrated.
+/// Calibrated factors: on the difference of two meshes, and on the estimate (as a lower limit of the error).
 fn factors(name: QuantityName) -> [f64; 2] {
     use QuantityName::*;
     match name {
@@ -31,7 +33,7 @@ fn factors(name: QuantityName) -> [f64; 2] {
     }
 }
 
-/// A quantity on another mesh of the same problem.
+/// The value of a quantity on another mesh of the same problem.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OnOtherMesh {
     name: QuantityName,
@@ -43,7 +45,7 @@ pub struct OnOtherMesh {
 }
 
 impl OnOtherMesh {
-    /// A quantity of this contact.
+    /// Keeps name, contact and value of a quantity for a comparison.
     pub fn new(quantity: &Quantity, contact: &str) -> Self {
         OnOtherMesh {
             name: quantity.name,
@@ -55,8 +57,8 @@ impl OnOtherMesh {
     }
 }
 
-/// Errors by comparison with the mesh split in two, and with the one that this mesh was split from, if there is one.
-/// `estimated`: of a converged solution.
+/// Errors by comparison with the refined mesh and, if there is one, with the coarser mesh that this mesh was split
+/// from. `estimated`: the estimates for a converged solution.
 pub fn verified(
     estimated: &Accuracy,
     finer: &[OnOtherMesh],
@@ -126,7 +128,7 @@ pub fn verified(
     }
 }
 
-/// Estimates that could not be verified, and why.
+/// The estimates, with a reason that says why they could not be verified.
 pub fn unverified(mut estimated: Accuracy, why: &str) -> Accuracy {
     let why = why.trim_end_matches('.');
     let reason = format!("The errors are estimates, and not verified: {why}.");
@@ -137,7 +139,7 @@ pub fn unverified(mut estimated: Accuracy, why: &str) -> Accuracy {
     }
 }
 
-/// The quantities of a kind on another mesh, in order of arc length.
+/// The quantities of one kind on another mesh, in order of arc length.
 fn of_kind<'a>(
     name: QuantityName,
     contact: &str,
@@ -157,7 +159,7 @@ fn scale_of(quantity: &EstimatedQuantity, all: &[EstimatedQuantity], images: f64
     scale(quantity.quantity, quantity.value, own, images)
 }
 
-/// Gives a quantity what the other meshes say of it.
+/// Replaces the error of a quantity by the bound that follows from its values on the other meshes.
 fn compare(
     quantity: &mut EstimatedQuantity,
     finer: &OnOtherMesh,
@@ -200,13 +202,13 @@ fn compare(
     None
 }
 
-/// Nothing is known of it.
+/// Removes the error of a quantity, which becomes unknown.
 fn forget_error(quantity: &mut EstimatedQuantity) {
     (quantity.error, quantity.relative) = (None, None);
     (quantity.increments, quantity.direction) = (None, None);
 }
 
-/// The bound of an error by the difference to the finer mesh and the estimate on this one.
+/// The bound of an error from the difference to the refined mesh and from the estimate on this one.
 fn bound(name: QuantityName, difference: f64, order: Option<f64>, estimate: f64) -> f64 {
     let [factor, least] = factors(name);
     if matches!(name, QuantityName::ContactStart | QuantityName::ContactEnd) {
@@ -220,8 +222,8 @@ fn bound(name: QuantityName, difference: f64, order: Option<f64>, estimate: f64)
 mod tests {
     use super::*;
 
-    /// Of a quantity q + c hᵖ the bound is not below its error, c hᵖ: where the order is known, from ½ on; where it is not,
-    /// from 1 on.
+    /// For a quantity q + c hᵖ the bound is not below the error c hᵖ, for p from ½ if the order is known, and for p
+    /// from 1 if it is not.
     #[test]
     fn richardsons_error_is_bounded() {
         for order in [0.5f64, 0.7, 1.0, 1.5, 2.0, 3.0] {

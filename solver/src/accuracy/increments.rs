@@ -1,33 +1,33 @@
-//! What too few increments leave open under the incremental law: quantities at the end of the same path in more of them.
+//! The error that too few load increments cause under the incremental friction law, by comparison with more increments.
 //!
-//! The law is of first order in the increments, so that with q_n in n of them and q_m in m
+//! The law is of first order in the increments. With q_n from n increments and q_m from m of them
 //!
 //!   |q_n − q| ≈ |q_n − q_m| / (1 − n/m)
 //!
-//! The mesh is the same, and what it leaves open comes on top. Few increments are of no order yet: each step is compared with
-//! [`LEAST`] at least.
+//! The mesh is the same for both; its error is added. Since very few increments show no order yet, each step is
+//! compared with at least [`LEAST`] increments.
 
 use crate::algorithm::Quantity;
 use crate::problem::Step;
 use crate::solution::QuantityName;
 
-/// A step is solved again in twice its increments, and in no fewer than so many.
+/// A step is solved again in twice its increments, and at least in this number.
 const LEAST: u32 = 32;
 
-/// A margin on what the order says (`tests/verification/increments.rs`).
+/// A safety factor on the error that the first order predicts (`tests/verification/increments.rs`).
 const MARGIN: f64 = 1.25;
 
-/// The quantities of the end in more increments.
+/// The quantities at the end of the same load path, solved in more increments.
 #[derive(Default)]
 pub struct Increments {
-    /// None if it did not converge.
+    /// None if that solution did not converge.
     quantities: Vec<Quantity>,
-    /// From a difference to an error.
+    /// Multiplies a difference to give an error.
     factor: f64,
 }
 
 impl Increments {
-    /// The same steps in more increments.
+    /// The same steps, divided into more increments.
     pub fn more(steps: &[Step]) -> Vec<Step> {
         let more = |step: &Step| Step {
             increments: (2 * step.increments).max(LEAST),
@@ -36,7 +36,7 @@ impl Increments {
         steps.iter().map(more).collect()
     }
 
-    /// `quantities` of the end of `finer`, which are `steps` in more increments.
+    /// Compares `steps` with `finer`, the same steps in more increments; `quantities` are those at the end of `finer`.
     pub fn new(steps: &[Step], finer: &[Step], quantities: Vec<Quantity>) -> Self {
         let part = |(a, b): (&Step, &Step)| f64::from(a.increments) / f64::from(b.increments);
         let most = steps.iter().zip(finer).map(part).fold(0.0, f64::max);
@@ -46,11 +46,11 @@ impl Increments {
         }
     }
 
-    /// What the increments leave open in a quantity, by those of its kind `here` and in more increments; none if there are
-    /// none of its kind there.
+    /// The error of a quantity due to the increments: its difference from the value with more increments. `here`: all
+    /// quantities of this solution. None if the other solution has no quantity of this kind.
     ///
-    /// Ends of stick may be more or fewer: each is compared with the nearest there, and with those there that have none
-    /// nearer here.
+    /// The two solutions may have different numbers of stick ends: each end is compared with the nearest one of the
+    /// other solution, and with every end there to which it is the nearest.
     pub(super) fn left_open(&self, quantity: &Quantity, here: &[Quantity]) -> Option<f64> {
         let alike = |q: &&Quantity| (q.name, q.patch) == (quantity.name, quantity.patch);
         let values =
@@ -66,13 +66,13 @@ impl Increments {
     }
 }
 
-/// The value nearest to one.
+/// The value that is nearest to `to`.
 fn nearest(values: &[f64], to: f64) -> Option<f64> {
     let by_distance = |a: &f64, b: &f64| (a - to).abs().total_cmp(&(b - to).abs());
     values.iter().copied().min_by(by_distance)
 }
 
-/// A peak of σ_t may occur twice with both signs.
+/// The value without its sign for a peak of σ_t, which may occur twice with both signs; else the value.
 fn size(quantity: &Quantity) -> f64 {
     match quantity.name {
         QuantityName::PeakTangentialStress => quantity.value.abs(),

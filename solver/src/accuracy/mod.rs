@@ -25,7 +25,7 @@ use crate::body::{AXIS_SHARE, ElasticBody};
 use crate::contact::edge_nodes;
 use crate::elasticity::Dof;
 use crate::element::edge3;
-use crate::linear::{Breaks, Stopped};
+use crate::linear::{Interrupt, Stopped};
 use crate::model::Model;
 use crate::origins::{Added, Origins};
 use crate::solution::{
@@ -34,41 +34,42 @@ use crate::solution::{
 use singular::Surroundings;
 use verdict::{Doubt, conclude, length, relative, scale};
 
-/// What is known of the error of a quantity, in its unit.
+/// The parts of the error of a quantity, in its unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Parts {
     /// The weighted errors of all elements.
     signed: f64,
-    /// The same without signs: some cancel that need not.
+    /// The weighted errors of all elements without their signs: some errors of opposite sign cancel by chance only.
     absolute: f64,
-    /// The same of elements away from the contact: the errors of a peak near it, where the dual solution has a singular
-    /// point, cancel for the most part, and those that come from far away do not.
+    /// The weighted errors of the elements away from the contact: near the contact, where the dual solution of a peak
+    /// has a singular point, errors mostly cancel; errors from far away do not.
     away: f64,
-    /// What of these stands out from the errors around, at a singular point of which recovery sees but a part.
+    /// The part of the weighted errors that exceeds those around it, at a singular point, where recovery sees only a
+    /// part of the error.
     standing_out: f64,
-    /// What becomes of the quantity if the pressure, quadratic between nodes, is brought back to the nodes.
+    /// The change of the quantity if the pressure, quadratic between nodes, is moved to the nodes.
     consistency: f64,
-    /// What the gap leaves open within the edges at the ends of contact.
+    /// The error due to the gap between the nodes within the edges at the ends of contact.
     gap: f64,
     /// The square of the distance between the nodes at the ends of contact, in lengths of the contact, times the
     /// quantity: its change if the end moves by a node, since it is nearly stationary there.
     ends: f64,
-    /// [`Quantity::spacing`].
+    /// The error due to the distance between nodes, [`Quantity::spacing`].
     spacing: f64,
-    /// [`Quantity::between`].
+    /// The error due to the law between its points, [`Quantity::between`].
     between: f64,
-    /// [`Quantity::cut`].
-    cut: f64,
-    /// [`Quantity::unseen`].
+    /// The error due to an obstacle that ends inside an edge that is left out, [`Quantity::truncation`].
+    truncation: f64,
+    /// The pressure of a shape of the obstacle that the nodes miss, [`Quantity::unseen`].
     unseen: f64,
-    /// What the same shape of the obstacle changes by its mean.
+    /// The change of a force by the mean of that shape of the obstacle.
     unseen_mean: f64,
-    /// The quantity itself: rounding, and what no other part sees.
+    /// The size of the quantity itself, for rounding and errors that no other part contains.
     value: f64,
 }
 
 impl Parts {
-    /// The bound: each part with its factor.
+    /// The bound of the error: the sum of the parts, each with its factor.
     fn bound(&self, name: QuantityName) -> f64 {
         let [
             signed,
@@ -90,7 +91,7 @@ impl Parts {
             + ends * self.ends
             + spacing * self.spacing
             + between * self.between
-            + of_cut(name) * self.cut
+            + truncation_factor(name) * self.truncation
             + value * self.value;
         // the shape of the obstacle between the nodes is in the other parts as far as the nodes see it; its mean, which moves
         // the whole body, is in none, but changes the peak of the pressure less than the shape does
@@ -101,11 +102,11 @@ impl Parts {
     }
 }
 
-/// The factor of [`Parts::standing_out`]: a clamped corner of an orthotropic body needs as much
+/// The factor of [`Parts::standing_out`]: large enough for a clamped corner of an orthotropic body
 /// (`tests/verification/far_away.rs`).
 const STANDING_OUT: f64 = 4.0;
 
-/// The factors of [`Parts`], in its order: calibrated, with what did not help left at 0.
+/// The calibrated factors of [`Parts`], in its order. Parts that did not improve the bound have the factor 0.
 fn factors(name: QuantityName) -> [f64; 9] {
     use QuantityName::*;
     #[rustfmt::skip] // a table
@@ -121,9 +122,10 @@ fn factors(name: QuantityName) -> [f64; 9] {
     factors
 }
 
-/// The factor of [`Parts::cut`]: twice what flat punches show, whose force grows by a quarter to 0.3 of the part by which
-/// they are longer (`tests/verification/obstacle_points.rs`). Friction with a prescribed bound grows by all of it.
-fn of_cut(name: QuantityName) -> f64 {
+/// The factor of [`Parts::truncation`]: twice what flat punches show. If they are made longer by some part, their force
+/// grows by 0.25 to 0.3 of that part (`tests/verification/obstacle_points.rs`). Friction with a prescribed bound grows
+/// by all of it.
+fn truncation_factor(name: QuantityName) -> f64 {
     use QuantityName::*;
     match name {
         NormalForce => 0.5,
@@ -133,10 +135,11 @@ fn of_cut(name: QuantityName) -> f64 {
     }
 }
 
-/// Friction acts one way if its sum is its size but for this part.
+/// Friction acts in one direction if its sum equals the sum of its sizes up to this part.
 const ONE_WAY: f64 = 1e-9;
 
-/// The errors of all quantities, and the verdict. `increments`: what more of them come to, where the end depends on the path.
+/// Computes the errors of all quantities and the verdict. `increments`: the same solution in more increments, where the
+/// end depends on the path.
 pub fn assess(
     model: &Model,
     body: &ElasticBody,
@@ -192,7 +195,7 @@ pub fn assess(
     conclude(reported.summary.outcome, found, &doubts, &[])
 }
 
-/// What the error of a quantity is compared with.
+/// The size that the error of a quantity is compared with.
 fn scale_of(quantity: &Quantity, all: &[Quantity]) -> f64 {
     let own = |name: QuantityName| {
         let same = all
@@ -203,23 +206,23 @@ fn scale_of(quantity: &Quantity, all: &[Quantity]) -> f64 {
     scale(quantity.name, quantity.value, own, quantity.images)
 }
 
-/// What may be wrong with a quantity, in its unit.
+/// Bounds of the error of a quantity, in its unit, by cause.
 #[derive(Clone, Copy)]
 struct Bounds {
-    /// By the mesh.
+    /// The error due to the mesh.
     mesh: f64,
-    /// Because gaps are linear in an indentation along a direction.
+    /// The error because gaps are linear in an indentation along a direction.
     displaced: f64,
 }
 
-/// A difference of gaps changes quantities by more than to the first order of it: contact grows or shrinks
+/// A factor: different gaps also make the contact grow or shrink, which changes quantities by more than the first order
 /// (`tests/verification/directions.rs`).
 const SECOND_ORDER: f64 = 2.0;
 
-/// What parts that cancel to the first order leave open, in parts of their sum without signs.
+/// Where parts cancel to the first order, this part of the sum of their sizes is left as an error.
 const UNSURE: f64 = 0.05;
 
-/// What one element, and one place between nodes, takes for each quantity, in multiplications.
+/// The work for one element, and for one place between nodes, for each quantity, in multiplications.
 const WORK_OF_AN_ELEMENT: usize = 100;
 const WORK_OF_A_PLACE: usize = 30;
 
@@ -248,7 +251,7 @@ fn bounds(
     let surroundings = Surroundings::new(model);
     let away = surroundings.away_from(touching(system, finished));
     let mut go_on = || observe(Progress::Pulse);
-    let breaks = &mut Breaks::new(&mut go_on);
+    let interrupt = &mut Interrupt::new(&mut go_on);
     let work = WORK_OF_AN_ELEMENT * away.len() + WORK_OF_A_PLACE * 3 * system.nodes.len();
     let mut bounds = Vec::with_capacity(quantities.len());
     for quantity in quantities {
@@ -256,7 +259,7 @@ fn bounds(
             ends: quantity.value.abs() * end_spacing(quantity, quantities).powi(2),
             spacing: quantity.spacing,
             between: quantity.between,
-            cut: quantity.cut,
+            truncation: quantity.truncation,
             unseen: quantity.unseen,
             value: quantity.value.abs(),
             ..Parts::default()
@@ -265,7 +268,7 @@ fn bounds(
         let mut added = Added::default();
         if let Some(gradient) = &quantity.gradient {
             let (z, errors) = duals.next()?;
-            breaks.after((z.len().pow(2) + work) as f64).ok()?;
+            interrupt.worked((z.len().pow(2) + work) as f64).ok()?;
             let force = system.stiffness.times(z);
             let moved = gradient.reaction.iter().zip(&smoothing);
             parts.signed = quantity.factor * errors.iter().sum::<f64>();
@@ -333,40 +336,40 @@ fn weighted_errors(
     influences: &[Vec<f64>],
     observe: &mut Observer<'_>,
 ) -> Option<Vec<Vec<f64>>> {
-    /// Duals that are treated together: eight numbers fill a line of the cache, but many problems have few.
+    /// Dual solutions that are treated together: eight numbers fill a cache line, but many problems have few.
     const MANY: usize = 8;
     const FEW: usize = 4;
     let threads = body.threads(observe);
     let mut go_on = || observe(Progress::Pulse);
-    let breaks = &mut Breaks::new(&mut go_on);
+    let interrupt = &mut Interrupt::new(&mut go_on);
     let mut errors = Vec::with_capacity(influences.len());
     for some in influences.chunks(MANY) {
         let of_some = match some.len() {
-            ..=FEW => weighted_errors_of::<FEW>((model, body), reported, some, threads, breaks),
-            _ => weighted_errors_of::<MANY>((model, body), reported, some, threads, breaks),
+            ..=FEW => weighted_errors_of::<FEW>((model, body), reported, some, threads, interrupt),
+            _ => weighted_errors_of::<MANY>((model, body), reported, some, threads, interrupt),
         };
         errors.extend(of_some.ok()?);
     }
     Some(errors)
 }
 
-/// The same of so many duals at most.
+/// [`weighted_errors`] for at most `DUALS` dual solutions.
 fn weighted_errors_of<const DUALS: usize>(
     (model, body): (&Model, &ElasticBody),
     reported: &Reported,
     influences: &[Vec<f64>],
     threads: usize,
-    breaks: &mut Breaks<'_>,
+    interrupt: &mut Interrupt<'_>,
 ) -> Result<Vec<Vec<f64>>, Stopped> {
-    breaks.ask()?;
+    interrupt.ask()?;
     let duals = body.displacements_without_loads::<DUALS>(influences, threads);
     let (difference, elements) = (&reported.difference, body.elements(model));
-    let products = difference.products_with_fields(elements, &duals, breaks)?;
+    let products = difference.products_with_fields(elements, &duals, interrupt)?;
     Ok(products.into_iter().take(influences.len()).collect())
 }
 
-/// What elements and edges add to the bound of a quantity with a gradient: weighted errors, and pressures brought back
-/// to the nodes.
+/// Adds the parts from elements and edges to the error of a quantity with a gradient: weighted errors, and pressures
+/// moved to the nodes.
 fn by_weight(
     quantity: &Quantity,
     system: &System<'_>,
@@ -398,7 +401,7 @@ fn by_weight(
     added
 }
 
-/// Adds the parts that the distances between nodes and points leave open.
+/// Adds the parts of the error that the distances between nodes and between friction points cause.
 fn by_spacing(quantity: &Quantity, all: &[Quantity], parts: &Parts, added: &mut Added) {
     let [_, _, _, _, gap, ends, spacing, between, _] = factors(quantity.name);
     let at_ends: Vec<(usize, f64)> = all
@@ -451,7 +454,7 @@ fn end_spacing(quantity: &Quantity, all: &[Quantity]) -> f64 {
     }
 }
 
-/// The change of every nodal reaction if the pressure between the nodes is brought back to the nodes: ∫ h_i p − R_i.
+/// The change of every nodal reaction if the pressure between the nodes is moved to the nodes: ∫ h_i p − R_i.
 fn smoothing_of_reactions(system: &System<'_>, finished: &Finished) -> Vec<f64> {
     let reactions = system.reactions(&finished.state);
     let pressures = system.pressures(&reactions);
@@ -484,8 +487,8 @@ fn dual_pressures(system: &System<'_>, finished: &Finished, force: &[f64]) -> Ve
     system.pressures(&reactions)
 }
 
-/// What displaced obstacles change under the dual solution z with this force, by other gaps at the nodes in contact and by
-/// reactions that are turned; and the sum of its parts without signs.
+/// The change of a quantity by displaced obstacles, under the dual solution z for this force: by other gaps at the
+/// nodes in contact and by reactions that are turned. The second value is the sum of the sizes of its parts.
 fn by_displaced(
     system: &System<'_>,
     active: &[bool],
@@ -509,8 +512,8 @@ fn by_displaced(
     found
 }
 
-/// ∫ p_z (gap − parabola through the gap at the nodes) over edges that touch with all nodes, by the trapezoidal rule
-/// between the places at which the obstacle is known.
+/// ∫ p_z (gap − parabola through the gap at the nodes) over edges with all nodes in contact, by the trapezoidal rule
+/// between the places at which the obstacle is given.
 fn unseen_gap(system: &System<'_>, finished: &Finished, force: &[f64]) -> f64 {
     let pressures = dual_pressures(system, finished, force);
     let mut sum = 0.0;

@@ -1,28 +1,28 @@
-//! Elements whose weighted errors stand out from those around them: at a singular point of the stresses.
+//! Elements whose weighted errors stand out from those around them, at a singular point of the stresses.
 //!
-//! At a corner of the supports, a reentrant corner, the end of a load or of an interface stresses grow without limit, and
-//! the elements that meet there hold most of what the body adds to an error, however fine the mesh. Recovery sees only a
-//! part of that: a fifth at a clamped corner of an orthotropic body, where one element has nothing to be compared with. Such
-//! points are found by the errors themselves, whatever they come from.
+//! At a corner of the supports, a reentrant corner, the end of a load or of an interface, stresses grow without limit.
+//! The elements that meet there hold most of the error that the body contributes, however fine the mesh is. Recovery
+//! sees only a part of it: a fifth at a clamped corner of an orthotropic body, where one element has no neighbour to be
+//! compared with. Such points are found from the errors themselves, whatever their cause.
 //!
-//! A body goes on beyond a line of symmetry: elements there have the mirror images of each other as neighbours too, whose
-//! errors are the same, so that half a model and the whole of it judge alike.
+//! A body continues beyond a line of symmetry: elements there also have mirror images as neighbours, with the same
+//! errors. Half a model is therefore judged like the whole.
 
 use crate::contact::edge_normals;
 use crate::model::{Held, Model};
 
 /// The elements around every corner node of a mesh.
 pub(super) struct Surroundings {
-    /// By node: the elements that meet there.
+    /// By node: the elements that have it as a corner.
     stars: Vec<Vec<u32>>,
-    /// By node: the other elements that share a corner with one of these, images of elements included.
+    /// By node: the other elements that share a corner with one of those that meet there, mirror images included.
     rings: Vec<Vec<u32>>,
 }
 
-/// Lines of symmetry, one bit each: those across x, and others.
+/// A set of lines of symmetry, one bit each: those across x, and others.
 type Lines = u8;
 
-/// An element, or its image in some lines.
+/// An element, or its mirror image in some lines of symmetry.
 type Imaged = (u32, Lines);
 
 impl Surroundings {
@@ -58,8 +58,8 @@ impl Surroundings {
         Surroundings { stars, rings }
     }
 
-    /// By element, what part of its error stands out: by how much the errors of the elements at one of its corners are more
-    /// than those of all around them, in parts of them.
+    /// By element, the part of its error that stands out: by how much the errors of the elements at one of its corners
+    /// exceed those of all elements around, as a part of the former.
     pub(super) fn standing_out(&self, errors: &[f64]) -> Vec<f64> {
         let sum = |elements: &[u32]| -> f64 {
             let errors = elements.iter().map(|e| errors[*e as usize].abs());
@@ -78,7 +78,8 @@ impl Surroundings {
         parts
     }
 
-    /// By element, whether it is away from some nodes: it touches none, and shares no corner with one that does.
+    /// By element, whether it is away from some nodes: it contains none, and shares no corner with an element that
+    /// does.
     pub(super) fn away_from(&self, nodes: impl Iterator<Item = u32>) -> Vec<bool> {
         let count = self
             .stars
@@ -95,7 +96,7 @@ impl Surroundings {
     }
 }
 
-/// By node, the lines of symmetry through it: straight sides whose nodes do not move across them, and move along them freely.
+/// By node, the lines of symmetry through it: straight sides whose nodes are held across the side and free along it.
 fn lines_of_symmetry(model: &Model) -> Vec<Lines> {
     let mut lines = vec![0; model.mesh.nodes.len()];
     for side in model.mesh.surface() {
@@ -135,8 +136,8 @@ mod tests {
         (model, surroundings)
     }
 
-    /// Errors that are the same on all sides of two lines of symmetry stand out alike in a quarter, a half and the whole of a
-    /// body, wherever they are largest; and a clamped side is no line of symmetry.
+    /// Errors that are symmetric about two lines stand out equally in a quarter, a half and the whole of a body,
+    /// wherever they are largest. A clamped side is no line of symmetry.
     #[test]
     fn parts_of_a_symmetric_body_judge_as_the_whole() {
         let (half, whole) = ([0, 1, 2, 3, 4], [-4, -3, -2, -1, 0, 1, 2, 3, 4]);

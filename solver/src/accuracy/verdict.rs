@@ -6,40 +6,40 @@ use crate::solution::{
     Accuracy, ErrorMethod, EstimatedQuantity, Outcome, QuantityName, Verdict, Warning, WarningCode,
 };
 
-/// Relative errors up to which a verdict is `good`, and `fair`: of forces, and of peaks and extents. `good` promises 1 %
-/// and 5 %: since one stated error in twenty is too small, it takes three quarters of that for forces and three fifths for the
-/// others, of which some are too small by more (`tests/verification/calibration.rs`).
+/// Largest relative errors for the verdict `good`, and for `fair`: of forces, and of peaks and extents. `good` promises
+/// 1 % and 5 %. Since one stated error in twenty is too small, the limits are three quarters of that for forces and
+/// three fifths for the others, some of which are too small by more (`tests/verification/calibration.rs`).
 const FORCES: [f64; 2] = [0.0075, 0.05];
 const OTHERS: [f64; 2] = [0.03, 0.2];
 
 /// Why a quantity has no error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Doubt {
-    /// Its obstacle reaches into the body between the nodes.
+    /// The obstacle reaches into the body between the nodes.
     Unseen,
-    /// It has a value on a finer mesh, but no estimate that would tell whether the two agree by chance.
+    /// There is a value on the refined mesh, but no estimate that would show whether the two agree by chance.
     Unestimated,
-    /// It has neither an estimate nor a counterpart on the finer mesh.
+    /// There is neither an estimate nor a counterpart on the refined mesh.
     Alone,
 }
 
-/// Quantities of a kind and a contact of which the mesh split in two has another number.
+/// Quantities of one kind and contact whose number differs on the refined mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Unpaired {
     pub(super) name: QuantityName,
     pub(super) contact: String,
-    /// How many on the mesh of the solution.
+    /// Their number on the mesh of the solution.
     pub(super) here: usize,
-    /// How many on the finer one.
+    /// Their number on the refined mesh.
     pub(super) there: usize,
 }
 
-/// A reason of a verdict, and how serious it is: its error in parts of what would be good.
+/// A reason of a verdict, and how serious it is: its error divided by the limit for `good`.
 type Reason = (f64, String);
 
-/// What the error of a quantity is compared with, as a size: of a force or a peak its own; of a tangential force the friction
-/// force; of an end the length of the contact. `own`: values of that kind of the same contact, which has `images` parts like
-/// the one that is modelled.
+/// The reference size for the error of a quantity, without its sign: a force or a peak itself; for a tangential force
+/// the friction force; for an end the length of the contact. `own`: values of that kind at the same contact, which has
+/// `images` parts like the one that is modelled.
 pub(super) fn scale(
     name: QuantityName,
     value: f64,
@@ -60,12 +60,12 @@ pub(super) fn scale(
     f64::abs(scale)
 }
 
-/// From the first start of contact to its last end; of what is modelled.
+/// The length from the first start of contact to its last end, in the part that is modelled.
 pub(super) fn length(starts: impl Iterator<Item = f64>, ends: impl Iterator<Item = f64>) -> f64 {
     ends.fold(f64::NEG_INFINITY, f64::max) - starts.fold(f64::INFINITY, f64::min)
 }
 
-/// An error in parts of what it is compared with; none if that is 0.
+/// An error divided by its reference size; none if that is 0.
 pub(super) fn relative(error: f64, scale: f64) -> Option<f64> {
     let relative = match error {
         0.0 => 0.0,
@@ -74,7 +74,8 @@ pub(super) fn relative(error: f64, scale: f64) -> Option<f64> {
     Some(relative).filter(|relative| relative.is_finite())
 }
 
-/// The verdict and its reasons; `doubts`: of the quantities; `unpaired`: what a finer mesh has in another number.
+/// The verdict and its reasons. `doubts`: why quantities have no error. `unpaired`: quantities whose number differs on
+/// the refined mesh.
 pub(super) fn conclude(
     outcome: Outcome,
     quantities: Vec<EstimatedQuantity>,
@@ -87,7 +88,7 @@ pub(super) fn conclude(
         found.extend(assessed.filter_map(|(quantity, doubt)| by_error(quantity, *doubt)));
         found.extend(unpaired.iter().map(by_number));
     } else {
-        let reason = "The iterations did not converge: nothing is known of the errors.";
+        let reason = "The iterations did not converge, so the errors are unknown.";
         found.push((Verdict::Poor, (f64::INFINITY, reason.to_owned())));
     }
     let verdicts = found.iter().map(|(verdict, _)| *verdict);
@@ -105,18 +106,18 @@ pub(super) fn conclude(
     }
 }
 
-/// Warnings that say that stated errors cannot be relied on: the best verdict beside each, and why.
+/// Warnings with which stated errors cannot be relied on, the best verdict that each permits, and the reason.
 #[rustfmt::skip] // a table
 const DOUBTFUL: [(WarningCode, Verdict, &str); 3] = [
     (WarningCode::NotUnique, Verdict::Poor,
-        "There is a second solution, with other forces: the errors say nothing of which of the two occurs."),
+        "There is a second solution with other forces; the errors do not tell which of the two occurs."),
     (WarningCode::MeshTooCoarseForContact, Verdict::Fair,
         "The mesh is too coarse for a contact (`mesh_too_coarse_for_contact`), so that the stated errors may be too small."),
     (WarningCode::MeshTooCoarseForRadius, Verdict::Fair,
         "The mesh is too coarse for a nonlocal radius (`mesh_too_coarse_for_radius`), so that the stated errors of friction may be too small."),
 ];
 
-/// Lowers the verdict to the best one beside these warnings.
+/// Lowers the verdict to the best one that these warnings permit.
 pub fn limit_by(warnings: &[Warning], accuracy: &mut Accuracy) {
     for (code, best, reason) in DOUBTFUL {
         let given = warnings.iter().any(|warning| warning.code == code);
@@ -130,7 +131,7 @@ pub fn limit_by(warnings: &[Warning], accuracy: &mut Accuracy) {
     }
 }
 
-/// What the error of a quantity, or that there is none, says against it.
+/// The verdict on one quantity by its error, or because it has none, with the reason if it is not good.
 fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Reason)> {
     let (name, contact) = (<&str>::from(q.quantity), &q.contact);
     let [good, fair] = match q.quantity {
@@ -144,7 +145,7 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
         false => Verdict::Poor,
     };
     let unknown = |why: String| {
-        let reason = format!("Of `{name}` of contact `{contact}` the error is not known: {why}.");
+        let reason = format!("The error of `{name}` at contact `{contact}` is unknown: {why}.");
         Some((Verdict::Poor, (f64::INFINITY, reason)))
     };
     let finer = q.finer.unwrap_or_default();
@@ -159,7 +160,7 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
             (
                 0.0,
                 format!(
-                    "`{name}` of contact `{contact}` grows without limit as the mesh is refined, at an edge, a tip or a kink of the obstacle, at a corner of the body or where materials meet: its value means nothing. The verdict is about the other quantities: forces have a limit, and so has the averaged pressure."
+                    "`{name}` at contact `{contact}` grows without limit as the mesh is refined (at an edge, a tip or a kink of the obstacle, at a corner of the body or where materials meet), so its value means nothing. The verdict is about the other quantities: forces converge, and so does the averaged pressure."
                 ),
             ),
         )),
@@ -168,7 +169,7 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
             (
                 1.0,
                 format!(
-                    "Contact `{contact}` has more ends of stick (`{name}`) than are followed, and no error is stated for them: where stick and slip alternate from point to point, another mesh has them elsewhere. Refine the contact, or raise elastic_slip."
+                    "Contact `{contact}` has too many ends of stick (`{name}`) to state errors for them: where stick and slip alternate from point to point, they depend on the mesh. Refine the contact, or raise elastic_slip."
                 ),
             ),
         )),
@@ -181,10 +182,14 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
                 (
                     relative / good,
                     format!(
-                        "`{name}` of contact `{contact}`, {:.5e}, may be off by {}{}, that is {error:.1e}, most of it because the load grows in too few increments: give `steps` more `increments` (without `steps` there is one), or a deck a smaller first number in the row of *STATIC.",
+                        "`{name}` at contact `{contact}`, {:.5e}, may be wrong by {}{}, that is {error:.1e}, mostly because the load grows in too few increments: give `steps` more `increments` (without `steps` there is one), or a deck a smaller first number in the row of *STATIC.",
                         q.value,
                         percent(relative),
-                        if end { " of the length of the contact" } else { "" },
+                        if end {
+                            " of the length of the contact"
+                        } else {
+                            ""
+                        },
                     ),
                 ),
             ))
@@ -196,10 +201,14 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
                 (
                     relative / good,
                     format!(
-                        "`{name}` of contact `{contact}`, {:.5e}, may be off by {}{}, that is {error:.1e}, most of it because gaps are linear in an indentation along `direction`: draw the obstacle where that leaves it, with an `indentation` of 0, or push it by less.",
+                        "`{name}` at contact `{contact}`, {:.5e}, may be wrong by {}{}, that is {error:.1e}, mostly because gaps are linear in an indentation along `direction`: draw the obstacle in its final position with an `indentation` of 0, or push it less far.",
                         q.value,
                         percent(relative),
-                        if end { " of the length of the contact" } else { "" },
+                        if end {
+                            " of the length of the contact"
+                        } else {
+                            ""
+                        },
                     ),
                 ),
             ))
@@ -211,7 +220,7 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
                 (
                     relative / good,
                     format!(
-                        "`{name}` of contact `{contact}`, s = {:.4}, is known to ±{error:.1e} only, {} of the length of the contact: the nodes there are as far apart, or the obstacle ends between two of them.",
+                        "`{name}` at contact `{contact}`, s = {:.4}, is known only to ±{error:.1e}, {} of the length of the contact: that is the distance of the nodes there, or the obstacle ends between two of them.",
                         q.value,
                         percent(relative)
                     ),
@@ -225,7 +234,7 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
                 (
                     relative / good,
                     format!(
-                        "`{name}` of contact `{contact}`, s = {:.4}, is known to ±{error:.1e} only, {} of the length of the contact: with every element split in two it is s = {finer:.4}.",
+                        "`{name}` at contact `{contact}`, s = {:.4}, is known only to ±{error:.1e}, {} of the length of the contact: on the refined mesh it is s = {finer:.4}.",
                         q.value,
                         percent(relative)
                     ),
@@ -236,7 +245,7 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
             let relative = relative.unwrap_or(f64::INFINITY);
             let why = match method {
                 ErrorMethod::MeshHalved => format!(
-                    "with every element split in two it is {finer:.5e}, and two meshes may agree by chance"
+                    "on the refined mesh it is {finer:.5e}, and two meshes may agree by chance"
                 ),
                 _ => "the mesh is too coarse for it".to_owned(),
             };
@@ -245,7 +254,7 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
                 (
                     relative / good,
                     format!(
-                        "`{name}` of contact `{contact}`, {:.5e}, may be off by {}, that is {error:.1e}: {why}.",
+                        "`{name}` at contact `{contact}`, {:.5e}, may be wrong by {}, that is {error:.1e}: {why}.",
                         q.value,
                         percent(relative)
                     ),
@@ -257,10 +266,10 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
                 unknown("the shape of the obstacle between the nodes is not resolved".to_owned())
             }
             Some(Doubt::Unestimated) => unknown(format!(
-                "there is no estimate of it, and that it is {finer:.5e} with every element split in two is no bound by itself"
+                "it has no estimate; on the refined mesh it is {finer:.5e}, which alone does not bound the error"
             )),
             Some(Doubt::Alone) => unknown(
-                "there is no estimate of it, and nothing to compare it with where every element is split in two"
+                "it has no estimate, and the refined mesh has no counterpart to compare with"
                     .to_owned(),
             ),
             None => unknown("the linearised problem has no unique solution".to_owned()),
@@ -268,7 +277,7 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
     }
 }
 
-/// That contact or stick begins or ends where it does not on the mesh split in two, or the other way round.
+/// The reason for intervals of contact or stick that exist on only one of the two meshes.
 fn by_number(unpaired: &Unpaired) -> (Verdict, Reason) {
     let Unpaired {
         name,
@@ -278,7 +287,7 @@ fn by_number(unpaired: &Unpaired) -> (Verdict, Reason) {
     } = unpaired;
     let name = <&str>::from(*name);
     let reason = format!(
-        "Contact `{contact}` has {here} of `{name}`, and {there} with every element split in two: they cannot be compared, and what is stated for them is estimated."
+        "Contact `{contact}` has {here} of `{name}` on this mesh and {there} on the refined one, so they cannot be compared: their errors are estimates."
     );
     // after what is known to be wrong
     (Verdict::Fair, (1.0, reason))

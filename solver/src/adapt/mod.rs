@@ -1,12 +1,13 @@
-//! `refine: {"tolerance": …}`: the mesh is refined where errors come from until all quantities are known to a tolerance.
+//! `refine: {"tolerance": …}`: the mesh is refined where errors come from until all quantities are known to a
+//! tolerance.
 //!
 //! Solves, divides the elements that hold most of the errors above the tolerance, as `accuracy` states them and
 //! `origins` places them, and repeats. Edges under a peak of σ_t that are wider than a part of ρ are divided in any
-//! case, since the errors of what is not resolved at all are not seen; and edges that an end of the obstacle cuts,
-//! until the part left out of the contact counts no more.
+//! case, since an estimate does not see what the mesh does not resolve at all. So are edges inside which the obstacle
+//! ends, until the part that is left out of the contact is negligible.
 
-mod unmet;
-mod watched;
+mod mesh_results;
+mod stopping;
 
 use std::ops::ControlFlow;
 
@@ -17,8 +18,8 @@ use crate::model::{ContactModel, Model};
 use crate::origins::Origins;
 use crate::problem::{AdaptiveRefine, Algorithm, Problem};
 use crate::solution::{Observer, Outcome, Progress, Refinement, Solution, Warning};
-use unmet::{Unmet, given_up, unfinished};
-use watched::{WatchedResults, largest_error};
+use mesh_results::{MeshResults, largest_error};
+use stopping::{StopReason, given_up, unfinished};
 
 /// The elements to be divided hold this part of the errors above the tolerance.
 const BULK: f64 = 0.6;
@@ -68,37 +69,37 @@ pub fn run(
         let (mesh, contacts) = (model.mesh.clone(), model.contacts.clone());
         let unknowns = model.estimate_of_mesh().dofs;
         let (solved, mut on_mesh) = solve_on(model, &mut origins, solve, before.is_some(), observe);
-        if let (Some(unmet), Some(before)) = (on_mesh.failed(&solved, unknowns), before.take()) {
+        if let (Some(reason), Some(before)) = (on_mesh.failed(&solved, unknowns), before.take()) {
             let of_before = sequence.iter().rev().nth(1);
             let _ = observe(Progress::Refinement {
                 number: sequence.len() as u32,
                 elements: before.mesh.elements.len() as u64,
                 error: of_before.and_then(|row| row.error),
             });
-            return Ok(before.ended(problem, goal, sequence, Some(unmet), observe));
+            return Ok(before.ended(problem, goal, sequence, Some(reason), observe));
         }
         let solution = solved?;
-        let cut = cut_edges(&contacts, &solution, &mesh, goal.tolerance);
-        let results = WatchedResults::new(&solution);
+        let truncation = cut_edges(&contacts, &solution, &mesh, goal.tolerance);
+        let results = MeshResults::new(&solution);
         let change = sequence.last().map(|before| results.change(before));
         let unsolved = unsolved(solution.summary.outcome);
         let error = match unsolved {
-            None => largest_error(&solution).max(cut.error),
+            None => largest_error(&solution).max(truncation.error),
             Some(_) => f64::INFINITY,
         };
         sequence.push(results.row(change, error));
 
         let mut next = None;
-        let unmet = if on_mesh.stopped || solution.summary.outcome == Outcome::Canceled {
+        let reason = if on_mesh.stopped || solution.summary.outcome == Outcome::Canceled {
             None
         } else if let Some(why) = unsolved {
-            Some(Unmet::First(why))
+            Some(StopReason::First(why))
         } else if error <= goal.tolerance {
-            Some(Unmet::Nothing)
-        } else if let Some(unmet) = given_up(&sequence, goal.tolerance) {
-            Some(unmet)
+            Some(StopReason::Nothing)
+        } else if let Some(reason) = given_up(&sequence, goal.tolerance) {
+            Some(reason)
         } else {
-            let marked = marks(&contacts, &solution, &origins, &cut.elements);
+            let marked = marks(&contacts, &solution, &origins, &truncation.elements);
             match finer(problem, &mut graded, &mesh, &mut parts, &marked) {
                 Ok(mesh) => {
                     let warnings = notes.clone();
@@ -108,18 +109,18 @@ pub fn run(
                     next = too_large.is_none().then_some(model);
                     too_large
                 }
-                Err(unmet) => Some(unmet),
+                Err(reason) => Some(reason),
             }
         };
         let here = Solved {
             solution,
             mesh,
             warnings: std::mem::take(&mut on_mesh.warnings),
-            cut: cut.error,
+            truncation: truncation.error,
         };
         match next {
             Some(finer) => (model, before) = (finer, Some(here)),
-            None => return Ok(here.ended(problem, goal, sequence, unmet, observe)),
+            None => return Ok(here.ended(problem, goal, sequence, reason, observe)),
         }
     }
 }
@@ -128,26 +129,28 @@ pub fn run(
 struct Solved {
     solution: Solution,
     mesh: Mesh,
-    /// What was found while it was solved.
+    /// The warnings while it was solved.
     warnings: Vec<Warning>,
-    /// [`Cut::error`].
-    cut: f64,
+    /// The largest error by truncation, [`Truncation::error`].
+    truncation: f64,
 }
 
 impl Solved {
-    /// This is the result: with the sequence of meshes, why it ends here, and what the observer has not seen yet.
+    /// The final result: with the sequence of meshes, the reason for its end, and the iterations that the observer has
+    /// not seen yet.
     fn ended(
         mut self,
         problem: &Problem,
         goal: &AdaptiveRefine,
         sequence: Vec<Refinement>,
-        unmet: Option<Unmet>,
+        reason: Option<StopReason>,
         observe: &mut Observer<'_>,
     ) -> (Solution, Mesh) {
         let solution = &mut self.solution;
-        let unmet =
-            unmet.and_then(|unmet| unfinished(problem, goal, solution, &sequence, unmet, self.cut));
-        if let Some(warning) = unmet {
+        let warning = reason.and_then(|reason| {
+            unfinished(problem, goal, solution, &sequence, reason, self.truncation)
+        });
+        if let Some(warning) = warning {
             solution.summary.warnings.push(warning.clone());
             self.warnings.push(warning);
         }
@@ -162,46 +165,46 @@ impl Solved {
     }
 }
 
-/// What the observer was asked while a mesh was solved, and what it said.
+/// The questions to the observer while one mesh was solved, and its answers.
 #[derive(Default)]
 struct OnMesh {
     warnings: Vec<Warning>,
-    /// It is to end.
+    /// Whether the observer asked to stop.
     stopped: bool,
-    /// So much memory was needed that there is not (bytes).
+    /// The memory that was needed and not available (bytes).
     short: Option<u64>,
 }
 
 impl OnMesh {
-    /// Why a mesh has no solution that could take the place of the one before.
-    fn failed(&self, solved: &Result<Solution, SolveError>, unknowns: u64) -> Option<Unmet> {
+    /// Why the solution on this mesh cannot replace the one before.
+    fn failed(&self, solved: &Result<Solution, SolveError>, unknowns: u64) -> Option<StopReason> {
         match (self.short, solved) {
             _ if self.stopped => None,
-            (Some(bytes), _) => Some(Unmet::Memory { unknowns, bytes }),
+            (Some(bytes), _) => Some(StopReason::Memory { unknowns, bytes }),
             (_, Err(SolveError::Stopped | SolveError::Invalid(_))) => None,
-            (_, Err(error)) => Some(Unmet::Failed(unknowns, error.to_string())),
+            (_, Err(error)) => Some(StopReason::Failed(unknowns, error.to_string())),
             (_, Ok(solution)) => {
                 let why = unsolved(solution.summary.outcome)?;
-                Some(Unmet::Failed(unknowns, why.to_owned()))
+                Some(StopReason::Failed(unknowns, why.to_owned()))
             }
         }
     }
 }
 
-/// Why an outcome is no solution, unless it is one or was stopped.
+/// Why an outcome is no solution; none if it is one, or was stopped.
 fn unsolved(outcome: Outcome) -> Option<&'static str> {
     match outcome {
         Outcome::Converged | Outcome::Canceled => None,
-        Outcome::NotConverged => Some("its iteration does not converge"),
-        Outcome::ContactCycling => Some("its contact and slip repeat themselves"),
+        Outcome::NotConverged => Some("its iterations do not converge"),
+        Outcome::ContactCycling => Some("its contact and slip states repeat in a cycle"),
         Outcome::FalseConvergence => Some(
-            "its forces do not balance, or its residual is false: the stiffness is nearly singular",
+            "its forces do not balance, or its residual is not the true one: the stiffness is nearly singular",
         ),
     }
 }
 
-/// Solves on one mesh. `later`: it is not the first, and if it needs too much memory the solution before remains; the observer is
-/// asked whether there is room, and not told that there has to be.
+/// Solves on one mesh. `later`: this is not the first mesh, and if it needs too much memory the solution before
+/// remains; the observer is then asked whether the memory is available, and its refusal is no error.
 fn solve_on(
     model: Model,
     origins: &mut Origins,
@@ -241,7 +244,7 @@ fn solve_on(
     (solved, on_mesh)
 }
 
-/// Whether there is so much memory; an error if the solution is to end anyhow.
+/// Asks the observer whether this much memory is available; an error if it stops the solution.
 fn has_room(bytes: u64, observe: &mut Observer<'_>) -> Result<bool, SolveError> {
     match observe(Progress::Room { bytes }) {
         ControlFlow::Continue(()) => Ok(true),
@@ -257,39 +260,39 @@ fn too_large(
     model: &Model,
     most_at_contacts: &[usize],
     observe: &mut Observer<'_>,
-) -> Result<Option<Unmet>, SolveError> {
+) -> Result<Option<StopReason>, SolveError> {
     let at_contacts = model.contacts.iter().zip(most_at_contacts);
     let too_many = at_contacts
         .map(|(contact, most)| (contact.boundary.edge_count(), *most))
         .find(|(count, most)| count > most);
     if let Some((count, most)) = too_many {
-        return Ok(Some(Unmet::ContactElements(count, most)));
+        return Ok(Some(StopReason::ContactElements(count, most)));
     }
     let estimate = model.estimate_of_mesh();
     let (unknowns, bytes) = (estimate.dofs, estimate.memory_bytes);
     let fits = has_room(bytes, observe)?;
-    Ok((!fits).then_some(Unmet::Memory { unknowns, bytes }))
+    Ok((!fits).then_some(StopReason::Memory { unknowns, bytes }))
 }
 
-/// Most elements at a contact, which are as many as the estimate of the memory assumes.
+/// The largest number of elements at a contact, as the estimate of the memory assumes.
 fn most_elements(contact: &ContactModel) -> usize {
     MOST_ADAPTIVE_CONTACT_ELEMENTS.max(contact.boundary.edge_count())
 }
 
-/// The next mesh, whose elements are each a part of one of `graded`: `parts`.
+/// The next mesh. `parts`: for each of its elements, the element of `graded` that contains it.
 fn finer(
     problem: &Problem,
     graded: &mut GradedMesh,
     mesh: &Mesh,
     parts: &mut Vec<u32>,
     marked: &[bool],
-) -> Result<Mesh, Unmet> {
+) -> Result<Mesh, StopReason> {
     // closures have triangles, which the thesis's own iteration does not know
     let finer = if problem.solver.algorithm == Algorithm::Thesis {
         mesh::refine(mesh)
     } else {
         if !marked.contains(&true) {
-            return Err(Unmet::Stalled);
+            return Err(StopReason::Stalled);
         }
         let mut divided = vec![false; graded.elements()];
         for (part, _) in parts.iter().zip(marked).filter(|(_, marked)| **marked) {
@@ -306,24 +309,29 @@ fn finer(
     };
     let elements = finer.elements.len();
     if elements > MOST_ADAPTIVE_ELEMENTS {
-        return Err(Unmet::Elements(elements));
+        return Err(StopReason::Elements(elements));
     }
     if !finer.inverted_elements(false).is_empty() {
-        return Err(Unmet::Folded);
+        return Err(StopReason::Inverted);
     }
     Ok(finer)
 }
 
-/// What is left out of contacts because an end of the obstacle lies inside an edge.
-struct Cut {
-    /// The largest such part in lengths of its contact.
+/// The parts of contacts that are left out because the obstacle ends inside an edge.
+struct Truncation {
+    /// The largest such part, divided by the length of its contact.
     error: f64,
-    /// Elements at edges where it is above the tolerance.
+    /// Elements at edges where that part is above the tolerance.
     elements: Vec<usize>,
 }
 
-fn cut_edges(contacts: &[ContactModel], solution: &Solution, mesh: &Mesh, tolerance: f64) -> Cut {
-    let mut found = Cut {
+fn cut_edges(
+    contacts: &[ContactModel],
+    solution: &Solution,
+    mesh: &Mesh,
+    tolerance: f64,
+) -> Truncation {
+    let mut found = Truncation {
         error: 0.0,
         elements: Vec::new(),
     };
@@ -361,19 +369,19 @@ fn marks(
     contacts: &[ContactModel],
     solution: &Solution,
     origins: &Origins,
-    cut: &[usize],
+    truncation: &[usize],
 ) -> Vec<bool> {
     // where no error of a quantity is known, those of the stresses have to do
     let known = origins.elements.iter().any(|part| *part > 0.0);
     let mut marked = match known {
         true => bulk(&origins.elements),
-        false if cut.is_empty() && origins.unresolved.is_empty() => {
+        false if truncation.is_empty() && origins.unresolved.is_empty() => {
             bulk(&solution.fields.element_error)
         }
         false => vec![false; origins.elements.len()],
     };
     let unresolved = origins.unresolved.iter();
-    unresolved.chain(cut).for_each(|e| marked[*e] = true);
+    unresolved.chain(truncation).for_each(|e| marked[*e] = true);
     under_peaks(contacts, solution, &mut marked);
     marked
 }
@@ -396,7 +404,7 @@ fn bulk(parts: &[f64]) -> Vec<bool> {
     chosen
 }
 
-/// Marks elements with an edge within ρ of a peak of σ_t that is longer than a part of ρ.
+/// Marks elements with an edge within ρ of a peak of σ_t whose length exceeds [`PART_OF_RADIUS`] ρ.
 fn under_peaks(contacts: &[ContactModel], solution: &Solution, marked: &mut [bool]) {
     let fields = &solution.fields;
     for contact in contacts {

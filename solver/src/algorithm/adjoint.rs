@@ -1,9 +1,9 @@
-//! What small forces on the contact unknowns would change in a quantity of the solution: the adjoint of the
-//! linearised contact problem.
+//! The change of a quantity of the solution by small forces on the contact unknowns: the adjoint of the linearised
+//! contact problem.
 //!
-//! Free unknowns F move, those of nodes in contact and of held tangents, A, do not; their reactions answer. With
-//! H = ∂r/∂v_F of [`newton`](super::newton), a quantity J(v, R, Q) of displacements, normal reactions
-//! R = (f̂ − Ŝ v)_A and tangential ones Q = (Ŝ v − f̂)_A changes by z · δf̂,
+//! Free unknowns F move, those of nodes in contact and of held tangents, A, do not; their reactions answer. With H =
+//! ∂r/∂v_F of [`newton`](super::newton), a quantity J(v, R, Q) of displacements, normal reactions R = (f̂ − Ŝ v)_A and
+//! tangential ones Q = (Ŝ v − f̂)_A changes by z · δf̂,
 //!
 //!   Hᵀ z_F = J_v − Ŝ_FA J_R + Ŝ_FA J_Q,    z_A = J_R − Bᵀ z_F  or  −J_Q,
 //!
@@ -14,22 +14,22 @@ use crate::algorithm::factors::{dense, free_dofs};
 use crate::algorithm::newton::jacobian;
 use crate::algorithm::system::{Point, State, System};
 use crate::elasticity::Dof;
-use crate::linear::Breaks;
+use crate::linear::Interrupt;
 use crate::solution::{Observer, Progress};
 
-/// The derivatives of a quantity.
+/// The derivatives of a quantity by the contact unknowns and reactions.
 #[derive(Clone, Debug)]
 pub struct Gradient {
-    /// By the contact unknowns.
+    /// The derivative by each contact unknown.
     pub displacement: Vec<f64>,
-    /// By the normal reaction of every contact node.
+    /// The derivative by the normal reaction of each contact node.
     pub reaction: Vec<f64>,
-    /// By the tangential reaction of every contact node whose tangent is held.
+    /// The derivative by the tangential reaction of each contact node whose tangent is held.
     pub held: Vec<f64>,
 }
 
 impl Gradient {
-    /// Of a quantity that depends on nothing.
+    /// The gradient of a constant.
     pub fn zero(system: &System<'_>) -> Self {
         Gradient {
             displacement: vec![0.0; system.load.len()],
@@ -76,7 +76,7 @@ impl Gradient {
     }
 }
 
-/// What the law at one friction point takes, in multiplications.
+/// The work for the law at one friction point, in multiplications.
 const WORK_OF_A_POINT: usize = 100;
 
 /// z of every quantity, on the contact unknowns: dJ = z · δf̂. None if the linearised problem has no unique solution,
@@ -95,7 +95,7 @@ pub fn influences(
     let mut rhs = Vec::with_capacity(free.len() * gradients.len());
     let mut fixed = Vec::new();
     let mut go_on = || observe(Progress::Pulse);
-    let breaks = &mut Breaks::new(&mut go_on);
+    let interrupt = &mut Interrupt::new(&mut go_on);
     for gradient in gradients {
         let mut z = vec![0.0; system.load.len()];
         for (i, node) in system.nodes.iter().enumerate() {
@@ -108,29 +108,29 @@ pub fn influences(
         }
         let reflected = system.stiffness.times(&z);
         let columns = z.iter().filter(|z| **z != 0.0).count().max(1);
-        breaks.after((columns * z.len()) as f64).ok()?;
+        interrupt.worked((columns * z.len()) as f64).ok()?;
         rhs.extend(
             free.iter()
                 .map(|&dof| gradient.displacement[dof] - reflected[dof]),
         );
         fixed.push(z);
     }
-    let solved = dense(free.len(), observe, |breaks| {
+    let solved = dense(free.len(), observe, |interrupt| {
         let known = (&bound[..], &pressures[..]);
-        let mut h = jacobian(system, state, known, &free, &place, 0.0, breaks)?;
-        h.transpose(breaks)?;
-        h.solve(&rhs, breaks)
+        let mut h = jacobian(system, state, known, &free, &place, 0.0, interrupt)?;
+        h.transpose(interrupt)?;
+        h.solve(&rhs, interrupt)
     })?;
     let mut influences = fixed;
     let mut go_on = || observe(Progress::Pulse);
-    let breaks = &mut Breaks::new(&mut go_on);
+    let interrupt = &mut Interrupt::new(&mut go_on);
     for (k, z) in influences.iter_mut().enumerate() {
         let own = &solved[k * free.len()..(k + 1) * free.len()];
         free.iter()
             .zip(own)
             .for_each(|(&dof, value)| z[dof] = *value);
-        breaks
-            .after((z.len() + WORK_OF_A_POINT * system.points.len()) as f64)
+        interrupt
+            .worked((z.len() + WORK_OF_A_POINT * system.points.len()) as f64)
             .ok()?;
         // friction follows the reactions: −Bᵀ z_F
         for point in &system.points {
@@ -173,8 +173,8 @@ mod tests {
         (finished.state, reported.quantities)
     }
 
-    /// The change of every quantity under small forces on the contact, found by solving again, against z · δf̂: with
-    /// averaging, in axisymmetry with a node on the axis, without friction, and bonded.
+    /// The predicted change z · δf̂ of each quantity under small forces on the contact equals the change found by
+    /// solving again: with averaging, in axisymmetry with a node on the axis, without friction, and bonded.
     #[test]
     fn influences_are_what_small_forces_change() {
         let law =

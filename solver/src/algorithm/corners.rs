@@ -1,4 +1,5 @@
-//! What a solution says of the ends of contacts: which contact each common end is of, and which ends on the axis are open.
+//! Decisions after a solution about the ends of contacts: which contact owns each common end, and which nodes on the
+//! axis are open.
 
 use std::collections::BTreeSet;
 
@@ -8,7 +9,8 @@ use crate::model::Alone;
 /// An obstacle reaches into a body if it does so by more than this part of its contact's length.
 const ROUNDING: f64 = 1e-10;
 
-/// Common nodes that are taken to be of one contact alone, though the obstacle of the other one reaches into the body there.
+/// Common nodes that were assigned to one contact alone, though the obstacle of the other one reaches into the body
+/// there.
 pub fn touched_by_both(system: &System<'_>, state: &State) -> Vec<u32> {
     let mut found = Vec::new();
     for patch in &system.patches {
@@ -24,8 +26,8 @@ pub fn touched_by_both(system: &System<'_>, state: &State) -> Vec<u32> {
     found
 }
 
-/// Which contact each common node is better taken to be of alone, after this solution; those in `both` have been
-/// found to be of both. None if that is as it was. Without a state there is no solution.
+/// The better assignment of each common node to one contact, judged by this solution; the nodes in `both` are known to
+/// touch both. None if the assignment does not change. Without a state there is no solution yet.
 pub fn better(system: &System<'_>, state: Option<&State>, both: &BTreeSet<u32>) -> Option<Alone> {
     let model = system.model;
     let mut alone = model.alone.clone();
@@ -58,7 +60,7 @@ pub fn better(system: &System<'_>, state: Option<&State>, both: &BTreeSet<u32>) 
     (alone != model.alone).then_some(alone)
 }
 
-/// Nodes on the axis that are open while the midside node beside them presses: the obstacle is hollow there.
+/// Nodes on the axis that are open while the midside node beside them is pressed: the obstacle is hollow there.
 pub fn open_on_axis(system: &System<'_>, state: &State) -> BTreeSet<u32> {
     let beside = |patch: &Patch<'_>, i: usize| {
         let end = system.nodes[i].beside_axis?;
@@ -70,7 +72,7 @@ pub fn open_on_axis(system: &System<'_>, state: &State) -> BTreeSet<u32> {
     found.collect()
 }
 
-/// Whether a node on the axis that was to stay open touches.
+/// Whether a node on the axis that was set to stay open touches.
 pub fn closed_on_axis(system: &System<'_>, state: &State) -> bool {
     let open = &system.model.open_on_axis;
     system.patches.iter().any(|patch| {

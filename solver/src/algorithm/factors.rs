@@ -1,11 +1,11 @@
-//! Dense work of the iterations: factors of H on the free unknowns, kept while they serve.
+//! Factorisations of H on the free unknowns, reused while they are accurate enough.
 
 use crate::algorithm::system::System;
 use crate::elasticity::Dof;
-use crate::linear::{Breaks, Cholesky, Dense, Unsolved};
+use crate::linear::{Cholesky, Dense, Interrupt, Unsolved};
 use crate::solution::{Observer, Progress};
 
-/// Unknowns that are not held: the normal ones of nodes not `held`, and the tangential ones.
+/// The free unknowns: normal ones of nodes that are not `held`, and tangential ones.
 pub(super) fn free_dofs(system: &System<'_>, held: impl Fn(usize) -> bool) -> Vec<usize> {
     let mut free = Vec::with_capacity(system.load.len());
     for (i, node) in system.nodes.iter().enumerate() {
@@ -30,18 +30,18 @@ pub(super) fn semidefinite_shift(system: &System<'_>) -> f64 {
     1e-9 * diagonal / size as f64
 }
 
-/// Dense work on a matrix of this size, for which the observer is asked first. None if it has no solution, or the
+/// Dense work on a matrix of this size, for which the observer is called first. None if it has no solution, or the
 /// observer stops.
 pub(super) fn dense<T>(
     size: usize,
     observe: &mut Observer<'_>,
-    solve: impl FnOnce(&mut Breaks<'_>) -> Result<T, Unsolved>,
+    solve: impl FnOnce(&mut Interrupt<'_>) -> Result<T, Unsolved>,
 ) -> Option<T> {
     let bytes = Dense::bytes(size);
     if observe(Progress::Needs { bytes }).is_break() {
         return None;
     }
-    match solve(&mut Breaks::new(&mut || observe(Progress::Pulse))) {
+    match solve(&mut Interrupt::new(&mut || observe(Progress::Pulse))) {
         Ok(x) => Some(x),
         Err(Unsolved::TooLarge { bytes }) => {
             // the answer is given again at the next question
@@ -52,8 +52,8 @@ pub(super) fn dense<T>(
     }
 }
 
-/// The last factor of H = Ŝ + Σ w τ φ′ h hᵀ on some unknowns. It serves again as long as steps with it are nearly as
-/// good as with a new one: from sweep to sweep friction bounds change little.
+/// The last factor of H = Ŝ + Σ w τ φ′ h hᵀ on some unknowns. It is reused as long as steps with it are nearly as good
+/// as with a new one: from sweep to sweep friction bounds change little.
 #[derive(Default)]
 pub(super) struct Factors {
     last: Option<(Vec<usize>, Cholesky)>,
@@ -61,8 +61,8 @@ pub(super) struct Factors {
 }
 
 impl Factors {
-    /// Has a factor on the free unknowns: true if it is a new one, for this state. None if H has no factor, or the observer
-    /// stops.
+    /// Makes sure that there is a factor on the free unknowns; true if a new one was made, for this state. None if H
+    /// has no factor, or the observer stops.
     pub(super) fn prepare(
         &mut self,
         system: &System<'_>,
@@ -82,7 +82,7 @@ impl Factors {
         Some(true)
     }
 
-    /// −H⁻¹ ∇J on the unknowns that it was prepared for, 0 on the others. `force`: ∇J.
+    /// The step −H⁻¹ ∇J on the unknowns that the factor is for, 0 on the others. `force`: ∇J.
     pub(super) fn direction(&self, force: &[f64]) -> Option<Vec<f64>> {
         let (free, factor) = self.last.as_ref()?;
         let mut moved: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
@@ -94,7 +94,7 @@ impl Factors {
         direction.iter().all(|d| d.is_finite()).then_some(direction)
     }
 
-    /// Gives the last factor up.
+    /// Discards the last factor.
     pub(super) fn renew(&mut self) {
         self.old = true;
     }
@@ -137,7 +137,7 @@ fn factor(
         let shift = if i == j { shift } else { 0.0 };
         system.stiffness.at(free[i], free[j]) + shift
     };
-    dense(free.len(), observe, |breaks| {
-        Cholesky::new(free.len(), elastic, &friction, room, breaks)
+    dense(free.len(), observe, |interrupt| {
+        Cholesky::new(free.len(), elastic, &friction, room, interrupt)
     })
 }

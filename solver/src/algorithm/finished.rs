@@ -1,9 +1,9 @@
-//! The end of an iteration: what every method returns, and what is kept of it.
+//! The end of the iterations: what every method returns.
 
+use crate::algorithm::recorder::{Cycle, Measured, Recorder};
 use crate::algorithm::rounding::{self, Rounding};
 use crate::algorithm::slides::Slide;
 use crate::algorithm::system::{State, System};
-use crate::algorithm::track::{Cycle, Measured, Track};
 use crate::problem::Algorithm;
 use crate::solution::{Iteration, Outcome, Residuals, Stage};
 
@@ -12,23 +12,23 @@ use crate::solution::{Iteration, Outcome, Residuals, Stage};
 pub struct Finished {
     /// The final state.
     pub state: State,
-    /// Ŝ v − f̂ of it.
+    /// The elastic force Ŝ v − f̂ of the final state.
     pub elastic_force: Vec<f64>,
-    /// The friction bound used for it, at every friction point.
+    /// The friction bound in the final state, at every friction point.
     pub bound: Vec<f64>,
-    /// σ_t at every friction point.
+    /// The tangential stress σ_t at every friction point.
     pub tractions: Vec<f64>,
-    /// The tractions are those of the thesis's own iteration, not those of the law at this state.
+    /// Whether the tractions are those of the thesis's own iteration, instead of those of the law in this state.
     pub own_tractions: bool,
     /// How it ended.
     pub outcome: Outcome,
     /// The stage that produced the final state.
     pub stage: Stage,
-    /// kkt, friction and monolithic; equilibrium is computed from the body.
+    /// The residuals kkt, friction and monolithic; equilibrium is computed from the body later.
     pub residuals: Residuals,
-    /// Last q = |Δτ_k|/|Δτ_{k−1}| of plain sweeps.
+    /// The last contraction q = |Δτ_k|/|Δτ_{k−1}| of sweeps that were not accelerated.
     pub contraction: Option<f64>,
-    /// All rows.
+    /// All iterations, a row each.
     pub history: Vec<Iteration>,
     /// Period and nodes of a cycle.
     pub cycle: Option<Cycle>,
@@ -38,22 +38,22 @@ pub struct Finished {
     pub rounding: Option<Rounding>,
 }
 
-/// Where a method ended.
+/// The end of one method: its best state and how it ended.
 pub(super) struct End {
     pub(super) measured: Measured,
     pub(super) stage: Stage,
     pub(super) outcome: Outcome,
     pub(super) cycle: Option<Cycle>,
-    /// Last q of sweeps that were not accelerated.
+    /// The last contraction q of sweeps that were not accelerated.
     pub(super) contraction: Option<f64>,
-    /// The limit of iterations is reached.
+    /// Whether the limit of iterations is reached.
     pub(super) exhausted: bool,
     /// Rounding keeps residuals above the tolerance.
     pub(super) rounding: Option<Rounding>,
 }
 
 impl End {
-    /// Without a cycle or a contraction, and with iterations left.
+    /// An end without a cycle or a contraction, and with iterations left.
     pub(super) fn new(measured: Measured, stage: Stage, outcome: Outcome) -> Self {
         End {
             measured,
@@ -66,9 +66,9 @@ impl End {
         }
     }
 
-    /// Where rounding is all that keeps the residuals above the tolerance, nothing more can be reached: this is converged,
-    /// or if rounding is not small, no method gets any further. What follows from it alone is no cycle and no
-    /// contraction.
+    /// Marks the end of a method where only rounding keeps the residuals above the tolerance. If rounding is small, the
+    /// state is converged; if it is not, no other method would get further. A cycle or a contraction is not reported
+    /// then, since rounding causes them.
     pub(super) fn settled(
         mut self,
         system: &System<'_>,
@@ -96,7 +96,7 @@ impl End {
         self
     }
 
-    /// A method that does not converge, and has no cycle, is reported with the cycle found by the other method.
+    /// Reports a method that did not converge and has no cycle with the cycle that the other method found.
     pub(super) fn with_cycle_of(mut self, other: &End) -> Self {
         if self.outcome == Outcome::NotConverged && other.cycle.is_some() {
             self.cycle.clone_from(&other.cycle);
@@ -105,7 +105,7 @@ impl End {
         self
     }
 
-    /// No other method is to be tried: it converged, or rounding, the observer or the limit ended it.
+    /// Whether no other method is to be tried: this one converged, or rounding, the observer or the limit ended it.
     pub(super) fn ended(&self) -> bool {
         matches!(self.outcome, Outcome::Converged | Outcome::Canceled)
             || self.exhausted
@@ -113,21 +113,27 @@ impl End {
     }
 }
 
-pub(super) fn finish(track: Track<'_, '_>, end: End) -> Finished {
-    let end = match track.controls.algorithm {
+pub(super) fn finish(recorder: Recorder<'_, '_>, end: End) -> Finished {
+    let end = match recorder.controls.algorithm {
         // stops by a test of its own
         Algorithm::Thesis => end,
-        _ => end.settled(track.system, track.controls.tolerance, &track.history),
+        _ => end.settled(
+            recorder.system,
+            recorder.controls.tolerance,
+            &recorder.history,
+        ),
     };
     let measured = end.measured;
     Finished {
-        tractions: track.system.tractions(&measured.state.v, &measured.bound),
+        tractions: recorder
+            .system
+            .tractions(&measured.state.v, &measured.bound),
         own_tractions: false,
         outcome: end.outcome,
         stage: end.stage,
         residuals: measured.residuals,
         contraction: end.contraction,
-        history: track.history,
+        history: recorder.history,
         cycle: end.cycle,
         slide: None,
         rounding: end.rounding,

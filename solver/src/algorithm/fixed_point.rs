@@ -6,39 +6,39 @@ use std::ops::ControlFlow;
 
 use crate::algorithm::convex::{Minimum, minimise_with};
 use crate::algorithm::finished::End;
+use crate::algorithm::recorder::{Measured, Recorder, Row};
 use crate::algorithm::rounding;
 use crate::algorithm::system::{State, System};
-use crate::algorithm::track::{Measured, Row, Track};
 use crate::elasticity::Dof;
 use crate::friction::Source;
 use crate::linear::least_squares;
 use crate::solution::{Observer, Outcome, Stage};
 
-/// q above which sweeps are accelerated.
+/// The contraction q above which sweeps are accelerated.
 const SLOW: f64 = 0.7;
 
-/// Sweeps that an acceleration uses.
+/// The number of sweeps that an acceleration uses.
 const DEPTH: usize = 5;
 
 /// Sweeps without progress after which another method is tried.
 const PATIENCE: usize = 15;
 
-/// A residual that is more than this part of the one before may be rounding.
+/// A residual above this part of the one before may consist of rounding.
 const STEADY: f64 = 0.5;
 
-/// Sweeps in a row with nothing but rounding left after which no better one is expected: each has tried several steps.
+/// Sweeps in a row that leave only rounding, after which no better one is expected: each has tried several steps.
 const SETTLED: u32 = 3;
 
 /// Solves one convex problem; its solution is measured and reported.
 pub(super) fn sweep(
-    track: &mut Track<'_, '_>,
+    recorder: &mut Recorder<'_, '_>,
     stage: Stage,
     bound: Vec<f64>,
     start: &State,
     observe: &mut Observer<'_>,
     contraction: impl FnOnce(&Measured) -> Option<f64>,
 ) -> (Measured, ControlFlow<()>) {
-    let tolerance = track.controls.tolerance;
+    let tolerance = recorder.controls.tolerance;
     let Minimum {
         state,
         elastic_force,
@@ -46,44 +46,46 @@ pub(super) fn sweep(
         residual,
         ..
     } = minimise_with(
-        track.system,
+        recorder.system,
         &bound,
         start,
         tolerance,
-        &mut track.factors,
+        &mut recorder.factors,
         observe,
     );
-    let measured = Measured::with_force(track.system, state, elastic_force, bound);
+    let measured = Measured::with_force(recorder.system, state, elastic_force, bound);
     let row = Row {
         stage,
         residual,
         contraction: contraction(&measured),
         inner: steps,
-        tractions: track.system.tractions(&measured.state.v, &measured.bound),
+        tractions: recorder
+            .system
+            .tractions(&measured.state.v, &measured.bound),
         own_r_f: None,
     };
-    let answer = track.record(&measured, row, observe);
+    let answer = recorder.record(&measured, row, observe);
     (measured, answer)
 }
 
-/// Sweeps from a state and the bound it implies until everything settles.
+/// Sweeps from a state and the bound it implies until state and bound no longer change.
 ///
-/// Converged means: contact set unchanged, and the kkt, friction and monolithic residuals at or
-/// below the tolerance (formulation 4.4).
+/// Converged means: contact set unchanged, and the kkt, friction and monolithic residuals at or below the tolerance
+/// (formulation 4.4).
 pub(super) fn run(
-    track: &mut Track<'_, '_>,
+    recorder: &mut Recorder<'_, '_>,
     start: Measured,
     give_up_early: bool,
     observe: &mut Observer<'_>,
 ) -> End {
     let given = |source: &Source| matches!(source, Source::Given(_));
-    let prescribed = track.system.points.iter().all(|p| given(&p.source));
+    let prescribed = recorder.system.points.iter().all(|p| given(&p.source));
     let stage = if prescribed {
         Stage::Inner
     } else {
         Stage::Outer
     };
-    let tolerance = track.controls.tolerance;
+    let tolerance = recorder.controls.tolerance;
     let mut swept = End::new(start, stage, Outcome::NotConverged);
     let mut best: Option<Measured> = None;
     let mut since_best = 0;
@@ -94,20 +96,21 @@ pub(super) fn run(
     let mut rounded: Option<(Measured, u32)> = None;
     let mut residual_before = f64::INFINITY;
     let mut next = swept.measured.implied_bound.clone();
-    for count in 0..track.controls.max_iterations {
+    for count in 0..recorder.controls.max_iterations {
         let before = change_before.filter(|_| !accelerated);
         let quotient = |m: &Measured| {
             let before = before.filter(|b| *b > 0.0 && m.bound_change > 0.0)?;
             Some(m.bound_change / before)
         };
         let start = swept.measured.state.clone();
-        let (measured, answer) = sweep(track, stage, next, &start, observe, quotient);
+        let (measured, answer) = sweep(recorder, stage, next, &start, observe, quotient);
         let q = quotient(&measured);
         swept.contraction = q.or(swept.contraction);
         let (change, friction) = (measured.bound_change, measured.residuals.friction);
-        let settled = count > 0 || !track.contact_changed || prescribed;
+        let settled = count > 0 || !recorder.contact_changed || prescribed;
         swept.measured = measured;
-        if settled && (!track.contact_changed || prescribed) && swept.measured.within(tolerance) {
+        if settled && (!recorder.contact_changed || prescribed) && swept.measured.within(tolerance)
+        {
             swept.outcome = Outcome::Converged;
             swept.cycle = None;
             return swept;
@@ -119,7 +122,7 @@ pub(super) fn run(
         // what still shrinks is not rounding
         let residual = swept.measured.residuals.monolithic;
         rounded = match residual > STEADY * residual_before {
-            true => nearer(rounded, &swept.measured, track.system, tolerance),
+            true => nearer(rounded, &swept.measured, recorder.system, tolerance),
             false => None,
         };
         residual_before = residual;
@@ -136,7 +139,7 @@ pub(super) fn run(
         } else {
             since_best += 1;
         }
-        if let Some(cycle) = track.note(&swept.measured.state, friction) {
+        if let Some(cycle) = recorder.note(&swept.measured.state, friction) {
             // an acceleration may still lead out of the cycle; if not, it is what is reported at the end
             swept.cycle = Some(cycle);
             if give_up_early && !accelerated {
@@ -161,7 +164,7 @@ pub(super) fn run(
         if give_up_early && accelerated && since_best >= PATIENCE {
             break;
         }
-        swept.exhausted = count + 1 == track.controls.max_iterations;
+        swept.exhausted = count + 1 == recorder.controls.max_iterations;
     }
     if swept.cycle.is_some() {
         swept.outcome = Outcome::ContactCycling;
@@ -174,7 +177,7 @@ pub(super) fn run(
     swept
 }
 
-/// The best of the sweeps in a row that have nothing but rounding left above the tolerance, and their number.
+/// Updates the best of the sweeps in a row that leave only rounding above the tolerance, and their number.
 fn nearer(
     before: Option<(Measured, u32)>,
     now: &Measured,
@@ -190,7 +193,7 @@ fn nearer(
     }
 }
 
-/// The last sweeps: the bounds tried, and the difference of each from the bound that it implied.
+/// The last sweeps: the bounds tried, and the difference between each and the bound that its pressure implied.
 #[derive(Default)]
 struct Memory {
     bounds: Vec<Vec<f64>>,
@@ -208,8 +211,8 @@ impl Memory {
             .push(implied.iter().zip(bound).map(|(a, b)| a - b).collect());
     }
 
-    /// Anderson's step: the combination of the last sweeps with the least defect, plus that defect.
-    /// A friction bound is never negative.
+    /// Anderson's step: the combination of the last sweeps with the smallest difference, plus that difference. A
+    /// friction bound is never negative.
     fn extrapolate(&self) -> Vec<f64> {
         let last = self.bounds.len() - 1;
         let (bound, defect) = (&self.bounds[last], &self.defects[last]);
@@ -237,7 +240,7 @@ impl Memory {
 
 /// The state with u_t at rest on the obstacle at every contact node with friction: every point
 /// sticks and acts with full stiffness.
-pub(super) fn stuck(system: &System<'_>, state: &State) -> State {
+pub(super) fn all_sticking(system: &System<'_>, state: &State) -> State {
     let mut state = state.clone();
     for patch in system.patches.iter().filter(|patch| patch.law.is_some()) {
         for node in &system.nodes[system.range(patch)] {

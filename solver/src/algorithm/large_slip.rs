@@ -1,15 +1,16 @@
-//! Whether a body slides farther than its contact is long. Gaps are those of the places before deformation: however far a
-//! body slides, its contact stays on the same material, which is then not where the obstacle is.
+//! A warning for bodies that slide farther than their contact is long. Gaps are evaluated at the places before
+//! deformation: however far a body slides, its contact stays on the same material, which is then no longer at the
+//! obstacle.
 
 use crate::algorithm::system::{Patch, System};
 use crate::error::rounded;
 use crate::problem::Condition;
 use crate::solution::{Warning, WarningCode};
 
-/// Slip in lengths of the contact above which no point that touches would still do so.
+/// The slip, in lengths of the contact, above which no point that touches would still touch.
 const LARGE_SLIP: f64 = 1.0;
 
-/// A piece of contact: how far the body slides along the obstacle there, the mean over the pressure, and its length.
+/// A piece of contact: its mean slip along the obstacle, weighted by the pressure, and its length.
 struct Sliding {
     slip: f64,
     length: f64,
@@ -21,7 +22,7 @@ impl Sliding {
     }
 }
 
-/// Warns once, of the piece of contact that slides by most of its lengths; true if it does.
+/// Warns once, about the piece of contact that slides farthest in relation to its length; true if it does.
 pub(super) fn warn_of_large_slip(
     system: &System<'_>,
     v: &[f64],
@@ -41,7 +42,7 @@ pub(super) fn warn_of_large_slip(
         code: WarningCode::LargeSlip,
         pointer: patch.contact.pointer.clone(),
         message: format!(
-            "Where it touches, the body slides along the obstacle by {:?} on average, and the contact is {:?} long: in linear kinematics it stays on the material that touched at first. Slide by less, or place the obstacle where it ends and press there.",
+            "The body slides along the obstacle by {:?} on average where it touches, and the contact is only {:?} long. In linear kinematics the contact stays on the material that touched at first. Slide less far, or place the obstacle in its final position and press there.",
             rounded(piece.slip.abs()),
             rounded(piece.length)
         ),
@@ -49,8 +50,8 @@ pub(super) fn warn_of_large_slip(
     true
 }
 
-/// The pieces of a contact that can slide as a whole, and matter: not one that ends on a line of symmetry, and not along
-/// a straight obstacle without ends.
+/// The pieces of a contact that can slide as a whole and matter: a piece that ends on a line of symmetry is not one,
+/// nor is one along a straight obstacle without ends.
 fn pieces<'a>(
     system: &'a System<'_>,
     patch: &'a Patch<'_>,

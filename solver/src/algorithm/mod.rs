@@ -1,7 +1,7 @@
 //! Contact and friction on the condensed system, docs/formulation.md section 4.
 //!
-//! Algorithms are functions from a [`System`] to its final state, and show each iteration to the
-//! observer. [`run`] chooses among them.
+//! Algorithms are functions from a [`System`] to its final state, and show each iteration to the observer. [`run`]
+//! chooses among them.
 //!
 //! # Where to look
 //!
@@ -12,10 +12,10 @@
 //! | methods: sweeps over the friction bound | `fixed_point` |
 //! | methods: Newton's | `newton` |
 //! | methods: the convex problem for a given bound | `convex` |
-//! | the nodes that may touch | `near` |
+//! | the nodes that may touch | `may_touch` |
 //! | factors that are used again | `factors` |
-//! | a start from a neighbour's solution | `settle` |
-//! | what every method records and returns | `track`, `finished` |
+//! | a start from a neighbour's solution | `neighbour` |
+//! | what every method records and returns | `recorder`, `finished` |
 //! | what rounding leaves of residuals | `rounding` |
 //! | a second solution: uniqueness, twice the increments | `uniqueness` |
 //! | from the final state to the result | `report` |
@@ -31,30 +31,30 @@ mod factors;
 mod finished;
 mod fixed_point;
 mod large_slip;
-mod near;
+mod may_touch;
+mod neighbour;
 mod newton;
 mod profile;
+mod recorder;
 mod report;
 mod rounding;
-mod settle;
 mod slides;
 mod small_strain;
 mod system;
 mod thesis;
-mod track;
 mod uniqueness;
 
 pub use adjoint::{Gradient, influences};
 pub use convex::{Minimum, minimise};
 pub use corners::{better, closed_on_axis, open_on_axis, touched_by_both};
 pub use finished::Finished;
-pub use near::{Extent, Region, run_near, settle_near};
+pub use may_touch::{Extent, Region, follow_neighbour, run_reduced};
 pub use profile::{DisplacedNode, Estimable, Missed, Quantity};
+pub use recorder::{Cycle, Place};
 pub use report::{Reported, numbers, quantities, report};
 pub use rounding::Rounding;
 pub use slides::Slide;
 pub use system::{Averages, ContactNode, Patch, Path, Point, State, System};
-pub use track::{Cycle, Place};
 pub use uniqueness::{
     EndForces, note_doubled_increments, note_uniqueness, other_solution, rounding_of_forces,
     warn_of_increments,
@@ -65,8 +65,8 @@ use std::ops::ControlFlow;
 use crate::problem::{Algorithm, SolverControls};
 use crate::solution::{Observer, Outcome, Progress, Stage};
 use finished::{End, finish};
-use fixed_point::{stuck, sweep};
-use track::{Measured, Row, Track};
+use fixed_point::{all_sticking, sweep};
+use recorder::{Measured, Recorder, Row};
 
 /// Newton steps before giving up.
 const NEWTON_STEPS: u32 = 60;
@@ -83,7 +83,7 @@ pub fn run(
     if system.semidefinite
         && let Some(slide) = slides::certain(system)
     {
-        return away(Track::new(system, controls, place), slide, observe);
+        return away(Recorder::new(system, controls, place), slide, observe);
     }
     let finished = iterate(system, controls, place, before, observe);
     let slide = match finished.outcome {
@@ -94,26 +94,28 @@ pub fn run(
     Finished { slide, ..finished }
 }
 
-/// The end of a body that slides away: the bonded state with all the friction that its pressure allows.
-fn away(mut track: Track<'_, '_>, slide: Slide, observe: &mut Observer<'_>) -> Finished {
-    let (bonded, answer) = bonded_state(track.system, track.controls, observe);
-    let measured = slides::slid(track.system, bonded, &slide);
+/// The end for a body that slides away: the bonded state with all the friction that its pressure permits.
+fn away(mut recorder: Recorder<'_, '_>, slide: Slide, observe: &mut Observer<'_>) -> Finished {
+    let (bonded, answer) = bonded_state(recorder.system, recorder.controls, observe);
+    let measured = slides::slid(recorder.system, bonded, &slide);
     let row = Row {
         stage: Stage::Bonded,
         residual: measured.residuals.kkt,
         contraction: None,
         inner: 0,
-        tractions: track.system.tractions(&measured.state.v, &measured.bound),
+        tractions: recorder
+            .system
+            .tractions(&measured.state.v, &measured.bound),
         own_r_f: None,
     };
-    let answers = [answer, track.record(&measured, row, observe)];
+    let answers = [answer, recorder.record(&measured, row, observe)];
     let outcome = match answers.iter().any(ControlFlow::is_break) {
         true => Outcome::Canceled,
         false => Outcome::NotConverged,
     };
     Finished {
         slide: Some(slide),
-        ..finish(track, End::new(measured, Stage::Bonded, outcome))
+        ..finish(recorder, End::new(measured, Stage::Bonded, outcome))
     }
 }
 
@@ -124,16 +126,16 @@ fn iterate(
     before: Option<&Finished>,
     observe: &mut Observer<'_>,
 ) -> Finished {
-    let mut track = Track::new(system, controls, place);
+    let mut recorder = Recorder::new(system, controls, place);
     if controls.algorithm == Algorithm::Thesis {
-        let (end, tractions) = thesis::run(&mut track, observe);
+        let (end, tractions) = thesis::run(&mut recorder, observe);
         return Finished {
             tractions,
             own_tractions: true,
-            ..finish(track, end)
+            ..finish(recorder, end)
         };
     }
-    let (start, answer) = start(&mut track, before, observe);
+    let (start, answer) = start(&mut recorder, before, observe);
     // without friction, or if friction never acts, the first solution is final
     let solved = start.within(controls.tolerance) && before.is_none();
     if system.points.is_empty() || solved || answer.is_break() {
@@ -142,24 +144,24 @@ fn iterate(
             ControlFlow::Break(()) => Outcome::Canceled,
             ControlFlow::Continue(()) => Outcome::NotConverged,
         };
-        return finish(track, End::new(start, Stage::Frictionless, outcome));
+        return finish(recorder, End::new(start, Stage::Frictionless, outcome));
     }
     let end = match controls.algorithm {
-        Algorithm::FixedPoint => fixed_point::run(&mut track, start, false, observe),
-        Algorithm::Newton => newton::run(&mut track, &start, controls.max_iterations, observe),
-        Algorithm::Auto | Algorithm::Thesis => return auto(track, start, observe),
+        Algorithm::FixedPoint => fixed_point::run(&mut recorder, start, false, observe),
+        Algorithm::Newton => newton::run(&mut recorder, &start, controls.max_iterations, observe),
+        Algorithm::Auto | Algorithm::Thesis => return auto(recorder, start, observe),
     };
-    finish(track, end)
+    finish(recorder, end)
 }
 
 /// The state that friction starts from: that of the previous increment; else the frictionless
 /// solution with u_t = d (friction pulls with full stiffness at first).
 fn start(
-    track: &mut Track<'_, '_>,
+    recorder: &mut Recorder<'_, '_>,
     before: Option<&Finished>,
     observe: &mut Observer<'_>,
 ) -> (Measured, ControlFlow<()>) {
-    let system = track.system;
+    let system = recorder.system;
     if let (Some(before), false) = (before, system.points.is_empty()) {
         let (state, bound) = (before.state.clone(), before.bound.clone());
         // its reactions are not valid at the new level; its friction bound is a good guess
@@ -172,33 +174,33 @@ fn start(
     let none = vec![0.0; system.points.len()];
     let rest = before.map_or_else(|| system.rest(), |before| before.state.clone());
     let stage = Stage::Frictionless;
-    let (mut measured, answer) = sweep(track, stage, none, &rest, observe, |_| None);
-    let solved = measured.within(track.controls.tolerance);
+    let (mut measured, answer) = sweep(recorder, stage, none, &rest, observe, |_| None);
+    let solved = measured.within(recorder.controls.tolerance);
     if system.points.is_empty() || solved || answer.is_break() {
         return (measured, answer);
     }
-    let tolerance = track.controls.tolerance;
+    let tolerance = recorder.controls.tolerance;
     let rounded = || rounding::limit(system, &measured, tolerance).is_some();
     if system.semidefinite && measured.residuals.kkt > tolerance && !rounded() {
         // only friction holds this body: without it, it slides away
-        let (bonded, answer) = bonded_state(system, track.controls, observe);
+        let (bonded, answer) = bonded_state(system, recorder.controls, observe);
         return (bonded, answer);
     }
-    measured.state = stuck(system, &measured.state);
+    measured.state = all_sticking(system, &measured.state);
     measured.elastic_force = system.elastic_force(&measured.state.v);
     (measured, answer)
 }
 
-/// The state with u_t = d throughout, and the friction bound that it implies.
+/// The bonded state, u_t = d throughout, and the friction bound that it implies.
 fn bonded_state(
     system: &System<'_>,
     controls: &SolverControls,
     observe: &mut Observer<'_>,
 ) -> (Measured, ControlFlow<()>) {
     let bonded = system.bonded();
-    let mut track = Track::new(&bonded, controls, Place::default());
+    let mut recorder = Recorder::new(&bonded, controls, Place::default());
     let (found, answer) = sweep(
-        &mut track,
+        &mut recorder,
         Stage::Bonded,
         Vec::new(),
         &bonded.rest(),
@@ -209,7 +211,8 @@ fn bonded_state(
     (Measured::new(system, found.state, none), answer)
 }
 
-/// Passes iterations on as pulses and nothing else: the observer may stop a solution that it is not shown.
+/// An observer that sees iterations as plain signs of work: it may stop a solution whose iterations are not shown to
+/// it.
 pub fn quiet(observe: &mut Observer<'_>) -> impl FnMut(Progress<'_>) -> ControlFlow<()> {
     |progress| match progress {
         Progress::Iteration(_) | Progress::Pulse => observe(Progress::Pulse),
@@ -222,18 +225,18 @@ pub fn quiet(observe: &mut Observer<'_>) -> impl FnMut(Progress<'_>) -> ControlF
 
 /// Sweeps; where they do not converge, Newton's method from the best sweep; where that fails too, both
 /// again from the bonded state: beyond a fold the free branch ends, and only a jammed state exists.
-fn auto(mut track: Track<'_, '_>, start: Measured, observe: &mut Observer<'_>) -> Finished {
-    let first = both(&mut track, start, observe);
+fn auto(mut recorder: Recorder<'_, '_>, start: Measured, observe: &mut Observer<'_>) -> Finished {
+    let first = both(&mut recorder, start, observe);
     if first.ended() {
-        return finish(track, first);
+        return finish(recorder, first);
     }
-    let (bonded, answer) = bonded_state(track.system, track.controls, observe);
+    let (bonded, answer) = bonded_state(recorder.system, recorder.controls, observe);
     if answer.is_break() {
         let outcome = Outcome::Canceled;
-        return finish(track, End { outcome, ..first });
+        return finish(recorder, End { outcome, ..first });
     }
-    track.forget();
-    let second = both(&mut track, bonded, observe);
+    recorder.forget();
+    let second = both(&mut recorder, bonded, observe);
     let nearer = second.outcome == Outcome::Converged
         || second.rounding.is_some()
         || second.outcome == Outcome::Canceled
@@ -243,20 +246,20 @@ fn auto(mut track: Track<'_, '_>, start: Measured, observe: &mut Observer<'_>) -
     } else {
         (first, second)
     };
-    finish(track, nearest.with_cycle_of(&other))
+    finish(recorder, nearest.with_cycle_of(&other))
 }
 
 /// Sweeps, then Newton's method from the best of them.
-fn both(track: &mut Track<'_, '_>, start: Measured, observe: &mut Observer<'_>) -> End {
-    let (system, tolerance) = (track.system, track.controls.tolerance);
-    let swept = fixed_point::run(track, start, true, observe);
-    let swept = swept.settled(system, tolerance, &track.history);
+fn both(recorder: &mut Recorder<'_, '_>, start: Measured, observe: &mut Observer<'_>) -> End {
+    let (system, tolerance) = (recorder.system, recorder.controls.tolerance);
+    let swept = fixed_point::run(recorder, start, true, observe);
+    let swept = swept.settled(system, tolerance, &recorder.history);
     if swept.ended() {
         return swept;
     }
-    track.forget();
-    let newton = newton::run(track, &swept.measured, NEWTON_STEPS, observe);
-    let newton = newton.settled(system, tolerance, &track.history);
+    recorder.forget();
+    let newton = newton::run(recorder, &swept.measured, NEWTON_STEPS, observe);
+    let newton = newton.settled(system, tolerance, &recorder.history);
     let nearer = newton.outcome == Outcome::Converged
         || newton.rounding.is_some()
         || newton.outcome == Outcome::Canceled

@@ -1,5 +1,5 @@
-//! One monolithic semi-smooth Newton iteration for contact, friction and averaging together,
-//! formulation 4.3. The friction bound is a function of the displacements here,
+//! One monolithic semi-smooth Newton iteration for contact, friction and averaging together, formulation 4.3. The
+//! friction bound is a function of the displacements here,
 //!
 //!   τ(v) = bound(W p),   p = P R,   R = f̂_n − Ŝ_n v on active nodes,
 //!
@@ -7,18 +7,18 @@
 //!
 //!   H = Ŝ + Σ_g w τ φ′ h hᵀ − Σ_g w φ τ′ h (W P Ŝ_n)_g
 //!
-//! Not symmetric. A step that does not reduce the residual is shortened to the least energy along it, with
-//! the friction bound before it; there is no other safeguard. Where it converges it takes four
-//! to twenty steps.
+//! Not symmetric. A step that does not reduce the residual is shortened to the smallest energy along it, for the
+//! friction bound before the step; there is no other safeguard. Where the iteration converges it takes four to twenty
+//! steps.
 
 use crate::algorithm::convex::{close, least_along, update_active};
 use crate::algorithm::factors::{dense, free_dofs, semidefinite_shift};
 use crate::algorithm::finished::End;
+use crate::algorithm::recorder::{Measured, Recorder, Row};
 use crate::algorithm::rounding;
 use crate::algorithm::system::{Point, State, System};
-use crate::algorithm::track::{Measured, Row, Track};
 use crate::elasticity::Dof;
-use crate::linear::{Breaks, Dense, General, Unsolved};
+use crate::linear::{Dense, General, Interrupt, Unsolved};
 use crate::solution::{Observer, Outcome, Progress, Stage};
 
 /// Steps without progress after which the method gives up.
@@ -26,13 +26,13 @@ const PATIENCE: u32 = 20;
 
 /// Iterates from a state; returns the best state reached.
 pub(super) fn run(
-    track: &mut Track<'_, '_>,
+    recorder: &mut Recorder<'_, '_>,
     start: &Measured,
     most_steps: u32,
     observe: &mut Observer<'_>,
 ) -> End {
-    let system = track.system;
-    let tolerance = track.controls.tolerance;
+    let system = recorder.system;
+    let tolerance = recorder.controls.tolerance;
     let mut end = End::new(start.clone(), Stage::Newton, Outcome::NotConverged);
     let mut state = start.state.clone();
     let (mut best, mut residual_before) = (f64::INFINITY, f64::INFINITY);
@@ -56,7 +56,7 @@ pub(super) fn run(
             tractions: system.tractions(&measured.state.v, &measured.bound),
             own_r_f: None,
         };
-        let answer = track.record(&measured, row, observe);
+        let answer = recorder.record(&measured, row, observe);
         let converged = !changed && measured.within(tolerance);
         since_best += 1;
         if residual < 0.9 * best || converged {
@@ -79,7 +79,7 @@ pub(super) fn run(
             end.outcome = Outcome::Converged;
             return end;
         }
-        end.cycle = track.note(&state, residual);
+        end.cycle = recorder.note(&state, residual);
         if end.cycle.is_some() {
             end.outcome = Outcome::ContactCycling;
             return end;
@@ -91,8 +91,8 @@ pub(super) fn run(
     end
 }
 
-/// The state after a step: the whole step if it reduces the residual, else the part of it with the least
-/// energy; and whether the contact set changed.
+/// The state after a step, the whole step if it reduces the residual, else the part of it with the smallest energy; and
+/// whether the contact set changed.
 fn next(
     system: &System<'_>,
     state: &State,
@@ -141,7 +141,7 @@ fn step(system: &System<'_>, state: &State, observe: &mut Observer<'_>) -> Optio
         0.0
     };
     let rhs: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
-    let delta = dense(free.len(), observe, |breaks| {
+    let delta = dense(free.len(), observe, |interrupt| {
         let h = jacobian(
             system,
             state,
@@ -149,16 +149,16 @@ fn step(system: &System<'_>, state: &State, observe: &mut Observer<'_>) -> Optio
             &free,
             &place,
             shift,
-            breaks,
+            interrupt,
         )?;
-        h.solve(&rhs, breaks)
+        h.solve(&rhs, interrupt)
     })?;
     let mut v = state.v.clone();
     free.iter().zip(&delta).for_each(|(&dof, d)| v[dof] += d);
     Some(v)
 }
 
-/// H on the free unknowns; `place`: where each of all unknowns is among them.
+/// H on the free unknowns. `place`: for each unknown, its position among the free ones.
 pub(super) fn jacobian(
     system: &System<'_>,
     state: &State,
@@ -166,17 +166,17 @@ pub(super) fn jacobian(
     free: &[usize],
     place: &[usize],
     shift: f64,
-    breaks: &mut Breaks<'_>,
+    interrupt: &mut Interrupt<'_>,
 ) -> Result<General, Unsolved> {
     let n = free.len();
     let bytes = Dense::bytes(n);
-    let mut h = General::try_zero(n, breaks)?.ok_or(Unsolved::TooLarge { bytes })?;
+    let mut h = General::try_zero(n, interrupt)?.ok_or(Unsolved::TooLarge { bytes })?;
     for (j, &dof) in free.iter().enumerate() {
         let (column, elastic) = (h.column_mut(j), system.stiffness.column(dof));
         let entries = column.iter_mut().zip(free);
         entries.for_each(|(entry, &i)| *entry = elastic[i]);
         column[j] += shift;
-        breaks.after(n as f64)?;
+        interrupt.worked(n as f64)?;
     }
     for (point, tau) in system.points.iter().zip(bound) {
         let (law, slip) = (system.law(point), system.slip(&state.v, point));
@@ -207,7 +207,7 @@ pub(super) fn jacobian(
                 let h = h.column_mut(k);
                 rows.iter().for_each(|&(row, a)| h[row] -= a * value);
             }
-            breaks.after(10.0 * n as f64)?; // each to another column: far slower than a sum
+            interrupt.worked(10.0 * n as f64)?; // each to another column: far slower than a sum
         }
     }
     Ok(h)

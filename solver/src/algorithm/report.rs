@@ -12,29 +12,29 @@ use crate::algorithm::system::System;
 use crate::body::ElasticBody;
 use crate::elasticity::{Dof, Recovered, StressDifference, recover};
 use crate::error::SolveError;
-use crate::linear::{Breaks, Stopped};
+use crate::linear::{Interrupt, Stopped};
 use crate::model::{Hold, Model};
 use crate::solution::{
     ContactProfile, ContactSummary, Fields, GaussFields, NodeState, Observer, Outcome, Phase,
     Progress, Residuals, Summary, Warning, WarningCode, at_all_points,
 };
 
-/// Forces with a larger imbalance than this have lost half of their digits: the result is not reliable.
+/// Forces with a larger relative imbalance than this have lost half of their digits: the result is not reliable.
 const OUT_OF_BALANCE: f64 = 1e-7;
 
-/// The same where a material is nearly incompressible: its bulk modulus multiplies the rounding of displacements, and
-/// long thin elements do so again. Forces are still known to six digits.
+/// The largest imbalance where a material is nearly incompressible: its bulk modulus multiplies the rounding of
+/// displacements, and long thin elements do so again. Forces are still known to six digits.
 const OUT_OF_BALANCE_INCOMPRESSIBLE: f64 = 1e-6;
 
-/// Forces count as more than rounding when they exceed this part of modulus × displacement × depth, and of the problem's
-/// own force: what is at rest again may have borne that.
+/// Forces count as more than rounding when they exceed this part of modulus × displacement × depth, and of the
+/// problem's own force, which a body that is at rest again may have borne.
 const FORCE_FLOOR: f64 = 1e-6;
 
-/// How often the observer is asked on after it has said to stop, until a state is given up: a stopped solution has its last
-/// state if that is little work, and otherwise none.
+/// How many calls of the observer may still answer "stop" before a state is given up. A stopped solution has its last
+/// state if computing the results is little work, else none.
 const PATIENCE: u32 = 6;
 
-/// q above which the sweeps barely contract.
+/// The contraction q above which the sweeps barely converge.
 const SLOW_CONTRACTION: f64 = 0.9;
 
 /// The results of a final state.
@@ -43,9 +43,9 @@ pub struct Reported {
     pub summary: Summary,
     /// Columns along each contact boundary, by its name, at all points.
     pub profiles: BTreeMap<String, ContactProfile>,
-    /// The same at the nodes.
+    /// Columns at the nodes, by contact boundary.
     pub node_profiles: BTreeMap<String, ContactProfile>,
-    /// The same where friction acts.
+    /// Columns at the points where friction acts, by contact boundary.
     pub friction_profiles: BTreeMap<String, ContactProfile>,
     /// Displacements and stresses.
     pub fields: Fields,
@@ -53,14 +53,14 @@ pub struct Reported {
     pub quantities: Vec<Quantity>,
     /// Places between the nodes at which the obstacle reaches into the body, of all contacts: where a mesh needs nodes.
     pub missed: Vec<Missed>,
-    /// What obstacles that were pushed along a direction are beside the linear ones, at all contact nodes.
+    /// The displaced obstacles compared with the linear ones, at all contact nodes, where obstacles were pushed along a
+    /// direction.
     pub displaced: Vec<DisplacedNode>,
-    /// What recovered stresses differ by from those of the elements.
+    /// The difference between recovered stresses and those of the elements.
     pub difference: StressDifference,
 }
 
-/// The numbers of the contacts of a final state, by their names, and what to consider before relying on them: what is known
-/// without the displacements of the whole body.
+/// The results of a final state that need no displacements inside the body: numbers by contact, and warnings.
 pub fn numbers(
     model: &Model,
     system: &System<'_>,
@@ -70,16 +70,16 @@ pub fn numbers(
     let forces = Forces::new(system, finished);
     let mut ask = || observe(Progress::Pulse);
     let questions = Questions::new(&mut ask);
-    let go_on = &|work: f64| questions.after(work).is_ok();
+    let go_on = &|work: f64| questions.worked(work).is_ok();
     let mut warnings = model.warnings.clone();
     let mut contacts = BTreeMap::new();
     for (p, patch) in system.patches.iter().enumerate() {
-        questions.after(work_of_contact(system))?;
+        questions.worked(work_of_contact(system))?;
         let view = PatchView::new(system, p, finished, &forces, go_on);
         view.warn(&mut warnings);
         contacts.insert(patch.contact.name.clone(), view.summary());
     }
-    questions.after(0.0)?;
+    questions.worked(0.0)?;
     warn_of_iteration(finished, &mut warnings);
     warn_of_rounding(model, finished, &mut warnings);
     if finished.slide.is_none() {
@@ -89,7 +89,8 @@ pub fn numbers(
     Ok((contacts, warnings))
 }
 
-/// The forces, peaks and extents of a final state, without the displacements of the whole body; none if the observer stops.
+/// The quantities with stated errors (forces, peaks and extents) in a final state, without the displacements inside the
+/// body. None if the observer stops.
 pub fn quantities(
     system: &System<'_>,
     finished: &Finished,
@@ -98,35 +99,36 @@ pub fn quantities(
     let forces = Forces::new(system, finished);
     let mut ask = || observe(Progress::Pulse);
     let questions = Questions::new(&mut ask);
-    let go_on = &|work: f64| questions.after(work).is_ok();
+    let go_on = &|work: f64| questions.worked(work).is_ok();
     let mut found = Vec::new();
     for p in 0..system.patches.len() {
         let view = PatchView::new(system, p, finished, &forces, go_on);
         found.extend(view.quantities());
-        if questions.after(work_of_contact(system)).is_err() {
+        if questions.worked(work_of_contact(system)).is_err() {
             return Vec::new();
         }
     }
     found
 }
 
-/// [`Breaks`] for many who look at one state, and who are not stopped themselves: what they find then is not used.
+/// One observer shared by many functions that read a state. They are not interrupted themselves; after a stop their
+/// results are discarded.
 struct Questions<'a> {
-    breaks: RefCell<Breaks<'a>>,
+    interrupt: RefCell<Interrupt<'a>>,
     stopped: Cell<bool>,
 }
 
 impl<'a> Questions<'a> {
     fn new(ask: &'a mut dyn FnMut() -> ControlFlow<()>) -> Self {
         Questions {
-            breaks: RefCell::new(Breaks::new(ask)),
+            interrupt: RefCell::new(Interrupt::new(ask)),
             stopped: Cell::new(false),
         }
     }
 
-    /// As [`Breaks::after`]; after one stop always that.
-    fn after(&self, work: f64) -> Result<(), Stopped> {
-        if self.stopped.get() || self.breaks.borrow_mut().after(work).is_err() {
+    /// As [`Interrupt::worked`]; after one stop it stops always.
+    fn worked(&self, work: f64) -> Result<(), Stopped> {
+        if self.stopped.get() || self.interrupt.borrow_mut().worked(work).is_err() {
             self.stopped.set(true);
             return Err(Stopped);
         }
@@ -134,15 +136,15 @@ impl<'a> Questions<'a> {
     }
 }
 
-/// What one contact takes beside its averages, in multiplications.
+/// The work for one contact apart from its averages, in multiplications.
 fn work_of_contact(system: &System<'_>) -> f64 {
-    /// For every node and friction point of all contacts.
+    /// The work for each node and friction point of all contacts.
     const WORK: usize = 100;
     (WORK * (system.nodes.len() + system.points.len())) as f64
 }
 
-/// The results of a final state: forces, extents, profiles, fields and warnings. [`SolveError::Stopped`] if the observer
-/// stops, and goes on to for a while.
+/// The results of a final state: forces, extents, profiles, fields and warnings. [`SolveError::Stopped`] if the
+/// observer stops and still does at the next calls.
 pub fn report(
     model: &Model,
     body: &ElasticBody,
@@ -159,7 +161,7 @@ pub fn report(
         answer => answer,
     };
     let questions = Questions::new(&mut ask);
-    let go_on = &|work: f64| questions.after(work).is_ok();
+    let go_on = &|work: f64| questions.worked(work).is_ok();
     let v = &finished.state.v;
     if system.semidefinite && finished.outcome != Outcome::Canceled {
         held(model, system, finished)?;
@@ -170,10 +172,10 @@ pub fn report(
     let elements = body.elements(model);
     let body_force = model.body_force(&system.level);
     let (recovered, difference, errors) = {
-        let breaks = &mut *questions.breaks.borrow_mut();
-        let recovered = recover(elements, &displacements, body_force, breaks)?;
-        let difference = StressDifference::new(elements, &recovered, breaks)?;
-        let errors = difference.norms(elements, breaks)?;
+        let interrupt = &mut *questions.interrupt.borrow_mut();
+        let recovered = recover(elements, &displacements, body_force, interrupt)?;
+        let difference = StressDifference::new(elements, &recovered, interrupt)?;
+        let errors = difference.norms(elements, interrupt)?;
         (recovered, difference, errors)
     };
     let (mut quantities, mut missed, mut displaced) = (Vec::new(), Vec::new(), Vec::new());
@@ -184,7 +186,7 @@ pub fn report(
     let (mut contacts, mut profiles) = (BTreeMap::new(), BTreeMap::new());
     let (mut node_profiles, mut friction_profiles) = (BTreeMap::new(), BTreeMap::new());
     for (p, patch) in system.patches.iter().enumerate() {
-        questions.after(work_of_contact(system))?;
+        questions.worked(work_of_contact(system))?;
         let view = PatchView::new(system, p, finished, &forces, go_on);
         let summary = view.summary();
         view.warn(&mut warnings);
@@ -207,7 +209,7 @@ pub fn report(
         friction_profiles.insert(name.clone(), friction);
         contacts.insert(name.clone(), summary);
     }
-    questions.after(0.0)?;
+    questions.worked(0.0)?;
     warn_of_iteration(finished, &mut warnings);
     warn_of_rounding(model, finished, &mut warnings);
     // how far a body that slides away has come means nothing
@@ -323,7 +325,7 @@ pub fn report(
     })
 }
 
-/// Checks that the contacts of the final state, with their friction, hold what the supports do not.
+/// Checks that the contacts of the final state, with their friction, prevent the motions that the supports do not.
 fn held(model: &Model, system: &System<'_>, finished: &Finished) -> Result<(), SolveError> {
     let mut hindered = Vec::new();
     for patch in &system.patches {
@@ -353,7 +355,7 @@ fn held(model: &Model, system: &System<'_>, finished: &Finished) -> Result<(), S
     }
 }
 
-/// Force on every contact unknown: the obstacle's reaction −R along n, friction and the reaction of bonded nodes
+/// The force on every contact unknown: the obstacle's reaction −R along n; friction and the reaction of bonded nodes
 /// along t.
 fn contact_force(system: &System<'_>, finished: &Finished, forces: &Forces) -> Vec<f64> {
     let mut friction = vec![0.0; finished.state.v.len()];
@@ -370,7 +372,7 @@ fn contact_force(system: &System<'_>, finished: &Finished, forces: &Forces) -> V
     force
 }
 
-/// ∫τψ of (1.21), without 2π.
+/// The energy of friction, ∫τψ of thesis (1.21), without 2π.
 fn friction_energy(system: &System<'_>, finished: &Finished) -> f64 {
     let points = system.points.iter().zip(&finished.bound);
     let energy = points.map(|(point, tau)| {
@@ -380,9 +382,9 @@ fn friction_energy(system: &System<'_>, finished: &Finished) -> f64 {
     energy.sum()
 }
 
-/// |Σ forces| / Σ|forces| over loads, contact, friction and the supports' reactions, the last
-/// taken from the stresses in the body. In axisymmetry only the axial sum is a balance. Forces below `floor` are what
-/// rounding has left of larger ones.
+/// The imbalance |Σ forces| / Σ|forces| of loads, contact, friction and the supports' reactions, the last computed from
+/// the stresses in the body. In axisymmetry only the axial sum is a balance. Forces below `floor` are rounding of
+/// larger ones.
 fn equilibrium(
     model: &Model,
     body: &ElasticBody,
@@ -517,7 +519,7 @@ fn warn_of_iteration(finished: &Finished, warnings: &mut Vec<Warning>) {
         warn(
             WarningCode::FalseConvergence,
             format!(
-                "The thesis's iteration meets its own test, R_F, but does not solve the problem: the true residual is {:.1e}. Choose \"algorithm\": \"auto\".",
+                "The thesis's iteration meets its own criterion, R_F, but does not solve the problem: the true residual is {:.1e}. Choose \"algorithm\": \"auto\".",
                 finished.residuals.monolithic
             ),
         );
@@ -533,7 +535,7 @@ fn warn_of_iteration(finished: &Finished, warnings: &mut Vec<Warning>) {
     }
 }
 
-/// Two digits that are not below the number: what exceeds a limit is seen to exceed it.
+/// A number to two digits, rounded up, so that a number above a limit is also shown above it.
 fn rounded_up(value: f64) -> String {
     let nearest = format!("{value:.1e}");
     match nearest.parse::<f64>() {
@@ -542,7 +544,7 @@ fn rounded_up(value: f64) -> String {
     }
 }
 
-/// Says where rounding keeps residuals above the tolerance, and what would lower them.
+/// Warns where rounding keeps residuals above the tolerance, and says what would lower them.
 fn warn_of_rounding(model: &Model, finished: &Finished, warnings: &mut Vec<Warning>) {
     let Some(rounding) = finished.rounding else {
         return;
@@ -553,7 +555,7 @@ fn warn_of_rounding(model: &Model, finished: &Finished, warnings: &mut Vec<Warni
         Some((slip.displacement, contact, contact.friction.as_ref()?))
     });
     let mut message = format!(
-        "A residual of {} remains, above the tolerance of {tolerance:.1e}. It is rounding, which may leave up to {floor:.1e} here: ",
+        "A residual of {} remains, above the tolerance of {tolerance:.1e}. It is due to rounding, which may leave up to {floor:.1e} here: ",
         rounded_up(rounding.residual)
     );
     let pointer = match slip {
@@ -564,16 +566,16 @@ fn warn_of_rounding(model: &Model, finished: &Finished, warnings: &mut Vec<Warni
                 displacement / slip
             );
             if !rounding.negligible() {
-                message += " Rounding may decide what sticks and what slips: this does not count as converged.";
+                message += " Rounding may decide what sticks and what slips, so this does not count as converged.";
             }
             message += &format!(
-                " Raise elastic_slip, to {:.1e} for this tolerance (less may do), or let the obstacle move less far.",
+                " Raise elastic_slip to {:.1e} for this tolerance (less may be enough), or move the obstacle less far.",
                 slip * floor / tolerance
             );
             format!("{}/friction/elastic_slip", contact.pointer)
         }
         None => {
-            message += "displacements are large beside those that strain the body. Prescribe supports and obstacles relative to one another, or raise the tolerance.";
+            message += "the displacements are large compared with those that strain the body. Prescribe supports and obstacles relative to one another, or raise the tolerance.";
             "/solver/tolerance".to_owned()
         }
     };

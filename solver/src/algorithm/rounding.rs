@@ -1,23 +1,24 @@
-//! What rounding leaves of the residuals, formulation 4.4: no iteration gets below it.
+//! The smallest residuals that rounding permits, formulation 4.4: no iteration gets below them.
 //!
-//! Displacements are known to a part η = 2⁻⁵² of themselves. Slip is a small difference of them, and friction divides it
-//! by ε, so that σ_t is known to τ φ′ η (|u_t| + |d| + |g|) / ε only; elastic forces are known to η (|Ŝ| |v| + |f̂|). Both
-//! are divided by what the residuals are divided by: no unit enters.
+//! Displacements are known to a part η = 2⁻⁵² of themselves. Slip is a small difference of them, and friction divides
+//! it by ε, so that σ_t is known to τ φ′ η (|u_t| + |d| + |g|) / ε only; elastic forces are known to η (|Ŝ| |v| +
+//! |f̂|). Both are divided by what the residuals are divided by: no unit enters.
 
+use crate::algorithm::recorder::Measured;
 use crate::algorithm::system::{Point, State, System};
-use crate::algorithm::track::Measured;
 use crate::elasticity::Dof;
 use crate::solution::Residuals;
 
-/// Operations that round one after the other: a sum, a product, the interpolation between nodes, the division by ε.
+/// The number of operations that round one after the other: a sum, a product, the interpolation between nodes, the
+/// division by ε.
 const OPERATIONS: f64 = 4.0;
 
-/// Where rounding may leave more than this, no state counts as a solution: the estimated error of a force or a peak is never
-/// a smaller part of it (formulation 3.9), and rounding is not to add to it. What is left is mostly less, by 30 times, but by chance, and in other units by
-/// another: the outcome follows from the bound.
+/// Where rounding may leave a residual above this, no state counts as a solution. The estimated error of a force or a
+/// peak is never a smaller part of it (formulation 3.9), and rounding should not add to it. The actual residual is
+/// mostly 30 times smaller, but that depends on chance and on units, so the outcome follows from the bound.
 const MOST: f64 = 1e-4;
 
-/// States in a row with no more than rounding left after which no better one is expected.
+/// The number of states in a row with only rounding left, after which no better one is expected.
 pub(super) const PATIENCE: u32 = 5;
 
 /// Why a residual stays above the tolerance: rounding.
@@ -25,29 +26,30 @@ pub(super) const PATIENCE: u32 = 5;
 pub struct Rounding {
     /// The largest residual.
     pub residual: f64,
-    /// What rounding leaves of it at most.
+    /// The largest residual that rounding may leave.
     pub floor: f64,
-    /// What rounds; `None`: displacements that are large beside those that strain the body.
+    /// The slip that is rounded; `None`: the displacements are large compared with those that strain the body.
     pub slip: Option<RoundedSlip>,
 }
 
 /// The friction point where rounding leaves most.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoundedSlip {
-    /// Its patch.
+    /// The contact of this point.
     pub patch: usize,
-    /// |u_t| + |d| + |g| there, of which slip is the difference (length).
+    /// The size |u_t| + |d| + |g| of the displacements whose difference is the slip (length).
     pub displacement: f64,
 }
 
 impl Rounding {
-    /// The state is a solution to all digits that count.
+    /// Whether the state is a solution to all digits that matter.
     pub fn negligible(&self) -> bool {
         self.floor <= MOST
     }
 }
 
-/// Whether a state with residuals above the tolerance owes all that to rounding; and the floor of the friction residual.
+/// The rounding in a state whose residuals are above the tolerance for no other reason, and the floor of the friction
+/// residual.
 pub(super) fn limit(
     system: &System<'_>,
     measured: &Measured,
@@ -89,7 +91,8 @@ pub(super) fn is_rounding(
     residual > tolerance && residual <= floors(system, state, reactions, bound).0.kkt
 }
 
-/// What rounding leaves of each residual, and the friction point that it leaves most at, unless it is not friction.
+/// The largest value that rounding may leave of each residual, and the friction point where it is largest, unless it is
+/// not friction.
 fn floors(
     system: &System<'_>,
     state: &State,
@@ -156,7 +159,7 @@ fn floors(
     (floors, worst.1.filter(|_| by_slip))
 }
 
-/// The size of the displacements that slip at a point is a difference of.
+/// The size of the displacements whose difference is the slip at a point.
 fn displacement(system: &System<'_>, v: &[f64], point: &Point) -> f64 {
     let size = |i: usize| {
         let node = point.nodes[i];

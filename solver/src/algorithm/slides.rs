@@ -1,36 +1,36 @@
-//! Bodies that only friction holds along some motion, and that are pushed along it by more than friction can hold. They
-//! have no equilibrium: iterations would run away with them.
+//! Bodies that only friction holds against some motion, and that the loads push along it by more than friction can
+//! resist. They have no equilibrium, so iterations would diverge.
 
+use crate::algorithm::recorder::Measured;
 use crate::algorithm::system::{Patch, Point, State, System};
-use crate::algorithm::track::Measured;
 use crate::elasticity::Dof;
 use crate::error::rounded;
 use crate::friction::{BoundLaw, Source};
 use crate::model::{Hold, RigidMotion};
 use crate::problem::Condition;
 
-/// Push and friction that differ by less are equal: by rounding, and by what iterations leave.
+/// Push and friction that differ by less are equal: limits for rounding, and for the error of the iterations.
 const EQUAL: [f64; 2] = [1e-9, 1e-6];
 
-/// Two directions are the same, or perpendicular, to this part.
+/// Two directions are parallel, or perpendicular, if they are so to this part.
 const ALIGNED: f64 = 1e-9;
 
-/// Elastic slips by which a body that slides away is moved: all of its friction then acts, also with `tanh`.
+/// A body that slides away is moved by this many elastic slips: all of its friction then acts, also with `tanh`.
 const MOVED: f64 = 20.0;
 
 /// A body that slides away.
 #[derive(Clone, Debug)]
 pub struct Slide {
     motion: RigidMotion,
-    /// Along the motion, with its sign: the power of the loads, and of the largest friction (with 2π).
+    /// Along the motion, with its sign: the power of the loads, and the power of the largest friction (with 2π).
     push: f64,
     hold: f64,
-    /// The friction is the largest that equilibrium allows, and not only that of the pressure found.
+    /// Whether the friction is the largest that equilibrium permits, rather than that of the computed pressure.
     certain: bool,
 }
 
 impl Slide {
-    /// The cause, with both forces or moments, and what to do.
+    /// The message: the cause, both forces or moments, and what to do.
     pub(super) fn message(&self) -> String {
         let (kind, arm) = match self.motion.arm {
             None => ("", 1.0),
@@ -45,11 +45,11 @@ impl Slide {
         let most = match self.certain {
             true => format!("at most {hold:?}: there is no equilibrium"),
             false => format!(
-                "{hold:?} with the pressure found: there is no equilibrium unless that grows"
+                "at most {hold:?} at the computed pressure; without more pressure there is no equilibrium"
             ),
         };
         format!(
-            "The loads {verb} the body with {kind}{push:?} {words}, where only friction holds it, and friction can hold {most}. Support the body against this motion, or {verb} it by less."
+            "The loads {verb} the body with {kind}{push:?} {words}, where only friction holds it, and friction can resist {most}. Support the body against this motion, or {verb} it less."
         )
     }
 }
@@ -72,7 +72,7 @@ pub(super) fn certain(system: &System<'_>) -> Option<Slide> {
     motions.filter_map(slide).next()
 }
 
-/// A slide in a state that iterations have left: with its contacts and its pressure.
+/// The slide, if there is one, in a state at the end of iterations, with its contacts and its pressure.
 pub(super) fn found(system: &System<'_>, state: &State) -> Option<Slide> {
     let active = &state.active;
     let reactions = system.reactions(state);
@@ -92,7 +92,7 @@ pub(super) fn found(system: &System<'_>, state: &State) -> Option<Slide> {
     motions.filter_map(slide).next()
 }
 
-/// The bonded state moved along a slide, so that all friction acts against it.
+/// The bonded state moved along a slide until all friction acts against it.
 pub(super) fn slid(system: &System<'_>, bonded: Measured, slide: &Slide) -> Measured {
     let moved = Moved::new(system, &slide.motion);
     let laws = system.patches.iter().filter_map(|patch| patch.law.as_ref());
@@ -110,7 +110,7 @@ pub(super) fn slid(system: &System<'_>, bonded: Measured, slide: &Slide) -> Meas
     Measured::new(system, state, bonded.implied_bound)
 }
 
-/// Motions that nothing but friction prevents, if these nodes touch.
+/// Motions that only friction prevents, if these nodes touch.
 fn motions(system: &System<'_>, touches: impl Fn(usize) -> bool) -> Vec<RigidMotion> {
     let mut hindered = Vec::new();
     for patch in &system.patches {
@@ -127,7 +127,7 @@ fn motions(system: &System<'_>, touches: impl Fn(usize) -> bool) -> Vec<RigidMot
     system.model.free_motions(&hindered)
 }
 
-/// The displacement of every node by a motion; none of those that do not take part.
+/// The displacement of every node by a motion; none for nodes that do not take part.
 struct Moved(Vec<Option<[f64; 2]>>);
 
 impl Moved {
@@ -174,7 +174,7 @@ impl Moved {
         system.circumference * power.sum::<f64>()
     }
 
-    /// Whether an obstacle that does not touch yet is in the way.
+    /// Whether an obstacle that does not touch yet would stop the motion.
     fn stopped(&self, system: &System<'_>, active: &[bool], push: f64) -> bool {
         system.patches.iter().any(|patch| {
             let boundary = &patch.contact.boundary;
@@ -188,9 +188,9 @@ impl Moved {
         })
     }
 
-    /// The largest power of friction (without 2π), if that is known before solving: with prescribed bounds or caps, or if
-    /// the sum of all pressures follows from equilibrium. First for averaged pressures that are nowhere negative, then for
-    /// any: parabolas between the nodes may be, where contact ends.
+    /// The largest power of friction (without 2π), if it is known before solving: with prescribed bounds or caps, or if
+    /// the sum of all pressures follows from equilibrium. The first value is for averaged pressures that are nowhere
+    /// negative, the second for any: parabolas between the nodes may be negative where contact ends.
     fn most(&self, system: &System<'_>) -> Option<[f64; 2]> {
         let (mut given, mut capped, mut cohesive) = (0.0, 0.0, 0.0);
         let mut coefficients = [0.0f64; 2];
@@ -232,8 +232,8 @@ impl Moved {
         }
     }
 
-    /// The most that averaging can make of a reaction: 1 inside a contact; and the same without what is negative, somewhat
-    /// more.
+    /// The largest factor from a reaction to the averaged pressure: 1 inside a contact. The second value, somewhat
+    /// larger, ignores negative parts of the pressure.
     fn gain(&self, system: &System<'_>, p: usize) -> [f64; 2] {
         let mut sums = vec![[0.0; 2]; system.nodes.len()];
         for point in system.points.iter().filter(|point| point.patch == p) {

@@ -1,5 +1,5 @@
-//! Whether the strains are small, as linear elasticity assumes: judged where the load acts, and not by the size of the
-//! body.
+//! A warning where strains are not small, as linear elasticity assumes, judged where the load acts and not by the size
+//! of the body.
 
 use crate::algorithm::system::{Patch, System};
 use crate::contact::edge_nodes;
@@ -14,8 +14,8 @@ const LARGE_STRAIN: f64 = 0.25;
 /// Displacements above this part of the body's size are not small.
 const LARGE_DISPLACEMENT: f64 = 0.1;
 
-/// Warns once: of the contact with the largest strain, or else of displacements beside the size of the body. Displacements
-/// of a body that `slides` too far are that: it is told already.
+/// Warns once: about the contact with the largest strain, or else about displacements relative to the size of the body.
+/// A body that `slides` too far has a warning already.
 pub(super) fn warn_of_large_strain(
     model: &Model,
     system: &System<'_>,
@@ -34,7 +34,7 @@ pub(super) fn warn_of_large_strain(
             code: WarningCode::LargeStrain,
             pointer: patch.contact.pointer.clone(),
             message: format!(
-                "The material in contact is strained by {:.0} % on average: linear elasticity ends at a few per cent. Forces and stresses are those of the linear model, not of a material. Press less, or use a program for large strains.",
+                "The material in contact is strained by {:.0} % on average: linear elasticity is valid up to a few per cent. Forces and stresses are those of the linear model, not of a real material. Press less, or use a program for large strains.",
                 100.0 * strain
             ),
         });
@@ -92,7 +92,7 @@ fn mean_strain(model: &Model, patch: &Patch<'_>, active: &[bool], recovered: &Re
     if volume > 0.0 { sum / volume } else { 0.0 }
 }
 
-/// The principal strain that is largest in size, of xx, yy, 2xy and zz.
+/// The principal strain that is largest in size, from the components xx, yy, 2xy and zz.
 fn principal([x, y, twice_xy, z]: [f64; COMPONENTS]) -> f64 {
     let radius = (0.5 * (x - y)).hypot(0.5 * twice_xy);
     ((0.5 * (x + y)).abs() + radius).max(z.abs())

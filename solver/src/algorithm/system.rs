@@ -10,30 +10,30 @@ use crate::model::{ContactModel, Level, Model};
 use crate::problem::{Condition, FrictionPoints};
 use crate::solution::{Observer, Progress};
 
-/// A friction point whose bound is below this part of the largest is open: its anchor follows it.
+/// A friction point whose bound is below this part of the largest counts as open: its anchor follows it.
 const OPEN: f64 = 1e-12;
 
-/// The data of the iterations, all contacts in a row.
+/// The data of the iterations, for all contacts in a row.
 pub struct System<'a> {
-    /// Ŝ.
+    /// The condensed stiffness Ŝ.
     pub stiffness: &'a Dense,
-    /// f̂ at this level.
+    /// The condensed load f̂ at this load level.
     pub load: Vec<f64>,
     /// Contact nodes.
     pub nodes: Vec<ContactNode>,
     /// Points where friction acts; none in a frictionless contact.
     pub points: Vec<Point>,
-    /// One for each contact.
+    /// The contacts, one each.
     pub patches: Vec<Patch<'a>>,
-    /// From a sum of nodal forces to a total: 2π in axisymmetry, else 1.
+    /// The factor from a sum of nodal forces to a total: 2π in axisymmetry, else 1.
     pub circumference: f64,
     /// The load level that all of the above is for.
     pub level: Level,
-    /// Ŝ has rigid motions that only contact can prevent.
+    /// Whether Ŝ has rigid motions that only contact can prevent.
     pub semidefinite: bool,
     /// What sliding has dissipated in the increments so far, under the incremental law (force × length, without 2π).
     pub dissipated: f64,
-    /// A typical nodal force of this problem, for levels where nothing acts: that of the full loads, or of a
+    /// A typical nodal force of this problem, for levels where nothing acts: the force of the full loads, or that on a
     /// contact node pushed by the indentation or the drag.
     pub reference_force: f64,
     /// How many threads may compute the fields of the whole body; 1 until more are free.
@@ -49,27 +49,27 @@ pub struct System<'a> {
 /// them (docs/theory.md, "Where a second body would enter").
 #[derive(Clone, Copy, Debug)]
 pub struct ContactNode {
-    /// u_n; of a node beside the axis what [`AXIS_SHARE`] leaves of it.
+    /// u_n; at a node beside the axis the part of it that [`AXIS_SHARE`] leaves.
     pub normal: Dof,
     /// u_t, where it is a component of its own; at a node with oblique axes it counts as held, and `oblique` gives it.
     pub tangent: Dof,
-    /// Present where the axes of the node are oblique.
+    /// The node's axes, where they are oblique.
     pub oblique: Option<Oblique>,
-    /// Present where the node is of another contact alone: then `normal` and `tangent` are no unknowns.
+    /// Present where the node belongs to another contact alone: then `normal` and `tangent` are no unknowns.
     pub follows: Option<Follows>,
-    /// `normal` ≤ gap; infinite where there is no obstacle.
+    /// The bound on u_n, `normal` ≤ gap; infinite where there is no obstacle.
     pub gap: f64,
-    /// u_n = gap, whatever the reaction.
+    /// Whether u_n = gap, whatever the reaction.
     pub bonded: bool,
     /// d: the obstacle's own displacement along t at this level.
     pub drag: f64,
-    /// u_t where it is held.
+    /// The prescribed u_t where the tangent is held.
     pub held_tangent: Option<f64>,
-    /// ∫ of what `normal` moves, h_i, on the axis h₀ + h₁/8: the area of its reaction.
+    /// The area for the reaction of `normal`: ∫ h_i, and on the axis ∫ h₀ + h₁/8.
     pub weight: f64,
-    /// On the axis of a body of revolution.
+    /// Whether the node is on the axis of a body of revolution.
     pub on_axis: bool,
-    /// The node on the axis that this midside node lies beside.
+    /// For a midside node beside the axis: the node on the axis.
     pub beside_axis: Option<usize>,
 }
 
@@ -82,7 +82,7 @@ impl ContactNode {
         }
     }
 
-    /// Held at 0 along the surface: a line of symmetry.
+    /// Whether u_t is held at 0: on a line of symmetry.
     pub fn symmetric(&self) -> bool {
         match self.oblique {
             None => matches!(self.tangent, Dof::Fixed(value) if value == 0.0),
@@ -91,37 +91,37 @@ impl ContactNode {
     }
 }
 
-/// A node whose displacement is measured along its normal and another direction, not perpendicular to it: the normal
-/// of another contact, or that of a support. No friction acts on it: slip is continued to it from the other two nodes of
-/// its edge, and friction forces are passed on to these (formulation 3.3).
+/// A node whose displacement is measured along its normal and another direction, not perpendicular to it: the normal of
+/// another contact, or the direction of a support. No friction acts on it: slip is continued to it from the other two
+/// nodes of its edge, and friction forces are passed on to these (formulation 3.3).
 #[derive(Clone, Copy, Debug)]
 pub struct Oblique {
     /// The displacement along the other direction.
     pub other: Dof,
-    /// u_t by u_n and the other.
+    /// The coefficients of u_n and `other` in u_t.
     pub(super) part: [f64; 2],
-    /// A line of symmetry passes through it.
+    /// Whether a line of symmetry passes through the node.
     pub symmetric: bool,
-    /// Another contact begins where this one ends.
+    /// Whether another contact begins where this one ends.
     pub shared: bool,
 }
 
-/// Where increments have led to.
+/// The point of the load path that increments have reached.
 pub struct Path {
-    /// g of every friction point.
+    /// The anchor g of every friction point.
     anchors: Vec<f64>,
     dissipated: f64,
     level: Level,
 }
 
-/// u_n and u_t of a common end of two contacts, where the node is of the other one alone.
+/// How a common end of two contacts follows the other contact, if it belongs to that one alone: gives u_n and u_t.
 #[derive(Clone, Copy, Debug)]
 pub struct Follows {
-    /// The displacements along the normal and the tangent of that one.
+    /// The displacements along the normal and the tangent of the other contact.
     pub dofs: [Dof; 2],
-    /// u_n by these.
+    /// The coefficients of these displacements in u_n.
     pub(super) normal: [f64; 2],
-    /// u_t by these.
+    /// The coefficients of these displacements in u_t.
     pub(super) tangent: [f64; 2],
 }
 
@@ -131,32 +131,32 @@ impl Follows {
     }
 }
 
-/// One friction point.
+/// A point at which friction acts.
 #[derive(Clone, Debug)]
 pub struct Point {
-    /// The patch it belongs to.
+    /// The contact of this point.
     pub patch: usize,
-    /// Arc length.
+    /// The arc length.
     pub s: f64,
-    /// Its three nodes.
+    /// The three nodes of its edge.
     pub nodes: [usize; 3],
-    /// Their shape functions.
+    /// The shape functions of these nodes at the point.
     pub shape: [f64; 3],
-    /// w_g.
+    /// The weight w_g of the point in integrals.
     pub weight: f64,
-    /// Where its bound comes from, on all nodes.
+    /// The averaging row that gives its bound from the pressures of all nodes.
     pub source: Source,
-    /// g, the anchor: slip is measured from here; 0 in the total law.
+    /// The anchor g, from which slip is measured; 0 under the total law.
     pub anchor: f64,
 }
 
-/// Averaging operators of contacts, with the rows of them that are known: those of problems that differ in other
-/// numbers than the radius are the same.
+/// Averaging operators of contacts, with those rows that are computed already. Problems that differ in other numbers
+/// than the radius share them.
 #[derive(Default)]
 pub struct Averages(Vec<(usize, Average, Averaging)>);
 
 impl Averages {
-    /// So many are kept, each with its rows.
+    /// The number of operators that are kept, each with its rows.
     const MOST: usize = 16;
 
     /// The law of a contact along its chain.
@@ -184,21 +184,21 @@ pub struct Patch<'a> {
     pub contact: &'a ContactModel,
     /// Number of its first node.
     pub first: usize,
-    /// Its friction law; none: frictionless.
+    /// The friction law; none: frictionless.
     pub law: Option<FrictionLaw>,
 }
 
-/// A state of the system.
+/// A state of the system: displacements and the contact set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
-    /// Contact unknowns.
+    /// The contact unknowns.
     pub v: Vec<f64>,
-    /// Nodes in contact.
+    /// Whether each node is in contact.
     pub active: Vec<bool>,
 }
 
 impl<'a> System<'a> {
-    /// Collects the contacts of a model on its condensed body, at full load. The observer is asked at every friction
+    /// Collects the contacts of a model on its condensed body, at full load. The observer is called at every friction
     /// point: a wide average along a long contact takes minutes.
     pub fn new(
         model: &'a Model,
@@ -208,7 +208,7 @@ impl<'a> System<'a> {
         System::with_averages(model, body, &mut Averages::default(), observe)
     }
 
-    /// The same with the averages of earlier systems on this body, and this one's added to them.
+    /// As [`System::new`], using the averages of earlier systems on this body and adding those of this one.
     pub fn with_averages(
         model: &'a Model,
         body: &'a ElasticBody,
@@ -364,7 +364,8 @@ impl<'a> System<'a> {
         Ok(())
     }
 
-    /// A node of a contact that is of another one alone. `dofs`: along the normal and the tangent of that one.
+    /// A contact node that belongs to another contact alone. `dofs`: the displacements along the normal and the tangent
+    /// of that one.
     fn following(
         &self,
         model: &Model,
@@ -406,7 +407,7 @@ impl<'a> System<'a> {
         })
     }
 
-    /// A friction point beside those of the solution, without a weight in it.
+    /// A friction point without weight, for evaluating the law at any place.
     pub(super) fn probe(
         &self,
         patch: usize,
@@ -430,7 +431,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// Forgets the increments so far, anchors and work: what is forgotten, with the level.
+    /// Resets anchors and dissipated work to the start of the load path; returns the path so far, with its level.
     pub fn restart(&mut self) -> Path {
         let anchors = self.points.iter_mut();
         Path {
@@ -442,7 +443,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// Is again where it was forgotten.
+    /// Returns to a path that [`System::restart`] gave.
     pub fn resume(&mut self, path: Path) {
         self.set_level(path.level);
         self.dissipated = path.dissipated;
@@ -488,7 +489,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// This system with u_t = d at all nodes of contacts with friction: everything sticks.
+    /// The same system with u_t = d prescribed at all nodes of contacts with friction: everything sticks.
     pub fn bonded(&self) -> Self {
         // without friction points, whose averages are most of a large system
         let mut bonded = System {
@@ -507,7 +508,7 @@ impl<'a> System<'a> {
         bonded
     }
 
-    /// The end of an increment: the anchors of sliding and of open points move with the slip, which dissipates τ|Δg|.
+    /// Ends an increment: the anchors of points that slide or are open move with the slip, which dissipates τ|Δg|.
     pub fn move_anchors(&mut self, v: &[f64], bound: &[f64]) {
         let largest = bound.iter().fold(0.0f64, |a, b| a.max(*b));
         for (g, tau) in bound.iter().enumerate() {
@@ -520,7 +521,8 @@ impl<'a> System<'a> {
         }
     }
 
-    /// Work done against friction (without 2π): ∫τ φ |e| in this state, and what sliding has dissipated before.
+    /// The work done against friction (without 2π): ∫τ φ |e| in this state, plus the work that sliding has dissipated
+    /// before.
     pub fn work(&self, v: &[f64], bound: &[f64]) -> f64 {
         let points = self.points.iter().zip(bound);
         let work = points.map(|(point, tau)| {
@@ -538,12 +540,12 @@ impl<'a> System<'a> {
         }
     }
 
-    /// Nodes of a patch.
+    /// The nodes of a contact, as a range.
     pub fn range(&self, patch: &Patch<'_>) -> std::ops::Range<usize> {
         patch.first..patch.first + patch.contact.boundary.nodes.len()
     }
 
-    /// u_n of a node.
+    /// The normal displacement u_n of a node.
     pub fn normal_displacement(&self, v: &[f64], node: usize) -> f64 {
         if let Some(follows) = &self.nodes[node].follows {
             return Follows::along(follows.normal, follows.dofs, v);
@@ -555,7 +557,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// How far a node is from the obstacle: gap − u_n.
+    /// The distance of a node from the obstacle: gap − u_n.
     pub fn opening(&self, v: &[f64], node: usize) -> f64 {
         if self.nodes[node].follows.is_some() {
             return self.nodes[node].gap - self.normal_displacement(v, node);
@@ -567,7 +569,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// u_t of a node.
+    /// The tangential displacement u_t of a node.
     pub fn tangential_displacement(&self, v: &[f64], node: usize) -> f64 {
         let node = &self.nodes[node];
         if let Some(follows) = &node.follows {
@@ -581,7 +583,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// u_t − d at a friction point.
+    /// The displacement relative to the obstacle, u_t − d, at a friction point.
     fn relative_displacement(&self, v: &[f64], point: &Point) -> f64 {
         let relative = |node: usize| self.tangential_displacement(v, node) - self.nodes[node].drag;
         (0..3)
@@ -589,7 +591,7 @@ impl<'a> System<'a> {
             .sum()
     }
 
-    /// e = u_t − d − g at a friction point: the displacement that friction acts on.
+    /// The slip e = u_t − d − g at a friction point: the displacement that friction acts on.
     pub fn slip(&self, v: &[f64], point: &Point) -> f64 {
         self.relative_displacement(v, point) - point.anchor
     }
@@ -602,7 +604,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// Ŝ v − f̂: the elastic force on the contact unknowns.
+    /// The elastic force on the contact unknowns, Ŝ v − f̂.
     pub fn elastic_force(&self, v: &[f64]) -> Vec<f64> {
         self.stiffness
             .times(v)
@@ -642,7 +644,7 @@ impl<'a> System<'a> {
         self.reactions_of(state, &self.elastic_force(&state.v))
     }
 
-    /// The same from Ŝ v − f̂, which takes a product with a dense matrix.
+    /// As [`System::reactions`], from the elastic force Ŝ v − f̂, which takes a product with a dense matrix.
     pub(super) fn reactions_of(&self, state: &State, force: &[f64]) -> Vec<f64> {
         let reaction = |(node, active): (&ContactNode, &bool)| match node.normal {
             Dof::Free(dof) if *active => -force[dof],
@@ -651,8 +653,8 @@ impl<'a> System<'a> {
         self.nodes.iter().zip(&state.active).map(reaction).collect()
     }
 
-    /// Nodal forces along t of the obstacle on nodes whose tangential displacement is held; exactly 0
-    /// on the others. `force`: Ŝ v − f̂.
+    /// Tangential forces of the obstacle on nodes whose tangential displacement is held; exactly 0 on the others.
+    /// `force`: Ŝ v − f̂.
     pub(super) fn tangential_reactions(&self, force: &[f64]) -> Vec<f64> {
         let reaction = |node: &ContactNode| match (node.tangent, node.held_tangent) {
             (Dof::Free(dof), Some(_)) => force[dof],
@@ -661,7 +663,7 @@ impl<'a> System<'a> {
         self.nodes.iter().map(reaction).collect()
     }
 
-    /// ∫σ_t and ∫|σ_t| of friction points with their tractions, and of the nodal forces that hold nodes along t; in
+    /// The sums ∫σ_t and ∫|σ_t| over friction points with these tractions, and over nodes that are held along t; in
     /// axisymmetry without 2π.
     pub fn tangential_forces<'b>(
         &self,
@@ -674,8 +676,8 @@ impl<'a> System<'a> {
             .fold([0.0; 2], |[sum, size], f| [sum + f, size + f.abs()])
     }
 
-    /// Nodal pressures: p = R / ∫h, and beside the axis what makes the profile add up to the reactions (formulation 3.5);
-    /// exactly 0 where there is no reaction.
+    /// Nodal pressures: p = R / ∫h, with a correction beside the axis so that the profile adds up to the reactions
+    /// (formulation 3.5); exactly 0 where there is no reaction.
     pub fn pressures(&self, reactions: &[f64]) -> Vec<f64> {
         let nodes = self.nodes.iter().zip(reactions);
         let mut pressures: Vec<f64> = nodes
@@ -706,7 +708,7 @@ impl<'a> System<'a> {
         std::iter::once((node, own * factor / area)).chain(beside)
     }
 
-    /// The averaged pressure of a point as a sum over reactions, W P: nodes in contact and their weights.
+    /// The averaged pressure of a point as a sum over reactions, by W P: nodes in contact and their weights.
     pub fn reaction_weights(&self, state: &State, point: &Point) -> Vec<(usize, f64)> {
         let Source::Average(row) = &point.source else {
             return Vec::new();
@@ -722,12 +724,12 @@ impl<'a> System<'a> {
         weights
     }
 
-    /// ∫p over some nodes by their reactions (without 2π).
+    /// The normal force ∫p on some nodes, from their reactions (without 2π).
     pub fn normal_force(&self, nodes: std::ops::Range<usize>, reactions: &[f64]) -> f64 {
         nodes.map(|i| self.nodes[i].force() * reactions[i]).sum()
     }
 
-    /// τ at every friction point, thesis (1.3): also where the body is open but within ρ of contact.
+    /// The friction bound τ at every friction point, thesis (1.3): also where the body is open but within ρ of contact.
     pub fn friction_bound(&self, pressures: &[f64]) -> Vec<f64> {
         let of_patch = |patch| largest_pressure(&pressures[self.range(patch)]);
         let largest: Vec<f64> = self.patches.iter().map(of_patch).collect();
@@ -738,16 +740,16 @@ impl<'a> System<'a> {
         self.points.iter().map(bound).collect()
     }
 
-    /// The largest force or complementarity defect for a given friction bound, divided by the
-    /// largest nodal reaction. Where nothing touches: by the largest load, friction force or, since a
-    /// body may be at rest again, by the problem's own force. `elastic`: Ŝ v − f̂ of the state.
+    /// The largest force or complementarity defect for a given friction bound, divided by the largest nodal reaction.
+    /// Where nothing touches it is divided by the largest load or friction force or, since a body may be at rest again,
+    /// by the problem's own force. `elastic`: Ŝ v − f̂ of the state.
     pub(super) fn kkt_residual(&self, state: &State, elastic: &[f64], bound: &[f64]) -> f64 {
         let mut friction = vec![0.0; state.v.len()];
         self.add_traction_force(&self.tractions(&state.v, bound), &mut friction);
         self.kkt_residual_of(state, elastic, &friction)
     }
 
-    /// The same from the forces of friction, of [`System::add_traction_force`].
+    /// As [`System::kkt_residual`], with the friction forces of [`System::add_traction_force`].
     pub(super) fn kkt_residual_of(&self, state: &State, elastic: &[f64], friction: &[f64]) -> f64 {
         let force: Vec<f64> = elastic.iter().zip(friction).map(|(a, b)| a + b).collect();
         let reactions = self.reactions_of(state, elastic);
@@ -797,8 +799,8 @@ impl<'a> System<'a> {
     }
 }
 
-/// Shape functions of an edge (start, end, midside) where its ends with oblique axes take no part: there the straight
-/// line through the other two continues. They still add up to 1.
+/// The shape functions of an edge (start, end, midside) without the nodes that have oblique axes, which are replaced by
+/// the straight line through the other two nodes. They still add up to 1.
 pub(super) fn shape_without_oblique(
     nodes: &[ContactNode],
     edge: [usize; 3],

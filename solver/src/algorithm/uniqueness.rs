@@ -1,8 +1,9 @@
-//! Solutions that are compared with a second one: from the bonded state, a test of uniqueness, and in twice the increments.
+//! Comparisons with a second solution: one that starts from the bonded state, as a test of uniqueness, and one in twice
+//! the increments.
 
+use crate::algorithm::recorder::{Measured, Recorder};
 use crate::algorithm::rounding::Rounding;
 use crate::algorithm::system::System;
-use crate::algorithm::track::{Measured, Track};
 use crate::algorithm::{End, Finished, Place, bonded_state, both, fixed_point, quiet};
 use crate::problem::SolverControls;
 use crate::solution::{Comparison, Observer, Outcome, StepSolution, Summary, Warning, WarningCode};
@@ -12,13 +13,13 @@ pub fn note_uniqueness(summary: &mut Summary, second: Comparison) {
     let warning = if !second.converged {
         Some((
             WarningCode::UniquenessUnknown,
-            "Started from the bonded state the method does not converge: whether there is a second solution is unknown.".to_owned(),
+            "From the bonded state the method does not converge, so it is unknown whether there is a second solution.".to_owned(),
         ))
     } else if !second.agrees {
         Some((
             WarningCode::NotUnique,
             format!(
-                "There is a second solution: started from the bonded state (u_t = d) the forces are Y = {:.6}, T = {:.6} instead of Y = {:.6}, T = {:.6}. Which one occurs depends on the history of loading, which the incremental law with load steps can follow.",
+                "There is a second solution: from the bonded state (u_t = d) the solver finds a normal force of {:.6} and a tangential force of {:.6} instead of {:.6} and {:.6}. Which one occurs depends on the history of loading, which the incremental law with load steps can follow.",
                 second.normal_force,
                 second.tangential_force,
                 summary.normal_force,
@@ -50,7 +51,7 @@ pub fn note_doubled_increments(summary: &mut Summary, second: Comparison) {
                 if second.converged {
                     ""
                 } else {
-                    " (and do not converge)"
+                    " (and the iterations do not converge)"
                 }
             ),
         });
@@ -58,14 +59,14 @@ pub fn note_doubled_increments(summary: &mut Summary, second: Comparison) {
     summary.doubled_increments = Some(second);
 }
 
-/// ∫p, ∫σ_t and ∫|σ_t| at the end of a step.
+/// The forces ∫p, ∫σ_t and ∫|σ_t| at the end of a step.
 pub struct EndForces {
     forces: [f64; 3],
     converged: bool,
 }
 
 impl EndForces {
-    /// Of an end, with the anchors that led to it.
+    /// The forces in a final state, under the anchors that led to it.
     pub fn new(system: &System<'_>, finished: &Finished) -> Self {
         let (state, bound) = (finished.state.clone(), finished.bound.clone());
         EndForces {
@@ -74,7 +75,7 @@ impl EndForces {
         }
     }
 
-    /// Compares them with those of a solution, which are to agree to `tolerance`.
+    /// Compares these forces with those of a solution, which should agree to `tolerance`.
     pub fn compared(&self, solution: &Summary, tolerance: f64) -> Comparison {
         let first = [
             solution.normal_force,
@@ -94,12 +95,12 @@ impl EndForces {
     }
 }
 
-/// Forces at the end of a step count as known if more increments change them by no more than this part: they are then off
-/// by less than twice that, and `good` promises 1 %.
+/// Forces at the end of a step count as accurate if more increments change them by no more than this part: their error
+/// is then less than twice that, and `good` promises 1 %.
 const KNOWN: f64 = 0.004;
 
-/// Adds a warning to an earlier step whose forces depend on the number of increments; of the end errors are stated.
-/// `more`: at the end of that step in at least twice as many.
+/// Adds a warning to an earlier step whose forces depend on the number of increments; for the last step errors are
+/// stated instead. `more`: the forces at the end of that step in at least twice as many increments.
 pub fn warn_of_increments(step: &mut StepSolution, more: &EndForces) {
     let compared = more.compared(&step.summary, KNOWN);
     if compared.agrees {
@@ -107,24 +108,24 @@ pub fn warn_of_increments(step: &mut StepSolution, more: &EndForces) {
     }
     let found = match compared.converged {
         true => format!(
-            "more of them change its forces by {:.1} %",
+            "more increments change the forces by {:.1} %",
             100.0 * compared.change
         ),
-        false => "with more of them the iterations do not converge".to_owned(),
+        false => "with more increments the iterations do not converge".to_owned(),
     };
     step.summary.warnings.push(Warning {
         code: WarningCode::IncrementsMatter,
         pointer: "/steps".to_owned(),
         message: format!(
-            "The increments are too few for the incremental law at the end of this step: {found}. Give this step and those before it more `increments`."
+            "This step has too few increments for the incremental law: at its end {found}. Give this step and those before it more `increments`."
         ),
     });
 }
 
-/// A sum of forces may be off by this many times the largest residual, which is that of one node.
+/// The error of a sum of forces may be this many times the largest residual, which is that of one node.
 const NODES: f64 = 10.0;
 
-/// What rounding leaves unknown of the forces of two solutions.
+/// The error of the forces of two solutions due to rounding.
 pub fn rounding_of_forces(solutions: [Option<Rounding>; 2]) -> f64 {
     let residuals = solutions.iter().flatten().map(|rounding| rounding.residual);
     NODES * residuals.fold(0.0, f64::max)
@@ -142,8 +143,8 @@ fn relative(a: f64, b: f64, scale: f64) -> f64 {
     if a == b { 0.0 } else { (a - b).abs() / scale }
 }
 
-/// Solutions agree if their forces and friction bounds do so to this part: far above the error that the tolerance
-/// leaves, far below the difference of two states.
+/// Two solutions are equal if their forces and friction bounds agree to this part: far above the error that the
+/// tolerance leaves, far below the difference of two states.
 const AGREES: f64 = 1e-6;
 
 /// Solves a system from the bonded state (u_t = d everywhere) and compares with `first`.
@@ -155,14 +156,14 @@ pub fn other_solution(
 ) -> Comparison {
     let quiet: &mut Observer<'_> = &mut quiet(observe);
     let (start, _) = bonded_state(system, controls, quiet);
-    let mut track = Track::new(system, controls, Place::default());
-    let mut end = both(&mut track, start, quiet);
+    let mut recorder = Recorder::new(system, controls, Place::default());
+    let mut end = both(&mut recorder, start, quiet);
     if !end.ended() {
         // no solution is near the bonded state: sweeps may move further away from it
-        track.forget();
-        end = fixed_point::run(&mut track, end.measured, false, quiet);
+        recorder.forget();
+        end = fixed_point::run(&mut recorder, end.measured, false, quiet);
     }
-    let end = end.settled(system, controls.tolerance, &track.history);
+    let end = end.settled(system, controls.tolerance, &recorder.history);
     let End {
         measured: second,
         outcome,
@@ -193,7 +194,7 @@ pub fn other_solution(
     }
 }
 
-/// ∫p, ∫σ_t and ∫|σ_t| over all contacts.
+/// The forces ∫p, ∫σ_t and ∫|σ_t| over all contacts.
 fn forces(system: &System<'_>, measured: &Measured) -> [f64; 3] {
     let tractions = system.tractions(&measured.state.v, &measured.bound);
     let held = system.tangential_reactions(&measured.elastic_force);

@@ -1,14 +1,14 @@
-//! Curves in space that are met along the body's normal.
+//! Curves in the plane as obstacles: where a normal of the body meets them.
 
 use super::{Profile, ROUNDING};
 use crate::problem::Interpolation;
 use crate::spline::Spline;
 
-/// A curve in space.
+/// A curve that an obstacle follows.
 pub(super) enum Curve<'a> {
-    /// A broken line.
+    /// A polyline, with its segments in blocks.
     Segments(&'a [[f64; 2]], Vec<Block>),
-    /// A smooth line: the Bézier points of its cubics.
+    /// A smooth line: the Bézier points of its cubic pieces, and these in blocks.
     Smooth(Vec<Bezier>, Vec<Block>),
     /// A straight line through two points, without ends.
     Line([f64; 2], [f64; 2]),
@@ -17,36 +17,36 @@ pub(super) enum Curve<'a> {
 /// The four points of a cubic: its ends, and two between that its tangents there point at.
 type Bezier = [[f64; 2]; 4];
 
-/// Pieces of a curve in space, one after the other, and a disc that holds them.
+/// Consecutive pieces of a curve, and a disc that contains them.
 pub(super) struct Block {
     pieces: std::ops::Range<usize>,
     center: [f64; 2],
     radius: f64,
 }
 
-/// Pieces in a block.
+/// The number of pieces in a block.
 const BLOCK: usize = 32;
 
-/// A side of a curve in space, as one goes along it.
+/// A side of a curve, seen in the direction of the curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Side {
     Left,
     Right,
 }
 
-/// The place of a curve in space that a normal of the body faces.
+/// The place of a curve that a normal of the body faces.
 pub(super) struct Hit {
     pub(super) profile: Profile,
     /// The first and the last of the pieces that meet there.
     pub(super) pieces: [usize; 2],
 }
 
-/// A place where the straight line through a normal of the body crosses a curve in space.
+/// A place where the straight line through a normal of the body crosses a curve.
 pub(super) struct Crossing {
-    /// The distance is negative behind the surface.
+    /// The profile there; its distance is negative behind the surface.
     profile: Profile,
     piece: usize,
-    /// The side of the curve that one enters there in the direction of the normal.
+    /// The side of the curve that is entered there in the direction of the normal.
     entered: Side,
 }
 
@@ -58,7 +58,7 @@ pub(super) struct Ray {
 }
 
 impl<'a> Curve<'a> {
-    /// Through points, of which no two that follow one another are equal.
+    /// The curve through points, no two consecutive ones of which are equal.
     pub(super) fn through(points: &'a [[f64; 2]], interpolation: Interpolation) -> Self {
         match interpolation {
             Interpolation::Linear => {
@@ -73,13 +73,13 @@ impl<'a> Curve<'a> {
         }
     }
 
-    /// Through a point at an angle from x (degrees).
+    /// The straight line through a point at an angle from x (degrees).
     pub(super) fn line(point: [f64; 2], angle: f64) -> Self {
         let (sine, cosine) = angle.to_radians().sin_cos();
         Curve::Line(point, [point[0] + cosine, point[1] + sine])
     }
 
-    /// Its two ends; none of a straight line, and of a curve that is closed.
+    /// The two ends of the curve; none for a straight line or a closed curve.
     pub(super) fn ends(&self) -> Option<[[f64; 2]; 2]> {
         let [first, last] = match self {
             Curve::Segments(points, _) => [*points.first()?, *points.last()?],
@@ -114,9 +114,9 @@ impl<'a> Curve<'a> {
 
     /// The place of the curve that a normal of the body faces, if the obstacle is rigid on the side `rigid` of it.
     ///
-    /// What is ahead of the surface is faced. What is behind it is faced by a surface that lies inside the obstacle: the
-    /// normal enters the rigid side there, and did not leave it since. Where it leaves that side, it is a face for another
-    /// side of the body.
+    /// A place ahead of the surface is faced. A place behind it is faced only if the surface there lies inside the
+    /// obstacle: the normal enters the rigid side at that place and does not leave it before the surface. Where the
+    /// normal leaves the rigid side, the curve faces another side of the body.
     pub(super) fn faced_by(&self, ray: &Ray, rigid: Side, rounding: f64) -> Option<Hit> {
         let mut crossings = self.crossings(ray, rounding);
         let [ahead, behind] = nearest(&crossings, rounding);
@@ -154,7 +154,7 @@ impl<'a> Curve<'a> {
         })
     }
 
-    /// The profile where a normal of the body crosses the curve, at the distance that is nearest to this one.
+    /// The profile at that crossing of a normal of the body with the curve whose distance is nearest to `distance`.
     pub(super) fn crossing_near(&self, ray: &Ray, rounding: f64, distance: f64) -> Option<Profile> {
         let crossings = self.crossings(ray, rounding).into_iter();
         let profiles = crossings.map(|crossing| crossing.profile);
@@ -162,8 +162,8 @@ impl<'a> Curve<'a> {
         profiles.min_by(|a, b| off(a).total_cmp(&off(b)))
     }
 
-    /// The side of the curve that is rigid, as it looks along one normal; none if it does not cross the curve. `reach`: how
-    /// far the body extends along −n (length).
+    /// The side of the curve that is rigid, judged along one normal; none if that does not cross the curve. `reach`:
+    /// how far the body extends along −n (length).
     pub(super) fn rigid_side(&self, ray: &Ray, reach: f64, rounding: f64) -> Option<Side> {
         let crossings = self.crossings(ray, rounding);
         match nearest(&crossings, rounding) {
@@ -191,8 +191,8 @@ impl<'a> Curve<'a> {
         }
     }
 
-    /// The point between piece `k − 1` and piece `k` of a curve in space, and the change of the profile's slope there,
-    /// seen along the normal `n`.
+    /// The point between pieces `k − 1` and `k` of a curve, and the change of the profile's slope there, seen along the
+    /// normal `n`.
     pub(super) fn joint(&self, k: usize, n: [f64; 2], t: [f64; 2]) -> ([f64; 2], f64) {
         match self {
             Curve::Segments(points, _) => {
@@ -227,7 +227,7 @@ impl Side {
         }
     }
 
-    /// The side of a curve that is entered along n, by the part of the curve's direction along t.
+    /// The side of a curve that is entered along n. `across`: the component of the curve's direction along t.
     fn entered(across: f64) -> Side {
         if across > 0.0 {
             Side::Left
@@ -237,7 +237,7 @@ impl Side {
     }
 }
 
-/// The nearest crossings ahead of the surface or on it, and behind it.
+/// The nearest crossing ahead of the surface or on it, and the nearest one behind it.
 fn nearest(crossings: &[Crossing], rounding: f64) -> [Option<&Crossing>; 2] {
     let size = |crossing: &&Crossing| crossing.profile.distance.abs();
     let least = |ahead: bool| {
@@ -249,7 +249,8 @@ fn nearest(crossings: &[Crossing], rounding: f64) -> [Option<&Crossing>; 2] {
     [least(true), least(false)]
 }
 
-/// Where a normal meets the straight line from `start` to `end`, if the parameter between them is in its range.
+/// The crossing of a normal with the straight line from `start` to `end`, if the parameter along it is in the given
+/// range.
 fn on_segment(
     ray: &Ray,
     start: [f64; 2],
@@ -285,7 +286,7 @@ fn on_segment(
     })
 }
 
-/// The spline through points of a plane, by the length of the chords.
+/// The spline through points of the plane, parametrised by the length of the chords.
 fn spline(points: &[[f64; 2]]) -> Vec<Bezier> {
     let mut length = vec![0.0];
     for pair in points.windows(2) {
@@ -311,10 +312,10 @@ fn spline(points: &[[f64; 2]]) -> Vec<Bezier> {
     (0..splines[0].pieces()).map(cubic).collect()
 }
 
-/// Slopes of a curve in space up to this are rounding: a symmetric one is flat in its middle.
+/// Slopes of a curve up to this are rounding: a symmetric curve is flat in its middle.
 const FLAT: f64 = 1e-12;
 
-/// Pieces in blocks; `points`: those that a piece lies between.
+/// Divides pieces into blocks. `points`: the points that contain a piece between them.
 fn blocks(count: usize, points: impl Fn(usize) -> Vec<[f64; 2]>) -> Vec<Block> {
     let block = |first: usize| {
         let pieces = first..count.min(first + BLOCK);
@@ -336,7 +337,7 @@ fn blocks(count: usize, points: impl Fn(usize) -> Vec<[f64; 2]>) -> Vec<Block> {
     (0..count).step_by(BLOCK).map(block).collect()
 }
 
-/// The pieces of the blocks that a normal of the body passes through.
+/// The pieces of those blocks that a normal of the body passes through.
 fn near(blocks: &[Block], ray: &Ray, rounding: f64) -> impl Iterator<Item = usize> {
     let Ray { place, t, .. } = *ray;
     let passes = move |block: &&Block| {
@@ -351,13 +352,13 @@ fn near(blocks: &[Block], ray: &Ray, rounding: f64) -> impl Iterator<Item = usiz
         .flat_map(|block| block.pieces.clone())
 }
 
-/// Parts of a cubic, in each of which it crosses a normal at most once.
+/// The number of parts of a cubic; each crosses a normal at most once.
 const PARTS: usize = 8;
 
-/// Most steps to a crossing.
+/// The largest number of steps to find a crossing.
 const STEPS: usize = 60;
 
-/// Where a normal meets one cubic of a curve.
+/// Adds the crossings of a normal with one cubic of a curve.
 fn on_cubic(ray: &Ray, cubic: &Bezier, k: usize, rounding: f64, found: &mut Vec<Crossing>) {
     let Ray { place, n, t } = *ray;
     let part_along = |axis: [f64; 2]| cubic.map(|p| dot([p[0] - place[0], p[1] - place[1]], axis));

@@ -1,4 +1,4 @@
-//! An obstacle that was displaced as a rigid body, as the nodes of a contact face it then.
+//! An obstacle displaced as a rigid body, and the profile that the nodes of a contact face then.
 
 use super::curve::Ray;
 use super::shape::Shape;
@@ -6,19 +6,19 @@ use super::{ContactBoundary, Profile, ROUNDING, edge_nodes};
 use crate::element::edge3;
 use crate::problem::{Along, Obstacle};
 
-/// An obstacle that may be displaced in space. One that is given along the boundary is the curve in space that it is before:
-/// at its distance from the body.
+/// An obstacle that may be displaced in the plane. An obstacle given along the boundary is first converted to a curve,
+/// by its distance from the body.
 pub struct Displaced<'a> {
     shape: Shape<'a>,
     along: Along,
     boundary: &'a ContactBoundary,
-    /// Of the body at the nodes.
+    /// The normals of the body at the nodes.
     normals: &'a [[f64; 2]],
     rounding: f64,
 }
 
 impl<'a> Displaced<'a> {
-    /// Before a contact boundary; `normals`: of the body at its nodes.
+    /// The obstacle at a contact boundary. `normals`: those of the body at its nodes.
     pub fn new(
         obstacle: &'a Obstacle,
         boundary: &'a ContactBoundary,
@@ -33,8 +33,8 @@ impl<'a> Displaced<'a> {
         }
     }
 
-    /// The profile at a node after a displacement: of a curve that the node's normal meets several times that nearest to
-    /// `expected`. None where the obstacle does not face the node any more.
+    /// The profile at a node after a displacement. If the node's normal meets the curve several times, the crossing
+    /// nearest to `expected` counts. None where the obstacle does not face the node any more.
     pub fn profile(&self, node: usize, by: [f64; 2], expected: f64) -> Option<Profile> {
         let ([x, y], n) = (self.boundary.positions[node], self.normals[node]);
         let t = [n[1], -n[0]];
@@ -47,7 +47,8 @@ impl<'a> Displaced<'a> {
         }
     }
 
-    /// The same of an obstacle along the boundary: its place that the displacement brings before the node.
+    /// The profile at a node after a displacement, for an obstacle along the boundary: at the place that is moved
+    /// before the node.
     fn before(&self, node: usize, by: [f64; 2]) -> Option<Profile> {
         let (place, n) = (self.boundary.positions[node], self.normals[node]);
         let t = [n[1], -n[0]];
@@ -94,8 +95,8 @@ impl<'a> Displaced<'a> {
         })
     }
 
-    /// A point of the obstacle before it is displaced, over the place q of the boundary: in edges from its start, on its tangents
-    /// beyond its ends.
+    /// A point of the obstacle before it is displaced, over the place q of the boundary (in edges from its start);
+    /// beyond the ends of the boundary it is continued along the tangents there.
     fn point(&self, q: f64) -> Option<[f64; 2]> {
         let boundary = self.boundary;
         let count = boundary.edge_count();
@@ -129,8 +130,8 @@ mod tests {
     use crate::mesh::grid_mesh;
     use crate::problem::{Grid, Interpolation};
 
-    /// A parabola, given along the top or drawn in space, moved across the body: that of another place, also from beyond the ends
-    /// of the boundary.
+    /// A parabola moved across the body has the profile of a parabola elsewhere, whether it is given along the top or
+    /// as a curve, also if it comes from beyond the ends of the boundary.
     #[test]
     fn a_parabola_that_is_moved_is_a_parabola_elsewhere() {
         let mesh = grid_mesh(&Grid {

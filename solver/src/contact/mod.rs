@@ -25,7 +25,7 @@ use crate::element::edge3;
 use crate::element::gauss::GAUSS_3;
 use crate::mesh::{Edge, Mesh};
 
-/// Positions count as equal within this part of a length: they coincide with grid lines only up to rounding.
+/// Positions count as equal within this part of a length, since they coincide with grid lines only up to rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// The directions (unit vectors, with their errors as angles) along which supports hold nodes.
@@ -36,7 +36,7 @@ pub type HeldDirections = BTreeMap<u32, ([f64; 2], f64)>;
 pub struct Profile {
     /// Distance along the body's normal (length); the indentation is not yet subtracted.
     pub distance: f64,
-    /// Its change per length along t; the mean of both sides at a kink.
+    /// The change of the distance per length along t; the mean of both sides at a kink.
     pub slope: f64,
 }
 
@@ -49,40 +49,40 @@ pub struct Profile {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContactBoundary {
-    /// Mesh nodes.
+    /// The mesh nodes.
     pub nodes: Vec<u32>,
-    /// Positions.
+    /// The positions of the nodes.
     pub positions: Vec<[f64; 2]>,
-    /// Arc length from the start of the named boundary, whatever part of it faces the obstacle.
+    /// The arc length from the start of the named boundary, whatever part of it faces the obstacle.
     pub s: Vec<f64>,
-    /// Unit outward normal; at a corner between two edges the mean of theirs, also at an end where the surface goes on
-    /// smoothly.
+    /// The unit outward normal; at a corner the mean of the normals of both edges, also at an end where the surface
+    /// continues smoothly.
     pub normals: Vec<[f64; 2]>,
-    /// How far each normal may be off that of the surface (angle).
+    /// How far each normal may deviate from that of the surface (angle).
     pub normal_errors: Vec<f64>,
-    /// ∫ h_i, with the depth of the section: from a nodal force to a pressure.
+    /// The area ∫ h_i with the depth of the section: divides a nodal force to give a pressure.
     pub weights: Vec<f64>,
-    /// Three Gauss points per edge.
+    /// The points where friction acts, three Gauss points on each edge.
     pub friction_points: Vec<FrictionPoint>,
 }
 
 /// A point where friction acts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrictionPoint {
-    /// Arc length.
+    /// The arc length.
     pub s: f64,
     /// The three chain nodes of its edge.
     pub nodes: [usize; 3],
-    /// Their shape functions here.
+    /// The shape functions of these nodes at the point.
     pub shape: [f64; 3],
     /// Weight of the point in an integral along Γ_C, with the depth of the section.
     pub weight: f64,
 }
 
 impl ContactBoundary {
-    /// From edges that follow one another, the first node at arc length `start`; `depth` as in `elasticity::Section`. A normal
-    /// that a direction of `held` is parallel or perpendicular to, up to the errors of both, is made exactly so: on a line of
-    /// symmetry it lies in that line.
+    /// The contact along consecutive edges, with the first node at arc length `start`; `depth` as in
+    /// `elasticity::Section`. A normal that is parallel or perpendicular to a direction of `held`, within the errors of
+    /// both, is made exactly so: on a line of symmetry it lies in that line.
     pub fn new(
         mesh: &Mesh,
         chain: &[Edge],
@@ -143,7 +143,7 @@ impl ContactBoundary {
         boundary
     }
 
-    /// Arc length from the first node to the last.
+    /// The arc length from the first node to the last.
     pub fn length(&self) -> f64 {
         self.s[self.s.len() - 1] - self.s[0]
     }
@@ -153,7 +153,7 @@ impl ContactBoundary {
         self.nodes.len() / 2
     }
 
-    /// Tangent: the normal turned clockwise.
+    /// The tangent at a node: the normal turned clockwise.
     pub fn tangent(&self, node: usize) -> [f64; 2] {
         let [x, y] = self.normals[node];
         [y, -x]
@@ -175,7 +175,8 @@ impl ContactBoundary {
     }
 }
 
-/// A normal (unit vector), or the direction that is normal or tangent instead of it but for an error (angle).
+/// The normal (unit vector), or `direction` or its perpendicular if the normal agrees with one of them within `error`
+/// (angle).
 fn aligned(normal: [f64; 2], direction: [f64; 2], error: f64) -> [f64; 2] {
     let ([a, b], [x, y]) = (normal, direction);
     let (sine, cosine) = (a * y - b * x, a * x + b * y);
@@ -186,7 +187,7 @@ fn aligned(normal: [f64; 2], direction: [f64; 2], error: f64) -> [f64; 2] {
     }
 }
 
-/// Chain nodes (start, end, midside) of an edge.
+/// The chain nodes (start, end, midside) of an edge.
 pub fn edge_nodes(edge: usize) -> [usize; 3] {
     [2 * edge, 2 * edge + 2, 2 * edge + 1]
 }

@@ -1,4 +1,4 @@
-//! Rigid obstacles: the part of a boundary that faces one, its distance at the nodes, and what lies between them.
+//! Rigid obstacles: the part of a boundary that faces one, its distance at the nodes, and its shape between them.
 
 use std::ops::Range;
 
@@ -15,49 +15,50 @@ use crate::problem::{Along, Obstacle};
 pub struct Facing {
     /// Edges whose three nodes all face the obstacle, in connected runs.
     pub runs: Vec<FacingRun>,
-    /// Coordinates c of edges inside which the obstacle ends, and that were therefore left out.
+    /// The ranges of the coordinate c of edges inside which the obstacle ends; these edges are left out.
     pub cut: Vec<[f64; 2]>,
-    /// The same edges, each with the length of it that the obstacle covers.
+    /// The edges inside which the obstacle ends, each with the length that the obstacle covers.
     pub cut_edges: Vec<(Edge, f64)>,
 }
 
-/// A chain of edges and the obstacle's profile at its nodes.
+/// A chain of edges that face the obstacle, and the profile at its nodes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FacingRun {
-    /// Edges, following one another.
+    /// Consecutive edges.
     pub chain: Vec<Edge>,
     /// The obstacle at each node of the chain.
     pub profile: Vec<Profile>,
     /// Arc length of the first node from the start of the boundary.
     pub start: f64,
-    /// The coordinate c there.
+    /// The coordinate c of each node.
     pub coordinate: Vec<f64>,
     /// The obstacle between the nodes, and at its corners.
     pub places: Vec<Place>,
 }
 
-/// A place of an edge at which the obstacle is known: between the nodes, or at a corner of the obstacle.
+/// A place of an edge at which the obstacle is evaluated: between the nodes, or at a corner of the obstacle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
-    /// The edge, by its number in the chain.
+    /// The number of the edge in the chain.
     pub edge: usize,
-    /// Where on the edge, −1 … 1.
+    /// The place on the edge, −1 … 1.
     pub xi: f64,
     /// The body's normal there.
     pub normal: [f64; 2],
-    /// The obstacle there.
+    /// The obstacle's distance and slope there.
     pub profile: Profile,
-    /// The change of its slope along t; positive at a kink that points at the body, 0 where it is smooth.
+    /// The change of the obstacle's slope along t; positive at a kink that points at the body, 0 where it is smooth.
     pub kink: f64,
-    /// How much nearer it is than the parabola through the profile at the edge's nodes; negative: farther (length).
+    /// How much nearer the obstacle is than the parabola through the profile at the edge's nodes (length); negative:
+    /// farther.
     pub nearer: f64,
 }
 
-/// Where an edge is looked at between its nodes.
+/// The places between the nodes of an edge where the obstacle is evaluated.
 const BETWEEN: [f64; 6] = [-0.75, -0.5, -0.25, 0.25, 0.5, 0.75];
 
-/// Most places that are kept of one edge: a quarter where the obstacle is nearest, a quarter where it is farthest, and the
-/// sharpest kinks.
+/// The largest number of places on one edge: a quarter where the obstacle is nearest, a quarter where it is farthest,
+/// and the sharpest kinks.
 const MOST_PLACES: usize = 32;
 
 /// Finds the part of `boundary` (edges that follow one another) that faces the obstacle. `held`: as in
@@ -97,13 +98,14 @@ pub fn facing(
     found
 }
 
-/// Γ_C along edges; its geometry only: the depth of the section does not matter.
+/// The geometry of Γ_C along edges; the depth of the section does not matter.
 fn along(mesh: &Mesh, chain: &[Edge], held: &HeldDirections) -> ContactBoundary {
     ContactBoundary::new(mesh, chain, 0.0, held, |_| 1.0)
 }
 
-/// Where an obstacle ends inside edges of `boundary` (edges that follow one another): those edges, with the place of the
-/// end on each, −1 … 1. `deepest`: the largest indentation; of a curve in space that an edge then does not reach, no end matters.
+/// Where an obstacle ends inside edges of `boundary` (edges that follow one another): those edges, with the place of
+/// the end on each, −1 … 1. `deepest`: the largest indentation; ends of a curve that an edge does not reach then are
+/// left out.
 pub fn ends_inside_edges(
     mesh: &Mesh,
     boundary: &[Edge],
@@ -139,7 +141,7 @@ struct View<'a> {
     shape: Shape<'a>,
     along: Along,
     whole: ContactBoundary,
-    /// The side of a curve in space on which it is rigid.
+    /// The rigid side of a curve.
     rigid: Side,
     corners: Vec<Corner>,
     rounding: f64,
@@ -149,7 +151,7 @@ struct View<'a> {
 #[derive(Clone, Copy)]
 struct Seen {
     profile: Profile,
-    /// The first and the last piece of a curve in space that meet there.
+    /// The first and the last piece of a curve that meet there.
     pieces: [usize; 2],
 }
 
@@ -178,7 +180,7 @@ impl<'a> View<'a> {
         }
     }
 
-    /// The coordinates c between which an edge lies.
+    /// The range of the coordinate c of an edge.
     fn range(&self, edge: usize) -> [f64; 2] {
         let c = edge_nodes(edge).map(|node| self.coordinate(node));
         [
@@ -187,8 +189,8 @@ impl<'a> View<'a> {
         ]
     }
 
-    /// The runs of edges of which every node faces the obstacle along the normal that it has in a contact of this run: that
-    /// of its own edge at an end, else the mean of both edges. `within`: edges that `from` and `to` allow.
+    /// The runs of edges whose nodes all face the obstacle along the normals of a contact that consists of this run: at
+    /// an end the normal of the edge itself, else the mean of both edges. `within`: the edges between `from` and `to`.
     fn runs(&self, boundary: &[Edge], within: &dyn Fn(usize) -> bool) -> Vec<Range<usize>> {
         let mut runs: Vec<Range<usize>> = Vec::new();
         for k in (0..boundary.len()).filter(|k| within(*k)) {
@@ -214,13 +216,13 @@ impl<'a> View<'a> {
         runs
     }
 
-    /// The normals of an edge's nodes if it is a contact alone.
+    /// The normals of an edge's nodes if the edge is a contact by itself.
     fn own_normals(&self, edge: &Edge) -> [[f64; 2]; 3] {
         let own = along(self.mesh, &[*edge], self.held);
         edge_nodes(0).map(|i| own.normals[i])
     }
 
-    /// From which nodes of an edge the obstacle is seen along its own normals.
+    /// Which nodes of an edge see the obstacle along the edge's own normals.
     fn seen_along_own_normals(&self, k: usize, edge: &Edge) -> [bool; 3] {
         let (nodes, normals) = (edge_nodes(k), self.own_normals(edge));
         std::array::from_fn(|i| {
@@ -231,7 +233,7 @@ impl<'a> View<'a> {
         })
     }
 
-    /// From now on the normals at the ends of a run are those of a contact that ends there. `chain`: its edges.
+    /// Sets the normals at the ends of a run to those of a contact that ends there. `chain`: its edges.
     fn end_at(&mut self, run: Range<usize>, chain: &[Edge]) {
         let normals = along(self.mesh, chain, self.held).normals;
         self.whole.normals[2 * run.start..=2 * run.end].copy_from_slice(&normals);
@@ -256,7 +258,7 @@ impl<'a> View<'a> {
         })
     }
 
-    /// The ends of the obstacle in the coordinate c.
+    /// The range of the coordinate c that the obstacle covers.
     fn limits(&self, obstacle: &Obstacle) -> [f64; 2] {
         let (from, to, _) = obstacle.span();
         let [first, last] = self.shape.ends();
@@ -266,7 +268,7 @@ impl<'a> View<'a> {
         ]
     }
 
-    /// Where on an edge the coordinate c is, if that lies between the edge's ends.
+    /// The place on an edge with the coordinate c, if the edge contains it.
     fn place_of(&self, edge: usize, c: f64) -> Option<f64> {
         let ends = edge_nodes(edge).map(|node| self.coordinate(node));
         let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
@@ -287,9 +289,9 @@ impl<'a> View<'a> {
         bisected(|xi| length(xi) < c, -1.0, 1.0)
     }
 
-    /// Where an edge faces an end of a curve in space along the edge's own normals. A curve that is lost from sight before its end
-    /// has none there: it turns away, and its flank, steeper than 45°, is no place for a node. Round a corner of the body nothing
-    /// ends: what overlaps the body there is faced by the other side.
+    /// The places where an edge faces an end of a curve along the edge's own normals. Where a curve turns away from the
+    /// edge before its end, there is none: its flank, steeper than 45°, is no place for a node. Nor does contact end at
+    /// a corner of the body: there the next side faces the part of the obstacle that overlaps the body.
     fn ends_of_sight(&self, k: usize, edge: &Edge, deepest: f64) -> Vec<f64> {
         let Some(curve_ends) = self.shape.in_space().and_then(Curve::ends) else {
             return Vec::new();
@@ -377,7 +379,7 @@ impl<'a> View<'a> {
         })
     }
 
-    /// Change of the coordinate c per length along t.
+    /// The change of the coordinate c per length along t.
     fn per_length(&self, t: [f64; 2]) -> f64 {
         match self.along {
             Along::X => t[0],
@@ -391,7 +393,7 @@ impl<'a> View<'a> {
         self.place_between(edge, xi, &normals)
     }
 
-    /// The same with these normals at the edge's nodes.
+    /// Position, normal and coordinate c at a place of an edge, for the given normals at its nodes.
     fn place_between(
         &self,
         edge: usize,
@@ -414,8 +416,9 @@ impl<'a> View<'a> {
         self.seen_from_place(place, n, c)
     }
 
-    /// Whether a curve in space ends inside an edge: some of its nodes face it and others do not. Where it ends exactly
-    /// at a node, nothing of it is seen beside that node. A straight line has no end: the body turns away from it.
+    /// Whether a curve ends inside an edge: some of the edge's nodes face it and others do not. Where the curve ends
+    /// exactly at a node, the edge beyond that node sees nothing of it. A straight line has no end: the body turns away
+    /// from it.
     fn ends_inside(&self, k: usize, edge: &Edge) -> bool {
         const BESIDE: f64 = 1.0 / 64.0;
         let normals = self.own_normals(edge);
@@ -431,8 +434,8 @@ impl<'a> View<'a> {
         ends && (middle || beside(start, -1.0 + BESIDE) || beside(end, 1.0 - BESIDE))
     }
 
-    /// The obstacle between the nodes of an edge, and at its corners there, in order of s. `nodes`: as seen from its
-    /// start, end and midside.
+    /// The obstacle between the nodes of an edge, and at its corners there, in order of s. `nodes`: the obstacle as
+    /// seen from the edge's start, end and midside.
     fn places(&self, edge: usize, nodes: [Seen; 3]) -> Vec<Place> {
         let mut found: Vec<Place> = Vec::new();
         let at_nodes = nodes.map(|seen| seen.profile.distance);
@@ -486,7 +489,7 @@ impl<'a> View<'a> {
         found
     }
 
-    /// Corners of the obstacle on an edge; one at its end belongs to the next edge, if there is one.
+    /// The corners of the obstacle on an edge. One at the edge's end belongs to the next edge, if there is one.
     fn corners_in(&self, edge: usize) -> Vec<(f64, Corner)> {
         let mut c = edge_nodes(edge).map(|node| self.coordinate(node));
         let falls = c[1] < c[0];
@@ -519,8 +522,8 @@ impl<'a> View<'a> {
         found
     }
 
-    /// Joints of the pieces of a curve in space that an edge faces: where on the edge, the point, and the change of slope.
-    /// `sight`: the obstacle from places of the edge, in their order.
+    /// The joints between pieces of a curve that an edge faces: the place on the edge, the point, and the change of
+    /// slope. `sight`: the obstacle seen from places of the edge, in their order.
     fn joints_in(
         &self,
         curve: &Curve<'_>,
@@ -554,7 +557,7 @@ impl<'a> View<'a> {
         found.into_iter().map(with_change).collect()
     }
 
-    /// Where between two places of an edge its normal meets a joint, if it does.
+    /// The place between two places of an edge whose normal meets a joint, if there is one.
     fn faces(
         &self,
         curve: &Curve<'_>,
@@ -589,7 +592,7 @@ impl<'a> View<'a> {
     }
 }
 
-/// The last place from `from` on, towards `to`, that something is true of; none if that is `from` itself.
+/// The last place from `from` towards `to` for which `holds` is true, by bisection; none if that is `from` itself.
 fn bisected(holds: impl Fn(f64) -> bool, from: f64, to: f64) -> Option<f64> {
     let (mut inside, mut outside) = (from, to);
     // to rounding
@@ -604,12 +607,12 @@ fn bisected(holds: impl Fn(f64) -> bool, from: f64, to: f64) -> Option<f64> {
     (inside != from).then_some(inside)
 }
 
-/// n turned clockwise.
+/// The tangent: n turned clockwise.
 fn tangent([x, y]: [f64; 2]) -> [f64; 2] {
     [y, -x]
 }
 
-/// The side of a curve in space on which it is rigid: that which most of the boundary sees so.
+/// The rigid side of a curve, as most of the boundary sees it.
 fn rigid_side(curve: &Curve<'_>, mesh: &Mesh, boundary: &ContactBoundary, rounding: f64) -> Side {
     let surface = mesh.surface();
     let mut left = 0.0;
@@ -630,7 +633,7 @@ fn rigid_side(curve: &Curve<'_>, mesh: &Mesh, boundary: &ContactBoundary, roundi
     if left >= 0.0 { Side::Left } else { Side::Right }
 }
 
-/// How far the body reaches from a place of its surface along −n (length).
+/// How far the body extends from a place of its surface along −n (length).
 fn depth(mesh: &Mesh, surface: &[Edge], ray: &Ray, rounding: f64) -> f64 {
     let Ray { place, n, t } = *ray;
     let mut least = f64::INFINITY;
@@ -737,7 +740,7 @@ mod tests {
         assert_eq!(found.runs[0].chain.len(), 1);
     }
 
-    /// A roof over a flat top: distances and slopes along its normal, no obstacle beside it.
+    /// A roof over a flat top has the right distances and slopes along the top's normal, and is no obstacle beside it.
     #[test]
     fn curves_in_space_are_met_along_the_normal() {
         let (from, to, along) = (None, None, Along::X);

@@ -1,16 +1,16 @@
-//! The shape of an obstacle: its distance as a function of the coordinate c, or a curve in space.
+//! The shape of an obstacle: its distance as a function of the coordinate c, or a curve.
 
 use super::curve::Curve;
 use crate::problem::{Interpolation, Obstacle};
 use crate::spline::{Spline, smoothed};
 
-/// A circle ends where its side is so near to vertical: this part of its radius below its centre.
+/// A circle ends where its flank is almost vertical: at this part of its radius below its centre.
 const FLANK: f64 = 1e-3;
 
-/// A place where an obstacle may be nearer to the body than beside it, or has a kink.
+/// A place where the obstacle has a kink, or may be nearer to the body than on both sides of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Corner {
-    /// The coordinate c.
+    /// The coordinate c of the place.
     pub(super) c: f64,
     /// The change of the profile's slope there, along growing c; positive where the obstacle points at the body.
     pub(super) change: f64,
@@ -22,7 +22,7 @@ pub(super) enum Shape<'a> {
     Of(&'a Obstacle),
     /// A smooth table.
     Smooth(Spline),
-    /// A curve in space, which has no coordinate c.
+    /// A curve, which has no coordinate c.
     InSpace(Curve<'a>),
 }
 
@@ -52,7 +52,7 @@ impl<'a> Shape<'a> {
         }
     }
 
-    /// The curve, if it is one in space.
+    /// The curve, if the shape is one.
     pub(super) fn in_space(&self) -> Option<&Curve<'a>> {
         match self {
             Shape::InSpace(curve) => Some(curve),
@@ -60,8 +60,8 @@ impl<'a> Shape<'a> {
         }
     }
 
-    /// The ends of the obstacle in the coordinate c. A circle has none: contact does not come near to where it stands
-    /// upright.
+    /// The range of the coordinate c that the obstacle covers. A circle has no ends: contact never comes near its
+    /// vertical flank.
     pub(super) fn ends(&self) -> [f64; 2] {
         match self {
             Shape::Of(Obstacle::Table { x, .. }) => [x[0], x[x.len() - 1]],
@@ -127,8 +127,8 @@ impl<'a> Shape<'a> {
         }
     }
 
-    /// Distance before the obstacle is pushed, and its change with c, at coordinate c; `None` where there is no
-    /// obstacle, and for curves in space.
+    /// The distance before the obstacle is pushed, and its derivative by c, at coordinate c. `None` where there is no
+    /// obstacle, and for curves.
     pub(super) fn at(&self, c: f64, rounding: f64) -> Option<(f64, f64)> {
         match self {
             Shape::Of(obstacle) => formula(obstacle, c, rounding),
@@ -142,7 +142,7 @@ impl<'a> Shape<'a> {
     }
 }
 
-/// Distance and its change with c, where the profile is a formula or a table with straight lines.
+/// The distance and its derivative by c, where the profile is a formula or a table with straight lines.
 fn formula(obstacle: &Obstacle, c: f64, rounding: f64) -> Option<(f64, f64)> {
     // a circle of radius R that leaves the surface at x = 0
     let round = |radius: f64, x: f64| {
@@ -197,7 +197,7 @@ fn formula(obstacle: &Obstacle, c: f64, rounding: f64) -> Option<(f64, f64)> {
     }
 }
 
-/// Linear between the points of a table; at a point the mean of both slopes.
+/// The distance and its slope, linear between the points of a table; at a point the mean of both slopes.
 fn tabulated(x: &[f64], y: &[f64], at: f64, rounding: f64) -> Option<(f64, f64)> {
     let last = x.len() - 1;
     if at < x[0] - rounding || at > x[last] + rounding {

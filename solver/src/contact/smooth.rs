@@ -1,24 +1,25 @@
-//! Where the surface of a body is smooth: one criterion for all that depends on the direction of its normal.
+//! Where the surface of a body is smooth: one criterion for everything that depends on the direction of its normal.
 //!
-//! A side is a parabola through three nodes. On a curve its ends leave the curve's direction by an angle that follows from the
-//! side itself: a side of a circle that turns by 2α by α³/4, one whose midside node is off the middle by a part δ of its
-//! length by 4δα; and two sides of different lengths h on a curve with the curvature κ differ at their common node by
-//! |h₁ − h₂|·|κ₁ − κ₂|/6. Within a few such errors two directions are one; beyond them the surface has a corner. Straight sides
-//! have no such error: where they meet at an angle, there is a corner.
+//! A side is a parabola through three nodes. On a curve, the direction at its ends differs from the curve's by an angle
+//! that follows from the side itself: α³/4 for a side of a circle that turns by 2α; 4δα for a side whose midside node
+//! is away from the middle by a part δ of its length. Two sides of different lengths h on a curve of curvature κ differ
+//! at their common node by
+//! |h₁ − h₂|·|κ₁ − κ₂|/6. Directions that differ by a few such errors are taken as equal; beyond that the surface has a corner.
+//! Straight sides have no such error: where they meet at an angle, there is a corner.
 
 use std::collections::BTreeMap;
 
 use crate::element::edge3;
 use crate::mesh::{Edge, Mesh};
 
-/// Directions differ by no more than this many errors of the sides where a curve is smooth (ellipses, waves and cubics
-/// of ten sides and more, also unequal ones; circles of four).
+/// A curve is smooth where directions differ by at most this many errors of the sides (ellipses, waves and cubics of
+/// ten sides and more, also unequal ones; circles of four).
 const ERRORS: f64 = 4.0;
 
-/// The same for the difference of lengths and curvatures.
+/// The factor on the error by different lengths and curvatures of two sides.
 const DIFFERENCES: f64 = 2.0;
 
-/// What coordinates of six to eight digits leave of the direction of a side (angle): 0.03°.
+/// The error of a side's direction if coordinates have six to eight digits (angle): 0.03°.
 const PRINTED: f64 = 5e-4;
 
 /// The surface has a corner where it turns by more than this, however coarse its sides are: 15°.
@@ -39,7 +40,7 @@ pub fn edge_normal(positions: &Side, xi: f64) -> [f64; 2] {
     [-dy / length, dx / length]
 }
 
-/// How far the direction of a side at its ends may be off that of the surface (angle).
+/// How far the direction of a side at its ends may deviate from that of the surface (angle).
 pub fn direction_error(side: &Side) -> f64 {
     let shape = SideShape::of(side);
     (ERRORS * shape.error + PRINTED).min(CORNER)
@@ -60,8 +61,8 @@ pub fn corner(before: &Side, after: &Side) -> f64 {
     }
 }
 
-/// The unit normals of the sides of the surface next to the ends of a boundary, by the node where they meet: of those that
-/// the boundary goes on to smoothly.
+/// The unit normals of the sides of the surface beyond the ends of a boundary, by the node where they meet, if the
+/// surface continues smoothly there.
 pub fn normals_beyond(mesh: &Mesh, boundary: &[Edge]) -> BTreeMap<u32, [f64; 2]> {
     // nodes that one side of the boundary has, and how it reaches them
     let mut ends: BTreeMap<(u32, bool), Edge> = BTreeMap::new();
@@ -103,13 +104,13 @@ fn end_direction([start, end, middle]: &Side, xi: f64) -> [f64; 2] {
     })
 }
 
-/// A side as a part of a curve.
+/// Length, curvature and error of a side as a part of a curve.
 struct SideShape {
-    /// Of its chord.
+    /// The length of its chord.
     length: f64,
-    /// The angle that it turns by per length of its chord, with the sign of the turn.
+    /// The angle of its turn per length of its chord, with sign.
     curvature: f64,
-    /// Of its directions at its ends, if it stands for a curve (angle).
+    /// The error of its directions at the ends, if it stands for a curve (angle).
     error: f64,
 }
 
@@ -137,12 +138,12 @@ mod tests {
 
     use super::*;
 
-    /// A side of a curve between two parameters, its midside at the middle of them.
+    /// A side of a curve between two parameters, with its midside at the mean parameter.
     fn side(curve: impl Fn(f64) -> [f64; 2], from: f64, to: f64) -> Side {
         [from, to, 0.5 * (from + to)].map(curve)
     }
 
-    /// Turned, moved, scaled, and printed with so many digits.
+    /// A side turned, moved, scaled, and rounded to `digits` digits.
     fn placed(side: Side, angle: f64, scale: f64, digits: usize) -> Side {
         let (s, c) = angle.sin_cos();
         side.map(|[x, y]| {
@@ -153,7 +154,7 @@ mod tests {
         })
     }
 
-    /// All joints of a closed curve, the parameters of its sides by their part of the whole.
+    /// The angles at all joints of a closed curve whose sides end at these parts of the whole parameter.
     fn turns(curve: impl Fn(f64) -> [f64; 2] + Copy, places: &[f64]) -> Vec<f64> {
         let mut found = Vec::new();
         for (angle, scale, digits) in [(0.0, 1.0, 16), (0.7, 1e-6, 7), (2.2, 1e6, 7)] {
@@ -167,7 +168,7 @@ mod tests {
         found
     }
 
-    /// Parameters from 0 to a whole turn, in steps of one length or, `uneven`, in steps that differ by half.
+    /// Parameters from 0 to a whole turn, in equal steps or, if `uneven`, in steps that differ by half.
     fn places(count: usize, uneven: bool) -> Vec<f64> {
         let step = |k: usize| match uneven {
             true => 1.0 + 0.25 * ((7 * k * k + 3 * k) % 5) as f64 / 4.0,
@@ -204,7 +205,7 @@ mod tests {
         }
     }
 
-    /// Two arcs or lines that meet at an angle; with sides that turn by 10° one of a degree is still told.
+    /// A corner of one degree between two arcs or lines is still detected between sides that turn by 10°.
     #[test]
     fn a_corner_of_a_degree_stays_one() {
         for degrees in [1.0f64, 2.0, 5.0, -1.0, -5.0] {
@@ -230,7 +231,7 @@ mod tests {
         }
     }
 
-    /// An arc that ends on a line of symmetry: its normal there lies along that line, but for its error.
+    /// The normal of an arc that ends on a line of symmetry lies along that line, within its stated error.
     #[test]
     fn a_side_knows_the_error_of_its_direction() {
         for count in [2, 4, 8, 40] {

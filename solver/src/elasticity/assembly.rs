@@ -16,24 +16,24 @@ use crate::mesh::{Edge, Mesh};
 /// One component of one node's displacement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Dof {
-    /// Unknown, with its place in the system.
+    /// Unknown: its number in the system.
     Free(usize),
-    /// Prescribed, with its value (length).
+    /// Prescribed: its value (length).
     Fixed(f64),
 }
 
-/// Axes of a node's two components.
+/// The axes of a node's two displacement components.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axes {
-    /// The unit vectors along which its displacement is measured.
+    /// The unit vectors along which the displacement is measured.
     pub along: [[f64; 2]; 2],
     /// How the node moves where one component is 1 and the other 0: the same vectors if they are perpendicular, else
-    /// those of the dual basis. A force has its components along these.
+    /// the dual basis. Components of a force are taken along these.
     pub moves: [[f64; 2]; 2],
 }
 
 impl Axes {
-    /// Perpendicular unit vectors.
+    /// Axes along perpendicular unit vectors.
     pub fn perpendicular(along: [[f64; 2]; 2]) -> Self {
         Axes {
             along,
@@ -41,7 +41,7 @@ impl Axes {
         }
     }
 
-    /// Unit vectors that are not parallel.
+    /// Axes along unit vectors that are not parallel.
     pub fn oblique(along: [[f64; 2]; 2]) -> Self {
         let [[a, b], [c, d]] = along;
         let det = a * d - b * c;
@@ -55,16 +55,16 @@ impl Axes {
 /// Which displacements are unknown, and along which axes each node's two components are measured.
 #[derive(Clone, Debug)]
 pub struct DofMap {
-    /// Two components of every node.
+    /// The two components of every node.
     pub dofs: Vec<[Dof; 2]>,
-    /// Axes of a node's two components; absent: x and y.
+    /// The axes of a node's two components; absent: x and y.
     pub axes: Vec<Option<Axes>>,
-    /// Number of unknowns.
+    /// The number of unknowns.
     pub unknowns: usize,
 }
 
 impl DofMap {
-    /// Displacements along x and y of every node, from the unknowns; prescribed ones times `supports`.
+    /// Displacements of every node along x and y, from the unknowns and from the prescribed ones times `supports`.
     pub fn displacements(&self, unknown: impl Fn(usize) -> f64, supports: f64) -> Vec<[f64; 2]> {
         let node = |(dofs, axes): (&[Dof; 2], &Option<Axes>)| {
             let [a, b] = dofs.map(|dof| match dof {
@@ -82,7 +82,7 @@ impl DofMap {
         self.dofs.iter().zip(&self.axes).map(node).collect()
     }
 
-    /// The same of several fields at once, without prescribed displacements.
+    /// Displacements of every node along x and y for several fields at once, without prescribed displacements.
     pub fn displacements_together<const FIELDS: usize>(
         &self,
         unknowns: &[[f64; FIELDS]],
@@ -114,7 +114,7 @@ impl DofMap {
         }
     }
 
-    /// A force on a node along x and y, as forces on its two components.
+    /// Converts a force on a node along x and y to forces on its two components.
     pub fn to_axes(&self, node: usize, [x, y]: [f64; 2]) -> [f64; 2] {
         match self.axes[node] {
             None => [x, y],
@@ -126,12 +126,12 @@ impl DofMap {
     }
 }
 
-/// Element stiffness k_ij = ∫ B_iᵀ D B_j, along x and y; 16 × 16, symmetric. The last four rows and
-/// columns of a triangle are zero.
+/// Element stiffness k_ij = ∫ B_iᵀ D B_j, along x and y; 16 × 16, symmetric. The last four rows and columns of a
+/// triangle are zero.
 ///
-/// `material`: its number in the section; one that is nearly incompressible has the element of [`Mixed`], with the
-/// full rule. `quadrature`: with 3 only the rigid modes have no stiffness; with 2 a quadrilateral has one more such
-/// mode, which its neighbours may or may not suppress.
+/// `material`: its number in the section; one that is nearly incompressible has the element of [`Mixed`], with the full
+/// rule. `quadrature`: with 3 only the rigid modes have no stiffness; with 2 a quadrilateral has another mode without
+/// stiffness, which its neighbours may or may not suppress.
 pub fn assemble_element(
     family: Family,
     nodes: &[[f64; 2]; 8],
@@ -143,7 +143,7 @@ pub fn assemble_element(
     stiffness(&Masters::new(quadrature), section, &shape)
 }
 
-/// That of elements of a shape.
+/// The stiffness of elements of one shape, along x and y.
 fn stiffness(masters: &Masters, section: &Section, shape: &Shape) -> [[f64; 16]; 16] {
     match section.split(usize::from(shape.material)) {
         Some(split) => Mixed::stiffness(section, split, shape.family, &shape.nodes),
@@ -155,12 +155,12 @@ fn stiffness(masters: &Masters, section: &Section, shape: &Shape) -> [[f64; 16];
 pub struct ElementStiffness<'a> {
     elements: Elements<'a>,
     map: &'a DofMap,
-    /// Of the shapes of several elements.
+    /// The matrices of the shapes that several elements have.
     of_shapes: Vec<[[f64; 16]; 16]>,
 }
 
 impl<'a> ElementStiffness<'a> {
-    /// That of these elements, on the unknowns of `map`.
+    /// The stiffness of these elements on the unknowns of `map`.
     pub fn new(elements: Elements<'a>, map: &'a DofMap) -> Self {
         let (tables, section) = (elements.tables, elements.section);
         let of_shape = |shape| stiffness(&tables.masters, section, shape);
@@ -171,7 +171,7 @@ impl<'a> ElementStiffness<'a> {
         }
     }
 
-    /// Puts the matrix of an element in place.
+    /// Writes the matrix of an element to `matrix`.
     pub fn put(&self, e: u32, matrix: &mut ElementMatrix) {
         let Elements {
             mesh,
@@ -201,7 +201,7 @@ impl<'a> ElementStiffness<'a> {
         }
     }
 
-    /// Forces on the unknowns by the prescribed displacements, −K_fp u_p.
+    /// Forces on the unknowns due to the prescribed displacements, −K_fp u_p.
     pub fn load_of_supports(&self) -> Vec<f64> {
         let (mesh, map) = (self.elements.mesh, self.map);
         let mut load = vec![0.0; map.unknowns];
@@ -231,8 +231,8 @@ impl<'a> ElementStiffness<'a> {
 }
 
 impl Elements<'_> {
-    /// Numbers that are equal for elements with the same matrix, on the same unknown components of their nodes; none for
-    /// elements whose shape no other has.
+    /// Numbers that are equal for elements with the same matrix on the same unknown components of their nodes; none for
+    /// an element with a unique shape.
     pub fn kinds(self, map: &DofMap) -> Vec<Option<u32>> {
         let (mut known, mut turned) = (HashMap::new(), HashMap::new());
         let mut kind = |(e, element): (usize, &Element)| {
@@ -255,7 +255,7 @@ impl Elements<'_> {
     }
 }
 
-/// Rows and columns of node `i`, turned to its axes: k ← Q k Qᵀ.
+/// Turns rows and columns of node `i` to its axes: k ← Q k Qᵀ.
 fn rotate(k: &mut [[f64; 16]; 16], i: usize, [n, t]: [[f64; 2]; 2]) {
     let (a, b) = (2 * i, 2 * i + 1);
     for column in 0..16 {
@@ -275,18 +275,18 @@ pub struct Loads {
     pub edges: Vec<EdgeLoad>,
     /// Force per volume along x and y.
     pub body_force: [f64; 2],
-    /// Forces along x and y at nodes (without 2π).
+    /// Forces at nodes along x and y (without 2π).
     pub nodal: Vec<(u32, [f64; 2])>,
 }
 
 /// A stress on an edge, interpolated between start, end and midside.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct EdgeLoad {
-    /// The edge.
+    /// The edge that is loaded.
     pub edge: Edge,
     /// The directions of the two components.
     pub axes: LoadAxes,
-    /// Two components (stress) at start, end and midside.
+    /// The two components (stress) at start, end and midside.
     pub values: [[f64; 2]; 3],
 }
 
@@ -295,7 +295,7 @@ pub struct EdgeLoad {
 pub enum LoadAxes {
     /// x and y.
     Fixed,
-    /// The outward normal, and t: the normal turned clockwise.
+    /// The outward normal, and t, the normal turned clockwise.
     Edge,
 }
 
@@ -335,7 +335,7 @@ pub fn assemble_loads(
     forces
 }
 
-/// Adds what the body force on the bubbles of nearly incompressible elements does to the nodes: `forces` of
+/// Adds the effect of the body force on the bubbles of nearly incompressible elements to the nodes: `forces` of
 /// [`assemble_loads`] add up to the load, and become the right-hand side of the stiffness, whose bubbles are condensed.
 pub fn condense_body_force(mesh: &Mesh, section: &Section, loads: &Loads, forces: &mut [[f64; 2]]) {
     if loads.body_force == [0.0; 2] || !section.has_split() {
@@ -475,7 +475,8 @@ mod tests {
         assert_eq!(forces[2][0], 7.0);
     }
 
-    /// Two rows of quadrilaterals and triangles on computed lines, of two materials, one of them nearly incompressible.
+    /// A mesh of two rows of quadrilaterals and triangles between computed lines, of two materials, one nearly
+    /// incompressible.
     fn mixed(kind: &str) -> crate::model::Model {
         let mut analysis = serde_json::json!({"kind": kind});
         if kind == "plane_stress" {
@@ -541,7 +542,7 @@ mod tests {
         crate::prepare(&problem, None, quiet).unwrap().model
     }
 
-    /// Against each element by itself: what is shared, and what is of its own, is the right one.
+    /// Elements assembled by shape have the same matrix as each element assembled by itself.
     #[test]
     fn elements_of_a_shape_have_the_matrix_of_each_of_them() {
         for kind in ["plane_strain", "plane_stress", "axisymmetric"] {

@@ -1,4 +1,4 @@
-//! What integrals over an element need of its shape, computed once for all elements of the same shape.
+//! The part of element integrals that depends on the shape alone, computed once for all elements of the same shape.
 
 use crate::elasticity::Section;
 use crate::elasticity::material::{COMPONENTS, Moduli};
@@ -6,18 +6,19 @@ use crate::elasticity::shapes::{Shape, Shapes};
 use crate::element::{AtNodes, Family, GaussPoint, Tabulated};
 use crate::mesh::Mesh;
 
-/// The strains of an element's nodes at one of its places, as rows of B.
+/// Shape functions, derivatives and weight at one place of an element, which give the strain from the nodes (rows of
+/// B).
 #[derive(Clone, Debug)]
 pub(super) struct Station {
-    /// h_i.
+    /// The shape functions h_i.
     pub(super) shape: AtNodes<f64>,
-    /// dh_i/dx.
+    /// The derivatives dh_i/dx.
     pub(super) dx: AtNodes<f64>,
-    /// dh_i/dy.
+    /// The derivatives dh_i/dy.
     pub(super) dy: AtNodes<f64>,
-    /// h_i / r in axisymmetry, else 0.
+    /// The coefficients of the hoop strain: h_i / r in axisymmetry, else 0.
     pub(super) hoop: AtNodes<f64>,
-    /// Weight of the rule × det J × depth.
+    /// The weight of the place: weight of the rule × det J × depth.
     pub(super) weight: f64,
 }
 
@@ -37,7 +38,7 @@ impl Station {
         }
     }
 
-    /// The strain of nodes displaced by `ux` and `uy`.
+    /// The strain where the nodes are displaced by `ux` and `uy`.
     #[inline(always)]
     pub(super) fn strain(&self, ux: &AtNodes<f64>, uy: &AtNodes<f64>) -> [f64; COMPONENTS] {
         let mut strain = [0.0; COMPONENTS];
@@ -67,18 +68,19 @@ impl Station {
     }
 }
 
-/// An element's stations.
+/// The stations of an element: its integration points and its superconvergent points.
 #[derive(Clone, Debug)]
 pub(super) struct Stations {
-    /// At the points of its integrals.
+    /// Stations at the integration points.
     pub(super) rule: Vec<Station>,
-    /// At its superconvergent points.
+    /// Stations at the superconvergent points.
     pub(super) stress: Vec<Station>,
-    /// Weights of the superconvergent points in the linear map to each node; none beyond its nodes.
+    /// The weights of the superconvergent points in the linear extrapolation to each node; zero beyond the element's
+    /// nodes.
     pub(super) to_nodes: AtNodes<[f64; 4]>,
 }
 
-/// The places of stations on the master elements.
+/// The places of stations on the master elements, for each family.
 pub(super) struct Masters {
     families: [Master; 2],
 }
@@ -108,7 +110,7 @@ impl Master {
 }
 
 impl Masters {
-    /// `quadrature`: as in `assemble_element`.
+    /// The places for a number of Gauss points; `quadrature` as in `assemble_element`.
     pub(super) fn new(quadrature: u32) -> Self {
         Masters {
             families: [Family::Quad, Family::Triangle].map(|f| Master::new(f, quadrature)),
@@ -119,7 +121,7 @@ impl Masters {
         &self.families[family as usize]
     }
 
-    /// The stations of elements of a shape.
+    /// The stations of elements of one shape.
     fn stations(&self, section: &Section, shape: &Shape) -> Stations {
         let master = self.of(shape.family);
         let at = |places: &[(Tabulated, f64)]| {
@@ -135,7 +137,7 @@ impl Masters {
         }
     }
 
-    /// The stiffness of elements of a shape, along x and y.
+    /// The stiffness of elements of one shape, along x and y.
     pub(super) fn stiffness(&self, section: &Section, shape: &Shape) -> [[f64; 16]; 16] {
         let moduli = &section.materials()[usize::from(shape.material)];
         let master = self.of(shape.family);
@@ -148,7 +150,8 @@ impl Masters {
     }
 }
 
-/// The matrix with rows and columns (node, direction); its two triangles may differ in rounding before.
+/// The matrix with rows and columns ordered by node, then direction, made exactly symmetric: its two triangles may
+/// differ by rounding.
 fn symmetric(k: &[[[[f64; 8]; 2]; 2]; 8]) -> [[f64; 16]; 16] {
     let mut whole = [[0.0; 16]; 16];
     for row in 0..16 {
@@ -193,16 +196,16 @@ fn add_stiffness(station: &Station, moduli: &Moduli, k: &mut [[[[f64; 8]; 2]; 2]
 
 /// What is computed once for all elements of the same shape.
 pub struct ElementTables {
-    /// As in `assemble_element`.
+    /// The number of Gauss points, as in `assemble_element`.
     pub quadrature: u32,
     pub(super) shapes: Shapes,
     pub(super) masters: Masters,
-    /// Of every shape.
+    /// The stations of every shape.
     stations: Vec<Stations>,
 }
 
 impl ElementTables {
-    /// `quadrature`: as in `assemble_element`.
+    /// The tables for the elements of a mesh; `quadrature` as in `assemble_element`.
     pub fn new(mesh: &Mesh, section: &Section, quadrature: u32) -> Self {
         let (shapes, masters) = (Shapes::new(mesh, section), Masters::new(quadrature));
         let stations = |shape| masters.stations(section, shape);
@@ -214,7 +217,7 @@ impl ElementTables {
         }
     }
 
-    /// The elements of the mesh and section that these were made of.
+    /// The elements of the mesh and section that these tables are for.
     pub fn elements<'a>(&'a self, mesh: &'a Mesh, section: &'a Section) -> Elements<'a> {
         Elements {
             mesh,
@@ -224,14 +227,14 @@ impl ElementTables {
     }
 }
 
-/// The elements of a mesh.
+/// The elements of a mesh, with their materials and tables.
 #[derive(Clone, Copy)]
 pub struct Elements<'a> {
-    /// Their nodes.
+    /// The nodes of the elements.
     pub mesh: &'a Mesh,
-    /// Their materials.
+    /// The materials of the elements.
     pub section: &'a Section,
-    /// Those of this mesh and section.
+    /// The tables for this mesh and section.
     pub tables: &'a ElementTables,
 }
 
@@ -247,12 +250,12 @@ impl<'a> Elements<'a> {
 /// The stations of a mesh's elements.
 pub(super) struct MeshStations<'a> {
     elements: Elements<'a>,
-    /// Those of the last element with a shape of its own.
+    /// The stations of the last element that has a unique shape.
     own: Option<Stations>,
 }
 
 impl MeshStations<'_> {
-    /// Those of an element.
+    /// The stations of an element.
     pub(super) fn of(&mut self, e: usize) -> &Stations {
         let Elements {
             mesh,

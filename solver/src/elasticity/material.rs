@@ -8,27 +8,28 @@ use crate::problem::{Analysis, Orthotropic};
 /// axisymmetry); the shear strain is the engineering one, γ = 2 ε_xy.
 pub const COMPONENTS: usize = 4;
 
-/// σ = moduli · ε, symmetric (stress).
+/// The elastic moduli, σ = moduli · ε, symmetric (stress).
 pub type Moduli = [[f64; COMPONENTS]; COMPONENTS];
 
-/// The moduli of a nearly incompressible material in two parts, σ = rest · ε + bulk (ε_xx + ε_yy + ε_zz) m with
-/// m = (1, 1, 0, 1): of an isotropic one 2G and λ.
+/// The moduli of a nearly incompressible material in two parts, σ = rest · ε + bulk (ε_xx + ε_yy + ε_zz) m with m = (1,
+/// 1, 0, 1) (2G and λ for an isotropic material).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Split {
-    /// What resists all strains alike; positive definite.
+    /// The resistance to all strains except that of `bulk`; positive definite.
     pub rest: Moduli,
-    /// What resists the change of volume (stress).
+    /// The resistance to a change of volume (stress).
     pub bulk: f64,
 }
 
 /// λ/G = 2ν/(1 − 2ν) of an isotropic material with ν = .48: above it a material is nearly incompressible.
 const NEARLY_INCOMPRESSIBLE: f64 = 24.0;
 
-/// About λ/G of ν = .49999: what is stiffer still is no measure of forces any more.
+/// About λ/G for ν = .49999: a larger bulk modulus is not used as a measure of forces.
 const STIFFEST: f64 = 1e5;
 
 impl Split {
-    /// `None`: not nearly incompressible, or plane stress, where the thickness takes up any change of volume.
+    /// The two parts of the moduli; `None` if the material is not nearly incompressible, or in plane stress, where the
+    /// thickness takes up any change of volume.
     fn new(moduli: &Moduli) -> Option<Split> {
         let bulk = moduli[0][1].min(moduli[0][3]).min(moduli[1][3]);
         let mut rest = *moduli;
@@ -50,19 +51,19 @@ impl Split {
 pub struct Section {
     analysis: Analysis,
     moduli: Vec<Moduli>,
-    /// Of every material.
+    /// The split of every material that is nearly incompressible.
     splits: Vec<Option<Split>>,
-    /// Material of every element; empty: the first for all.
+    /// The material of every element; empty: the first for all.
     material_of: Vec<u16>,
 }
 
 impl Section {
-    /// One material for the whole body.
+    /// A body of one material.
     pub fn uniform(analysis: Analysis, moduli: Moduli) -> Self {
         Section::by_element(analysis, vec![moduli], Vec::new())
     }
 
-    /// Several materials, with the number of its material for every element.
+    /// A body of several materials, with the number of the material for every element.
     pub fn by_element(analysis: Analysis, moduli: Vec<Moduli>, material_of: Vec<u16>) -> Self {
         Section {
             analysis,
@@ -82,8 +83,8 @@ impl Section {
         &self.moduli
     }
 
-    /// The modulus by which displacements are compared with forces: the largest of all materials, but no bulk modulus
-    /// far above the resistance to shear (stress).
+    /// The modulus for comparing displacements with forces: the largest of all materials, without bulk moduli far above
+    /// the resistance to shear (stress).
     pub fn modulus(&self) -> f64 {
         let of_material = |(moduli, split): (&Moduli, &Option<Split>)| match split {
             None => moduli[0][0],
@@ -93,7 +94,7 @@ impl Section {
         moduli.fold(0.0, f64::max)
     }
 
-    /// The two parts of the moduli of a material that is nearly incompressible.
+    /// The two parts of the moduli of a material, if it is nearly incompressible.
     pub fn split(&self, material: usize) -> Option<&Split> {
         self.splits[material].as_ref()
     }
@@ -122,7 +123,7 @@ impl Section {
         }
     }
 
-    /// True if there is a hoop strain u_r / r.
+    /// Whether there is a hoop strain u_r / r.
     pub fn axisymmetric(&self) -> bool {
         matches!(self.analysis, Analysis::Axisymmetric {})
     }
@@ -141,12 +142,12 @@ impl Section {
     }
 }
 
-/// σ = moduli · ε.
+/// The stress σ = moduli · ε.
 pub fn stress(moduli: &Moduli, strain: &[f64; COMPONENTS]) -> [f64; COMPONENTS] {
     moduli.map(|row| (0..COMPONENTS).map(|k| row[k] * strain[k]).sum())
 }
 
-/// From E and Poisson's ratio.
+/// The moduli of an isotropic material from E and Poisson's ratio.
 #[rustfmt::skip]
 pub fn isotropic(analysis: &Analysis, youngs_modulus: f64, poissons_ratio: f64) -> Moduli {
     let (e, nu) = (youngs_modulus, poissons_ratio);
@@ -175,8 +176,8 @@ pub fn isotropic(analysis: &Analysis, youngs_modulus: f64, poissons_ratio: f64) 
     }
 }
 
-/// From the constants of an orthotropic material; `None` if the material is not stable. Constants
-/// across the plane are required unless the analysis is plane stress.
+/// The moduli of an orthotropic material from its constants; `None` if the material is not stable. Constants across the
+/// plane are required unless the analysis is plane stress.
 #[rustfmt::skip]
 pub fn orthotropic(analysis: &Analysis, material: &Orthotropic) -> Option<Moduli> {
     let Orthotropic { e1, e2, nu12, g12, angle, e3, nu13, nu23 } = *material;
@@ -292,8 +293,7 @@ mod tests {
         }
     }
 
-    /// A sheet pulled at an angle θ to its stiff axis:
-    /// 1/E = c⁴/e1 + (1/g12 − 2 nu12/e1) c²s² + s⁴/e2.
+    /// A sheet pulled at an angle θ to its stiff axis has 1/E = c⁴/e1 + (1/g12 − 2 nu12/e1) c²s² + s⁴/e2.
     #[test]
     fn a_sheet_pulled_off_its_axis_has_the_known_modulus() {
         let sheet = Analysis::PlaneStress { thickness: 1.0 };
@@ -335,7 +335,7 @@ mod tests {
         assert_eq!(split(sheet, 0.499), None);
     }
 
-    /// An orthotropic material is judged in the same way; wood is far from it.
+    /// An orthotropic material is split by the same criterion; wood is far from nearly incompressible.
     #[test]
     fn an_orthotropic_material_is_split_as_the_isotropic_one_that_it_is() {
         let strain = Analysis::PlaneStrain {};

@@ -13,39 +13,39 @@ use crate::elasticity::Section;
 use crate::elasticity::material::{COMPONENTS, Split, stress};
 use crate::element::{AtNodes, Family, GaussPoint, Mapped};
 
-/// Displacements of the largest element with its bubble, which comes after the nodes.
+/// The displacement components of the largest element with its bubble, which comes after the nodes.
 const SIZE: usize = 18;
 
-/// The components of strain that add up to the dilatation.
+/// The components of strain whose sum is the dilatation.
 const NORMAL: [usize; 3] = [0, 1, 3];
 
-/// One element, without its displacements.
+/// One element of a nearly incompressible material.
 pub struct Mixed<'a> {
     split: &'a Split,
-    /// Nodes: the number of the bubble.
+    /// The number of nodes, which is also the index of the bubble.
     nodes: usize,
     frame: Frame,
-    /// g_k.
+    /// The vectors g_k, which give the projected dilatation from the displacements.
     dilatation: [[f64; SIZE]; 3],
-    /// Rows of the bubble in k.
+    /// The rows of the bubble in the stiffness k.
     bubble: [[f64; SIZE]; 2],
-    /// k_bb⁻¹.
+    /// The flexibility of the bubble, k_bb⁻¹.
     flexibility: [[f64; 2]; 2],
-    /// ∫ b.
+    /// The integral ∫ b of the bubble function.
     volume: f64,
 }
 
-/// B of every node and of the bubble at an integration point.
+/// The strain matrix B of every node and of the bubble at an integration point.
 type Strains = [[[f64; 2]; COMPONENTS]; SIZE / 2];
 
-/// The functions ψ_k.
+/// The pressure functions ψ_k of an element.
 #[derive(Clone, Copy, Debug)]
 struct Frame {
     centre: [f64; 2],
-    /// From x − centre to ξ, η: the inverse of the element's map, linear as at its centre. These two are of the
-    /// same size in an element of any shape.
+    /// The linear map from x − centre to ξ, η: the inverse of the element's map at its centre. ξ and η have the same
+    /// magnitude in an element of any shape.
     to_master: [[f64; 2]; 2],
-    /// ψ from (1, ξ, η): lower triangular.
+    /// The coefficients of ψ in (1, ξ, η): lower triangular.
     orthonormal: [[f64; 3]; 3],
 }
 
@@ -56,20 +56,21 @@ impl Frame {
         [1.0, xi, eta]
     }
 
-    /// The ψ_k at a position.
+    /// The values of ψ_k at a position.
     fn functions(&self, position: [f64; 2]) -> [f64; 3] {
         let q = self.monomials(position);
         self.orthonormal.map(|row| dot(&row, &q))
     }
 
-    /// Σ_k c_k ψ_k at a position.
+    /// The sum Σ_k c_k ψ_k at a position.
     fn combine(&self, coefficients: &[f64; 3], position: [f64; 2]) -> f64 {
         dot(coefficients, &self.functions(position))
     }
 }
 
 impl<'a> Mixed<'a> {
-    /// The rule of an element: always the full one, since a smaller one would leave the bubble modes without stiffness.
+    /// The integration rule of an element: always the full one, since a smaller one would leave the bubble modes
+    /// without stiffness.
     pub fn rule(family: Family) -> &'static [GaussPoint] {
         family.rule(3)
     }
@@ -84,7 +85,7 @@ impl<'a> Mixed<'a> {
         Self::integrate(section, split, family, nodes, |_, _| {})
     }
 
-    /// `visit`: called at every integration point, with its weight.
+    /// Integrates over the element. `visit`: called at every integration point, with its weight.
     fn integrate(
         section: &Section,
         split: &'a Split,
@@ -153,13 +154,13 @@ impl<'a> Mixed<'a> {
         element
     }
 
-    /// κ Σ_k g_k g_kᵀ: a row.
+    /// One row of the volumetric stiffness κ Σ_k g_k g_kᵀ.
     fn volumetric_row(&self, dof: usize) -> [f64; SIZE] {
         let own = self.dilatation.map(|g| self.split.bulk * g[dof]);
         std::array::from_fn(|j| (0..3).map(|k| own[k] * self.dilatation[k][j]).sum())
     }
 
-    /// The stiffness of the nodes, along x and y; what a triangle does not have is zero.
+    /// The stiffness of the nodes, along x and y; zero beyond the nodes of a triangle.
     pub fn stiffness(
         section: &Section,
         split: &Split,
@@ -187,18 +188,18 @@ impl<'a> Mixed<'a> {
         k
     }
 
-    /// k_bb⁻¹ f.
+    /// The displacement of the bubble by a force on it, k_bb⁻¹ f.
     fn bubble_from(&self, force: &[f64; 2]) -> [f64; 2] {
         self.flexibility
             .map(|row| row[0] * force[0] + row[1] * force[1])
     }
 
-    /// The force of a body force (force/volume) on the bubble.
+    /// The force on the bubble by a body force (force/volume).
     pub fn force_on_bubble(&self, body_force: [f64; 2]) -> [f64; 2] {
         body_force.map(|f| f * self.volume)
     }
 
-    /// What a force on the bubble does to the nodes: −k_ib k_bb⁻¹ f_b.
+    /// The forces on the nodes equivalent to a force on the bubble: −k_ib k_bb⁻¹ f_b.
     pub fn passed_on(&self, force_on_bubble: &[f64; 2]) -> AtNodes<[f64; 2]> {
         let a = self.bubble_from(force_on_bubble);
         let mut forces = [[0.0; 2]; 8];
@@ -211,7 +212,7 @@ impl<'a> Mixed<'a> {
         forces
     }
 
-    /// What the displacements of the nodes, and a force on the bubble, cause inside.
+    /// The state inside the element by the displacements of its nodes and a force on the bubble.
     pub fn inside(&self, u: &AtNodes<[f64; 2]>, force_on_bubble: &[f64; 2]) -> Inside<'a> {
         let nodal = |row: &[f64; SIZE]| -> f64 {
             let nodes = u.iter().take(self.nodes).enumerate();
@@ -236,9 +237,9 @@ impl<'a> Mixed<'a> {
 pub struct Inside<'a> {
     split: &'a Split,
     frame: Frame,
-    /// a.
+    /// The displacement a of the bubble.
     pub bubble: [f64; 2],
-    /// The coefficients of θ̄.
+    /// The coefficients of the projected dilatation θ̄.
     dilatation: [f64; 3],
 }
 
@@ -257,7 +258,7 @@ impl Inside<'_> {
         (0..COMPONENTS).for_each(|c| strain[c] += dot2(&b[c], &self.bubble));
     }
 
-    /// θ̄ at a position, and the stress there with the whole strain.
+    /// The projected dilatation θ̄ at a position, and the stress there for the whole strain.
     pub fn stress(
         &self,
         strain: &[f64; COMPONENTS],
@@ -272,22 +273,22 @@ impl Inside<'_> {
     }
 }
 
-/// An element as a function of the displacements of its nodes alone, x and y in turn, without a force on its bubble.
+/// An element as a linear function of the displacements of its nodes (x and y in turn), without a force on its bubble.
 pub(super) struct OfNodes<'a> {
     split: &'a Split,
     frame: Frame,
-    /// a.
+    /// The displacement a of the bubble by each of the nodes' displacements.
     bubble: [[f64; 16]; 2],
-    /// The coefficients of θ̄.
+    /// The coefficients of the projected dilatation θ̄ by each of the nodes' displacements.
     dilatation: [[f64; 16]; 3],
 }
 
-/// What the displacements of the nodes cause at a place.
+/// Strain and dilatation at one place of an element, as linear functions of the displacements of its nodes.
 pub(super) struct OfNodesAt<'a> {
     split: &'a Split,
-    /// The strain, with the bubble's part.
+    /// The strain, including the bubble's part.
     strain: [[f64; 16]; COMPONENTS],
-    /// θ̄.
+    /// The projected dilatation θ̄.
     projected: [f64; 16],
 }
 
@@ -310,7 +311,8 @@ impl<'a> OfNodes<'a> {
         }
     }
 
-    /// At a place in master coordinates, which is mapped to `m`; `nodes`: where the element's nodes are.
+    /// The functions at a place in master coordinates, which is mapped to `m`; `nodes`: the positions of the element's
+    /// nodes.
     #[inline(always)]
     pub(super) fn at(
         &self,
@@ -343,7 +345,7 @@ impl<'a> OfNodes<'a> {
 }
 
 impl OfNodesAt<'_> {
-    /// The components of the stress.
+    /// The components of the stress, as linear functions of the displacements of the nodes.
     #[inline(always)]
     pub(super) fn stress(&self) -> [[f64; 16]; COMPONENTS] {
         std::array::from_fn(|c| {
@@ -353,7 +355,7 @@ impl OfNodesAt<'_> {
         })
     }
 
-    /// `stress` : σ + `gap` (θ̄ − div u).
+    /// The linear function `stress` : σ + `gap` (θ̄ − div u).
     #[inline(always)]
     pub(super) fn sum(&self, stress: &[f64; COMPONENTS], gap: f64) -> [f64; 16] {
         let Split { rest, bulk, .. } = self.split;
@@ -368,7 +370,7 @@ impl OfNodesAt<'_> {
     }
 }
 
-/// Adds ∫ Bᵀ R B of one point to the row for displacement `p` of node `i`, up to that node.
+/// Adds the part ∫ Bᵀ R B of one integration point to the row for displacement `p` of node `i`, up to that node.
 fn add_row(
     split: &Split,
     weight: f64,
@@ -386,24 +388,24 @@ fn add_row(
     }
 }
 
-/// ε_xx + ε_yy + ε_zz.
+/// The dilatation ε_xx + ε_yy + ε_zz.
 pub(super) fn dilatation(strain: &[f64; COMPONENTS]) -> f64 {
     NORMAL.iter().map(|c| strain[*c]).sum()
 }
 
-/// The bubble at a place, and its derivatives by x and y.
+/// The bubble function at a place, and its derivatives by x and y.
 fn bubble(family: Family, m: &Mapped, place: [f64; 2]) -> (f64, [f64; 2]) {
     let (value, [p, q]) = family.bubble(place);
     let [xi, eta] = m.master_gradients(family);
     (value, [0, 1].map(|d| p * xi[d] + q * eta[d]))
 }
 
-/// x and y of a mapped place.
+/// The position (x, y) of a mapped place.
 pub(super) fn position(m: &Mapped, nodes: &AtNodes<[f64; 2]>) -> [f64; 2] {
     [m.x, (0..8).map(|i| m.shape[i] * nodes[i][1]).sum()]
 }
 
-/// L⁻¹ of the lower triangle of M = L Lᵀ.
+/// The inverse L⁻¹ of the lower Cholesky factor of M = L Lᵀ.
 fn inverse_of_root(m: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
     let a = m[0][0].sqrt();
     let (b, c) = (m[1][0] / a, m[2][0] / a);
@@ -493,7 +495,7 @@ mod tests {
         }
     }
 
-    /// The bubble takes the displacement at which the element's energy is least.
+    /// The displacement of the bubble minimises the element's energy.
     #[test]
     fn the_bubble_minimises_the_energy() {
         let section = section(Analysis::PlaneStrain {}, 0.4999);

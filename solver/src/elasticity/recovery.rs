@@ -5,7 +5,7 @@ use crate::elasticity::geometry::{Elements, MeshStations, Stations};
 use crate::elasticity::material::{COMPONENTS, Moduli, stress};
 use crate::elasticity::mixed::{Inside, Mixed, OfNodes, dilatation, position};
 use crate::element::{AtNodes, Element, Family, Mapped};
-use crate::linear::{Breaks, Stopped};
+use crate::linear::{Interrupt, Stopped};
 use crate::mesh::Mesh;
 
 /// Stresses, forces and energy of a displacement field.
@@ -14,18 +14,18 @@ pub struct Recovered {
     pub stress: Vec<[f64; COMPONENTS]>,
     /// Stress at every element's nodes, averaged over the elements of its own material; empty if there is one material.
     element_stress: Vec<[[f64; COMPONENTS]; 8]>,
-    /// Positions of the integration points, x and y, element by element, as in [`Family::rule`].
+    /// Positions (x and y) of the integration points, element by element, as in [`Family::rule`].
     pub points: [Vec<f64>; 2],
-    /// The components of the stress there, not averaged.
+    /// The components of the stress at the integration points, not averaged.
     pub point_stress: [Vec<f64>; COMPONENTS],
-    /// θ̄ − div u there: what the pressure of nearly incompressible elements leaves out of the dilatation. Empty if
-    /// there are none.
+    /// θ̄ − div u at the integration points: the difference between projected and actual dilatation. Empty if there are
+    /// no nearly incompressible elements.
     pub dilatation_gap: Vec<f64>,
-    /// Force that the stresses exert at every node along x and y, ∫ Bᵀ σ (without 2π).
+    /// The force of the stresses on every node along x and y, ∫ Bᵀ σ (without 2π).
     pub internal_force: Vec<[f64; 2]>,
-    /// ½ ∫ σ : ε (without 2π).
+    /// The strain energy ½ ∫ σ : ε (without 2π).
     pub strain_energy: f64,
-    /// Work of the body force on the bubbles of nearly incompressible elements (without 2π).
+    /// The work of the body force on the bubbles of nearly incompressible elements (without 2π).
     pub work_on_bubbles: f64,
 }
 
@@ -45,15 +45,15 @@ impl Recovered {
     }
 }
 
-/// Stresses at nodes are taken at the superconvergent points of each element (2 × 2 of a
-/// quadrilateral), carried to its nodes linearly, and averaged over the elements that meet there.
+/// Recovers stresses at nodes: taken at the superconvergent points of each element (2 × 2 of a quadrilateral),
+/// extrapolated to its nodes linearly, and averaged over the elements that meet there.
 ///
-/// `body_force`: the one (force/volume) that the displacements belong to.
+/// `body_force`: the body force (force/volume) under which the displacements occur.
 pub fn recover(
     elements: Elements<'_>,
     displacements: &[[f64; 2]],
     body_force: [f64; 2],
-    breaks: &mut Breaks<'_>,
+    interrupt: &mut Interrupt<'_>,
 ) -> Result<Recovered, Stopped> {
     let Elements { mesh, section, .. } = elements;
     let quadrature = elements.tables.quadrature;
@@ -101,14 +101,14 @@ pub fn recover(
                 at_nodes.push(stations.carried_to_nodes(&stresses));
             }
         });
-        breaks.after((WORK_OF_AN_ELEMENT * some.len()) as f64)?;
+        interrupt.worked((WORK_OF_AN_ELEMENT * some.len()) as f64)?;
     }
     found.average(mesh, section, &at_nodes);
     Ok(found)
 }
 
 impl Recovered {
-    /// Adds what an element has at its integration points.
+    /// Adds the contribution of an element at its integration points.
     #[inline(always)]
     fn add(
         &mut self,
@@ -136,7 +136,8 @@ impl Recovered {
         }
     }
 
-    /// The same of a nearly incompressible element, and its stresses at the nodes.
+    /// Adds the contribution of a nearly incompressible element at its integration points; returns its stresses at the
+    /// nodes.
     fn add_mixed(
         &mut self,
         mesh: &Mesh,
@@ -173,7 +174,7 @@ impl Recovered {
         deformed.at_nodes()
     }
 
-    /// Averages the stresses that elements have at their nodes.
+    /// Averages the stresses of the elements at their common nodes.
     fn average(&mut self, mesh: &Mesh, section: &Section, own: &[[[f64; COMPONENTS]; 8]]) {
         let averaged = |of_material: Option<usize>| average(mesh, section, own, of_material);
         self.stress = averaged(None);
@@ -192,7 +193,7 @@ impl Recovered {
     }
 }
 
-/// Mean at every node of the stresses of its elements: of one material, or of all.
+/// The mean at every node of the stresses of its elements: of one material, or of all.
 fn average(
     mesh: &Mesh,
     section: &Section,
@@ -214,13 +215,13 @@ fn average(
     sum.iter().zip(&count).map(mean).collect()
 }
 
-/// Elements between two questions whether to go on.
+/// The number of elements between two calls that ask whether to continue.
 pub(super) const ELEMENTS_PER_QUESTION: usize = 1 << 14;
 
-/// What the stresses of an element take, in multiplications.
+/// The work for the stresses of one element, in multiplications.
 pub(super) const WORK_OF_AN_ELEMENT: usize = 3000;
 
-/// The components of a stress in each of several fields.
+/// The components of the stress in each of several fields.
 pub(super) type Stresses<const FIELDS: usize> = [[f64; FIELDS]; COMPONENTS];
 
 /// The stresses of several displacement fields at the nodes, averaged over the elements of one material, as
@@ -230,7 +231,7 @@ pub(super) fn recover_nodal_stresses<const FIELDS: usize>(
     material: usize,
     stations: &mut MeshStations<'_>,
     fields: &[[[f64; FIELDS]; 2]],
-    breaks: &mut Breaks<'_>,
+    interrupt: &mut Interrupt<'_>,
 ) -> Result<Vec<Stresses<FIELDS>>, Stopped> {
     let Elements { mesh, section, .. } = elements;
     let mut sums = vec![[[0.0; FIELDS]; COMPONENTS]; mesh.nodes.len()];
@@ -238,7 +239,7 @@ pub(super) fn recover_nodal_stresses<const FIELDS: usize>(
     let moduli = &section.materials()[material];
     let split = section.split(material);
     for (k, elements) in mesh.elements.chunks(ELEMENTS_PER_QUESTION).enumerate() {
-        breaks.ask()?;
+        interrupt.ask()?;
         pulp::Arch::new().dispatch(|| {
             for (i, element) in elements.iter().enumerate() {
                 let e = k * ELEMENTS_PER_QUESTION + i;
@@ -301,7 +302,7 @@ fn mixed_stresses_at_nodes<const FIELDS: usize>(
 }
 
 impl Stations {
-    /// The stresses of several fields at the nodes.
+    /// The stresses of several fields at the nodes of an element.
     #[inline(always)]
     fn stresses_at_nodes<const FIELDS: usize>(
         &self,
@@ -338,7 +339,7 @@ impl Stations {
         at_nodes
     }
 
-    /// The stresses at the superconvergent points, carried to the nodes.
+    /// Extrapolates the stresses from the superconvergent points to the nodes.
     #[inline(always)]
     fn carried_to_nodes(&self, points: &[[f64; COMPONENTS]; 4]) -> [[f64; COMPONENTS]; 8] {
         let mut at_nodes = [[0.0; COMPONENTS]; 8];
@@ -358,7 +359,7 @@ pub struct Deformed<'a> {
     family: Family,
     nodes: &'a AtNodes<[f64; 2]>,
     u: &'a AtNodes<[f64; 2]>,
-    /// Of a nearly incompressible material.
+    /// The inside of an element of a nearly incompressible material; else none.
     inside: Option<Inside<'a>>,
     work_on_bubble: f64,
 }
@@ -368,12 +369,13 @@ pub struct Deformed<'a> {
 struct DeformedAt {
     strain: [f64; COMPONENTS],
     stress: [f64; COMPONENTS],
-    /// θ̄ − div u; 0 of other materials.
+    /// The difference θ̄ − div u; 0 in materials that are not nearly incompressible.
     dilatation_gap: f64,
 }
 
 impl<'a> Deformed<'a> {
-    /// `material`: its number in the section; `body_force`: the one (force/volume) that the displacements belong to.
+    /// A displaced element. `material`: its number in the section; `body_force`: the body force (force/volume) under
+    /// which the displacements occur.
     pub fn new(
         section: &'a Section,
         material: usize,
@@ -407,7 +409,7 @@ impl<'a> Deformed<'a> {
         self.at(&m, place).stress
     }
 
-    /// At a place in master coordinates, which is mapped to `m`.
+    /// Strain and stress at a place in master coordinates, which is mapped to `m`.
     fn at(&self, m: &Mapped, place: [f64; 2]) -> DeformedAt {
         let mut strain = self.strain_of_nodes(m);
         let Some(inside) = &self.inside else {
@@ -436,7 +438,7 @@ impl<'a> Deformed<'a> {
         strain
     }
 
-    /// Stresses at the nodes, carried from the superconvergent points.
+    /// The stresses at the nodes, extrapolated from the superconvergent points.
     fn at_nodes(&self) -> [[f64; COMPONENTS]; 8] {
         let family = self.family;
         let mut points = [[0.0; COMPONENTS]; 4];
@@ -447,7 +449,7 @@ impl<'a> Deformed<'a> {
     }
 }
 
-/// The stresses at the superconvergent points of an element, carried to its nodes.
+/// Extrapolates the stresses from the superconvergent points of an element to its nodes.
 fn carried_to_nodes(family: Family, points: &[[f64; COMPONENTS]; 4]) -> [[f64; COMPONENTS]; 8] {
     let mut at_nodes = [[0.0; COMPONENTS]; 8];
     for (stress, &place) in at_nodes.iter_mut().zip(family.places()) {

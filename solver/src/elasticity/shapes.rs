@@ -1,4 +1,4 @@
-//! Elements of the same shape: what depends on the shape alone is computed once for all of them.
+//! Elements of the same shape: results that depend on the shape alone are computed once for all of them.
 
 use std::collections::HashMap;
 
@@ -6,11 +6,11 @@ use crate::elasticity::Section;
 use crate::element::{AtNodes, Family};
 use crate::mesh::Mesh;
 
-/// What distinguishes elements: those that are equal here are moved onto each other by a shift that changes no integral.
+/// The shape of an element with its material: elements with equal shapes differ by a shift that changes no integral.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shape {
     pub(super) family: Family,
-    /// The number of its material.
+    /// The number of the element's material.
     pub(super) material: u16,
     /// Positions relative to the first node; in axisymmetry along the axis only.
     pub(super) nodes: AtNodes<[f64; 2]>,
@@ -43,7 +43,7 @@ impl Shape {
         }
     }
 
-    /// Its area over the longest distance between its corners: how thin it is.
+    /// The element's area divided by the longest distance between its corners: how thin it is.
     fn thickness(&self) -> f64 {
         let corners = &self.nodes[..self.family.nodes() / 2];
         let (mut area, mut longest) = (0.0, 0.0f64);
@@ -68,9 +68,9 @@ impl Shape {
             && pairs.fold(true, |near, (a, b)| near & ((a - b).abs() <= tolerance))
     }
 
-    /// A number that is the same for shapes that differ by far less than `cell`, unless one lies at the edge of a cell.
+    /// A hash that is the same for shapes that differ by far less than `cell`, unless one lies at the edge of a cell.
     fn hash(&self, cell: f64) -> u64 {
-        /// So that no simple fraction lies at an edge.
+        /// An offset so that no simple fraction lies at an edge of a cell.
         const OFFSET: f64 = 0.367_879;
         let cells = self.nodes.iter().flatten();
         let cells = cells.map(|x| (x / cell + OFFSET).floor() as i64 as u64);
@@ -84,30 +84,30 @@ impl Shape {
 /// The shapes that several elements of a mesh have, up to the rounding of their coordinates: a grid between equidistant
 /// lines has one.
 ///
-/// An element of such a shape is treated as if it had exactly that of the first one. This moves its nodes by no more than
-/// their coordinates are in doubt after a few operations with rounding.
+/// An element of such a shape is treated as if it had exactly the shape of the first one. This moves its nodes by no
+/// more than the error of their coordinates after a few rounded operations.
 #[derive(Debug)]
 pub(super) struct Shapes {
-    /// By element.
+    /// The number of each element's shape, if shared.
     of: Vec<Option<u16>>,
-    /// Each is that of two elements at least.
+    /// The shapes that at least two elements share.
     pub(super) shared: Vec<Shape>,
 }
 
-/// How far nodes of equal shapes may be apart, in roundings of the largest coordinate.
+/// The distance up to which nodes of equal shapes may differ, in roundings of the largest coordinate.
 const ROUNDING: f64 = 16.0;
 
-/// And at most this part of how thin the element is.
+/// The distance up to which nodes of equal shapes may differ, as a part of the element's thickness.
 const OF_THICKNESS: f64 = 1e-10;
 
-/// Hashes of shapes that are looked for: the most frequent ones.
+/// The number of shape hashes that are looked up: the most frequent ones.
 const MOST: usize = 512;
 
-/// Shapes with the same hash that are told apart.
+/// The number of different shapes with the same hash that are compared.
 const MOST_COMPARED: usize = 4;
 
 impl Shapes {
-    /// Those of a mesh.
+    /// The shapes of a mesh.
     pub(super) fn new(mesh: &Mesh, section: &Section) -> Self {
         let largest = mesh.nodes.iter().flatten();
         let largest = largest.fold(0.0f64, |largest, c| largest.max(c.abs()));
@@ -163,7 +163,7 @@ impl Shapes {
     }
 }
 
-/// Numbers for those that occur most often, and twice at least.
+/// Numbers for the hashes that occur most often, and at least twice.
 fn frequent(hashes: &[Option<u64>]) -> HashMap<u64, u16> {
     let mut sorted: Vec<u64> = hashes.iter().flatten().copied().collect();
     sorted.sort_unstable();
@@ -185,7 +185,7 @@ mod tests {
     use crate::element::Element;
     use crate::problem::Analysis;
 
-    /// Quadrilaterals between lines, with midside nodes of their own.
+    /// A mesh of quadrilaterals between lines.
     fn mesh(x: &[f64], y: &[f64]) -> Mesh {
         let mut mesh = Mesh::default();
         for y in y.windows(2) {
@@ -218,7 +218,8 @@ mod tests {
         (0..mesh.elements.len()).map(|e| shapes.of(e)).collect()
     }
 
-    /// Their widths differ in the last places: a third and a tenth have no exact form.
+    /// Equidistant computed lines make one shape, though widths differ in the last digits: a third and a tenth have no
+    /// exact form.
     #[test]
     fn computed_equidistant_lines_make_one_shape() {
         let mesh = mesh(&lines(40, 1.0 / 3.0), &lines(30, 0.1));
@@ -237,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn what_differs_by_more_than_rounding_has_no_shape_in_common() {
+    fn elements_that_differ_by_more_than_rounding_share_no_shape() {
         let plane = section(Analysis::PlaneStrain {});
         let mut mesh = mesh(&lines(3, 1.0), &lines(1, 1.0));
         assert_eq!(numbers(&mesh, &plane), [Some(0); 3]);
@@ -250,7 +251,8 @@ mod tests {
         assert_eq!(numbers(&mesh, &plane), [None, Some(0), Some(0)]);
     }
 
-    /// Layers that lie obliquely: of 10⁻⁸ of the body's size, with lines that rounding moves by as much as matters to them.
+    /// Thin oblique layers share a shape only if they are equal at their own scale: at 10⁻⁸ of the body's size,
+    /// rounding moves lines by a relevant part of the thickness.
     #[test]
     fn thin_elements_share_only_what_is_equal_for_them() {
         let plane = section(Analysis::PlaneStrain {});
@@ -277,7 +279,7 @@ mod tests {
         }
     }
 
-    /// The first thousands of a free mesh do not keep those of a grid after them from being found.
+    /// Shapes of a grid are found even if thousands of elements of a free mesh come before it.
     #[test]
     fn frequent_shapes_are_found_among_very_many() {
         let widths: Vec<f64> = (0..3000)

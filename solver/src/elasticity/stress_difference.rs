@@ -1,5 +1,6 @@
-//! Stresses recovered at nodes are better than those of the elements: their difference stands for the error (Zienkiewicz
-//! and Zhu), in the energy norm of every element, and weighted by the differences of other fields.
+//! The error of the stresses, estimated by the difference between stresses recovered at the nodes and those of the
+//! elements (Zienkiewicz and Zhu): in the energy norm of every element, and weighted by the differences of other
+//! fields.
 //!
 //!   ‖e‖² = ∫ (σ* − σ) : C⁻¹ (σ* − σ),   σ* = Σ h_i σ_i with the recovered nodal stresses σ_i
 
@@ -11,21 +12,21 @@ use crate::elasticity::recovery::{
 };
 use crate::elasticity::{Recovered, Section};
 use crate::element::{AtNodes, Element, Family, GaussPoint};
-use crate::linear::{Breaks, Stopped};
+use crate::linear::{Interrupt, Stopped};
 
-/// σ* − σ at the integration points.
+/// The difference σ* − σ at the integration points.
 pub struct StressDifference {
     stress: Vec<[f64; COMPONENTS]>,
-    /// As in [`Recovered`].
+    /// θ̄ − div u at the integration points, as in [`Recovered`].
     dilatation_gap: Vec<f64>,
 }
 
 impl StressDifference {
-    /// That of what was recovered of the same elements.
+    /// The difference for stresses recovered from the same elements.
     pub fn new(
         elements: Elements<'_>,
         recovered: &Recovered,
-        breaks: &mut Breaks<'_>,
+        interrupt: &mut Interrupt<'_>,
     ) -> Result<Self, Stopped> {
         let (mesh, quadrature) = (elements.mesh, elements.tables.quadrature);
         let mut differences = Vec::with_capacity(recovered.points[0].len());
@@ -45,7 +46,7 @@ impl StressDifference {
                     }
                 }
             });
-            breaks.after((WORK_OF_AN_ELEMENT * some.len()) as f64)?;
+            interrupt.worked((WORK_OF_AN_ELEMENT * some.len()) as f64)?;
         }
         Ok(StressDifference {
             stress: differences,
@@ -55,20 +56,20 @@ impl StressDifference {
 
     /// ∫ (σ* − σ) : C⁻¹ (σ* − σ)′ of every element, with the difference of another field (force × length, without 2π).
     ///
-    /// In nearly incompressible elements stress and strain are not those of each other, and the energy that the errors
-    /// of both fields have in common is more: with g = θ̄ − div u and t = tr C⁻¹ (σ* − σ),
+    /// In nearly incompressible elements the stress does not follow from the strain alone, and the product has more
+    /// terms: with g = θ̄ − div u and t = tr C⁻¹ (σ* − σ),
     ///
     ///   … + κ (g t′ + t g′) − κ (1 − κ mᵀC⁻¹m) g g′
     pub fn products(
         &self,
         elements: Elements<'_>,
         other: &StressDifference,
-        breaks: &mut Breaks<'_>,
+        interrupt: &mut Interrupt<'_>,
     ) -> Result<Vec<f64>, Stopped> {
-        integrate(elements, self.points().zip(other.points()), breaks)
+        integrate(elements, self.points().zip(other.points()), interrupt)
     }
 
-    /// The difference at every integration point.
+    /// The differences at all integration points.
     fn points(&self) -> impl Iterator<Item = Difference> {
         let gaps = self.dilatation_gap.iter().copied();
         let gaps = gaps.chain(std::iter::repeat(0.0));
@@ -79,15 +80,15 @@ impl StressDifference {
         })
     }
 
-    /// The same products with the differences of several fields, by their displacements at the nodes.
+    /// The products of [`StressDifference::products`] with several other fields, from their displacements at the nodes.
     ///
-    /// Both σ* and σ of those fields are linear in what is known at the nodes, so that each element's integral is a sum
-    /// over its nodes: the points of integration are visited once for all fields.
+    /// Both σ* and σ of those fields are linear in the nodal values, so that each element's integral is a sum over its
+    /// nodes: the integration points are visited once for all fields.
     pub fn products_with_fields<const FIELDS: usize>(
         &self,
         elements: Elements<'_>,
         fields: &[[[f64; FIELDS]; 2]],
-        breaks: &mut Breaks<'_>,
+        interrupt: &mut Interrupt<'_>,
     ) -> Result<[Vec<f64>; FIELDS], Stopped> {
         let Elements { mesh, section, .. } = elements;
         let quadrature = elements.tables.quadrature;
@@ -95,10 +96,11 @@ impl StressDifference {
         let mut stations = elements.stations();
         for (material, weights) in weights(section).iter().enumerate() {
             let split = section.split(material);
-            let smooth = recover_nodal_stresses(elements, material, &mut stations, fields, breaks)?;
+            let smooth =
+                recover_nodal_stresses(elements, material, &mut stations, fields, interrupt)?;
             let mut first = 0;
             for (k, elements) in mesh.elements.chunks(ELEMENTS_PER_QUESTION).enumerate() {
-                breaks.ask()?;
+                interrupt.ask()?;
                 pulp::Arch::new().dispatch(|| {
                     for (i, element) in elements.iter().enumerate() {
                         let e = k * ELEMENTS_PER_QUESTION + i;
@@ -144,22 +146,22 @@ impl StressDifference {
     pub fn norms(
         &self,
         elements: Elements<'_>,
-        breaks: &mut Breaks<'_>,
+        interrupt: &mut Interrupt<'_>,
     ) -> Result<Vec<f64>, Stopped> {
         let stress = self.points().map(|point| Difference { gap: 0.0, ..point });
         let pairs = stress.map(|point| (point, point));
-        let squares = integrate(elements, pairs, breaks)?;
+        let squares = integrate(elements, pairs, interrupt)?;
         let norm = |square: f64| square.max(0.0).sqrt();
         Ok(squares.into_iter().map(norm).collect())
     }
 }
 
-/// What an element's difference has in common with that of another field, by its values at the nodes.
+/// The linear functions that give an element's products with other fields from their nodal values.
 #[derive(Default)]
 struct InCommon {
-    /// By its recovered stresses: ∫ h_i C⁻¹ (σ* − σ).
+    /// Coefficients of the recovered stresses: ∫ h_i C⁻¹ (σ* − σ).
     by_stress: [[f64; 8]; COMPONENTS],
-    /// By its displacements, −∫ B_iᵀ (σ* − σ).
+    /// Coefficients of the displacements along x, −∫ B_iᵀ (σ* − σ).
     by_ux: [f64; 8],
     by_uy: [f64; 8],
 }
@@ -177,7 +179,7 @@ impl InCommon {
         found
     }
 
-    /// The same of a nearly incompressible element, whose stress depends on more.
+    /// The coefficients for a nearly incompressible element, whose stress depends on its bubble and pressure too.
     #[inline(always)]
     fn of_mixed<'a>(
         (section, body): (&Section, &OfNodes<'_>),
@@ -202,7 +204,7 @@ impl InCommon {
         found
     }
 
-    /// Adds what `of_stress` : σ* at a point is by the recovered stresses at the nodes.
+    /// Adds `of_stress` : σ* at a point, as a function of the recovered stresses at the nodes.
     #[inline(always)]
     fn add_smooth(&mut self, shape: &[f64; 8], of_stress: &[f64; COMPONENTS]) {
         for (by_stress, of_stress) in self.by_stress.iter_mut().zip(of_stress) {
@@ -210,7 +212,7 @@ impl InCommon {
         }
     }
 
-    /// With several fields, by their displacements and recovered stresses at the nodes.
+    /// The products with several fields, from their displacements and recovered stresses at the nodes.
     #[inline(always)]
     fn with<const FIELDS: usize>(
         &self,
@@ -232,18 +234,18 @@ impl InCommon {
     }
 }
 
-/// What the two of every pair, one for each integration point, have in common in each element.
+/// Integrates over each element the products of pairs of differences, one pair for each integration point.
 fn integrate(
     elements: Elements<'_>,
     mut pairs: impl Iterator<Item = (Difference, Difference)>,
-    breaks: &mut Breaks<'_>,
+    interrupt: &mut Interrupt<'_>,
 ) -> Result<Vec<f64>, Stopped> {
     let Elements { mesh, section, .. } = elements;
     let weights = weights(section);
     let mut stations = elements.stations();
     let product = |e: usize| {
         let weights = &weights[section.material_of(e)];
-        breaks.after(WORK_OF_AN_ELEMENT as f64)?;
+        interrupt.worked(WORK_OF_AN_ELEMENT as f64)?;
         let mut sum = 0.0;
         for (station, (own, other)) in stations.of(e).rule.iter().zip(&mut pairs) {
             sum += station.weight * weights.density(&own, &other);
@@ -253,7 +255,7 @@ fn integrate(
     (0..mesh.elements.len()).map(product).collect()
 }
 
-/// Σ h_i σ_i − σ.
+/// The difference Σ h_i σ_i − σ at a point.
 #[inline(always)]
 fn difference(
     shape: &[f64; 8],
@@ -263,26 +265,26 @@ fn difference(
     std::array::from_fn(|c| (0..8).map(|i| shape[i] * smooth[i][c]).sum::<f64>() - own[c])
 }
 
-/// The difference at a point.
+/// The difference of stress and dilatation at a point.
 #[derive(Clone, Copy)]
 struct Difference {
-    /// σ* − σ.
+    /// The stress difference σ* − σ.
     stress: [f64; COMPONENTS],
-    /// θ̄ − div u.
+    /// The dilatation gap θ̄ − div u.
     gap: f64,
 }
 
-/// What the differences of a material are multiplied by.
+/// The factors on differences in a material.
 struct Weights {
-    /// C⁻¹.
+    /// The compliance C⁻¹.
     compliance: Moduli,
-    /// κ, and κ (1 − κ mᵀC⁻¹m); 0 unless the material is nearly incompressible.
+    /// κ and κ (1 − κ mᵀC⁻¹m); 0 unless the material is nearly incompressible.
     bulk: f64,
     rest: f64,
 }
 
 impl Weights {
-    /// What two fields have in common at a point (energy per volume): see [`StressDifference::products`].
+    /// The product of two differences at a point (energy per volume): see [`StressDifference::products`].
     fn density(&self, own: &Difference, other: &Difference) -> f64 {
         let (of_stress, of_gap) = self.of_other(own);
         let density: f64 = (0..COMPONENTS)
@@ -291,7 +293,7 @@ impl Weights {
         density + of_gap * other.gap
     }
 
-    /// The same as factors of the other field's stress and gap.
+    /// The factors of the other field's stress and gap in [`Weights::density`].
     #[inline(always)]
     fn of_other(&self, own: &Difference) -> ([f64; COMPONENTS], f64) {
         let mut strain = stress(&self.compliance, &own.stress);
@@ -305,7 +307,7 @@ impl Weights {
     }
 }
 
-/// The weights of every material.
+/// The factors for every material.
 fn weights(section: &Section) -> Vec<Weights> {
     let of = |(material, moduli): (usize, &Moduli)| {
         let compliance = inverse(moduli).unwrap_or_default();
@@ -329,7 +331,8 @@ mod tests {
     use crate::elasticity::{ElementTables, recover};
     use crate::solution::Observer;
 
-    /// In every kind of analysis, with two materials, quadrilaterals and triangles.
+    /// Products with fields equal those computed from their recovered stresses, in every kind of analysis, with two
+    /// materials, quadrilaterals and triangles.
     #[test]
     fn products_of_fields_are_those_of_their_recovered_stresses() {
         for (kind, ratio) in [
@@ -374,27 +377,27 @@ mod tests {
                     .collect()
             };
             let go_on = &mut || ControlFlow::Continue(());
-            let breaks = &mut Breaks::new(go_on);
-            let difference = |u: &[[f64; 2]], breaks: &mut Breaks<'_>| {
-                let recovered = recover(elements, u, [0.0; 2], breaks).unwrap();
-                StressDifference::new(elements, &recovered, breaks).unwrap()
+            let interrupt = &mut Interrupt::new(go_on);
+            let difference = |u: &[[f64; 2]], interrupt: &mut Interrupt<'_>| {
+                let recovered = recover(elements, u, [0.0; 2], interrupt).unwrap();
+                StressDifference::new(elements, &recovered, interrupt).unwrap()
             };
-            let own = difference(&field(0), breaks);
+            let own = difference(&field(0), interrupt);
             let fields: Vec<_> = (1..=5).map(field).collect();
             let together: Vec<[[f64; 5]; 2]> = (0..mesh.nodes.len())
                 .map(|n| [0, 1].map(|a| std::array::from_fn(|k| fields[k][n][a])))
                 .collect();
-            let found = own.products_with_fields(elements, &together, breaks);
+            let found = own.products_with_fields(elements, &together, interrupt);
             for (found, u) in found.unwrap().iter().zip(&fields) {
-                let other = difference(u, breaks);
-                let expected = own.products(elements, &other, breaks).unwrap();
+                let other = difference(u, interrupt);
+                let expected = own.products(elements, &other, interrupt).unwrap();
                 let size: f64 = expected.iter().map(|p| p.abs()).sum();
                 for (a, b) in found.iter().zip(&expected) {
                     assert!((a - b).abs() <= 1e-12 * size, "{kind}: {a} for {b}");
                 }
             }
             let stop = &mut || ControlFlow::Break(());
-            let stopped = own.products_with_fields(elements, &together, &mut Breaks::new(stop));
+            let stopped = own.products_with_fields(elements, &together, &mut Interrupt::new(stop));
             assert_eq!(stopped, Err(Stopped));
         }
     }

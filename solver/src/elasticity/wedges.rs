@@ -16,40 +16,41 @@ use crate::element::edge3;
 use crate::element::gauss::GAUSS_3;
 use crate::linear::{Rows, least_squares, near_null, quadratic_eigenvalues};
 
-/// Largest angle of an element.
+/// The largest angle of an element.
 const WIDEST: f64 = PI / 12.0;
 
-/// λ at least: smaller ones are the rigid motions, with λ = 0, that rounding has moved.
+/// The smallest λ that counts: smaller ones are rigid motions, with λ = 0, moved by rounding.
 const LEAST: f64 = 0.05;
 
 /// λ closer to 1 than this count as 1: whatever grows like r^(λ−1) then looks like ln r on any mesh.
 const NEAR_ONE: f64 = 0.015;
 
-/// A wedge from one direction, counter-clockwise, to another (angles).
+/// A wedge of material between two directions (angles, counter-clockwise).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wedge {
-    /// Where it begins and ends.
+    /// The angles where the wedge begins and ends.
     pub angles: [f64; 2],
-    /// Its material.
+    /// The material's moduli.
     pub moduli: Moduli,
 }
 
-/// What an outer side of wedges is held by.
+/// The condition on an outer side of the wedges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Side {
-    /// A smooth obstacle, or a line of symmetry; with the traction along the side as a part of the pressure, positive away
-    /// from the point on the side where the wedges begin, and towards it where they end: along the same tangent.
+    /// A smooth obstacle or a line of symmetry, with friction as a part of the pressure: the traction along the side,
+    /// positive away from the point on the side where the wedges begin, and towards it where they end, which is the
+    /// same tangent.
     Slides(f64),
-    /// Nothing moves.
+    /// The side does not move.
     Sticks,
 }
 
 /// How the pressure on the sides grows towards the point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Growth {
-    /// The least exponent λ, if it is below 1.
+    /// The smallest exponent λ, if it is below 1.
     pub exponent: Option<f64>,
-    /// Its change for each factor e of the distance, by a traction 1 along both sides.
+    /// The change of the pressure for each factor e of the distance, by a traction 1 along both sides.
     pub logarithm: f64,
 }
 
@@ -72,7 +73,7 @@ pub fn growth(wedges: &[Wedge], sides: [Side; 2], rubbed: [bool; 2]) -> Option<G
     })
 }
 
-/// E⁰, E¹ᵀ − E¹ and −E² on all unknowns, those of the outer sides turned along normal and tangent.
+/// The matrices E⁰, E¹ᵀ − E¹ and −E² on all unknowns, those of the outer sides turned along normal and tangent.
 struct Pencil {
     quadratic: Rows,
     linear: Rows,
@@ -168,7 +169,7 @@ impl Pencil {
         (0..self.size()).filter(|i| !held.contains(i)).collect()
     }
 
-    /// The matrices on what is not held: tangential tractions follow the pressure.
+    /// The matrices on the free unknowns, where tangential tractions follow the pressure.
     fn restricted(&self) -> (Rows, Rows, Rows) {
         let free = self.free();
         let of = |matrix: &Rows| -> Rows {
@@ -247,19 +248,19 @@ impl Pencil {
     }
 }
 
-/// ε_xx, ε_yy and γ_xy of unit displacements along x and y with these derivatives.
+/// The strains ε_xx, ε_yy and γ_xy of unit displacements along x and y, for shape functions with these derivatives.
 fn strains(h: f64, [a, b]: [f64; 2], det: f64) -> [[f64; 3]; 2] {
     let (dx, dy) = (h * a / det, h * b / det);
     [[dx, 0.0, dy], [0.0, dy, dx]]
 }
 
-/// ε : D : ε′.
+/// The energy ε : D : ε′.
 fn energy(moduli: &Moduli, left: &[f64; 3], right: &[f64; 3]) -> f64 {
     let of = |i: usize| dot(&moduli[i][..3], right);
     (0..3).map(|i| left[i] * of(i)).sum()
 }
 
-/// Turns two unknowns, from `first` on, to the axes: a congruence.
+/// Turns two unknowns, `first` and the next, to the axes, in rows and columns.
 fn turn(matrix: &mut Rows, first: usize, axes: [[f64; 2]; 2]) {
     for row in matrix.iter_mut() {
         let old = [row[first], row[first + 1]];
@@ -315,7 +316,7 @@ mod tests {
         );
     }
 
-    /// Clamped on both sides, a corner of angle α has the λ of (κ sin λα)² = (λ sin α)², κ = 3 − 4ν.
+    /// A corner of angle α that is clamped on both sides has the λ of (κ sin λα)² = (λ sin α)², κ = 3 − 4ν.
     #[test]
     fn a_clamped_corner_has_its_exponent() {
         let (alpha, kappa) = (270f64.to_radians(), 3.0 - 4.0 * 0.3);

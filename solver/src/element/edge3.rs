@@ -6,7 +6,7 @@
 //!
 //! The thesis has straight edges only (3.3); the quadratic map here is a superset.
 
-/// h_i(ξ).
+/// The shape functions h_i(ξ).
 #[rustfmt::skip]
 pub fn shape(xi: f64) -> [f64; 3] {
     [
@@ -16,12 +16,12 @@ pub fn shape(xi: f64) -> [f64; 3] {
     ]
 }
 
-/// dh_i/dξ.
+/// The derivatives dh_i/dξ of the shape functions.
 pub fn derivative(xi: f64) -> [f64; 3] {
     [xi - 0.5, xi + 0.5, -2.0 * xi]
 }
 
-/// Σ h_i v_i.
+/// The interpolated value Σ h_i v_i.
 pub fn interpolate(h: &[f64; 3], v: &[f64; 3]) -> f64 {
     h[0] * v[0] + h[1] * v[1] + h[2] * v[2]
 }
@@ -33,7 +33,7 @@ pub fn map(x: &[[f64; 2]; 3], xi: f64) -> ([f64; 2], [f64; 2]) {
     ([at(&h, 0), at(&h, 1)], [at(&dh, 0), at(&dh, 1)])
 }
 
-/// ξ in [−1, 1] with Σ h_i(ξ) v_i = `value`, for v that grow along the edge; ends are clamped.
+/// The place ξ in [−1, 1] with Σ h_i(ξ) v_i = `value`, for v that grow along the edge; clamped to the ends.
 pub fn invert(v: &[f64; 3], value: f64) -> f64 {
     // a ξ² + b ξ + c = 0; b > 0, and the root nearest to the edge is the one without cancellation
     let a = 0.5 * (v[0] + v[1]) - v[2];
@@ -43,7 +43,7 @@ pub fn invert(v: &[f64; 3], value: f64) -> f64 {
     xi.clamp(-1.0, 1.0)
 }
 
-/// ξ in [−1, 1] with Σ h_i(ξ) v_i = 0, up to two; to rounding also at the ends. None if all v are 0.
+/// The places ξ in [−1, 1] with Σ h_i(ξ) v_i = 0, up to two, including the ends within rounding. None if all v are 0.
 pub fn zeros(v: &[f64; 3]) -> impl Iterator<Item = f64> {
     const ROUNDING: f64 = 1e-9;
     // a ξ² + b ξ + c = 0, without cancellation

@@ -1,9 +1,9 @@
 //! Gauss–Legendre integration on [−1, 1], thesis 2.3, and on the master elements.
 
-/// A place of integration in master coordinates, with its weight.
+/// An integration point in master coordinates, with its weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GaussPoint {
-    /// ξ and η.
+    /// The master coordinates ξ and η.
     pub place: [f64; 2],
     /// The weights of all points add up to the area of the master element.
     pub weight: f64,
@@ -109,7 +109,7 @@ pub fn rule(n: usize) -> Vec<(f64, f64)> {
     (0..n).map(root).collect()
 }
 
-/// P_n(x) and its derivative, by the three-term recurrence.
+/// The Legendre polynomial P_n(x) and its derivative, by the three-term recurrence.
 fn legendre(n: usize, x: f64) -> (f64, f64) {
     let (mut previous, mut current) = (1.0, x);
     for k in 2..=n {
@@ -150,7 +150,7 @@ mod tests {
         assert!((rule(2)[1].0 - GAUSS_2[1].0).abs() < 1e-15);
     }
 
-    /// ∫ ξ^a η^b over the master triangle is a! b! / (a + b + 2)!.
+    /// The integral of ξ^a η^b over the master triangle is a! b! / (a + b + 2)!.
     #[test]
     fn the_rules_of_a_triangle_are_exact_to_their_degree() {
         let factorial = |n: i32| (1..=n).map(f64::from).product::<f64>();

@@ -36,21 +36,21 @@ pub enum Family {
     Triangle,
 }
 
-/// The values for an integral over a real element at one of its points.
+/// The quantities of an element's map at one point, for integrals over the real element.
 #[derive(Clone, Copy, Debug)]
 pub struct Mapped {
-    /// h_i.
+    /// The shape functions h_i.
     pub shape: AtNodes<f64>,
-    /// dh_i/dx and dh_i/dy.
+    /// The gradients dh_i/dx and dh_i/dy.
     pub gradient: AtNodes<[f64; 2]>,
-    /// det J of the map; ≤ 0 where the element is inverted.
+    /// The determinant det J of the map; ≤ 0 where the element is inverted.
     pub det: f64,
-    /// First coordinate: x, or the radius r.
+    /// The first coordinate: x, or the radius r.
     pub x: f64,
 }
 
 impl Mapped {
-    /// dξ/dx, dξ/dy and dη/dx, dη/dy: the nodes reproduce ξ and η themselves.
+    /// The derivatives of the master coordinates, dξ/dx, dξ/dy and dη/dx, dη/dy.
     pub fn master_gradients(&self, family: Family) -> [[f64; 2]; 2] {
         let mut gradients = [[0.0; 2]; 2];
         for (place, gradient) in family.places().iter().zip(&self.gradient) {
@@ -73,7 +73,7 @@ impl Element {
         }
     }
 
-    /// Values at its nodes.
+    /// Gathers values at the element's nodes.
     pub fn gather<T: Copy + Default>(&self, value: impl Fn(u32) -> T) -> AtNodes<T> {
         let mut values = [T::default(); 8];
         for (slot, &node) in values.iter_mut().zip(self.iter()) {
@@ -90,7 +90,7 @@ impl Element {
         }
     }
 
-    /// Its sides as nodes of the mesh (corner, corner, midside), counter-clockwise.
+    /// The element's sides as nodes of the mesh (corner, corner, midside), counter-clockwise.
     pub fn sides(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
         let side = |side: &[usize; 3]| side.map(|i| self[i]);
         self.family().sides().iter().map(side)
@@ -126,8 +126,8 @@ fn wrong_count(count: usize) -> String {
     format!("{count} nodes, where an element has 8 (quadrilateral) or 6 (triangle)")
 }
 
-/// As a list of its nodes. Written by hand, as its reading: a list made for every element of a large mesh takes longer
-/// than its text.
+/// Writes the element as a list of its nodes. Written by hand, like its reading: a list made for every element of a
+/// large mesh takes longer than its text.
 impl Serialize for Element {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_seq(self.iter())
@@ -184,7 +184,7 @@ impl JsonSchema for Element {
 }
 
 impl Family {
-    /// Corners, and as many sides.
+    /// The number of corners, and of sides.
     pub fn corners(self) -> usize {
         match self {
             Family::Quad => 4,
@@ -192,7 +192,7 @@ impl Family {
         }
     }
 
-    /// Nodes.
+    /// The number of nodes.
     pub fn nodes(self) -> usize {
         2 * self.corners()
     }
@@ -213,7 +213,7 @@ impl Family {
         }
     }
 
-    /// h_i(ξ, η).
+    /// The shape functions h_i(ξ, η).
     pub fn shape(self, [xi, eta]: [f64; 2]) -> AtNodes<f64> {
         match self {
             Family::Quad => quad8::shape(xi, eta),
@@ -237,8 +237,8 @@ impl Family {
         }
     }
 
-    /// The rule of thesis 2.3 for quadrilaterals, 3 × 3 or 2 × 2 points, ξ running fastest; of the
-    /// same use for triangles 7 points (degree 5) or 3 points (degree 2).
+    /// The rule of thesis 2.3 for quadrilaterals, 3 × 3 or 2 × 2 points, ξ running fastest; for triangles 7 points
+    /// (degree 5) or 3 points (degree 2).
     pub fn rule(self, order: u32) -> &'static [GaussPoint] {
         match (self, order) {
             (Family::Quad, 2) => &gauss::QUAD_2,
@@ -254,7 +254,7 @@ impl Family {
         self.rule(2)
     }
 
-    /// Weights of the stress points in the linear map to a place.
+    /// The weights of the stress points in the linear extrapolation to a place.
     pub fn from_stress_points(self, [xi, eta]: [f64; 2]) -> [f64; 4] {
         match self {
             Family::Quad => {
@@ -280,7 +280,7 @@ impl Family {
         self.tabulate(place).map(nodes)
     }
 
-    /// What the map at a place needs of the master element.
+    /// Tabulates the shape functions at a place of the master element.
     pub fn tabulate(self, [xi, eta]: [f64; 2]) -> Tabulated {
         let (shape, derivative) = match self {
             Family::Quad => (quad8::shape(xi, eta), quad8::derivative(xi, eta)),
@@ -294,17 +294,17 @@ impl Family {
     }
 }
 
-/// A place of the master element.
+/// The shape functions and their derivatives at a place of the master element.
 #[derive(Clone, Debug)]
 pub struct Tabulated {
     nodes: usize,
     shape: AtNodes<f64>,
-    /// dh_i/dξ and dh_i/dη.
+    /// The derivatives dh_i/dξ and dh_i/dη.
     derivative: AtNodes<[f64; 2]>,
 }
 
 impl Tabulated {
-    /// The place in an element with node positions `nodes`.
+    /// Maps the place to an element with node positions `nodes`.
     pub fn map(&self, nodes: &AtNodes<[f64; 2]>) -> Mapped {
         let mut jacobian = [[0.0; 2]; 2]; // jacobian[a][b] = dx_b / dξ_a
         for i in 0..self.nodes {

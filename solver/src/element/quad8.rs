@@ -21,7 +21,7 @@ pub const NODES: [[f64; 2]; 8] = [
 /// Sides as local nodes (corner, corner, midside), counter-clockwise.
 pub const SIDES: [[usize; 3]; 4] = [[0, 1, 4], [1, 2, 5], [2, 3, 6], [3, 0, 7]];
 
-/// h_i(ξ, η).
+/// The shape functions h_i(ξ, η).
 #[rustfmt::skip]
 pub fn shape(xi: f64, eta: f64) -> [f64; 8] {
     std::array::from_fn(|i| {
@@ -35,15 +35,15 @@ pub fn shape(xi: f64, eta: f64) -> [f64; 8] {
     })
 }
 
-/// The function that an element may have beside its nodes, 0 on all sides, and its derivatives. With it the
-/// element has all functions of the 9-node quadrilateral.
+/// The bubble function, 0 on all sides, and its derivatives. With it the element has all functions of the 9-node
+/// quadrilateral.
 #[rustfmt::skip]
 pub fn bubble(xi: f64, eta: f64) -> (f64, [f64; 2]) {
     let (p, q) = (1.0 - xi * xi, 1.0 - eta * eta);
     (p * q, [-2.0 * xi * q, -2.0 * eta * p])
 }
 
-/// dh_i/dξ and dh_i/dη.
+/// The derivatives dh_i/dξ and dh_i/dη.
 #[rustfmt::skip]
 pub fn derivative(xi: f64, eta: f64) -> [[f64; 2]; 8] {
     std::array::from_fn(|i| {

@@ -21,7 +21,7 @@ pub const NODES: [[f64; 2]; 6] = [
 /// Sides as local nodes (corner, corner, midside), counter-clockwise.
 pub const SIDES: [[usize; 3]; 3] = [[0, 1, 3], [1, 2, 4], [2, 0, 5]];
 
-/// h_i(ξ, η); two zeros follow.
+/// The shape functions h_i(ξ, η), followed by two zeros.
 #[rustfmt::skip]
 pub fn shape(xi: f64, eta: f64) -> [f64; 8] {
     let zeta = 1.0 - xi - eta;
@@ -32,14 +32,14 @@ pub fn shape(xi: f64, eta: f64) -> [f64; 8] {
     ]
 }
 
-/// The function that an element may have beside its nodes, 0 on all sides, and its derivatives.
+/// The bubble function, 0 on all sides, and its derivatives.
 #[rustfmt::skip]
 pub fn bubble(xi: f64, eta: f64) -> (f64, [f64; 2]) {
     let zeta = 1.0 - xi - eta;
     (27.0 * xi * eta * zeta, [27.0 * eta * (zeta - xi), 27.0 * xi * (zeta - eta)])
 }
 
-/// dh_i/dξ and dh_i/dη; two zeros follow.
+/// The derivatives dh_i/dξ and dh_i/dη, followed by two zeros.
 #[rustfmt::skip]
 pub fn derivative(xi: f64, eta: f64) -> [[f64; 2]; 8] {
     let zeta = 1.0 - xi - eta;

@@ -7,24 +7,25 @@ use super::{Reason, Violation};
 /// Violations beyond this number are counted, not listed, so that the answer stays small.
 pub const MOST_LISTED: usize = 100;
 
-/// The same fault may occur thousands of times in one mesh; more of one kind would hide the other kinds.
+/// The largest number of violations of one kind in a mesh: the same fault may occur thousands of times and would hide
+/// the others.
 const MOST_OF_A_KIND: usize = 20;
 
-/// Characters of each text: a name from a request may be as long as the request.
+/// The largest number of characters of each text: a name from a request may be as long as the request.
 const LONGEST: usize = 2000;
 
 /// Collects violations.
 ///
-/// Whether a check failed is its own result, a [`Checked`]; the list is not asked.
+/// Whether a check failed is the result of the check itself, a [`Checked`], and is not read from this list.
 #[derive(Debug)]
 pub struct Findings {
-    /// The start of all pointers.
+    /// The start of all JSON Pointers.
     at: String,
     listed: Vec<Violation>,
-    /// Violations by reason, while there is room for more.
+    /// The number of violations of each kind, while there is a limit for each kind.
     of_a_kind: BTreeMap<Reason, usize>,
     most_of_a_kind: usize,
-    /// Violations found after the list was full.
+    /// The number of violations found after the list was full.
     more: usize,
 }
 
@@ -33,7 +34,7 @@ pub struct Findings {
 #[must_use]
 pub struct Refused(());
 
-/// Result of a check: the checked value, or [`Refused`].
+/// The result of a check: the checked value, or [`Refused`].
 pub type Checked<T = ()> = Result<T, Refused>;
 
 impl Default for Findings {
@@ -49,7 +50,7 @@ impl Default for Findings {
 }
 
 impl Findings {
-    /// For one mesh at `pointer`, with a limit for each kind of violation.
+    /// Findings of one mesh at `pointer`, with a limit for each kind of violation.
     pub fn of_mesh(pointer: &str) -> Self {
         Findings {
             at: pointer.to_owned(),
@@ -58,7 +59,7 @@ impl Findings {
         }
     }
 
-    /// Adds a violation that makes a check fail. `place`: the rest of its pointer.
+    /// Adds a violation that makes a check fail. `place`: the JSON Pointer relative to the start.
     pub fn report(
         &mut self,
         place: impl AsRef<str>,
@@ -95,7 +96,7 @@ impl Findings {
         });
     }
 
-    /// Whether further violations are only counted.
+    /// Whether the list is full, so that further violations are only counted.
     pub fn is_full(&self) -> bool {
         self.listed.len() >= MOST_LISTED
     }
@@ -113,7 +114,7 @@ impl Findings {
         })
     }
 
-    /// Counts one more; true if it is to be listed.
+    /// Counts one more violation; true if it should be listed.
     fn has_room(&mut self, reason: Reason) -> bool {
         if self.is_full() {
             self.more += 1;
@@ -199,7 +200,7 @@ pub fn shortened(text: &str, most: usize) -> String {
     }
 }
 
-/// A number to six digits, for messages: in any units, with `{:?}`.
+/// A number rounded to six digits, for messages; shown by `{:?}` in any units.
 pub fn rounded(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
 }

@@ -23,16 +23,16 @@ pub struct Violation {
     pub pointer: String,
     /// The kind of violation, stable for programs.
     pub reason: Reason,
-    /// What the problem has there.
+    /// The value found there.
     pub got: String,
-    /// What is required there.
+    /// The requirement there.
     pub expected: String,
     /// How to correct it.
     pub hint: String,
 }
 
 impl Violation {
-    /// From its parts, in their order.
+    /// A violation from its parts, in their order.
     pub fn new(
         pointer: impl Into<String>,
         reason: Reason,
@@ -51,19 +51,20 @@ impl Violation {
 }
 
 impl Violation {
-    /// The line of the file that it is about, and what was found there: readers of files begin `got` by `line 61: `.
+    /// The line of the file where the violation is, and the value found there: readers of files begin `got` by `line
+    /// 61: `.
     fn on_line(&self) -> Option<(u64, &str)> {
         let rest = self.got.strip_prefix("line ")?;
         let (line, got) = rest.split_once(": ").filter(|_| self.pointer.is_empty())?;
         Some((line.parse().ok()?, got))
     }
 
-    /// The line of the file that it is about, counted from 1; none: it is not about one line of a deck or mesh file.
+    /// The line of a deck or mesh file where the violation is, counted from 1; none if it is not about one line.
     pub fn line(&self) -> Option<u64> {
         self.on_line().map(|(line, _)| line)
     }
 
-    /// As one line of text about a file: `deck.inp:61: expected …, got …. …`
+    /// The violation as one line of text about a file: `deck.inp:61: expected …, got …. …`
     pub fn in_file(&self, file: impl fmt::Display) -> String {
         match self.on_line() {
             Some((line, got)) => format!(
@@ -121,17 +122,17 @@ pub enum SolveError {
         /// A node that moves.
         node: u32,
     },
-    /// There is not as much memory as a matrix needs.
+    /// There is not enough memory for a matrix.
     ResourceExhausted {
-        /// Bytes that it needs.
+        /// The number of bytes that the matrix needs.
         bytes: u64,
     },
     /// A phase computed NaN or infinity.
     NonFinite {
-        /// The phase.
+        /// The phase in which it occurred.
         phase: Phase,
     },
-    /// A problem that is to be solved on the body of another has another body.
+    /// A problem cannot be solved on this body, because its own body differs.
     OtherBody,
     /// The observer stopped the solution before there was a state to return.
     Stopped,
@@ -155,9 +156,9 @@ impl fmt::Display for SolveError {
             ),
             SolveError::Unheld { motion, node } => write!(
                 f,
-                "nothing holds the body: it is free to move {motion}, e.g. at node {node}. The supports leave \
-                 this motion to contact, which in the end does not touch, or not where it would hold the \
-                 body. Add a support, or loads that press the body against the obstacle"
+                "nothing holds the body: it is free to move {motion}, e.g. at node {node}. The supports rely \
+                 on contact to prevent this motion, but in the final state there is no contact where it would \
+                 do so. Add a support, or loads that press the body against the obstacle"
             ),
             SolveError::ResourceExhausted { bytes } => write!(
                 f,

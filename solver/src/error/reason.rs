@@ -27,47 +27,47 @@ pub enum Reason {
     // Values as they are written.
     /// A text or a value that cannot be read.
     Malformed,
-    /// A value of another type.
+    /// A value of the wrong type.
     WrongType,
     /// A name that is not known here.
     UnknownName,
-    /// None of the forms or words that are allowed here.
+    /// A value that is none of the allowed forms or words.
     UnknownAlternative,
     /// A name that occurs twice in one object.
     DuplicateName,
     /// A required value that is absent.
     Missing,
-    /// None or several were given where exactly one is required.
+    /// None or several values where exactly one is required.
     WrongCount,
-    /// A list of another length than required.
+    /// A list whose length is not the required one.
     WrongLength,
-    /// Fewer than required.
+    /// Fewer items than required.
     TooFew,
-    /// More than allowed.
+    /// More items than allowed.
     TooMany,
     /// A text longer than allowed.
     TooLong,
-    /// Needs more memory than allowed.
+    /// A problem that needs more memory than allowed.
     TooLarge,
-    /// NaN or infinity.
+    /// A number that is NaN or infinite.
     NotFinite,
     /// A number outside its range.
     OutOfRange,
     /// Numbers that do not increase.
     NotIncreasing,
-    /// Given where it has no effect, or together with a field that excludes it.
+    /// A value that has no effect here, or excludes another one that is given.
     NotUsed,
-    /// Two values that cannot both hold.
+    /// Two values that contradict each other.
     Conflict,
 
     // Names that refer to nothing, or that are taken.
-    /// No boundary of that name.
+    /// A boundary name that the mesh does not have.
     UnknownBoundary,
-    /// No group of elements of that name.
+    /// An element group that the mesh does not have.
     UnknownGroup,
-    /// No set of nodes of that name.
+    /// A node set that the mesh does not have.
     UnknownNodeSet,
-    /// No such mesh.
+    /// A mesh that does not exist.
     UnknownMesh,
     /// A name that is in use already.
     NameTaken,
@@ -81,9 +81,9 @@ pub enum Reason {
     NotUnderstood,
 
     // Meshes.
-    /// No node of that number.
+    /// A node number that the mesh does not have.
     UnknownNode,
-    /// No element of that number.
+    /// An element number that the mesh does not have.
     UnknownElement,
     /// A side that no element has.
     UnknownEdge,
@@ -115,9 +115,9 @@ pub enum Reason {
     EmptyBoundary,
     /// A rule that matches no element.
     EmptyGroup,
-    /// Something assigned to two where only one is allowed.
+    /// Something assigned twice where only one is allowed.
     Overlap,
-    /// Edges that do not follow one another.
+    /// Edges that are not consecutive.
     NotAChain,
     /// A boundary with a corner, where the normal is not defined.
     TurnsCorner,
@@ -157,7 +157,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn json_and_display_write_a_reason_alike() {
+    fn json_and_display_write_a_reason_in_the_same_way() {
         for reason in Reason::VARIANTS {
             let json = serde_json::to_string(reason).unwrap();
             assert_eq!(json, format!("\"{reason}\""));

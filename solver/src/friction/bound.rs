@@ -5,9 +5,9 @@ use std::sync::Arc;
 use crate::friction::{Average, Averaging, Row};
 use crate::problem::PrescribedBound;
 
-/// With cohesion an averaged pressure below this part of the largest nodal pressure is none: rounding must not
-/// switch on the cohesion where nothing touches. Pressures are known to far more digits, and what the kernel leaves of
-/// them at its very end matters to nobody.
+/// With cohesion, an averaged pressure below this part of the largest nodal pressure counts as zero, so that rounding
+/// does not switch on the cohesion where nothing touches. Pressures are known to far more digits, and the kernel is
+/// negligible at its very end.
 const NO_PRESSURE: f64 = 1e-9;
 
 /// The source of the friction bound; `A` as in [`FrictionLaw`](crate::friction::FrictionLaw).
@@ -16,30 +16,30 @@ pub enum BoundLaw<A = Averaging> {
     /// τ = min(cap, cohesion + μ S) where S > 0, else 0: thesis (1.3) with an offset and a cap. With cohesion, S > 0
     /// means more than a billionth of the largest nodal pressure.
     Pressure {
-        /// μ.
+        /// The coefficient μ.
         coefficient: f64,
-        /// c (stress).
+        /// The cohesion c (stress).
         cohesion: f64,
-        /// Largest τ (stress); infinite without one.
+        /// The largest τ (stress); infinite without a cap.
         shear_cap: f64,
-        /// S_ρ.
+        /// The average that gives S_ρ.
         average: A,
     },
-    /// Tresca's law: τ is given.
+    /// Tresca's law: τ is prescribed.
     Prescribed(PrescribedBound),
 }
 
-/// The source of the bound at one place.
+/// What the bound at one place is computed from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Source {
-    /// The pressures of these nodes.
+    /// The pressures of some nodes, averaged by this row.
     Average(Arc<Row>),
     /// A prescribed bound (stress).
     Given(f64),
 }
 
 impl Source {
-    /// S_ρ(p) (stress); 0 where the bound is given.
+    /// The averaged pressure S_ρ(p) (stress); 0 where the bound is prescribed.
     pub fn nonlocal_pressure(&self, pressures: &[f64]) -> f64 {
         match self {
             Source::Average(row) => row.apply(pressures),
@@ -47,7 +47,7 @@ impl Source {
         }
     }
 
-    /// With nodes numbered from `first` on.
+    /// The same source with nodes numbered from `first` on.
     pub fn shifted(mut self, first: usize) -> Self {
         // rows are shared with the operator: those of the first contact stay so
         if let Source::Average(row) = &mut self
@@ -78,7 +78,7 @@ impl BoundLaw<Average> {
         }
     }
 
-    /// ρ (length); `None` where the bound is given.
+    /// The radius ρ (length); `None` where the bound is prescribed.
     pub fn radius(&self) -> Option<f64> {
         match self {
             BoundLaw::Pressure { average, .. } => Some(average.radius),
@@ -86,7 +86,7 @@ impl BoundLaw<Average> {
         }
     }
 
-    /// ρ > 0 (length), if the bound depends on an average: μ > 0.
+    /// The radius ρ > 0 (length) if the bound depends on an average, with μ > 0.
     pub fn averaged_over(&self) -> Option<f64> {
         match self {
             BoundLaw::Pressure {
@@ -125,7 +125,7 @@ impl<A> BoundLaw<A> {
 }
 
 impl BoundLaw {
-    /// How far the bound depends on pressures (length); `None` where it is given.
+    /// The distance up to which the bound depends on pressures (length); `None` where it is prescribed.
     pub fn reach(&self) -> Option<f64> {
         match self {
             BoundLaw::Pressure { average, .. } => Some(average.radius()),
@@ -133,7 +133,7 @@ impl BoundLaw {
         }
     }
 
-    /// What computing a source takes (multiplications).
+    /// The work of computing a source (multiplications).
     pub fn work(&self, source: &Source) -> usize {
         match (self, source) {
             (BoundLaw::Pressure { average, .. }, Source::Average(row)) => average.work(row),
@@ -152,7 +152,8 @@ impl BoundLaw {
         }
     }
 
-    /// τ (stress, ≥ 0) for the nodal pressures (stress), of which those of the contact are at most `largest`.
+    /// The bound τ (stress, ≥ 0) for the nodal pressures (stress). `largest`: the largest nodal pressure of the
+    /// contact.
     pub fn bound(&self, source: &Source, pressures: &[f64], largest: f64) -> f64 {
         match (self, source) {
             (_, Source::Given(bound)) => *bound,
@@ -160,7 +161,7 @@ impl BoundLaw {
         }
     }
 
-    /// τ from an averaged pressure S, beside nodal pressures up to `largest`.
+    /// The bound τ for an averaged pressure S, where the largest nodal pressure is `largest`.
     pub fn of_average(&self, nonlocal_pressure: f64, largest: f64) -> f64 {
         match self {
             BoundLaw::Pressure {
@@ -175,7 +176,7 @@ impl BoundLaw {
         }
     }
 
-    /// dτ/dS, apart from the jump by the cohesion.
+    /// The derivative dτ/dS, apart from the jump by the cohesion.
     pub fn slope(&self, nonlocal_pressure: f64) -> f64 {
         match self {
             BoundLaw::Pressure {
@@ -193,7 +194,7 @@ impl BoundLaw {
     }
 }
 
-/// S has to be above this to count as pressure.
+/// The value that S must exceed to count as pressure.
 fn least_pressure(cohesion: f64, largest: f64) -> f64 {
     // without cohesion nothing jumps
     if cohesion > 0.0 {
@@ -208,7 +209,7 @@ pub fn largest_pressure(pressures: &[f64]) -> f64 {
     pressures.iter().fold(0.0, |most, p| p.max(most))
 }
 
-/// Linear between the points of a table, 0 outside.
+/// The value at a place, linear between the points of a table and 0 outside.
 fn interpolate(x: &[f64], y: &[f64], at: f64) -> f64 {
     let after = x.partition_point(|x| *x < at);
     match after {

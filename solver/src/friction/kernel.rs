@@ -15,45 +15,48 @@ use super::rings;
 use crate::element::{edge3, gauss};
 use crate::problem::{Kernel, Measure, Normalization};
 
-/// ∫ exp(1/(x² − 1)) dx over (−1, 1).
+/// The integral of exp(1/(x² − 1)) over (−1, 1).
 const BUMP_INTEGRAL: f64 = 0.443_993_816_168_079;
 
-/// 1 / ∫ exp(1/(r² − 1)) dA over the unit disc.
+/// The reciprocal 1 / ∫ exp(1/(r² − 1)) dA over the unit disc.
 const BUMP_DISC: f64 = 2.143_565_775_8;
 
-/// Points per piece; on a piece much shorter than ρ the kernel is almost constant, and fewer are enough.
+/// The integration rule for one piece; on a piece much shorter than ρ the kernel is almost constant and fewer points
+/// are enough.
 static FULL_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss::rule(40));
 static SHORT_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss::rule(12));
 const SHORT: f64 = 0.1;
 
-/// Over rings, where a value takes longer, they are also enough on a piece that is farther from the kernel's ends than this
-/// many times half its length, and a few more on one that is not long: to 10⁻¹³, away from the axis.
+/// With rings, where a kernel value takes longer to compute, fewer points are also used on a piece whose distance from
+/// the kernel's ends exceeds this many times half its length, and a few more on one that is not long: to 10⁻¹³, away
+/// from the axis.
 const FAR: f64 = 3.0;
 static MIDDLE_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss::rule(24));
 const MIDDLE: f64 = 0.25;
 
-/// The midside node of an edge is in its middle within this part of its length: rounding of arc length.
+/// The midside node of an edge counts as its middle within this part of its length, which is the rounding of arc
+/// length.
 const STRAIGHT: f64 = 1e-12;
 
-/// A radius below this part of the chain's length averages over no point: arc length itself is less accurate,
-/// and the law is Coulomb's.
+/// A radius below this part of the chain's length counts as 0, since arc length itself is less accurate: the law is
+/// Coulomb's.
 const LOCAL: f64 = 1e-9;
 
-/// Γ_C as arc length, and radius where rings count.
+/// Γ_C as arc length, with positions where rings are used.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chain {
     /// Arc length at the nodes (corner, midside, corner, …).
     pub s: Vec<f64>,
     /// The nodes (r, z), for `Measure::Surface`; not used otherwise.
     pub positions: Vec<[f64; 2]>,
-    /// The pressure continues as an even function beyond the first node: a line of symmetry.
+    /// Whether the pressure continues as an even function before the first node, which is on a line of symmetry.
     pub mirror_start: bool,
-    /// Likewise beyond the last node.
+    /// Whether the pressure continues as an even function beyond the last node, which is on a line of symmetry.
     pub mirror_end: bool,
 }
 
 impl Chain {
-    /// Arc length only, without lines of symmetry.
+    /// A chain with arc length only, without lines of symmetry.
     pub fn plain(s: Vec<f64>) -> Self {
         Chain {
             s,
@@ -67,13 +70,13 @@ impl Chain {
 /// The parameters of S_ρ.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Average {
-    /// ρ ≥ 0 (length); 0: Coulomb's local law.
+    /// The radius ρ ≥ 0 (length); 0: Coulomb's local law.
     pub radius: f64,
-    /// Shape of ω_ρ.
+    /// The shape of ω_ρ.
     pub kernel: Kernel,
-    /// Scale of ω_ρ.
+    /// The scale of ω_ρ.
     pub normalization: Normalization,
-    /// What ω_ρ is integrated over.
+    /// The domain over which ω_ρ is integrated.
     pub measure: Measure,
 }
 
@@ -81,42 +84,42 @@ pub struct Average {
 #[derive(Clone, Debug)]
 pub struct Averaging {
     chain: Arc<Chain>,
-    /// The rows computed so far: friction points, profiles and the search for peaks ask for the same places again and again.
+    /// The rows computed so far: friction points, profiles and the search for peaks need the same places many times.
     known: Arc<Mutex<KnownRows>>,
     radius: f64,
     kernel: Kernel,
     measure: Measure,
-    /// C of (1.2).
+    /// The factor C of thesis (1.2).
     scale: f64,
-    /// [`Normalization::Conserving`].
+    /// Whether the normalization is [`Normalization::Conserving`].
     conserving: bool,
 }
 
-/// A distance from the axis as a function of a place, a r + b z + c.
+/// The distance of a place from the axis as a function of its position, a r + b z + c.
 type Distance = [f64; 3];
 
-/// That of the place itself.
+/// The distance of the place itself from the axis.
 const OWN: Distance = [1.0, 0.0, 0.0];
 
-/// A copy of the chain that continues it evenly beyond its mirrors.
+/// A mirror image of the chain that continues it evenly beyond an end.
 struct Image {
-    /// Centre of the kernel before all was moved onto the chain itself.
+    /// The centre of the kernel, moved so that the image coincides with the chain.
     centre: f64,
-    /// Distance of the copy from the axis, of places of the chain.
+    /// The image's distance from the axis, as a function of places of the chain.
     distance: Distance,
 }
 
-/// One row of W: weights of the nodes from `first` on.
+/// One row of the averaging matrix W: the weights of nodes from `first` on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// First node with a weight.
+    /// The first node with a weight.
     pub first: usize,
-    /// Weights of it and the nodes after it.
+    /// The weights of `first` and the nodes after it.
     pub weights: Vec<f64>,
 }
 
 impl Row {
-    /// Σ W_j p_j.
+    /// The averaged pressure Σ W_j p_j.
     pub fn apply(&self, pressure: &[f64]) -> f64 {
         self.weights
             .iter()
@@ -126,16 +129,16 @@ impl Row {
     }
 }
 
-/// Rows of W by the bits of their arc length.
+/// Computed rows of W, by the bits of their arc length.
 #[derive(Debug, Default)]
 struct KnownRows {
     rows: HashMap<u64, Arc<Row>>,
-    /// Weights in all of them.
+    /// The total number of weights in all rows.
     weights: usize,
 }
 
 impl KnownRows {
-    /// Keeps a row, unless there are many: at most so many weights for each node of the chain.
+    /// Stores a row, unless there are too many weights for each node of the chain already.
     fn add(&mut self, s: f64, row: &Arc<Row>, nodes: usize) {
         const MOST_FOR_A_NODE: usize = 256;
         // a row takes some space beside its weights
@@ -148,7 +151,7 @@ impl KnownRows {
 }
 
 impl Averaging {
-    /// The operator of an average.
+    /// The averaging operator with these parameters on a chain.
     pub fn new(average: &Average, chain: Chain) -> Self {
         let length = chain.s[chain.s.len() - 1] - chain.s[0];
         let radius = match average.radius {
@@ -175,7 +178,8 @@ impl Averaging {
         }
     }
 
-    /// The part of ∫ω around a place on the chain that lies on the chain, in (0, 1]; beyond a line of symmetry it goes on.
+    /// The part of ∫ω around a place on the chain that lies on the chain, in (0, 1]; beyond a line of symmetry the
+    /// chain continues.
     pub fn part_inside(&self, s: f64) -> f64 {
         let (start, end) = (self.chain.s[0], self.chain.s[self.chain.s.len() - 1]);
         let reach = |distance: f64, mirrored: bool| match mirrored {
@@ -195,7 +199,8 @@ impl Averaging {
         (half(before) + half(after)) / (2.0 * half(1.0))
     }
 
-    /// The part of a wave of the pressure with this length that is left of it in S_ρ, beside what is left of a uniform one.
+    /// The factor by which averaging reduces the amplitude of a pressure wave of this length, relative to a uniform
+    /// pressure.
     pub fn part_of_wave(&self, length: f64) -> f64 {
         if self.radius == 0.0 {
             return 1.0;
@@ -209,17 +214,17 @@ impl Averaging {
         wave / whole
     }
 
-    /// ρ, or 0 where the law is local (length).
+    /// The radius ρ, or 0 where the law is local (length).
     pub fn radius(&self) -> f64 {
         self.radius
     }
 
-    /// ω_ρ at a distance.
+    /// The kernel ω_ρ at a distance.
     pub fn omega(&self, distance: f64) -> f64 {
         self.scale * shape(self.kernel, distance / self.radius)
     }
 
-    /// The row of W at arc length s. ρ = 0 is interpolation: Coulomb's law.
+    /// The row of W at arc length s. For ρ = 0 it is interpolation: Coulomb's law.
     pub fn row(&self, s: f64) -> Arc<Row> {
         let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(row) = known().rows.get(&s.to_bits()) {
@@ -230,7 +235,7 @@ impl Averaging {
         row
     }
 
-    /// What computing a row takes (multiplications).
+    /// The work of computing a row (multiplications).
     pub fn work(&self, row: &Row) -> usize {
         let of_a_weight = match self.measure {
             Measure::Line => 500,
@@ -274,14 +279,14 @@ impl Averaging {
         row
     }
 
-    /// Distance from the axis at arc length s.
+    /// The distance from the axis at arc length s.
     fn distance_from_axis(&self, s: f64) -> f64 {
         let edge = self.edge_at(s);
         let h = edge3::shape(edge3::invert(&self.arc(edge), s));
         edge3::interpolate(&h, &self.distances(edge, OWN)).max(0.0)
     }
 
-    /// A distance from the axis at the nodes of an edge.
+    /// The distances from the axis at the nodes of an edge.
     fn distances(&self, edge: usize, [a, b, c]: Distance) -> [f64; 3] {
         [2 * edge, 2 * edge + 2, 2 * edge + 1].map(|i| {
             let [r, z] = self.chain.positions[i];
@@ -317,8 +322,8 @@ impl Averaging {
         around * most * ring
     }
 
-    /// Integrates the kernel at an image's centre (also outside the chain) edge by edge; over rings, those of the image,
-    /// where the kernel's own distance from the axis is given.
+    /// Integrates the kernel at an image's centre, edge by edge, also outside the chain. If the distance of the
+    /// kernel's centre from the axis is given, it is integrated over the image's rings.
     fn integrate(&self, image: &Image, ring: Option<f64>, add: &mut impl FnMut(usize, [f64; 3])) {
         let centre = image.centre;
         let (low, high) = (centre - self.radius, centre + self.radius);
@@ -388,9 +393,9 @@ impl Averaging {
         }
     }
 
-    /// Whether the weights of an edge follow from moments of the kernel: its midside node lies in the middle, so that its
-    /// shape functions are parabolas of arc length; it is not so short beside ρ that differences of moments lose digits;
-    /// and the kernel is the same all along it.
+    /// Whether the weights of an edge follow from moments of the kernel: its midside node lies in the middle, so that
+    /// its shape functions are parabolas of arc length; it is not so short compared with ρ that differences of moments
+    /// lose digits; and the kernel does not vary along it.
     fn by_moments(&self, &[start, end, middle]: &[f64; 3]) -> bool {
         let length = end - start;
         (start + end - 2.0 * middle).abs() <= STRAIGHT * length
@@ -398,7 +403,7 @@ impl Averaging {
             && !(self.conserving && [start, end].iter().any(|s| self.part_inside(*s) < 1.0))
     }
 
-    /// ∫ ω h_i between two places of an edge.
+    /// The integrals ∫ ω h_i between two places of an edge.
     fn weights_by_moments(
         &self,
         &[start, end, _]: &[f64; 3],
@@ -423,8 +428,8 @@ impl Averaging {
         ]
     }
 
-    /// The chain continued evenly at its mirrors, for a kernel at s: a kernel over the mirrored pressure equals the mirrored
-    /// kernel over the pressure. Rings are mirrored in space.
+    /// The chain continued evenly at its mirrors, for a kernel at s: integrating a kernel over the mirrored pressure
+    /// equals integrating the mirrored kernel over the pressure. Rings are mirrored in space.
     fn images(&self, s: f64) -> Vec<Image> {
         let (start, end) = (self.chain.s[0], self.chain.s[self.chain.s.len() - 1]);
         let reaches = |i: &Image| i.centre > start - self.radius && i.centre < end + self.radius;
@@ -489,7 +494,7 @@ impl Averaging {
         [s[2 * edge], s[2 * edge + 2], s[2 * edge + 1]]
     }
 
-    /// The edge at arc length s; the first or last one beyond the ends.
+    /// The edge at arc length s; beyond the ends the first or the last one.
     fn edge_at(&self, s: f64) -> usize {
         let after = self.chain.s.partition_point(|&node| node <= s);
         (after.max(1) - 1).min(self.chain.s.len() - 2) / 2
@@ -556,9 +561,9 @@ mod tests {
         }
     }
 
-    /// Forty points leave 1.4e-11 of the bump's integral: hence 1e-10 here and below. The average
-    /// of a piecewise quadratic interpolant is exact to degree 2; degree 4 is interpolated on fine
-    /// edges, with an error of the fourth power of their length.
+    /// Forty points integrate the bump to 1.4e-11: hence the tolerance 1e-10 here and below. The average of a piecewise
+    /// quadratic interpolant is exact to degree 2; degree 4 is interpolated on fine edges, with an error of the fourth
+    /// power of their length.
     #[test]
     fn moments_of_the_bump_are_exact_on_any_mesh() {
         let (rho, x) = (0.3, 1.03);
@@ -678,7 +683,8 @@ mod tests {
         assert!(difference.abs() > 1e-4 && difference.abs() < rho * rho);
     }
 
-    /// The same weights as by many points in both directions, on edges shorter and longer than ρ, and near the axis.
+    /// Rows over rings have the weights of an integral by many points in both directions, on edges shorter and longer
+    /// than ρ, and near the axis.
     #[test]
     fn rows_over_rings_are_integrals_over_the_surface() {
         let rule = gauss::rule(40);
@@ -760,7 +766,7 @@ mod tests {
         }
     }
 
-    /// Rings of a plane.
+    /// The positions of rings in a plane.
     fn flat(s: &[f64]) -> Vec<[f64; 2]> {
         s.iter().map(|r| [*r, 0.0]).collect()
     }
@@ -801,7 +807,8 @@ mod tests {
         }
     }
 
-    /// The outside of a barrel r = 3 − z²/4, whole and cut where it is widest.
+    /// Rings of the outside of a barrel r = 3 − z²/4 that is cut where it is widest and mirrored are those of the whole
+    /// barrel.
     #[test]
     fn rings_beyond_a_mirror_are_those_of_the_whole() {
         let [half, whole] = [0.0, -1.0].map(|low| {

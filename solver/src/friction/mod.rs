@@ -21,23 +21,23 @@ pub use transition::{phi, phi_slope, psi};
 
 use crate::problem::{FrictionPoints, History, Transition};
 
-/// From pressure and tangential displacement along Γ_C to the tangential traction,
-/// σ_t = −τ φ_ε(|e|) sign(e): thesis (1.3), (1.8). e = u_t − d in the total law; in the incremental
-/// law e = u_t − d − g with the anchor g of the point, formulation 1.5.
+/// From pressure and tangential displacement along Γ_C to the tangential traction, σ_t = −τ φ_ε(|e|) sign(e): thesis
+/// (1.3), (1.8). e = u_t − d in the total law; in the incremental law e = u_t − d − g with the anchor g of the point,
+/// formulation 1.5.
 ///
-/// `A`: its average over the pressure, which is parameters in a model ([`Average`]) and an operator along Γ_C in a
-/// system ([`Averaging`]).
+/// `A`: the average over the pressure: its parameters in a model ([`Average`]), an operator along Γ_C in a system
+/// ([`Averaging`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrictionLaw<A = Averaging> {
-    /// τ.
+    /// The friction bound τ.
     pub bound: BoundLaw<A>,
-    /// ε (length).
+    /// The elastic slip ε (length).
     pub elastic_slip: f64,
-    /// φ_ε.
+    /// The transition function φ_ε.
     pub transition: Transition,
-    /// Whether points keep an anchor.
+    /// Whether points have an anchor (incremental law).
     pub history: History,
-    /// Where it is evaluated.
+    /// The points where friction is evaluated.
     pub points: FrictionPoints,
 }
 
@@ -55,17 +55,17 @@ impl FrictionLaw<Average> {
 }
 
 impl<A> FrictionLaw<A> {
-    /// φ_ε with the sign of `slip`, e above (length).
+    /// The transition φ_ε with the sign of the slip e (length).
     pub fn phi(&self, slip: f64) -> f64 {
         phi(self.transition, slip / self.elastic_slip)
     }
 
-    /// dφ/du_t (1/length).
+    /// The derivative dφ/du_t (1/length).
     pub fn phi_slope(&self, slip: f64) -> f64 {
         phi_slope(self.transition, slip / self.elastic_slip) / self.elastic_slip
     }
 
-    /// ψ_ε, the primitive of φ_ε (length).
+    /// The primitive ψ_ε of φ_ε (length).
     pub fn psi(&self, slip: f64) -> f64 {
         self.elastic_slip * psi(self.transition, slip / self.elastic_slip)
     }
@@ -86,7 +86,7 @@ mod tests {
     use super::*;
     use crate::problem::{Kernel, Measure, Normalization};
 
-    /// The average of most tests.
+    /// The average that most tests use.
     pub(super) fn average(radius: f64) -> Average {
         Average {
             radius,

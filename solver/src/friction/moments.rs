@@ -1,11 +1,11 @@
-//! The moments of a kernel up to a place: what its integral over a part of a straight edge is made of.
+//! The moments of a kernel up to a place, from which follows its integral over a part of a straight edge.
 
 use std::sync::LazyLock;
 
 use crate::element::gauss;
 use crate::problem::Kernel;
 
-/// ω(t) on (−1, 1), without its scale: exp(1/(t² − 1)) or 1 − t².
+/// The kernel shape ω(t) on (−1, 1), without its scale: exp(1/(t² − 1)) or 1 − t².
 pub(super) fn shape(kernel: Kernel, t: f64) -> f64 {
     let rest = 1.0 - t * t;
     match kernel {
@@ -16,7 +16,7 @@ pub(super) fn shape(kernel: Kernel, t: f64) -> f64 {
     }
 }
 
-/// ∫ ω(t) tᵏ dt from −1 to x, for k = 0, 1, 2; −1 ≤ x ≤ 1. For the bump to 10⁻¹⁵.
+/// ∫ ω(t) tᵏ dt from −1 to x, for k = 0, 1, 2; −1 ≤ x ≤ 1. The error for the bump is 10⁻¹⁵.
 #[rustfmt::skip]
 pub(super) fn moments_up_to(kernel: Kernel, x: f64) -> [f64; 3] {
     match kernel {
@@ -29,11 +29,11 @@ pub(super) fn moments_up_to(kernel: Kernel, x: f64) -> [f64; 3] {
     }
 }
 
-/// Cells of the table: with a quarter of them its error is 3·10⁻¹², with its sixth power.
+/// The number of cells of the table. A quarter of them would give an error of 3·10⁻¹²; it falls with the sixth power.
 const CELLS: usize = 1024;
 const CELL: f64 = 2.0 / CELLS as f64;
 
-/// What is known at an end of a cell: the moments up to it, ω and ω′.
+/// The values at an end of a cell: the moments up to it, ω and ω′.
 struct Known {
     moments: [f64; 3],
     omega: f64,
@@ -78,7 +78,8 @@ pub(super) fn hermite(r: f64) -> ([f64; 3], [f64; 3]) {
     (own(r), own(1.0 - r))
 }
 
-/// Between the ends of a cell the polynomial of degree five with the moments, and their first two derivatives, at both.
+/// The moments of the bump up to x: between the ends of a cell, the polynomial of degree five with the right values and
+/// first two derivatives at both ends.
 fn of_bump(x: f64) -> [f64; 3] {
     let place = (x + 1.0) / CELL;
     let cell = (place as usize).min(CELLS - 1);

@@ -1,4 +1,4 @@
-//! A kernel around a place, integrated over rings around the axis: what `measure: surface` averages over.
+//! The integral of a kernel around a place over rings around the axis, for `measure: surface`.
 //!
 //! A ring of radius r′, `along` away on the meridian from a place at distance r from the axis, has points at
 //!
@@ -16,20 +16,20 @@ use super::moments::hermite;
 use crate::element::gauss;
 use crate::problem::Kernel;
 
-/// Terms of the series: up to [`LARGEST`] the next one is below 10⁻¹⁵ of the first.
+/// The number of terms of the series: up to [`LARGEST`] the next one is below 10⁻¹⁵ of the first.
 const TERMS: usize = 20;
 
-/// The largest q that the series is used for: rings farther from the axis than about half of ρ.
+/// The largest q for which the series is used: rings farther from the axis than about half of ρ.
 pub(super) const LARGEST: f64 = 0.25;
 
-/// A term that is smaller than this beside the first is left out, with all after it.
+/// A term below this part of the first is left out, with all after it.
 const ROUNDING: f64 = 1e-17;
 
-/// Cells of the table on 0 ≤ b ≤ 1; the error of its polynomials of degree five is 10⁻¹⁴.
+/// The number of cells of the table on 0 ≤ b ≤ 1; the error of its polynomials of degree five is 10⁻¹⁴.
 const CELLS: usize = 1024;
 const CELL: f64 = 1.0 / CELLS as f64;
 
-/// a_k of (1 − x)^(−1/2) = Σ a_k xᵏ.
+/// The coefficients a_k of (1 − x)^(−1/2) = Σ a_k xᵏ.
 static COEFFICIENTS: LazyLock<[f64; TERMS]> = LazyLock::new(|| {
     let mut a = [1.0; TERMS];
     for k in 1..TERMS {
@@ -69,7 +69,7 @@ static BUMP: LazyLock<Vec<[[f64; 3]; TERMS]>> = LazyLock::new(|| {
     (0..=CELLS).map(at).collect()
 });
 
-/// ∫ ω̂ dθ around a ring, of a kernel without its scale, for 0 < b ≤ 1 and 0 < q ≤ [`LARGEST`].
+/// The integral ∫ ω̂ dθ around a ring, for a kernel without its scale, with 0 < b ≤ 1 and 0 < q ≤ [`LARGEST`].
 pub(super) fn around(kernel: Kernel, b: f64, q: f64) -> f64 {
     let terms = terms(q);
     let sum = match kernel {
@@ -96,7 +96,7 @@ pub(super) fn around(kernel: Kernel, b: f64, q: f64) -> f64 {
     4.0 * q.sqrt() * sum
 }
 
-/// So many terms matter.
+/// The number of terms that matter.
 fn terms(q: f64) -> usize {
     let (mut count, mut power) = (1, q);
     while power > ROUNDING && count < TERMS {
@@ -111,7 +111,7 @@ mod tests {
     use super::super::moments::shape;
     use super::*;
 
-    /// ∫ ω̂ dθ by 80 points.
+    /// The integral ∫ ω̂ dθ by 80 points.
     fn exact(kernel: Kernel, b: f64, q: f64) -> f64 {
         let rule = gauss::rule(40);
         let most = 2.0 * q.sqrt().min(1.0).asin();

@@ -4,7 +4,7 @@
 
 use crate::problem::Transition;
 
-/// φ(r), between −1 and 1.
+/// The transition φ(r), between −1 and 1.
 pub fn phi(transition: Transition, r: f64) -> f64 {
     match transition {
         Transition::Linear => r.clamp(-1.0, 1.0),
@@ -12,7 +12,7 @@ pub fn phi(transition: Transition, r: f64) -> f64 {
     }
 }
 
-/// dφ/dr.
+/// The derivative dφ/dr.
 pub fn phi_slope(transition: Transition, r: f64) -> f64 {
     match transition {
         Transition::Linear => f64::from(u8::from(r.abs() < 1.0)),
@@ -23,7 +23,7 @@ pub fn phi_slope(transition: Transition, r: f64) -> f64 {
     }
 }
 
-/// ∫₀ʳ φ.
+/// The primitive ψ(r) = ∫₀ʳ φ.
 pub fn psi(transition: Transition, r: f64) -> f64 {
     let r = r.abs();
     match transition {
@@ -40,7 +40,7 @@ mod tests {
 
     use super::*;
 
-    /// The four properties of thesis (1.6).
+    /// The transition has the four properties of thesis (1.6).
     #[test]
     fn phi_is_odd_monotone_bounded_and_tends_to_one() {
         for transition in Transition::VARIANTS.iter().copied() {

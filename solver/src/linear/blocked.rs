@@ -1,6 +1,6 @@
-//! Factors of dense matrices that can be interrupted: block by block, as faer computes them, with a question between
-//! the blocks. faer's own factorisations return only when they are done, which takes minutes for the thousands of
-//! unknowns of a long contact.
+//! Factorisations of dense matrices that can be interrupted: block by block, as faer computes them, with a call between
+//! blocks that asks whether to continue. faer's own factorisations return only at the end, which takes minutes for the
+//! thousands of unknowns of a long contact.
 //!
 //! A matrix of at most [`WHOLE`] rows is factored by faer in one piece.
 
@@ -16,26 +16,26 @@ use faer::linalg::triangular_solve::{
 use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Accum, MatMut, Par};
 
-use super::breaks::{Breaks, Stopped};
+use super::interrupt::{Interrupt, Stopped};
 
-/// Rows of a matrix that is factored in one piece.
+/// The largest number of rows of a matrix that is factored in one piece.
 const WHOLE: usize = 256;
 
-/// Columns of a block. It is faer's own size: a factor has the same bits as faer's.
+/// The number of columns of a block. It is faer's own size, so that factors have the same bits as faer's.
 const BLOCK: usize = 128;
 
-/// Columns that a block updates between two questions.
+/// The number of columns that a block updates before the next interruption point.
 pub(super) const STRIP: usize = 256;
 
-/// None: faer's parallel kernels do not promise the same bits.
+/// Sequential: faer's parallel kernels do not promise the same bits.
 const PAR: Par = Par::Seq;
 
 /// Why there is no Cholesky factor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum NoFactor {
-    /// A pivot is not positive: its row.
+    /// A pivot is not positive, in this row.
     NotPositiveDefinite(usize),
-    /// Stopped on request.
+    /// The observer stopped the work.
     Stopped,
 }
 
@@ -45,19 +45,19 @@ impl From<Stopped> for NoFactor {
     }
 }
 
-/// A = L Lᵀ in place, in the lower triangle; the upper one is neither read nor written, except within the blocks on
-/// the diagonal.
-pub(super) fn cholesky(a: MatMut<'_, f64>, breaks: &mut Breaks<'_>) -> Result<(), NoFactor> {
+/// Computes A = L Lᵀ in place, in the lower triangle; the upper one is neither read nor written, except within the
+/// blocks on the diagonal.
+pub(super) fn cholesky(a: MatMut<'_, f64>, interrupt: &mut Interrupt<'_>) -> Result<(), NoFactor> {
     let n = a.nrows();
-    eliminate(a, n, breaks)
+    eliminate(a, n, interrupt)
 }
 
-/// The first `count` columns of the same; what they leave of the other rows and columns, the Schur complement, takes
-/// their place.
+/// Computes the first `count` columns of the Cholesky factor in place; the Schur complement replaces the other rows and
+/// columns.
 pub(super) fn eliminate(
     mut a: MatMut<'_, f64>,
     count: usize,
-    breaks: &mut Breaks<'_>,
+    interrupt: &mut Interrupt<'_>,
 ) -> Result<(), NoFactor> {
     let n = a.nrows();
     let block = if n <= WHOLE { n } else { BLOCK };
@@ -82,7 +82,7 @@ pub(super) fn eliminate(
             NoFactor::NotPositiveDefinite(start + index)
         })?;
         solve_lower_triangular_in_place(diagonal.rb(), below.rb_mut().transpose_mut(), PAR);
-        breaks.after((size * size * (size + rest)) as f64 / 2.0)?;
+        interrupt.worked((size * size * (size + rest)) as f64 / 2.0)?;
         // the lower triangle of what is left: trailing −= below belowᵀ, some columns at a time
         for first in (0..rest).step_by(STRIP) {
             let width = STRIP.min(rest - first);
@@ -102,7 +102,7 @@ pub(super) fn eliminate(
                 PAR,
             );
             matmul(under, Accum::Add, left_under, left.transpose(), -1.0, PAR);
-            breaks.after((rows * width * size) as f64)?;
+            interrupt.worked((rows * width * size) as f64)?;
         }
     }
     Ok(())
@@ -114,11 +114,11 @@ pub(super) fn solve_cholesky(l: faer::MatRef<'_, f64>, mut b: MatMut<'_, f64>) {
     solve_upper_triangular_in_place(l.transpose(), b, PAR);
 }
 
-/// Solves A x = b in place by P A = L U with partial pivoting, both in the place of A.
+/// Solves A x = b in place by P A = L U with partial pivoting; L and U overwrite A.
 pub(super) fn solve_lu(
     mut a: MatMut<'_, f64>,
     mut b: MatMut<'_, f64>,
-    breaks: &mut Breaks<'_>,
+    interrupt: &mut Interrupt<'_>,
 ) -> Result<(), Stopped> {
     let n = a.nrows();
     let block = if n <= WHOLE { n } else { BLOCK };
@@ -153,7 +153,7 @@ pub(super) fn solve_lu(
         swap(before.rb_mut());
         swap(after.rb_mut());
         swap(b.rb_mut().subrows_mut(start, rows));
-        breaks.after((rows * size * size + 4 * rows * n) as f64)?;
+        interrupt.worked((rows * size * size + 4 * rows * n) as f64)?;
         let (on_diagonal, below) = panel.rb().split_at_row(size);
         let rest = n - start - size;
         for first in (0..rest).step_by(STRIP) {
@@ -162,7 +162,7 @@ pub(super) fn solve_lu(
             let (mut upper, under) = strip.split_at_row_mut(size);
             solve_unit_lower_triangular_in_place(on_diagonal, upper.rb_mut(), PAR);
             matmul(under, Accum::Add, below, upper.rb(), -1.0, PAR);
-            breaks.after((rows * width * size) as f64)?;
+            interrupt.worked((rows * width * size) as f64)?;
         }
     }
     solve_unit_lower_triangular_in_place(a.rb(), b.rb_mut(), PAR);

@@ -3,7 +3,7 @@
 use faer::{MatMut, MatRef};
 
 use super::blocked::{self, NoFactor};
-use super::breaks::{Breaks, Stopped, zeros};
+use super::interrupt::{Interrupt, Stopped, zeros};
 
 /// A dense symmetric matrix, by columns, both triangles stored.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,18 +13,18 @@ pub struct Dense {
 }
 
 impl Dense {
-    /// All zeros; none if that does not fit into memory.
-    pub fn try_zero(size: usize, breaks: &mut Breaks<'_>) -> Result<Option<Self>, Stopped> {
-        let values = zeros(size.saturating_mul(size), breaks)?;
+    /// A matrix of zeros; none if it does not fit into memory.
+    pub fn try_zero(size: usize, interrupt: &mut Interrupt<'_>) -> Result<Option<Self>, Stopped> {
+        let values = zeros(size.saturating_mul(size), interrupt)?;
         Ok(values.map(|values| Dense { size, values }))
     }
 
-    /// What a matrix of this size takes.
+    /// The memory for a matrix of this size (bytes).
     pub fn bytes(size: usize) -> u64 {
         (size as u64).saturating_mul(size as u64).saturating_mul(8)
     }
 
-    /// Number of rows.
+    /// The number of rows.
     pub fn size(&self) -> usize {
         self.size
     }
@@ -45,13 +45,13 @@ impl Dense {
         self.values[i * self.size + j] = value;
     }
 
-    /// The columns, of which only the lower triangle is given until [`Dense::mirror`] completes the matrix.
+    /// All values by columns. Only the lower triangle is written here; [`Dense::mirror`] completes the matrix.
     pub(super) fn values_mut(&mut self) -> &mut [f64] {
         &mut self.values
     }
 
     /// Copies the lower triangle to the upper one, by blocks that fit into the cache.
-    pub(super) fn mirror(&mut self, breaks: &mut Breaks<'_>) -> Result<(), Stopped> {
+    pub(super) fn mirror(&mut self, interrupt: &mut Interrupt<'_>) -> Result<(), Stopped> {
         const TILE: usize = 32;
         let n = self.size;
         for first in (0..n).step_by(TILE) {
@@ -62,12 +62,12 @@ impl Dense {
                     }
                 }
             }
-            breaks.after((TILE * (n - first)) as f64)?;
+            interrupt.worked((TILE * (n - first)) as f64)?;
         }
         Ok(())
     }
 
-    /// A v; where blocks of v are zero it takes as much less time.
+    /// The product A v. Where blocks of v are zero it takes accordingly less time.
     pub fn times(&self, v: &[f64]) -> Vec<f64> {
         let mut product = vec![0.0; self.size];
         pulp::Arch::new().dispatch(|| add_columns(&self.values, v, &mut product));
@@ -75,11 +75,11 @@ impl Dense {
     }
 }
 
-/// Adds Σ v_j a_j of the columns a_j of a matrix, some at once: each pass over the sum is as long as a column. The order of
-/// the additions does not depend on the machine.
+/// Adds the columns a_j of a matrix times v_j to a sum, several columns at once, since each pass over the sum is as
+/// long as a column. The order of the additions does not depend on the machine.
 #[inline(always)]
 fn add_columns(columns: &[f64], v: &[f64], sum: &mut [f64]) {
-    /// Columns at once.
+    /// The number of columns that are added at once.
     const TOGETHER: usize = 8;
     let n = sum.len();
     for (columns, v) in columns.chunks(TOGETHER * n.max(1)).zip(v.chunks(TOGETHER)) {
@@ -111,12 +111,12 @@ fn add_columns(columns: &[f64], v: &[f64], sum: &mut [f64]) {
 pub enum Unsolved {
     /// The matrix is not positive definite, or has no inverse.
     Singular,
-    /// The matrix does not fit into memory: what it would take.
+    /// The matrix does not fit into memory.
     TooLarge {
-        /// Bytes.
+        /// The number of bytes that the matrix would take.
         bytes: u64,
     },
-    /// Stopped on request.
+    /// The observer stopped the work.
     Stopped,
 }
 
@@ -135,22 +135,22 @@ impl From<NoFactor> for Unsolved {
     }
 }
 
-/// L of A = L Lᵀ, in the lower triangle.
+/// The Cholesky factor L of A = L Lᵀ, in the lower triangle.
 pub struct Cholesky {
     size: usize,
     values: Vec<f64>,
 }
 
 impl Cholesky {
-    /// Factors A + Σ aᵢⱼ eᵢeⱼᵀ: A positive definite, given by its entries; `additions` lists (i, j, aᵢⱼ), symmetric.
-    /// `room`: the memory of a factor that is no longer needed, since the first touch of memory takes as long as the
-    /// factor of a small matrix.
+    /// Factors A + Σ aᵢⱼ eᵢeⱼᵀ, with A positive definite, given by its entries, and `additions` a symmetric list of (i,
+    /// j, aᵢⱼ). `room`: the memory of a factor that is no longer needed, since the first touch of memory takes as long
+    /// as the factor of a small matrix.
     pub fn new(
         size: usize,
         entry: impl Fn(usize, usize) -> f64,
         additions: &[(usize, usize, f64)],
         room: Option<Cholesky>,
-        breaks: &mut Breaks<'_>,
+        interrupt: &mut Interrupt<'_>,
     ) -> Result<Self, Unsolved> {
         let bytes = Dense::bytes(size);
         let count = size.saturating_mul(size);
@@ -159,22 +159,22 @@ impl Cholesky {
                 values.resize(count, 0.0);
                 values
             }
-            _ => zeros(count, breaks)?.ok_or(Unsolved::TooLarge { bytes })?,
+            _ => zeros(count, interrupt)?.ok_or(Unsolved::TooLarge { bytes })?,
         };
         // the factorisation reads the lower triangle only
         for (j, column) in values.chunks_exact_mut(size.max(1)).enumerate() {
             (j..size).for_each(|i| column[i] = entry(i, j));
-            breaks.after((size - j) as f64)?;
+            interrupt.worked((size - j) as f64)?;
         }
         let mut a = MatMut::from_column_major_slice_mut(&mut values, size, size);
         for &(i, j, value) in additions.iter().filter(|(i, j, _)| i >= j) {
             a[(i, j)] += value;
         }
-        blocked::cholesky(a, breaks)?;
+        blocked::cholesky(a, interrupt)?;
         Ok(Cholesky { size, values })
     }
 
-    /// x of A x = b, in the place of b.
+    /// Solves A x = b; x overwrites b.
     pub fn solve(&self, b: &mut [f64]) {
         let l = MatRef::from_column_major_slice(&self.values, self.size, self.size);
         let b = MatMut::from_column_major_slice_mut(b, self.size, 1);
@@ -182,15 +182,15 @@ impl Cholesky {
     }
 }
 
-/// Solves A x = b: A positive definite, given by its entries.
+/// Solves A x = b, with A positive definite, given by its entries.
 pub fn solve_positive_definite(
     size: usize,
     entry: impl Fn(usize, usize) -> f64,
     b: &[f64],
-    breaks: &mut Breaks<'_>,
+    interrupt: &mut Interrupt<'_>,
 ) -> Result<Vec<f64>, Unsolved> {
     let mut x = b.to_vec();
-    Cholesky::new(size, entry, &[], None, breaks)?.solve(&mut x);
+    Cholesky::new(size, entry, &[], None, interrupt)?.solve(&mut x);
     Ok(x)
 }
 
@@ -201,38 +201,38 @@ pub struct General {
 }
 
 impl General {
-    /// All zeros; none if that does not fit into memory.
-    pub fn try_zero(size: usize, breaks: &mut Breaks<'_>) -> Result<Option<Self>, Stopped> {
-        let values = zeros(size.saturating_mul(size), breaks)?;
+    /// A matrix of zeros; none if it does not fit into memory.
+    pub fn try_zero(size: usize, interrupt: &mut Interrupt<'_>) -> Result<Option<Self>, Stopped> {
+        let values = zeros(size.saturating_mul(size), interrupt)?;
         Ok(values.map(|values| General { size, values }))
     }
 
-    /// A column.
+    /// One column, to be written.
     pub fn column_mut(&mut self, j: usize) -> &mut [f64] {
         &mut self.values[j * self.size..(j + 1) * self.size]
     }
 
-    /// Exchanges rows and columns.
-    pub fn transpose(&mut self, breaks: &mut Breaks<'_>) -> Result<(), Stopped> {
-        /// A number that is read across the columns takes as long as so many multiplications.
+    /// Transposes the matrix in place.
+    pub fn transpose(&mut self, interrupt: &mut Interrupt<'_>) -> Result<(), Stopped> {
+        /// The cost of reading one value across the columns, in multiplications.
         const ACROSS: usize = 8;
         for j in 0..self.size {
             for i in 0..j {
                 self.values.swap(j * self.size + i, i * self.size + j);
             }
-            breaks.after((ACROSS * j) as f64)?;
+            interrupt.worked((ACROSS * j) as f64)?;
         }
         Ok(())
     }
 
-    /// Solves A x = b for one b, or for several, one after the other; the factors take the place of A.
-    pub fn solve(mut self, b: &[f64], breaks: &mut Breaks<'_>) -> Result<Vec<f64>, Unsolved> {
+    /// Solves A x = b for one b, or for several stored one after another; the factors overwrite A.
+    pub fn solve(mut self, b: &[f64], interrupt: &mut Interrupt<'_>) -> Result<Vec<f64>, Unsolved> {
         let n = self.size;
         let mut x = b.to_vec();
         let columns = b.len().checked_div(n).unwrap_or(0);
         let a = MatMut::from_column_major_slice_mut(&mut self.values, n, n);
         let b = MatMut::from_column_major_slice_mut(&mut x, n, columns);
-        blocked::solve_lu(a, b, breaks)?;
+        blocked::solve_lu(a, b, interrupt)?;
         match x.iter().all(|x| x.is_finite()) {
             true => Ok(x),
             false => Err(Unsolved::Singular),
@@ -240,8 +240,8 @@ impl General {
     }
 }
 
-/// The x for which |Σ x_k a_k − b| is least, by Gram–Schmidt; columns that the others nearly span
-/// are left out. `None` without columns, or if the result is not finite.
+/// The x with the smallest |Σ x_k a_k − b|, by Gram–Schmidt. Columns that depend almost linearly on the others are left
+/// out. `None` without columns, or if the result is not finite.
 pub fn least_squares(columns: &[Vec<f64>], b: &[f64]) -> Option<Vec<f64>> {
     /// A column whose remainder is below this part of the largest is left out.
     const SPANNED: f64 = 1e-8;
@@ -291,20 +291,20 @@ mod tests {
 
     use super::*;
 
-    /// Without a stop.
-    fn go_on<T>(work: impl FnOnce(&mut Breaks<'_>) -> T) -> T {
-        work(&mut Breaks::new(&mut || ControlFlow::Continue(())))
+    /// Runs work without stopping it.
+    fn go_on<T>(work: impl FnOnce(&mut Interrupt<'_>) -> T) -> T {
+        work(&mut Interrupt::new(&mut || ControlFlow::Continue(())))
     }
 
     fn general(size: usize, entry: impl Fn(usize, usize) -> f64) -> General {
-        let mut a = go_on(|breaks| General::try_zero(size, breaks))
+        let mut a = go_on(|interrupt| General::try_zero(size, interrupt))
             .unwrap()
             .unwrap();
         (0..size).for_each(|j| (0..size).for_each(|i| a.column_mut(j)[i] = entry(i, j)));
         a
     }
 
-    /// Irregular numbers in −½ … ½.
+    /// Irregular numbers between −½ and ½.
     fn number(i: usize, j: usize) -> f64 {
         let mixed = (i * 7919 + j * 104_729 + i * j * 31 + 12_345) % 10_007;
         mixed as f64 / 10_007.0 - 0.5
@@ -313,15 +313,15 @@ mod tests {
     #[test]
     fn a_general_system_is_solved_and_a_singular_one_refused() {
         let solve = |columns: [[f64; 2]; 2]| {
-            go_on(|breaks| general(2, |i, j| columns[j][i]).solve(&[4.0, 14.0], breaks))
+            go_on(|interrupt| general(2, |i, j| columns[j][i]).solve(&[4.0, 14.0], interrupt))
         };
         assert_eq!(solve([[0.0, 2.0], [1.0, 3.0]]), Ok(vec![1.0, 4.0]));
         let singular = solve([[0.0, 0.0], [1.0, 3.0]]);
         assert_eq!(singular, Err(Unsolved::Singular));
     }
 
-    /// Sizes in one piece, in several blocks, and not a multiple of a block; some diagonals are zero, so that rows
-    /// must be swapped.
+    /// Systems of any size are solved by blocks: in one piece, in several blocks, and not a multiple of a block. Some
+    /// diagonals are zero, so that rows must be exchanged.
     #[test]
     fn systems_of_any_size_are_solved_by_blocks() {
         for n in [1, 5, 64, 255, 256, 257, 300, 511, 700] {
@@ -333,7 +333,7 @@ mod tests {
             let row = |i: usize| (0..n).map(|j| entry(i, j) * exact[j]).sum();
             let b: Vec<f64> = (0..n).map(row).collect();
             if n > 1 {
-                let x = go_on(|breaks| general(n, entry).solve(&b, breaks)).unwrap();
+                let x = go_on(|interrupt| general(n, entry).solve(&b, interrupt)).unwrap();
                 let off = x.iter().zip(&exact).map(|(a, b)| (a - b).abs());
                 assert!(off.fold(0.0, f64::max) < 1e-8, "{n}");
             }
@@ -344,7 +344,7 @@ mod tests {
             };
             let row = |i: usize| (0..n).map(|j| entry(i, j) * exact[j]).sum();
             let b: Vec<f64> = (0..n).map(row).collect();
-            let x = go_on(|breaks| solve_positive_definite(n, entry, &b, breaks)).unwrap();
+            let x = go_on(|interrupt| solve_positive_definite(n, entry, &b, interrupt)).unwrap();
             let off = x.iter().zip(&exact).map(|(a, b)| (a - b).abs());
             assert!(off.fold(0.0, f64::max) < 1e-13, "{n}");
         }
@@ -358,11 +358,11 @@ mod tests {
             (false, _) => 0.0,
         };
         let b = vec![1.0; 700];
-        let refused = go_on(|breaks| solve_positive_definite(700, entry, &b, breaks));
+        let refused = go_on(|interrupt| solve_positive_definite(700, entry, &b, interrupt));
         assert_eq!(refused, Err(Unsolved::Singular));
     }
 
-    /// 1,500 unknowns are some portions of work: every kind of it stops at the first question.
+    /// Every kind of dense work with 1,500 unknowns, which are several portions, stops at the first interruption point.
     #[test]
     fn dense_work_stops_when_it_is_told_to() {
         let n = 1500;
@@ -373,18 +373,21 @@ mod tests {
             ControlFlow::Break(())
         };
         let entry = |i: usize, j: usize| if i == j { 1.0 } else { 0.0 };
-        let solved = solve_positive_definite(n, entry, &b, &mut Breaks::new(&mut stop));
+        let solved = solve_positive_definite(n, entry, &b, &mut Interrupt::new(&mut stop));
         assert_eq!(solved, Err(Unsolved::Stopped));
-        let solved = general(n, entry).solve(&b, &mut Breaks::new(&mut stop));
+        let solved = general(n, entry).solve(&b, &mut Interrupt::new(&mut stop));
         assert_eq!(solved, Err(Unsolved::Stopped));
         assert_eq!(asked, 2);
     }
 
     #[test]
     fn a_matrix_that_fits_into_no_memory_is_refused() {
-        assert_eq!(go_on(|breaks| Dense::try_zero(1 << 31, breaks)), Ok(None));
+        assert_eq!(
+            go_on(|interrupt| Dense::try_zero(1 << 31, interrupt)),
+            Ok(None)
+        );
         assert!(
-            go_on(|breaks| General::try_zero(usize::MAX, breaks))
+            go_on(|interrupt| General::try_zero(usize::MAX, interrupt))
                 .unwrap()
                 .is_none()
         );
@@ -408,9 +411,9 @@ mod tests {
         let a: fn(usize, usize) -> f64 = |i, j| [[3.0, 1.5], [1.5, 3.0]][i][j];
         let additions = [(0, 0, 1.0), (0, 1, -0.5), (1, 0, -0.5)];
         let solve = |a: fn(usize, usize) -> f64, additions: &[_]| {
-            go_on(|breaks| {
+            go_on(|interrupt| {
                 let mut x = vec![6.0, 7.0];
-                Cholesky::new(2, a, additions, None, breaks)?.solve(&mut x);
+                Cholesky::new(2, a, additions, None, interrupt)?.solve(&mut x);
                 Ok(x)
             })
         };

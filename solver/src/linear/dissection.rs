@@ -1,73 +1,75 @@
-//! An order of elimination for the nodes of a mesh in the plane: its elements are halved again and again by their
-//! centres, and the nodes that two halves share are eliminated after both. Between the lines of a grid a cut is as short
-//! as can be; halves of a free mesh are improved (the module `halves`).
+//! An order of elimination for the nodes of a mesh in the plane: its elements are repeatedly halved by their centres,
+//! and the nodes that two halves share are eliminated after both. In a grid a cut between two lines is the shortest
+//! one; halves of a free mesh are improved (the module `bisection`).
 //!
 //! The result is a binary tree of *parts*. A part owns the nodes that lie in it alone, but in neither of its halves
-//! alone; a part that is not divided owns all that lie in it alone. Nodes that are kept are owned by none. Once its
-//! halves are eliminated, what is left of a part are the nodes it owns and its *boundary*: the nodes that it shares with
-//! the rest of the body, or that are kept.
+//! alone; a part that is not divided owns all that lie in it alone. No part owns the nodes that are never eliminated
+//! (`kept`). After its halves are eliminated, a part consists of the nodes it owns and its *boundary*: the nodes that
+//! it shares with the rest of the body, and those that are never eliminated.
 
 use std::ops::Deref;
 
-use super::halves::Halves;
+use super::bisection::Bisection;
 
-/// Parts with more elements are divided: smaller ones cost more administration than they save arithmetic.
+/// The largest number of elements of a part that is not divided: smaller parts cost more in overhead than they save in
+/// arithmetic.
 const LARGEST_LEAF: usize = 6;
 
-/// The smaller half of a part has at least this share of its elements, so that the tree is as deep as the logarithm of
-/// their number.
+/// The smaller half of a part has at least this share of its elements, so that the depth of the tree is the logarithm
+/// of their number.
 const SMALLEST_SHARE: f64 = 0.25;
 
-/// Centres nearer to each other than this part of the extent lie on one line of a grid.
+/// Centres whose distance is below this part of the extent lie on the same grid line.
 const SAME_LINE: f64 = 1e-10;
 
-/// Halves with fewer elements are not improved.
+/// Bisection with fewer elements are not improved.
 const SMALLEST_IMPROVED: usize = 12;
 
-/// Directions across which parts are cut: x, y and the diagonals.
+/// The directions across which parts are cut: x, y and the diagonals.
 const DIRECTIONS: [[f64; 2]; 4] = [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, -1.0]];
 
-/// A mesh, as far as it matters here.
+/// The part of a mesh that a dissection needs.
 pub struct Cells<'a, E> {
     /// The nodes of every element.
     pub elements: &'a [E],
-    /// Positions of the nodes.
+    /// The positions of the nodes.
     pub positions: &'a [[f64; 2]],
-    /// Nodes with unknowns; the others are left out.
+    /// Whether a node has unknowns; the others are left out.
     pub unknown: &'a [bool],
 }
 
-/// The tree. Halves come before their whole, so the last part is the mesh.
+/// The dissection of a mesh: a binary tree of parts. Bisection come before the part that they make up, so the last part is
+/// the whole mesh.
 #[derive(Default)]
 pub struct Dissection {
     /// The parts.
     pub parts: Vec<Part>,
-    /// Elements, those of each part in a row.
+    /// All elements, those of each part in a row.
     pub elements: Vec<u32>,
-    /// Nodes in the order of their elimination, then those that are kept.
+    /// The nodes in the order of their elimination, followed by those that are never eliminated.
     pub nodes: Vec<u32>,
-    /// The boundaries of all parts, as places in `nodes`; each is sorted, unless the module `alike` has brought it into the
-    /// order of another part's.
+    /// The boundaries of all parts, as places in `nodes`; each is sorted, unless the module `equal_parts` has put it into the
+    /// order of an equal part.
     pub boundaries: Vec<u32>,
 }
 
-/// A range of elements, and what it leaves to the rest.
+/// A part of a mesh: a range of elements, with the nodes it owns and its boundary.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Part {
-    /// The halves, as numbers of parts; none of a part that is not divided.
+    /// The numbers of the two halves; none for a part that is not divided.
     pub halves: Option<[usize; 2]>,
-    /// How often the mesh was halved for it.
+    /// The depth of the part in the tree.
     pub depth: u32,
-    /// Its elements: first and end in [`Dissection::elements`].
+    /// The range of its elements in [`Dissection::elements`]: first and end.
     pub elements: [usize; 2],
-    /// The nodes it owns: first and end in [`Dissection::nodes`].
+    /// The range of the nodes it owns in [`Dissection::nodes`]: first and end.
     pub own: [usize; 2],
-    /// Its boundary: first and end in [`Dissection::boundaries`].
+    /// The range of its boundary in [`Dissection::boundaries`]: first and end.
     pub boundary: [usize; 2],
 }
 
 impl Dissection {
-    /// Dissects a mesh. The nodes `kept`, each named once, stay to the end in their order; nodes of no element are left
+    /// Dissects a mesh. The nodes `kept`, each listed once, come last in their order; nodes without an element are left
     /// out.
     pub fn new<E: Deref<Target = [u32]>>(cells: &Cells<'_, E>, kept: &[u32]) -> Self {
         let mut state = Halving::new(cells, kept);
@@ -142,14 +144,14 @@ fn merge(a: &[u32], b: &[u32], into: &mut Vec<u32>) {
 struct Halving<'a, E> {
     cells: &'a Cells<'a, E>,
     centres: Vec<[f64; 2]>,
-    /// Nodes that no part owns yet, and that are not kept.
+    /// Whether a node is owned by no part yet and will be eliminated.
     free: Vec<bool>,
-    /// By node: which half it was last seen in, as a number that grows.
+    /// By node: a growing number that marks the half in which it was seen last.
     seen: Vec<u32>,
     stamp: u32,
     keys: Vec<f64>,
-    /// Made for the first halves that are improved.
-    halves: Option<Halves<'a, E>>,
+    /// The data for improving halves, made when first needed.
+    bisection: Option<Bisection<'a, E>>,
     parts: Vec<Part>,
     nodes: Vec<u32>,
 }
@@ -159,7 +161,7 @@ struct Halving<'a, E> {
 struct Cut {
     direction: usize,
     at: f64,
-    /// Whether it lies between two lines of centres, as in a grid.
+    /// Whether the cut lies between two lines of centres, as in a grid.
     between_lines: bool,
 }
 
@@ -169,7 +171,7 @@ impl Cut {
     }
 }
 
-/// A coordinate along one of the directions.
+/// The coordinate along one of the directions.
 fn along(direction: usize, [x, y]: [f64; 2]) -> f64 {
     let [a, b] = DIRECTIONS[direction];
     a * x + b * y
@@ -192,13 +194,13 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
             seen: vec![0; cells.positions.len()],
             stamp: 0,
             keys: Vec::with_capacity(cells.elements.len()),
-            halves: None,
+            bisection: None,
             parts: Vec::new(),
             nodes: Vec::new(),
         }
     }
 
-    /// Divides the part with these elements, the first of which is at `first` of all, and returns its number.
+    /// Divides the part with these elements, which begin at `first` among all elements, and returns its number.
     fn divide(&mut self, elements: &mut [u32], first: usize, depth: u32) -> usize {
         let mut part = Part {
             depth,
@@ -207,7 +209,7 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
         };
         let mut own = Vec::new();
         if elements.len() <= LARGEST_LEAF {
-            // so that parts that are alike are found to be: halving has left them in any order
+            // so that equal parts are recognised: halving has left them in any order
             elements.sort_unstable();
             for &e in elements.iter() {
                 let nodes = self.cells.elements[e as usize].iter();
@@ -223,9 +225,9 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
             let is_exact = cut.is_some_and(|cut| cut.between_lines);
             if !is_exact && elements.len() >= SMALLEST_IMPROVED {
                 let mesh = self.cells;
-                let make = || Halves::new(mesh.elements, mesh.positions.len());
-                let halves = self.halves.get_or_insert_with(make);
-                middle = halves.improve(elements, middle, &self.free);
+                let make = || Bisection::new(mesh.elements, mesh.positions.len());
+                let bisection = self.bisection.get_or_insert_with(make);
+                middle = bisection.improve(elements, middle, &self.free);
             }
             let (low, high) = elements.split_at_mut(middle);
             // before the halves take what is theirs
@@ -249,7 +251,7 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
         self.parts.len() - 1
     }
 
-    /// The cut through the fewest nodes; none if all centres coincide.
+    /// The cut that the fewest nodes lie on; none if all centres coincide.
     fn best_cut(&mut self, elements: &[u32]) -> Option<Cut> {
         let mut best: Option<(usize, Cut)> = None;
         for direction in 0..DIRECTIONS.len() {
@@ -267,7 +269,7 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
         best.map(|(_, cut)| cut)
     }
 
-    /// Between two lines of centres, as near to the middle as can be.
+    /// The cut between two lines of centres that is closest to the middle.
     fn middle(&mut self, elements: &[u32], direction: usize) -> Option<Cut> {
         let keys = &mut self.keys;
         keys.clear();
@@ -315,7 +317,7 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
         })
     }
 
-    /// Puts the elements below the cut before the others, and says how many they are.
+    /// Moves the elements below the cut before the others, and returns their number.
     fn part_by(&self, elements: &mut [u32], cut: Option<Cut>) -> usize {
         let Some(cut) = cut else {
             return elements.len() / 2;
@@ -335,7 +337,7 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
         }
     }
 
-    /// How many free nodes lie on both sides of a cut.
+    /// The number of free nodes that have elements on both sides of a cut.
     fn count_shared(&mut self, elements: &[u32], cut: Cut) -> usize {
         let (low, high) = self.stamps();
         let below = |e: &&u32| cut.is_below(self.centres[**e as usize]);
@@ -356,7 +358,7 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
         count
     }
 
-    /// The free nodes of elements of both halves.
+    /// The free nodes that belong to elements of both halves.
     fn shared(&mut self, low: &[u32], high: &[u32], into: &mut Vec<u32>) {
         let (in_low, in_both) = self.stamps();
         for &e in low {
@@ -376,7 +378,7 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
         }
     }
 
-    /// Two numbers that no node has been marked with.
+    /// Two numbers that have not been used to mark nodes yet.
     fn stamps(&mut self) -> (u32, u32) {
         self.stamp += 2;
         (self.stamp - 1, self.stamp)
@@ -387,7 +389,7 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
 pub(super) mod tests {
     use super::*;
 
-    /// A grid of four-node cells between lines along x and y, node numbers running along x first.
+    /// A grid of four-node cells between lines along x and y; nodes are numbered along x first.
     pub(in crate::linear) fn grid(x: &[f64], y: &[f64]) -> (Vec<Vec<u32>>, Vec<[f64; 2]>) {
         let positions = y.iter().flat_map(|y| x.iter().map(|x| [*x, *y])).collect();
         let columns = x.len();
@@ -464,7 +466,7 @@ pub(super) mod tests {
         );
     }
 
-    /// Where lines lie does not matter to a grid, only how many there are: cuts follow them.
+    /// A graded grid is dissected like an even one: only the number of lines matters, not where they are.
     #[test]
     fn a_graded_grid_is_dissected_as_an_even_one() {
         let graded: Vec<f64> = (0..=40).map(|i| 1.3f64.powi(i)).collect();
@@ -480,7 +482,8 @@ pub(super) mod tests {
         assert_eq!(even.iter().max(), Some(&51));
     }
 
-    /// Where no centres lie on lines: the nodes of a grid, moved about at random, cost about what they do on their lines.
+    /// A free mesh is dissected nearly as well as a grid: moving the nodes of a grid at random, so that no centres lie
+    /// on lines, costs little.
     #[test]
     fn a_free_mesh_is_dissected_nearly_as_well_as_a_grid() {
         let (elements, mut positions) = grid(&lines(60), &lines(60));
@@ -527,7 +530,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn elements_with_one_centre_are_divided_all_the_same() {
+    fn elements_with_the_same_centre_are_divided_too() {
         let elements: Vec<Vec<u32>> = (0..1000).map(|e| vec![e, 1000]).collect();
         let positions = vec![[1.0, 2.0]; 1001];
         let cells = Cells {

@@ -1,4 +1,4 @@
-//! A dense symmetric system of which some unknowns are eliminated, and found again from the others.
+//! A dense symmetric system with some unknowns eliminated, and their recovery from the others.
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{
@@ -7,43 +7,43 @@ use faer::linalg::triangular_solve::{
 use faer::{Accum, MatMut, MatRef, Par};
 
 use super::blocked;
-use super::breaks::{Breaks, zeros};
 use super::dense::{Dense, Unsolved};
+use super::interrupt::{Interrupt, zeros};
 
-/// The columns of L that belong to the eliminated unknowns, which are the first ones.
+/// The columns of L for the eliminated unknowns, which are the first ones.
 pub struct Eliminated {
     size: usize,
     count: usize,
-    /// By columns, each of `size` rows.
+    /// The values by columns, each of `size` rows.
     columns: Vec<f64>,
 }
 
 impl Eliminated {
-    /// Eliminates the first `count` of `size` unknowns of a positive definite A, given by its entries: also what is left
-    /// of A for the others.
+    /// Eliminates the first `count` of `size` unknowns of a positive definite A, given by its entries. Also returns the
+    /// Schur complement for the other unknowns.
     pub fn new(
         size: usize,
         count: usize,
         entry: impl Fn(usize, usize) -> f64,
-        breaks: &mut Breaks<'_>,
+        interrupt: &mut Interrupt<'_>,
     ) -> Result<(Self, Dense), Unsolved> {
         let bytes = Dense::bytes(size);
-        let values = zeros(size.saturating_mul(size), breaks)?;
+        let values = zeros(size.saturating_mul(size), interrupt)?;
         let mut values = values.ok_or(Unsolved::TooLarge { bytes })?;
         for (j, column) in values.chunks_exact_mut(size.max(1)).enumerate() {
             (j..size).for_each(|i| column[i] = entry(i, j));
-            breaks.after((size - j) as f64)?;
+            interrupt.worked((size - j) as f64)?;
         }
         let a = MatMut::from_column_major_slice_mut(&mut values, size, size);
-        blocked::eliminate(a, count, breaks)?;
+        blocked::eliminate(a, count, interrupt)?;
         let rest = size - count;
-        let mut left = Dense::try_zero(rest, breaks)?.ok_or(Unsolved::TooLarge { bytes })?;
+        let mut left = Dense::try_zero(rest, interrupt)?.ok_or(Unsolved::TooLarge { bytes })?;
         for j in 0..rest {
             let from = (count + j) * size + count;
             left.values_mut()[j * rest + j..(j + 1) * rest]
                 .copy_from_slice(&values[from + j..from + rest]);
         }
-        left.mirror(breaks)?;
+        left.mirror(interrupt)?;
         values.truncate(count * size);
         values.shrink_to_fit();
         let eliminated = Eliminated {
@@ -54,7 +54,7 @@ impl Eliminated {
         Ok((eliminated, left))
     }
 
-    /// Right-hand side: of the eliminated unknowns L⁻¹ b, of the others what is left for them.
+    /// Reduces a right-hand side: L⁻¹ b for the eliminated unknowns, and the reduced right-hand side for the others.
     pub fn reduce(&self, b: &mut [f64]) {
         let (on_diagonal, below) = self.parts();
         let (own, rest) = b.split_at_mut(self.count);
@@ -64,7 +64,8 @@ impl Eliminated {
         matmul(rest, Accum::Add, below, own.as_ref(), -1.0, Par::Seq);
     }
 
-    /// Solution: from what [`Eliminated::reduce`] made of the eliminated unknowns, and the other unknowns.
+    /// Completes a solution, from the result of [`Eliminated::reduce`] for the eliminated unknowns and the solution for
+    /// the others.
     pub fn expand(&self, x: &mut [f64]) {
         let (on_diagonal, below) = self.parts();
         let (own, rest) = x.split_at_mut(self.count);
@@ -94,9 +95,9 @@ mod tests {
 
     use super::*;
 
-    /// A solution by elimination, and by the whole matrix; in one piece and in several blocks.
+    /// Elimination gives the same solution as the whole matrix, in one piece and in several blocks.
     #[test]
-    fn what_is_left_has_the_same_solution() {
+    fn the_reduced_system_has_the_same_solution() {
         for (n, count) in [(5, 2), (300, 130), (300, 0), (40, 40)] {
             let entry = |i: usize, j: usize| match i == j {
                 true => n as f64,
@@ -107,7 +108,7 @@ mod tests {
             let mut b: Vec<f64> = (0..n).map(row).collect();
             let ask = &mut || ControlFlow::Continue(());
             let (eliminated, left) =
-                Eliminated::new(n, count, entry, &mut Breaks::new(ask)).unwrap();
+                Eliminated::new(n, count, entry, &mut Interrupt::new(ask)).unwrap();
             eliminated.reduce(&mut b);
             let remains = left.times(&exact[count..]);
             for (a, b) in remains.iter().zip(&b[count..]) {

@@ -1,5 +1,5 @@
-//! One dense front: what its halves have left is added, the unknowns that it owns are eliminated, and its boundary is
-//! reduced (the module `multifrontal` says how fronts make a factor).
+//! One dense front: the Schur complements of its halves are added, its own unknowns are eliminated, and its boundary is
+//! reduced (the module `multifrontal` explains how fronts make a factor).
 
 use std::iter;
 
@@ -10,18 +10,18 @@ use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Accum, MatMut, MatRef, Par};
 
 use super::blocked::{NoFactor, STRIP, cholesky};
-use super::breaks::{Breaks, PORTION, Stopped};
+use super::interrupt::{Interrupt, PORTION, Stopped};
 use super::parallel::for_each;
 
-/// A front while it is worked on, its lower triangle.
+/// The lower triangle of a front while it is computed.
 pub(super) struct FrontMatrix<'a> {
-    /// Columns that it owns.
+    /// The number of columns that it owns.
     pub(super) own: usize,
-    /// Rows: as many as it owns, and those of its boundary.
+    /// The number of rows: its own unknowns and its boundary.
     pub(super) height: usize,
-    /// The columns it owns, each of `height` rows.
+    /// The columns that it owns, each of `height` rows.
     pub(super) columns: &'a mut [f64],
-    /// The columns of its boundary, each of as many rows.
+    /// The columns of its boundary, each with one row for each unknown of the boundary.
     pub(super) left: &'a mut [f64],
 }
 
@@ -35,8 +35,8 @@ impl FrontMatrix<'_> {
         }
     }
 
-    /// Adds what a half has left to some of the columns. Its lower triangle may reach above the diagonal here, if the order
-    /// of its unknowns is another one: entries go to the other side then.
+    /// Adds the Schur complement of a half to some of the columns. If its unknowns are in another order, parts of its
+    /// lower triangle are above the diagonal here and are added to the entry opposite.
     pub(super) fn add(&mut self, runs: &[Run], from: &[f64], which: Columns) {
         let size = runs.iter().map(|run| run.len).sum::<usize>();
         for (k, run) in runs.iter().enumerate() {
@@ -61,7 +61,7 @@ impl FrontMatrix<'_> {
         }
     }
 
-    /// Adds to consecutive entries of a column, unless it is one of the others.
+    /// Adds to consecutive entries of a column, if it is one of the columns `which`.
     #[inline(always)]
     fn add_to_column(&mut self, column: usize, row: usize, entries: &[f64], which: Columns) {
         let boundary = self.height - self.own;
@@ -73,21 +73,21 @@ impl FrontMatrix<'_> {
         add(into, entries);
     }
 
-    /// L_oo and L_bo in place of F_oo and F_bo, on so many threads.
+    /// Replaces F_oo and F_bo by L_oo and L_bo, on `threads` threads.
     pub(super) fn eliminate(
         &mut self,
         threads: usize,
-        breaks: &mut Breaks<'_>,
+        interrupt: &mut Interrupt<'_>,
     ) -> Result<(), NoFactor> {
         let (own, height) = (self.own, self.height);
         if own <= NARROW {
             eliminate_narrow(self.columns, height, own)?;
-            breaks.after((own * own * height) as f64)?;
+            interrupt.worked((own * own * height) as f64)?;
             return Ok(());
         }
         let block = MatMut::from_column_major_slice_mut(self.columns, height, own);
         let (mut on_diagonal, below) = block.split_at_row_mut(own);
-        cholesky(on_diagonal.rb_mut(), breaks)?;
+        cholesky(on_diagonal.rb_mut(), interrupt)?;
         // rows are independent of each other: a large block is solved in parts
         let part = portion(own * own);
         let mut rest = Some(below);
@@ -99,21 +99,21 @@ impl FrontMatrix<'_> {
             Some(part)
         });
         let on_diagonal = on_diagonal.rb();
-        let solve = |(): &mut (), part: MatMut<'_, f64>, breaks: &mut Breaks<'_>| {
+        let solve = |(): &mut (), part: MatMut<'_, f64>, interrupt: &mut Interrupt<'_>| {
             let rows = part.nrows();
             solve_lower_triangular_in_place(on_diagonal, part.transpose_mut(), Par::Seq);
-            breaks.after((rows * own * own) as f64 / 2.0)
+            interrupt.worked((rows * own * own) as f64 / 2.0)
         };
         let threads = threads.min((height - own).div_ceil(part)).max(1);
-        Ok(for_each(parts, &mut vec![(); threads], solve, breaks)?)
+        Ok(for_each(parts, &mut vec![(); threads], solve, interrupt)?)
     }
 
-    /// F_bb − L_bo L_boᵀ, or its second term alone, in the lower triangle, on so many threads.
+    /// Computes F_bb − L_bo L_boᵀ, or its second term alone, in the lower triangle, on `threads` threads.
     pub(super) fn reduce(
         &mut self,
         accum: Accum,
         threads: usize,
-        breaks: &mut Breaks<'_>,
+        interrupt: &mut Interrupt<'_>,
     ) -> Result<(), Stopped> {
         let (own, boundary) = (self.own, self.height - self.own);
         if own == 0 && accum == Accum::Replace {
@@ -133,50 +133,52 @@ impl FrontMatrix<'_> {
             rest = Some(left);
             Some((start, strip.subrows_mut(start, boundary - start)))
         });
-        let reduce =
-            |(): &mut (), (start, strip): (usize, MatMut<'_, f64>), breaks: &mut Breaks<'_>| {
-                let (rows, width) = (strip.nrows(), strip.ncols());
-                let (on_diagonal, under) = strip.split_at_row_mut(width);
-                let (l, l_under) = l.subrows(start, rows).split_at_row(width);
-                if width <= FULL {
-                    matmul(on_diagonal, accum, l, l.transpose(), -1.0, Par::Seq);
-                } else {
-                    triangular::matmul(
-                        on_diagonal,
-                        BlockStructure::TriangularLower,
-                        accum,
-                        l,
-                        BlockStructure::Rectangular,
-                        l.transpose(),
-                        BlockStructure::Rectangular,
-                        -1.0,
-                        Par::Seq,
-                    );
-                }
-                matmul(under, accum, l_under, l.transpose(), -1.0, Par::Seq);
-                breaks.after((rows * width * own) as f64)
-            };
+        let reduce = |(): &mut (),
+                      (start, strip): (usize, MatMut<'_, f64>),
+                      interrupt: &mut Interrupt<'_>| {
+            let (rows, width) = (strip.nrows(), strip.ncols());
+            let (on_diagonal, under) = strip.split_at_row_mut(width);
+            let (l, l_under) = l.subrows(start, rows).split_at_row(width);
+            if width <= FULL {
+                matmul(on_diagonal, accum, l, l.transpose(), -1.0, Par::Seq);
+            } else {
+                triangular::matmul(
+                    on_diagonal,
+                    BlockStructure::TriangularLower,
+                    accum,
+                    l,
+                    BlockStructure::Rectangular,
+                    l.transpose(),
+                    BlockStructure::Rectangular,
+                    -1.0,
+                    Par::Seq,
+                );
+            }
+            matmul(under, accum, l_under, l.transpose(), -1.0, Par::Seq);
+            interrupt.worked((rows * width * own) as f64)
+        };
         let threads = threads.min(boundary.div_ceil(STRIP)).max(1);
-        for_each(strips, &mut vec![(); threads], reduce, breaks)
+        for_each(strips, &mut vec![(); threads], reduce, interrupt)
     }
 }
 
-/// Fronts that own no more columns are eliminated by a loop of our own, which costs less than the call of a kernel.
+/// Fronts that own at most this many columns are eliminated by a simple loop, which costs less than the call of a
+/// kernel.
 const NARROW: usize = 24;
 
-/// Rows of a square that is computed whole, where half of it would do.
+/// The number of rows of a square that is computed as a whole although half of it would be enough.
 const FULL: usize = 64;
 
-/// Lines of a product that make one portion of work, where each takes this many multiplications.
+/// The number of rows of a product that make one portion of work, if each takes this many multiplications.
 fn portion(of_one: usize) -> usize {
-    /// Fewer lines at once would take far more time than their part.
+    /// With fewer rows at once the work would be far less efficient.
     const FEWEST: usize = 16;
     let lines = (PORTION / of_one.max(1) as f64) as usize;
     lines.clamp(FEWEST, STRIP)
 }
 
-/// `own` columns of L in place of those of the front, some at a time: each of the columns to their right is then read and
-/// written once for all of them.
+/// Replaces the first `own` columns of the front by columns of L, several at a time, so that each column to their right
+/// is read and written only once for all of them.
 fn eliminate_narrow(columns: &mut [f64], height: usize, own: usize) -> Result<(), NoFactor> {
     const AT_ONCE: usize = 4;
     pulp::Arch::new().dispatch(|| {
@@ -221,25 +223,25 @@ fn add(into: &mut [f64], from: &[f64]) {
     into.iter_mut().zip(from).for_each(|(a, b)| *a += b);
 }
 
-/// Which columns of a front are added to.
+/// The columns of a front to which something is added.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Columns {
-    /// Those it owns.
+    /// The columns that the front owns.
     Own,
-    /// Those of its boundary.
+    /// The columns of its boundary.
     Left,
 }
 
-/// Consecutive unknowns of a half that are consecutive in the front of the whole.
+/// A run of unknowns that are consecutive both in a half and in the front that contains it.
 pub(super) struct Run {
-    /// The first one's place in the boundary of the half.
+    /// The place of the first one in the boundary of the half.
     from: usize,
-    /// Its place in the front.
+    /// The place of the first one in the front.
     to: usize,
     len: usize,
 }
 
-/// Where the boundary of a half lies in the front of the whole; `local`: the places of unknowns there.
+/// The runs of a half's boundary in the front that contains it; `local`: the places of unknowns in the front.
 pub(super) fn find_runs(half: &[u32], local: &[u32], runs: &mut Vec<Run>) {
     runs.clear();
     for (from, &row) in half.iter().enumerate() {
@@ -258,7 +260,8 @@ mod tests {
 
     use super::*;
 
-    /// A front that is wide enough for blocks, and one whose reduction takes several strips.
+    /// Large fronts are computed in blocks: one that is wide enough for blocks, and one whose reduction takes several
+    /// strips.
     #[test]
     fn large_fronts_are_computed_in_blocks() {
         let (own, height) = (150, 150 + STRIP + 100);
@@ -280,9 +283,9 @@ mod tests {
             left: &mut left,
         };
         let go_on = &mut || ControlFlow::Continue(());
-        let breaks = &mut Breaks::new(go_on);
-        front.eliminate(1, breaks).unwrap();
-        front.reduce(Accum::Add, 1, breaks).unwrap();
+        let interrupt = &mut Interrupt::new(go_on);
+        front.eliminate(1, interrupt).unwrap();
+        front.reduce(Accum::Add, 1, interrupt).unwrap();
         let mut narrow: Vec<f64> = (0..own)
             .flat_map(|j| (0..height).map(move |i| entry(i, j)))
             .collect();

@@ -1,49 +1,50 @@
-//! The structure of a factor by fronts, planned before it is made: which front owns which unknowns, where its columns go,
-//! and what waits meanwhile (the module `multifrontal` says how fronts make a factor).
+//! The plan of a factor by fronts: which front owns which unknowns, where its columns are stored, and where Schur
+//! complements wait (the module `multifrontal` explains how fronts make a factor).
 //!
-//! Of fronts that are alike only the first is worked on. What it leaves has a *slot*, if several fronts take it, and waits
-//! there for the last of them.
+//! Of equal fronts only the first one is computed. If several fronts need its Schur complement, it waits in a *slot*
+//! until the last of them has used it.
 
 use std::ops::{Deref, Range};
 
-use super::alike::find_alike;
 use super::dissection::Dissection;
+use super::equal_parts::find_equal_parts;
 
-/// Fronts of a lower depth are worked on one after the other, by all threads; each branch of the tree below them is left
-/// to one thread. Two branches that hang on one front have about the same number of elements. A front that several take is
-/// left to one thread with all that it needs, however high it stands.
+/// Fronts of a lower depth are computed one after another, each by all threads. Every branch of the tree below is
+/// computed by one thread; two branches of one front have about the same number of elements. A front that several
+/// others need is computed by one thread, with all that it depends on, at any depth.
 const SHARED_DEPTH: u32 = 3;
 
-/// So many numbers take some tenths of a second.
+/// A factor with at least this many numbers takes some tenths of a second.
 const LARGE: usize = 5_000_000;
 
-/// The structure of a factor.
+/// The plan of a factor by fronts.
 pub struct Fronts {
-    /// In the order of their elimination.
+    /// The fronts in the order of their elimination.
     pub(super) fronts: Vec<Front>,
-    /// The same in groups, in the same order.
+    /// The fronts in groups, in the same order.
     pub(super) pieces: Vec<Piece>,
-    /// Those to be worked on, in the order of their columns in the factor.
+    /// The fronts that are computed, in the order of their columns in the factor.
     pub(super) order: Vec<u32>,
-    /// What is done one after the other.
+    /// The stages of the computation, one after another.
     pub(super) stages: Vec<Stage>,
-    /// What waits for several fronts.
+    /// The places for Schur complements that several fronts need.
     pub(super) slots: Vec<Slot>,
-    /// Elements in the order of the parts that are not divided.
+    /// The elements in the order of the parts that are not divided.
     pub(super) elements: Vec<u32>,
-    /// Unknowns of all boundaries: those of each front ascending, or in the order of the first front that it is like.
+    /// The unknowns of all boundaries; those of each front ascending, or in the order of the first front that equals
+    /// it.
     rows: Vec<u32>,
     pub(super) unknowns: usize,
     pub(super) kept: usize,
-    /// Numbers in the factor.
+    /// The number of values in the factor.
     pub(super) len: usize,
-    /// Numbers in the columns of all fronts: more, if some are alike.
+    /// The number of values in the columns of all fronts: larger than `len` if some fronts are equal.
     len_of_all: usize,
-    /// The fronts above the branches: their widest columns, and what the two stacks hold at most.
+    /// The memory for the fronts above the branches: the widest columns, and the largest size of the two stacks.
     pub(super) above: Space,
-    /// The same of the branches, each for itself.
+    /// The memory for one branch: the widest columns, and the largest size of the two stacks.
     pub(super) branch: Space,
-    /// The most that the slots hold at once.
+    /// The largest size of all slots at one time.
     in_slots: usize,
 }
 
@@ -51,40 +52,40 @@ pub struct Fronts {
 pub(super) struct Front {
     pub(super) halves: Option<[usize; 2]>,
     pub(super) elements: [usize; 2],
-    /// The first unknown it owns.
+    /// The first unknown that it owns.
     pub(super) first: usize,
-    /// How many it owns.
+    /// The number of unknowns that it owns.
     pub(super) own: usize,
-    /// Its boundary: first and end in `rows`.
+    /// The range of its boundary in `rows`: first and end.
     rows: [usize; 2],
-    /// Where its columns begin in the factor.
+    /// The place in the factor where its columns begin.
     pub(super) values: usize,
-    /// The stack on which what it leaves waits, without a slot: what its halves leave is on the other one.
+    /// The stack for its Schur complement if it has no slot; those of its halves are on the other stack.
     pub(super) stack: usize,
-    /// The slot in which it waits, if several fronts take it.
+    /// The slot for its Schur complement, if several fronts need it.
     pub(super) slot: Option<usize>,
 }
 
-/// Where what a front leaves waits for several others.
+/// A place where the Schur complement of a front waits for several others.
 pub(super) struct Slot {
-    /// Numbers in it.
+    /// The number of values in it.
     pub(super) len: usize,
-    /// The stage in which it is taken for the last time.
+    /// The stage in which it is used for the last time.
     pub(super) last_stage: usize,
 }
 
-/// Fronts of unknowns that follow each other.
+/// Fronts with consecutive unknowns.
 pub(super) struct Piece {
     pub(super) fronts: Range<usize>,
-    /// Whether it is a branch of the tree, or one of the fronts above.
+    /// Whether the piece is a branch of the tree rather than one of the fronts above.
     pub(super) branch: bool,
 }
 
-/// Work on one front that all threads share, or several tasks that do not depend on each other.
+/// One stage of the computation: a front that all threads share, or several independent tasks.
 pub(super) enum Stage {
-    /// One front above the branches.
+    /// One front above the branches, computed by all threads.
     Above(Task),
-    /// Each is left to one thread.
+    /// Tasks that are each computed by one thread.
     Each(Vec<Task>),
 }
 
@@ -97,32 +98,32 @@ impl Stage {
     }
 }
 
-/// Fronts that one thread works on, one after the other: the last one takes what the others leave.
+/// Fronts that one thread computes one after another; the last one uses the Schur complements of the others.
 pub(super) struct Task {
-    /// First and end in `order`.
+    /// The range of the fronts in `order`.
     pub(super) fronts: Range<usize>,
-    /// Numbers in their columns of the factor.
+    /// The number of values in their columns of the factor.
     pub(super) len: usize,
 }
 
-/// What work on some fronts takes, in numbers.
+/// The memory for working on some fronts, in numbers of values.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Space {
-    /// The largest columns of a front.
+    /// The largest size of the columns of a front.
     pub(super) widest: usize,
-    /// The most that waits on each of the two stacks.
+    /// The largest size of each of the two stacks.
     pub(super) stacks: [usize; 2],
 }
 
 impl Space {
-    /// Makes room for stacks of these sizes.
+    /// Enlarges the stacks to hold these sizes.
     fn hold(&mut self, stacks: [usize; 2]) {
         for (most, size) in self.stacks.iter_mut().zip(stacks) {
             *most = (*most).max(size);
         }
     }
 
-    /// Divides memory: the columns, and the stacks.
+    /// Divides a piece of memory into the columns and the two stacks.
     pub(super) fn divide<'a>(&self, values: &'a mut [f64]) -> (&'a mut [f64], [&'a mut [f64]; 2]) {
         let (columns, stacks) = values.split_at_mut(self.widest);
         let (even, odd) = stacks.split_at_mut(self.stacks[0]);
@@ -143,15 +144,15 @@ impl Front {
         self.own + self.boundary()
     }
 
-    /// Numbers in its columns of L, each from the diagonal on.
+    /// The number of values in its columns of L, each from the diagonal on.
     pub(super) fn len(&self) -> usize {
         self.own * self.boundary() + self.own * (self.own + 1) / 2
     }
 }
 
 impl Fronts {
-    /// Plans the factor; `kept`: how many nodes the dissection keeps, `unknowns_of` a node; `kinds`: numbers that are equal
-    /// for elements with the same matrix, if there are several.
+    /// Plans the factor. `kept`: the number of nodes that the dissection does not eliminate. `unknowns_of`: the
+    /// unknowns of a node. `kinds`: numbers that are equal for elements with the same matrix, if there are any.
     pub fn new<E: Deref<Target = [u32]>>(
         mut dissection: Dissection,
         elements: &[E],
@@ -159,7 +160,7 @@ impl Fronts {
         unknowns_of: impl Fn(u32) -> usize,
         kept: usize,
     ) -> Self {
-        let first_alike = find_alike(&mut dissection, elements, kinds);
+        let first_equal = find_equal_parts(&mut dissection, elements, kinds);
         // the first unknown of every place
         let mut first = Vec::with_capacity(dissection.nodes.len() + 1);
         first.push(0);
@@ -203,25 +204,25 @@ impl Fronts {
             branch: Space::default(),
             in_slots: 0,
         };
-        planned.find_slots(&first_alike);
-        planned.find_stages(&first_alike);
-        planned.place_columns(&first_alike);
+        planned.find_slots(&first_equal);
+        planned.find_stages(&first_equal);
+        planned.place_columns(&first_equal);
         planned.find_last_stages();
         planned.find_space();
         planned
     }
 
-    /// What several fronts take waits in slots.
-    fn find_slots(&mut self, first_alike: &[usize]) {
+    /// Assigns slots to Schur complements that several fronts need.
+    fn find_slots(&mut self, first_equal: &[usize]) {
         let mut takers = vec![0u8; self.fronts.len()];
-        for number in firsts(first_alike) {
+        for number in firsts(first_equal) {
             for half in self.fronts[number].halves.into_iter().flatten() {
-                let takers = &mut takers[first_alike[half]];
+                let takers = &mut takers[first_equal[half]];
                 *takers = takers.saturating_add(1);
             }
         }
         for number in 0..self.fronts.len() {
-            let first = first_alike[number];
+            let first = first_equal[number];
             if takers[first] < 2 {
                 continue;
             }
@@ -236,15 +237,15 @@ impl Fronts {
         }
     }
 
-    /// First what goes to slots, in stages, each after those that it needs; then the rest.
-    fn find_stages(&mut self, first_alike: &[usize]) {
+    /// Plans the stages: first the fronts with slots, each after those that it depends on; then the others.
+    fn find_stages(&mut self, first_equal: &[usize]) {
         let mut stage_of = vec![0; self.fronts.len()];
         let mut stages: Vec<Vec<usize>> = Vec::new();
-        for number in firsts(first_alike) {
+        for number in firsts(first_equal) {
             let halves = self.fronts[number].halves.into_iter().flatten();
             let needed = halves.map(|half| match self.fronts[half].slot {
                 None => stage_of[half],
-                Some(_) => stage_of[first_alike[half]] + 1,
+                Some(_) => stage_of[first_equal[half]] + 1,
             });
             let stage = needed.max().unwrap_or(0);
             stage_of[number] = stage;
@@ -269,7 +270,7 @@ impl Fronts {
             for piece in group {
                 let start = self.order.len();
                 let top = piece.fronts.end - 1;
-                if first_alike[top] == top && !placed[top] {
+                if first_equal[top] == top && !placed[top] {
                     self.place_with_halves(top, &mut placed);
                     tasks.push(self.task(start));
                 }
@@ -285,7 +286,8 @@ impl Fronts {
         self.pieces = pieces;
     }
 
-    /// Puts a front to the end of the order, after those not there yet whose columns it takes from the stacks.
+    /// Appends a front to the order, after those fronts that are not in it yet and whose Schur complements it takes
+    /// from the stacks.
     fn place_with_halves(&mut self, top: usize, placed: &mut [bool]) {
         for half in self.fronts[top].halves.into_iter().flatten() {
             if self.fronts[half].slot.is_none() && !placed[half] {
@@ -306,19 +308,19 @@ impl Fronts {
         }
     }
 
-    fn place_columns(&mut self, first_alike: &[usize]) {
+    fn place_columns(&mut self, first_equal: &[usize]) {
         for &number in &self.order {
             let front = &mut self.fronts[number as usize];
             front.values = self.len;
             self.len += front.len();
         }
-        for (number, &first) in first_alike.iter().enumerate() {
+        for (number, &first) in first_equal.iter().enumerate() {
             self.fronts[number].values = self.fronts[first].values;
             self.len_of_all += self.fronts[number].len();
         }
     }
 
-    /// The stages after which slots are free again.
+    /// Finds the stage after which each slot is free again.
     fn find_last_stages(&mut self) {
         for (k, stage) in self.stages.iter().enumerate() {
             let fronts = stage.tasks().iter().flat_map(|task| task.fronts.clone());
@@ -333,7 +335,7 @@ impl Fronts {
         }
     }
 
-    /// What the fronts above the branches take, the branches at most, and the slots.
+    /// Computes the memory for the fronts above the branches, for the largest branch, and for the slots.
     fn find_space(&mut self) {
         let (mut above, mut branches) = (Space::default(), Space::default());
         let mut tops = [0; 2];
@@ -372,7 +374,7 @@ impl Fronts {
         self.in_slots = self.most_in_slots();
     }
 
-    /// The most that the slots hold at once.
+    /// The largest size of all slots at one time.
     fn most_in_slots(&self) -> usize {
         let (mut most, mut held) = (0, 0);
         for (k, stage) in self.stages.iter().enumerate() {
@@ -396,7 +398,7 @@ impl Fronts {
         &self.fronts[self.order[task.fronts.end - 1] as usize]
     }
 
-    /// Puts what a front leaves on its stack; the sizes of both.
+    /// Adds the Schur complement of a front to its stack; returns the sizes of both stacks.
     fn put(&self, front: &Front, stacks: &mut [usize; 2]) -> [usize; 2] {
         if front.slot.is_none() {
             stacks[front.stack] += front.boundary().pow(2);
@@ -404,7 +406,7 @@ impl Fronts {
         *stacks
     }
 
-    /// Takes what its halves have left from their stack.
+    /// Removes the Schur complements of its halves from their stack.
     fn take_halves(&self, front: &Front, stacks: &mut [usize; 2]) {
         for half in front.halves.into_iter().flatten() {
             let half = &self.fronts[half];
@@ -414,7 +416,7 @@ impl Fronts {
         }
     }
 
-    /// What the factor takes, and what waits while it is made on so many threads, with the places of unknowns in fronts
+    /// The memory for the factor and for its computation on this many threads, with the places of unknowns in fronts
     /// (bytes).
     pub fn bytes(&self, threads: usize) -> u64 {
         let waits = self.above.len() + threads * self.branch.len() + self.in_slots;
@@ -422,7 +424,7 @@ impl Fronts {
         8 * (self.len + waits) as u64 + 4 * places as u64
     }
 
-    /// Rows of the tallest front.
+    /// The number of rows of the tallest front.
     pub(super) fn tallest(&self) -> usize {
         self.fronts.iter().map(Front::height).max().unwrap_or(0)
     }
@@ -432,12 +434,12 @@ impl Fronts {
         self.len > LARGE
     }
 
-    /// Whether it is for fields, which go through all fronts.
+    /// Whether a second thread is worth its start for computing fields, which pass through all fronts.
     pub(super) fn has_large_fields(&self) -> bool {
         self.len_of_all > LARGE
     }
 
-    /// Number of those that are kept.
+    /// The number of unknowns that are not eliminated.
     pub fn kept(&self) -> usize {
         self.kept
     }
@@ -447,9 +449,9 @@ impl Fronts {
     }
 }
 
-/// The fronts that no earlier one is like.
-fn firsts(first_alike: &[usize]) -> impl Iterator<Item = usize> {
-    let all = first_alike.iter().enumerate();
+/// The fronts that equal no earlier one.
+fn firsts(first_equal: &[usize]) -> impl Iterator<Item = usize> {
+    let all = first_equal.iter().enumerate();
     all.filter(|(number, first)| number == *first)
         .map(|(number, _)| number)
 }

@@ -1,35 +1,35 @@
 //! The Cholesky factor of a body's stiffness by dense fronts, without a global matrix.
 //!
-//! Along the tree of a [`Dissection`], the front of a part is a dense matrix on the unknowns it owns (o) and on those of
-//! its boundary (b). Of a part that is not divided it is the sum of its elements' matrices; of any other, what its halves
-//! have left:
+//! Along the tree of a [`Dissection`], the front of a part is a dense matrix on the unknowns it owns (o) and on those
+//! of its boundary (b). For a part that is not divided it is the sum of its elements' matrices; for any other, the sum
+//! of its halves' Schur complements:
 //!
 //! ```text
-//!   F = | F_oo  F_ob |      F_oo = L_oo L_ooᵀ      L_bo = F_bo L_oo⁻ᵀ      left: F_bb − L_bo L_boᵀ
+//!   F = | F_oo  F_ob |      F_oo = L_oo L_ooᵀ      L_bo = F_bo L_oo⁻ᵀ      Schur complement: F_bb − L_bo L_boᵀ
 //!       | F_bo  F_bb |
 //! ```
 //!
-//! Unknowns are numbered in the order of their elimination, the kept ones last. These are never eliminated, so what the
-//! whole mesh leaves is their Schur complement: Ŝ = A_cc − A_ci A_ii⁻¹ A_ic.
+//! Unknowns are numbered in the order of their elimination, the kept ones last. These are never eliminated, so the
+//! Schur complement of the whole mesh is on them: Ŝ = A_cc − A_ci A_ii⁻¹ A_ic.
 
 use faer::Accum;
 
 use super::blocked::NoFactor;
-use super::breaks::{Breaks, Stopped, untouched_zeros};
 use super::dense::Dense;
 use super::front::{Columns, FrontMatrix, Run, find_runs};
 use super::fronts::{Front, Fronts, Space, Stage, Task};
+use super::interrupt::{Interrupt, Stopped, untouched_zeros};
 use super::parallel::for_each;
 
-/// Unknowns of the largest element.
+/// The number of unknowns of the largest element.
 const ELEMENT: usize = 16;
 
-/// One element's part of the matrix.
+/// The matrix of one element with its unknowns.
 #[derive(Clone, Default)]
 pub struct ElementMatrix {
-    /// Its unknowns; none where a displacement is prescribed, or the element has fewer.
+    /// The unknowns of the element; none where a displacement is prescribed, or the element has fewer nodes.
     pub unknowns: [Option<u32>; ELEMENT],
-    /// Symmetric.
+    /// The entries of the symmetric matrix.
     pub entries: [[f64; ELEMENT]; ELEMENT],
 }
 
@@ -38,17 +38,17 @@ pub struct ElementMatrix {
 pub enum FactorError {
     /// The matrix is not positive definite: a pivot is not positive.
     NotPositiveDefinite {
-        /// Its unknown.
+        /// The unknown of that pivot.
         unknown: usize,
     },
     /// An element's matrix is not finite.
     NonFinite,
-    /// It does not fit into memory.
+    /// The factor does not fit into memory.
     TooLarge {
-        /// What it would take.
+        /// The number of bytes that the factor would take.
         bytes: u64,
     },
-    /// Stopped on request.
+    /// The observer stopped the work.
     Stopped,
 }
 
@@ -58,7 +58,7 @@ impl From<Stopped> for FactorError {
     }
 }
 
-/// L of the eliminated unknowns.
+/// The Cholesky factor L of the eliminated unknowns.
 pub struct Factor {
     pub(super) fronts: Fronts,
     /// The columns of every front, each from the diagonal on.
@@ -66,13 +66,13 @@ pub struct Factor {
 }
 
 impl Factor {
-    /// Factors the sum of the elements' matrices, on so many threads, and returns Ŝ with it. `element` puts the matrix of an
-    /// element with a given number in place.
+    /// Factors the sum of the elements' matrices on `threads` threads; returns the factor and Ŝ. `element` writes the
+    /// matrix of an element with a given number.
     pub fn new(
         fronts: Fronts,
         element: &(impl Fn(u32, &mut ElementMatrix) + Sync),
         threads: usize,
-        breaks: &mut Breaks<'_>,
+        interrupt: &mut Interrupt<'_>,
     ) -> Result<(Self, Dense), FactorError> {
         let bytes = fronts.bytes(threads);
         let too_large = FactorError::TooLarge { bytes };
@@ -82,7 +82,7 @@ impl Factor {
         let of_threads = (0..threads).map(|_| Memory::new(&fronts, fronts.branch, 1));
         let mut of_threads: Vec<_> = of_threads.collect::<Option<_>>().ok_or(too_large)?;
         let bytes = Dense::bytes(fronts.kept);
-        let schur = Dense::try_zero(fronts.kept, breaks)?;
+        let schur = Dense::try_zero(fronts.kept, interrupt)?;
         let mut schur = schur.ok_or(FactorError::TooLarge { bytes })?;
         let mut slots: Vec<Vec<f64>> = Vec::new();
         slots.resize_with(fronts.slots.len(), Vec::new);
@@ -94,7 +94,7 @@ impl Factor {
                     rest = others;
                     let is_whole = k + 1 == fronts.stages.len();
                     let left = is_whole.then(|| schur.values_mut());
-                    above.work_on(task, left, values, (&fronts, &slots, element), breaks)?;
+                    above.work_on(task, left, values, (&fronts, &slots, element), interrupt)?;
                 }
                 Stage::Each(tasks) => {
                     let mut filled = Vec::new();
@@ -113,11 +113,11 @@ impl Factor {
                     for_each(
                         tasks.iter().zip(left).zip(columns),
                         &mut of_threads[..workers],
-                        |memory, ((task, left), values), breaks| {
+                        |memory, ((task, left), values), interrupt| {
                             let of_all = (&fronts, &slots[..], element);
-                            memory.work_on(task, Some(left), values, of_all, breaks)
+                            memory.work_on(task, Some(left), values, of_all, interrupt)
                         },
-                        breaks,
+                        interrupt,
                     )?;
                     for (slot, values) in filled {
                         slots[slot] = values;
@@ -130,34 +130,34 @@ impl Factor {
                 }
             }
         }
-        schur.mirror(breaks)?;
+        schur.mirror(interrupt)?;
         Ok((Factor { fronts, values }, schur))
     }
 
-    /// Whether a second thread is worth its start for fields.
+    /// Whether a second thread is worth its start for computing fields.
     pub fn has_large_fields(&self) -> bool {
         self.fronts.has_large_fields()
     }
 
-    /// Entries of L that are kept: fronts that are alike have theirs in common.
+    /// The number of stored entries of L: equal fronts share theirs.
     pub fn entries(&self) -> usize {
         self.values.len()
     }
 }
 
-/// Memory for fronts that are worked on one after the other, used again and again.
+/// Memory for fronts that one thread computes one after another; it is reused.
 struct Memory {
-    /// First the columns that a front owns; then two stacks with what fronts without a slot have left, until the front of
-    /// the whole takes it: what its halves leave is on one stack, what it leaves itself goes to the other.
+    /// First the columns that a front owns, then two stacks for the Schur complements of fronts without a slot, until
+    /// another front needs them: those of a front's halves are on one stack, and its own goes to the other.
     values: Vec<f64>,
     space: Space,
     tops: [usize; 2],
     assembly: Assembly,
-    /// How many work on one front.
+    /// The number of threads that work on one front.
     threads: usize,
 }
 
-/// What all threads read: the plan, what waits in its slots, and the matrices of elements.
+/// The data that all threads read: the plan, the contents of its slots, and the matrices of elements.
 type OfAll<'a, E> = (&'a Fronts, &'a [Vec<f64>], &'a E);
 
 impl Memory {
@@ -171,7 +171,7 @@ impl Memory {
         })
     }
 
-    /// Where the last fronts of tasks put what they leave: on the stacks, or into slots.
+    /// Where the last fronts of tasks store their Schur complements: on the stacks, or in slots.
     fn put<'a>(
         &'a mut self,
         fronts: &Fronts,
@@ -198,14 +198,15 @@ impl Memory {
         left
     }
 
-    /// Puts the columns of a task's fronts into the factor; what the last one leaves goes to `left`, or waits on its stack.
+    /// Computes the columns of a task's fronts. The Schur complement of the last one goes to `left`, or waits on its
+    /// stack.
     fn work_on<E: Fn(u32, &mut ElementMatrix)>(
         &mut self,
         task: &Task,
         left: Option<&mut [f64]>,
         values: &mut [f64],
         of_all: OfAll<'_, E>,
-        breaks: &mut Breaks<'_>,
+        interrupt: &mut Interrupt<'_>,
     ) -> Result<(), FactorError> {
         let (mut left, mut values) = (left, values);
         for place in task.fronts.clone() {
@@ -216,19 +217,19 @@ impl Memory {
             };
             let (own, others) = values.split_at_mut(front.len());
             values = others;
-            self.eliminate(front, left, own, of_all, breaks)?;
+            self.eliminate(front, left, own, of_all, interrupt)?;
         }
         Ok(())
     }
 
-    /// Puts the columns of a front into the factor; what it leaves goes to `left`, or waits on its stack.
+    /// Computes the columns of a front. Its Schur complement goes to `left`, or waits on its stack.
     fn eliminate<E: Fn(u32, &mut ElementMatrix)>(
         &mut self,
         front: &Front,
         left: Option<&mut [f64]>,
         values: &mut [f64],
         (fronts, slots, element): OfAll<'_, E>,
-        breaks: &mut Breaks<'_>,
+        interrupt: &mut Interrupt<'_>,
     ) -> Result<(), FactorError> {
         let (height, boundary, threads) = (front.height(), front.boundary(), self.threads);
         let (columns, [even, odd]) = self.space.divide(&mut self.values);
@@ -262,8 +263,8 @@ impl Memory {
                 into.left.fill(0.0);
                 self.assembly
                     .add_elements(fronts, front, element, &mut into)?;
-                into.eliminate(threads, breaks).map_err(failed)?;
-                into.reduce(Accum::Add, threads, breaks)?;
+                into.eliminate(threads, interrupt).map_err(failed)?;
+                into.reduce(Accum::Add, threads, interrupt)?;
             }
             Some(halves) => {
                 let halves = halves.map(|half| &fronts.fronts[half]);
@@ -286,11 +287,11 @@ impl Memory {
                 for (runs, from) in added.clone() {
                     into.add(runs, from, Columns::Own);
                 }
-                into.eliminate(threads, breaks).map_err(failed)?;
-                into.reduce(Accum::Replace, threads, breaks)?;
+                into.eliminate(threads, interrupt).map_err(failed)?;
+                into.reduce(Accum::Replace, threads, interrupt)?;
                 for (runs, from) in added {
                     into.add(runs, from, Columns::Left);
-                    breaks.after(from.len() as f64)?;
+                    interrupt.worked(from.len() as f64)?;
                 }
             }
         }
@@ -304,12 +305,12 @@ impl Memory {
     }
 }
 
-/// Adds to fronts.
+/// The assembly of fronts: which entries are added where.
 struct Assembly {
     matrix: ElementMatrix,
-    /// Places of unknowns in a front.
+    /// The places of unknowns in a front.
     local: Vec<u32>,
-    /// Where the boundaries of the halves lie in it.
+    /// The runs of the boundaries of both halves in the front.
     runs: [Vec<Run>; 2],
 }
 
@@ -323,7 +324,7 @@ impl Assembly {
         }
     }
 
-    /// Notes the places of a front's unknowns.
+    /// Records the places of a front's unknowns.
     fn place(&mut self, fronts: &Fronts, front: &Front) {
         let own = (front.first..front.first + front.own).map(|row| row as u32);
         let unknowns = own.chain(fronts.rows(front).iter().copied());
@@ -332,7 +333,7 @@ impl Assembly {
         }
     }
 
-    /// Adds the elements of a part that is not divided.
+    /// Adds the matrices of the elements of a part that is not divided.
     fn add_elements(
         &mut self,
         fronts: &Fronts,
@@ -373,7 +374,7 @@ mod tests {
     /// A made-up body: cells with positive definite matrices on nodes with 0, 1 or 2 unknowns.
     struct Body {
         elements: Vec<Vec<u32>>,
-        /// Whether a cell has the matrix that its kind has, or one of its own.
+        /// The kind of each cell, if cells of one kind have the same matrix; else each cell has its own.
         of_kinds: Option<Vec<Option<u32>>>,
         /// The first unknown of each node, in the order of elimination, and how many it has.
         unknowns: Vec<(usize, usize)>,
@@ -381,15 +382,15 @@ mod tests {
     }
 
     impl Body {
-        /// Of cells none of which is like another.
+        /// A body of cells that are all different.
         fn new(x: usize, y: usize, kept: &[u32]) -> Self {
             let count = |node: u32| (3 + node as usize * 5 % 7) / 3 % 3;
             let (elements, positions) = grid(&lines(x), &lines(y));
             Body::of(elements, &positions, kept, count, None)
         }
 
-        /// Of cells of a few kinds, between lines that are `x` and `y` cells apart; some nodes in the first column have
-        /// no unknowns, or one. Cells are of another kind beyond two thirds of x.
+        /// A body of cells of a few kinds, between lines that are `x` and `y` cells apart; some nodes in the first
+        /// column have no unknowns, or one. Cells beyond two thirds of x are of another kind.
         fn of_kinds(x: usize, y: usize, kept: &[u32]) -> Self {
             let (mut elements, mut positions) = grid(&lines(x), &lines(y));
             let count = move |node: u32| match node as usize % (2 * (x + 1)) {
@@ -491,11 +492,11 @@ mod tests {
             let fronts = self.fronts.take().unwrap();
             let go_on = &mut || ControlFlow::Continue(());
             let element = |e: u32, matrix: &mut ElementMatrix| self.matrix(e, matrix);
-            Factor::new(fronts, &element, threads, &mut Breaks::new(go_on))
+            Factor::new(fronts, &element, threads, &mut Interrupt::new(go_on))
         }
     }
 
-    /// Gaussian elimination.
+    /// The solution by Gaussian elimination.
     fn solve_dense(a: &[Vec<f64>], b: &[f64]) -> Vec<f64> {
         let (mut a, mut b, n) = (a.to_vec(), b.to_vec(), b.len());
         for k in 0..n {
@@ -519,9 +520,10 @@ mod tests {
             .fold(0.0, |most, (a, b)| (a - b).abs().max(most))
     }
 
-    /// In meshes of one part and of many, with nothing kept, some nodes, and nearly all.
+    /// The Schur complement of the whole equals the dense one, in meshes of one part and of many, with no node kept,
+    /// with some, and with nearly all.
     #[test]
-    fn what_is_left_of_the_whole_is_the_dense_schur_complement() {
+    fn the_schur_complement_equals_the_dense_one() {
         let all: Vec<u32> = (0..30 * 3).collect();
         let cases: [(usize, usize, &[u32]); 5] = [
             (1, 1, &[2]),
@@ -584,7 +586,7 @@ mod tests {
                     }
                 }
             };
-            let refused = Factor::new(fronts, &element, threads, &mut Breaks::new(go_on)).err();
+            let refused = Factor::new(fronts, &element, threads, &mut Interrupt::new(go_on)).err();
             let expected = match bad.is_nan() {
                 true => FactorError::NonFinite,
                 false => FactorError::NotPositiveDefinite { unknown: 7 },
@@ -593,7 +595,7 @@ mod tests {
         }
     }
 
-    /// Of a mesh that takes some portions of work.
+    /// The factorisation of a mesh that takes several portions of work stops when it is told to.
     #[test]
     fn a_factor_stops_when_it_is_told_to() {
         for threads in [1, 2] {
@@ -605,12 +607,14 @@ mod tests {
                 ControlFlow::Break(())
             };
             let element = |e: u32, matrix: &mut ElementMatrix| body.matrix(e, matrix);
-            let stopped = Factor::new(fronts, &element, threads, &mut Breaks::new(&mut stop)).err();
+            let stopped =
+                Factor::new(fronts, &element, threads, &mut Interrupt::new(&mut stop)).err();
             assert_eq!((stopped, asked), (Some(FactorError::Stopped), 1));
         }
     }
 
-    /// With fronts above the branches that are wide enough to be worked on in parts, and branches of one part.
+    /// Two threads compute the same factor as one, also with fronts above the branches that are wide enough to be
+    /// divided, and with branches of one part.
     #[test]
     fn two_threads_make_the_same_factor_as_one() {
         let kept: Vec<u32> = (0..400).collect();

@@ -7,18 +7,18 @@ use std::sync::mpsc::sync_channel;
 use std::sync::{Mutex, PoisonError};
 use std::thread;
 
-use super::breaks::{Breaks, Stopped};
+use super::interrupt::{Interrupt, Stopped};
 
-/// Does all tasks, on as many threads as there are workspaces. Each thread takes the next task as soon as it is free, so a
-/// task must not depend on what its workspace was used for before.
+/// Runs all tasks, on as many threads as there are workspaces. Each thread takes the next task as soon as it is free,
+/// so the result of a task must not depend on the earlier use of its workspace.
 ///
-/// The error is the one that a single thread finds first. Only this thread asks whether to go on: while it waits, whenever
-/// another one would.
+/// The error is the one that a single thread would find first. Only the calling thread asks whether to continue; while
+/// it waits, it does so whenever another thread has done a portion of work.
 pub(super) fn for_each<T: Send, W: Send, E: From<Stopped> + PartialEq + Send>(
     tasks: impl Iterator<Item = T> + Send,
     workspaces: &mut [W],
-    work: impl Fn(&mut W, T, &mut Breaks<'_>) -> Result<(), E> + Sync,
-    breaks: &mut Breaks<'_>,
+    work: impl Fn(&mut W, T, &mut Interrupt<'_>) -> Result<(), E> + Sync,
+    interrupt: &mut Interrupt<'_>,
 ) -> Result<(), E> {
     let [own, others @ ..] = workspaces else {
         return Ok(());
@@ -26,17 +26,17 @@ pub(super) fn for_each<T: Send, W: Send, E: From<Stopped> + PartialEq + Send>(
     if others.is_empty() {
         return tasks
             .into_iter()
-            .try_for_each(|task| work(own, task, breaks));
+            .try_for_each(|task| work(own, task, interrupt));
     }
     let (tasks, stopped) = (Mutex::new(tasks.enumerate()), AtomicBool::new(false));
     let failed = AtomicBool::new(false);
     // tasks are begun in their order, so all before one that fails are done as well
-    let work_on = |workspace: &mut W, breaks: &mut Breaks<'_>| {
+    let work_on = |workspace: &mut W, interrupt: &mut Interrupt<'_>| {
         let _stops = StopOnPanic([&failed, &stopped]);
         while !failed.load(Relaxed) {
             let next = tasks.lock().unwrap_or_else(PoisonError::into_inner).next();
             let Some((number, task)) = next else { break };
-            if let Err(error) = work(workspace, task, breaks) {
+            if let Err(error) = work(workspace, task, interrupt) {
                 failed.store(true, Relaxed);
                 return Some((number, error));
             }
@@ -58,14 +58,14 @@ pub(super) fn for_each<T: Send, W: Send, E: From<Stopped> + PartialEq + Send>(
                         false => ControlFlow::Continue(()),
                     }
                 };
-                work_on(workspace, &mut Breaks::new(&mut go_on))
+                work_on(workspace, &mut Interrupt::new(&mut go_on))
             };
             // where the system has no more threads, fewer do the work
             thread::Builder::new().spawn_scoped(scope, run).ok()
         };
         let threads: Vec<_> = others.iter_mut().filter_map(start).collect();
         drop(ask);
-        let own_error = work_on(own, breaks);
+        let own_error = work_on(own, interrupt);
         if let Some((_, error)) = &own_error
             && *error == Stopped.into()
         {
@@ -74,7 +74,7 @@ pub(super) fn for_each<T: Send, W: Send, E: From<Stopped> + PartialEq + Send>(
         errors.extend(own_error);
         // until all have ended
         for () in questions {
-            if !stopped.load(Relaxed) && breaks.ask().is_err() {
+            if !stopped.load(Relaxed) && interrupt.ask().is_err() {
                 stopped.store(true, Relaxed);
                 failed.store(true, Relaxed);
             }
@@ -92,7 +92,7 @@ pub(super) fn for_each<T: Send, W: Send, E: From<Stopped> + PartialEq + Send>(
     }
 }
 
-/// Lets the other threads stop if its own panics.
+/// Stops the other threads if this one panics.
 struct StopOnPanic<'a>([&'a AtomicBool; 2]);
 
 impl Drop for StopOnPanic<'_> {
@@ -133,16 +133,17 @@ mod tests {
             let mut counts = vec![0; threads];
             // each thread waits in its first task until all have one
             let all = Barrier::new(threads);
-            let work = |count: &mut i32, (i, result): (usize, &mut usize), _: &mut Breaks<'_>| {
-                if *count == 0 {
-                    all.wait();
-                }
-                *count += 1;
-                *result += i + 1;
-                Ok::<(), Error>(())
-            };
+            let work =
+                |count: &mut i32, (i, result): (usize, &mut usize), _: &mut Interrupt<'_>| {
+                    if *count == 0 {
+                        all.wait();
+                    }
+                    *count += 1;
+                    *result += i + 1;
+                    Ok::<(), Error>(())
+                };
             let tasks = results.iter_mut().enumerate();
-            for_each(tasks, &mut counts, work, &mut Breaks::new(&mut go_on)).unwrap();
+            for_each(tasks, &mut counts, work, &mut Interrupt::new(&mut go_on)).unwrap();
             assert!(results.into_iter().eq(1..=100));
             assert!(counts.iter().all(|count| *count > 0) && counts.iter().sum::<i32>() == 100);
         }
@@ -153,7 +154,7 @@ mod tests {
         for threads in [1, 2] {
             // of two that are begun, the later one fails first
             let failed = AtomicBool::new(threads == 1);
-            let work = |(): &mut (), task: usize, _: &mut Breaks<'_>| {
+            let work = |(): &mut (), task: usize, _: &mut Interrupt<'_>| {
                 if task == 1 {
                     failed.store(true, Relaxed);
                 }
@@ -163,7 +164,7 @@ mod tests {
                 Err(Error::Bad(task))
             };
             let mut workspaces = vec![(); threads];
-            let failed = for_each(0..9, &mut workspaces, work, &mut Breaks::new(&mut go_on));
+            let failed = for_each(0..9, &mut workspaces, work, &mut Interrupt::new(&mut go_on));
             assert_eq!(failed, Err(Error::Bad(0)));
         }
     }
@@ -172,15 +173,16 @@ mod tests {
     fn all_threads_stop_with_the_first_and_it_asks_while_it_waits() {
         let both = Barrier::new(2);
         // one task each: the first one's is short, the other's goes on until it is stopped
-        let work = |first: &mut bool, _: usize, breaks: &mut Breaks<'_>| -> Result<(), Error> {
-            both.wait();
-            match first {
-                true => Ok(()),
-                false => loop {
-                    breaks.ask()?;
-                },
-            }
-        };
+        let work =
+            |first: &mut bool, _: usize, interrupt: &mut Interrupt<'_>| -> Result<(), Error> {
+                both.wait();
+                match first {
+                    true => Ok(()),
+                    false => loop {
+                        interrupt.ask()?;
+                    },
+                }
+            };
         let mut asked = 0;
         let mut stop_at_third = || {
             asked += 1;
@@ -189,8 +191,8 @@ mod tests {
                 _ => ControlFlow::Continue(()),
             }
         };
-        let mut breaks = Breaks::new(&mut stop_at_third);
-        let stopped = for_each(0..2, &mut [true, false], work, &mut breaks);
+        let mut interrupt = Interrupt::new(&mut stop_at_third);
+        let stopped = for_each(0..2, &mut [true, false], work, &mut interrupt);
         assert_eq!((stopped, asked), (Err(Error::Stopped), 3));
     }
 
@@ -198,11 +200,16 @@ mod tests {
     #[should_panic(expected = "of the second thread")]
     fn a_panic_of_another_thread_is_passed_on() {
         let both = Barrier::new(2);
-        let work = |first: &mut bool, _: usize, _: &mut Breaks<'_>| {
+        let work = |first: &mut bool, _: usize, _: &mut Interrupt<'_>| {
             both.wait();
             assert!(*first, "of the second thread");
             Ok::<(), Error>(())
         };
-        let _ = for_each(0..2, &mut [true, false], work, &mut Breaks::new(&mut go_on));
+        let _ = for_each(
+            0..2,
+            &mut [true, false],
+            work,
+            &mut Interrupt::new(&mut go_on),
+        );
     }
 }

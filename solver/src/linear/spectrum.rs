@@ -6,7 +6,8 @@ use faer::linalg::solvers::Solve;
 /// A small matrix, by rows.
 pub type Rows = Vec<Vec<f64>>;
 
-/// The λ, as real and imaginary parts, with det(λ² A + λ B + C) = 0, A regular. None if the iterations that find them fail.
+/// The eigenvalues λ, as real and imaginary parts, with det(λ² A + λ B + C) = 0, for a regular A. None if their
+/// iterations fail.
 pub fn quadratic_eigenvalues(a: &Rows, b: &Rows, c: &Rows) -> Option<Vec<[f64; 2]>> {
     let n = a.len();
     let [a, b, c] = [a, b, c].map(matrix);
@@ -29,7 +30,7 @@ pub fn quadratic_eigenvalues(a: &Rows, b: &Rows, c: &Rows) -> Option<Vec<[f64; 2
     )
 }
 
-/// The pairs of vectors (w, g) of the `count` smallest singular values: A g and wᵀ A are that small.
+/// The pairs of vectors (w, g) of the `count` smallest singular values: |A g| and |wᵀ A| equal that value.
 pub fn near_null(a: &Rows, count: usize) -> Option<Vec<[Vec<f64>; 2]>> {
     let n = a.len();
     let finite = a.iter().flatten().all(|value| value.is_finite());

@@ -1,14 +1,15 @@
-//! Solutions with a factor: through the fronts upwards for the forces, downwards for the displacements.
+//! Solutions with a factor: upwards through the fronts for the forces, downwards for the displacements.
 
 use std::ops::ControlFlow;
 
-use super::breaks::{Breaks, Stopped};
 use super::fronts::{Front, Piece};
+use super::interrupt::{Interrupt, Stopped};
 use super::multifrontal::Factor;
 use super::parallel::for_each;
 
 impl Factor {
-    /// From f of all unknowns: y = L⁻¹ f of the eliminated ones, and f̂ = f_c − A_ci A_ii⁻¹ f_i of the kept ones.
+    /// Replaces f of all unknowns by y = L⁻¹ f for the eliminated ones, and by f̂ = f_c − A_ci A_ii⁻¹ f_i for the kept
+    /// ones.
     pub fn forward(&self, f: &mut [f64]) {
         let mut v = Vec::new();
         for front in &self.fronts.fronts {
@@ -30,8 +31,8 @@ impl Factor {
         }
     }
 
-    /// From y = L⁻¹ f of the eliminated unknowns and u of the kept ones: u of all. Several fields at once, on so many
-    /// threads.
+    /// Replaces y = L⁻¹ f of the eliminated unknowns by their displacements u, given u of the kept ones. Several fields
+    /// at once, on `threads` threads.
     pub fn backward<const FIELDS: usize>(&self, u: &mut [[f64; FIELDS]], threads: usize) {
         // this thread takes the memory of all: it has to answer for it
         let tallest = self.fronts.tallest();
@@ -50,18 +51,20 @@ impl Factor {
                 u = others;
                 tasks.push((fronts(piece), own));
             }
-            let work = |v: &mut Vec<_>, (fronts, own): (&[Front], &mut [_]), _: &mut Breaks<'_>| {
-                self.backward_in(fronts, own, (end, &*after), v);
-                Ok::<_, Stopped>(())
-            };
+            let work =
+                |v: &mut Vec<_>, (fronts, own): (&[Front], &mut [_]), _: &mut Interrupt<'_>| {
+                    self.backward_in(fronts, own, (end, &*after), v);
+                    Ok::<_, Stopped>(())
+                };
             let never = &mut || ControlFlow::Continue(());
             let workspaces = &mut workspaces[..threads.min(tasks.len())];
             let tasks = tasks.into_iter();
-            let _ = for_each(tasks, workspaces, work, &mut Breaks::new(never));
+            let _ = for_each(tasks, workspaces, work, &mut Interrupt::new(never));
         }
     }
 
-    /// The same in consecutive fronts: `own` are the unknowns that they own, `after` those from `end` on.
+    /// As [`Factor::backward`], in consecutive fronts: `own` are the unknowns that they own, `after` those from `end`
+    /// on.
     fn backward_in<const FIELDS: usize>(
         &self,
         fronts: &[Front],
@@ -85,7 +88,7 @@ impl Factor {
         }
     }
 
-    /// Values of a front's unknowns.
+    /// Gathers the values of a front's unknowns.
     fn gather(&self, front: &Front, all: &[f64], into: &mut Vec<f64>) {
         into.clear();
         into.extend_from_slice(&all[front.first..front.first + front.own]);
@@ -98,10 +101,10 @@ impl Factor {
     }
 }
 
-/// u of the unknowns that a front owns, from the last to the first: u_j = (y_j − Σ_{i > j} L_ij u_i) / L_jj.
+/// Computes u for the unknowns that a front owns, from the last to the first: u_j = (y_j − Σ_{i > j} L_ij u_i) / L_jj.
 #[inline(always)]
 fn backward_in_front<const FIELDS: usize>(columns: &[f64], own: usize, v: &mut [[f64; FIELDS]]) {
-    /// Sums of one field that do not wait for each other.
+    /// The number of independent partial sums of one field.
     const LANES: usize = 8;
     let (height, mut columns) = (v.len(), columns);
     for j in (0..own).rev() {

@@ -1,4 +1,4 @@
-//! From the nodes and elements of a file to a mesh: second order, counter-clockwise, without unused nodes.
+//! Builds a mesh from the nodes and elements of a file: second order, counter-clockwise, without unused nodes.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -13,7 +13,7 @@ pub const NO_NODE: u32 = u32::MAX;
 /// A mesh as read from a file. Labels are the numbers in the file, for messages.
 #[derive(Debug, Default)]
 pub struct RawMesh {
-    /// Positions.
+    /// The positions of the nodes.
     pub nodes: Vec<[f64; 2]>,
     /// Label of every node.
     pub node_labels: Vec<u64>,
@@ -49,7 +49,7 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
         return Err(found.report(
             "",
             Reason::TooFew,
-            "no element of two dimensions",
+            "no two-dimensional element",
             "at least one quadrilateral or triangle",
             "Mesh the surface, and save its elements (in Gmsh: put it in a physical group).",
         ));
@@ -117,7 +117,7 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
         let rest = match edges.len() {
             0 => "There is no boundary of that name.".to_owned(),
             sides => format!(
-                "The boundary `{outside}` has the other {sides}; there is none of the name of all."
+                "The boundary `{outside}` has the other {sides}; there is no boundary `{name}` with all of them."
             ),
         };
         note(
@@ -176,7 +176,7 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
                 raw.element_labels[e]
             ),
             "det J > 0 at all Gauss points and at the nodes",
-            "Move its nodes; a midside far off the middle of its side folds the element.",
+            "Move its nodes; a midside node far from the middle of its side inverts the element.",
         ));
     }
     all.finish((mesh, notes))
@@ -330,11 +330,11 @@ fn drop_unused(raw: &mut RawMesh, of_file: usize) -> (u32, BTreeMap<String, u32>
     (remaining as u32, left_out)
 }
 
-/// The elements on each side, known by its midside node.
+/// The elements on each side, which is identified by its midside node.
 struct Owners {
-    /// How many elements have this node as a midside.
+    /// The number of elements that have this node as a midside.
     count: Vec<u8>,
-    /// The first of them.
+    /// The first element that has this node as a midside.
     first: Vec<u32>,
 }
 
@@ -365,8 +365,8 @@ impl Owners {
     }
 }
 
-/// Sides with one element, directed with the body on the right; in the order of the elements. `count`:
-/// how many elements have a node as a midside.
+/// The sides with only one element, directed with the body on the right, in the order of the elements. `count`: how
+/// many elements have a node as a midside.
 fn surface(elements: &[Element], count: &[u8]) -> Vec<Edge> {
     elements
         .iter()
@@ -376,8 +376,8 @@ fn surface(elements: &[Element], count: &[u8]) -> Vec<Edge> {
         .collect()
 }
 
-/// Corners of the surface's sides and their places in it, in order. Two sides between the same corners
-/// are neighbours that do not share their midside.
+/// The corners of the surface's sides with their places in it, in order. Two sides between the same corners are
+/// neighbours that do not share their midside.
 fn by_corners(
     surface: &[Edge],
     owners: &Owners,
@@ -411,7 +411,7 @@ fn nonconforming(raw: &RawMesh, first: usize, second: usize, found: &mut Finding
         "",
         Reason::Nonconforming,
         format!("elements {a} and {b}, which do not share a whole side"),
-        "at most two elements on a side, with all three of its nodes in common",
+        "at most two elements on a side, which share all three of its nodes",
         "Merge coincident nodes (in Gmsh: Coherence), and remove elements that overlap.",
     )
 }
@@ -431,7 +431,7 @@ impl Mesh {
 mod tests {
     use super::*;
 
-    /// A set that holds both corners of a straight side holds its midside too, and so the side as a boundary.
+    /// A node set with both corners of a straight side gets its midside too, so that the side becomes a boundary.
     #[test]
     fn a_set_of_corners_is_the_boundary_between_them() {
         let mut raw = two_squares();

@@ -1,20 +1,20 @@
-//! Nodes at the same place that are not the same node: a crack along which the parts of a body do not hold each other.
+//! Distinct nodes at the same place: a crack along which the parts of a body are not connected.
 
 use super::Mesh;
 
-/// Nodes nearer to each other than this part of the shortest side at them are at the same place: a slit that thin is meant
-/// by nobody, and files print six digits.
+/// Nodes whose distance is below this part of the shortest side at them are at the same place: such a thin slit is
+/// never intended, and files have six digits.
 const SAME_PLACE: f64 = 3e-4;
 
-/// Nodes that each one is compared with: in a mesh of any use far fewer are as near to it along one direction.
+/// The number of nodes that each one is compared with: in any useful mesh far fewer are as close along one direction.
 const MOST_COMPARED: usize = 200;
 
-/// A unit vector that hardly any line of nodes is perpendicular to: in the order along it few nodes are neighbours that
-/// are not near each other.
+/// A unit vector that hardly any line of nodes is perpendicular to, so that nodes next to each other in the order along
+/// it are mostly close to each other.
 const DIRECTION: [f64; 2] = [0.618_181_9, 0.786_035_2];
 
-/// Pairs of nodes on the surface of the body at the same place, to rounding beside the elements there: each node with the
-/// one before it there, so that three nodes are two pairs; in the order of the second nodes.
+/// Pairs of nodes on the surface of the body at the same place, within rounding: each node with the one before it, so
+/// that three nodes make two pairs; in the order of the second nodes.
 pub fn coincident_nodes(mesh: &Mesh) -> Vec<[u32; 2]> {
     let sizes = surface_sizes(mesh);
     let at = |node: u32| mesh.nodes[node as usize];
@@ -50,7 +50,7 @@ pub fn coincident_nodes(mesh: &Mesh) -> Vec<[u32; 2]> {
         .collect()
 }
 
-/// The shortest side at every node on the surface; infinite at the others. A side is known by its midside node.
+/// The shortest side at every node on the surface; infinite at other nodes. A side is identified by its midside node.
 fn surface_sizes(mesh: &Mesh) -> Vec<f64> {
     let mut elements = vec![0u8; mesh.nodes.len()];
     let sides = || mesh.elements.iter().flat_map(|element| element.sides());

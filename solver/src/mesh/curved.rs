@@ -1,37 +1,38 @@
-//! Curves that boundaries lie on, where elements only have their corners there: meshes of the first order, raised to the
-//! second, have straight sides, and corners between them that the body has not.
+//! Curves for boundaries of which a mesh knows only the corners of elements: a mesh of the first order that is raised
+//! to the second has straight sides, with corners between them that the real body does not have.
 
 use super::{Edge, Mesh, runs};
 use crate::problem::{Curve, CurveKind};
 use crate::spline::Spline;
 
-/// Corners of elements lie on a circle if they are no farther off than this part of its radius.
+/// Corners of elements lie on a circle if their distance from it is at most this part of its radius.
 const OFF_CIRCLE: f64 = 1e-4;
 
-/// A boundary through whose corners a smooth curve is laid turns by less than this (cosine): 45°.
+/// A smooth curve is laid through the corners of a boundary if it turns by less than this (cosine): 45°.
 const SHARPEST: f64 = 0.7;
 
-/// A closed curve goes on beyond its ends by so many points, whose influence falls to a quarter from each to the next.
+/// The number of points by which a closed curve is continued beyond its ends; the influence of each is a quarter of
+/// that of the one before.
 const AROUND: usize = 16;
 
 /// Why a boundary does not lie on its curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OffCurve {
-    /// A corner of an element, its distance from the curve, and what is allowed (length).
+    /// A corner of an element is too far from the curve (lengths).
     Distance {
         /// The node.
         node: u32,
-        /// How far it is off.
+        /// The distance from the curve.
         distance: f64,
-        /// How far it may be.
+        /// The largest distance allowed.
         most: f64,
     },
-    /// A corner of the boundary, where it turns by so much (angle).
+    /// The boundary has a corner at this node, where it turns by this angle.
     Turns(u32, f64),
 }
 
-/// Moves the nodes of a boundary onto its curve: to a circle radially; on a spline through the corners of its sides the
-/// midside nodes, to the middle between these.
+/// Moves the nodes of a boundary onto its curve: radially onto a circle; for a spline through the corners of its sides,
+/// the midside nodes to the middle between these.
 pub(super) fn put_on_curve(
     nodes: &mut [[f64; 2]],
     boundary: &[Edge],
@@ -137,7 +138,7 @@ fn on_spline(nodes: &mut [[f64; 2]], run: &[Edge]) -> Result<(), OffCurve> {
 mod tests {
     use super::*;
 
-    /// Sides of a polygon through points of a curve, from one end to the other or closed.
+    /// The sides of a polygon through points of a curve, from one end to the other or closed.
     fn polygon(points: &[[f64; 2]], closed: bool) -> (Vec<[f64; 2]>, Vec<Edge>) {
         let count = points.len();
         let mut nodes = points.to_vec();
@@ -186,7 +187,7 @@ mod tests {
         );
     }
 
-    /// Of the fourth order, also where a closed curve begins.
+    /// A spline through the corners approximates their curve to fourth order, also where a closed curve begins.
     #[test]
     fn a_spline_through_the_corners_is_near_their_curve() {
         let ellipse = |t: f64| [3.0 * t.cos(), 2.0 * t.sin()];

@@ -1,13 +1,14 @@
-//! A side of the surface divided at a place of it: a node where an obstacle ends.
+//! Divides a side of the surface at a place where an obstacle ends, so that there is a node.
 
 use crate::element::{Element, Family, edge3};
 use crate::mesh::{Edge, Mesh};
 
-/// Least part of a side on either side of the place: elements would be needles, whose stiffness hides that of the others.
+/// The smallest part of a side on either side of the place: smaller ones make needle-shaped elements, whose stiffness
+/// hides that of the others.
 const LEAST_PART: f64 = 1e-4;
 
 impl Mesh {
-    /// Divides a side of the surface at ξ, and the element behind it in triangles; no other element changes:
+    /// Divides a side of the surface at ξ, and the element behind it into triangles; no other element changes:
     ///
     /// ```text
     ///   A ---P------- B
@@ -17,8 +18,8 @@ impl Mesh {
     ///   D ----------- C
     /// ```
     ///
-    /// The side's midside node becomes the corner P. False, and nothing changes, if P lies next to an end of the side, the
-    /// element is too curved for it, or a set names the midside node alone.
+    /// The side's midside node becomes the corner P. False, and nothing changes, if P lies next to an end of the side,
+    /// the element is too curved for it, or a set names the midside node alone.
     pub fn divide_side(&mut self, side: Edge, xi: f64) -> bool {
         let part = 0.5 * (1.0 + xi);
         let behind = self.elements.iter().position(|e| e.contains(&side[2]));
@@ -124,7 +125,8 @@ impl Mesh {
         true
     }
 
-    /// Whether a set names the midside of a side without its ends: a force or a support there must not move with it.
+    /// Whether a set names the midside of a side without its ends: a force or a support there must not move with the
+    /// node.
     fn has_midside_alone(&self, [a, b, mid]: &Edge) -> bool {
         let alone = |set: &Vec<u32>| set.contains(mid) && !(set.contains(a) && set.contains(b));
         self.node_sets.values().any(alone)
@@ -147,7 +149,8 @@ mod tests {
         mesh.elements.iter().map(of).sum()
     }
 
-    /// Every side of a grid, quadrilaterals first and then the triangles that they became, from either of its ends.
+    /// A divided side has a node at the place, and no elements overlap: for every side of a grid, of quadrilaterals and
+    /// then of the triangles that they became, from either end.
     #[test]
     fn a_divided_side_has_a_node_at_the_place_and_nothing_overlaps() {
         let mut mesh = grid_mesh(&Grid {

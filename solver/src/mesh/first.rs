@@ -1,4 +1,4 @@
-//! What a refined mesh knows of the first one.
+//! The relation of a refined mesh to the first one.
 
 use std::collections::BTreeMap;
 
@@ -8,14 +8,14 @@ use super::lineage::Part;
 use crate::element::Element;
 
 impl Mesh {
-    /// Number of nodes of the first mesh: they come first.
+    /// The number of nodes of the first mesh, which come first.
     pub fn first_nodes(&self) -> u32 {
         let all = self.nodes.len() as u32;
         self.lineage.first_nodes.unwrap_or(all)
     }
 
-    /// The part of a side of the first mesh that a side is, both in its direction; none for a side inside an element of the
-    /// first mesh.
+    /// The part of a side of the first mesh that this side is, both in its direction; none for a side inside an element
+    /// of the first mesh.
     pub fn part(&self, edge: &Edge) -> Option<Part> {
         self.lineage.part(edge)
     }
@@ -26,7 +26,7 @@ impl Mesh {
             .is_some_and(|first| (first..self.first_nodes()).contains(&side[2]))
     }
 
-    /// The nodes of the first mesh that a set holds, without midsides that its file did not have.
+    /// The nodes of the first mesh that a set contains, without midsides that its file did not have.
     pub fn given_nodes(&self, set: &[u32]) -> Vec<u32> {
         let first = self.first_nodes();
         let count = self.added_midsides.map_or(first, |added| added.min(first));
@@ -34,7 +34,7 @@ impl Mesh {
         given.collect()
     }
 
-    /// Whether forces and supports at nodes have to be carried to others: sides are split, or had no midsides.
+    /// Whether forces and supports at nodes have to be applied to other nodes too: sides are split, or had no midsides.
     pub fn has_later_nodes(&self) -> bool {
         self.lineage.first_nodes.is_some() || self.added_midsides.is_some()
     }
@@ -64,8 +64,8 @@ impl Mesh {
 /// A side of the first mesh.
 #[derive(Clone, Debug, Default)]
 pub struct FirstSide {
-    /// Its parts, all with the side in the same direction.
+    /// The parts of the side in this mesh, all directed like it.
     pub parts: Vec<Part>,
-    /// It lies between two elements.
+    /// Whether the side lies between two elements.
     pub inside: bool,
 }

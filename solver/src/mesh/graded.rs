@@ -1,7 +1,8 @@
-//! Refinement of single elements, without hanging nodes: red where it is asked for, green beside.
+//! Refinement of single elements without hanging nodes: red for marked elements, green for their neighbours.
 //!
-//! A *red* division makes four elements of one; a quadrilateral much longer than wide is halved across before, so often
-//! that divisions end (`halving`). An element with a split side of which nothing more is asked is *closed*, for the mesh of one solution only:
+//! A *red* division makes four elements of one; a quadrilateral much longer than wide is first halved across its
+//! length, as often as still lets the refinement end (`halving`). Another element with a split side is *closed*
+//! (divided along with that side), for the mesh of one solution only:
 //!
 //! ```text
 //!   +-------+    +-------+    +---+---+    +-------+        +
@@ -22,7 +23,8 @@ use super::{Edge, Mesh};
 use crate::element::Element;
 use crate::problem::Curve;
 
-/// So often folded closures are replaced by divisions; those of an element that is all but folded itself remain.
+/// The largest number of rounds in which closures that would be inverted are replaced by divisions; closures of an
+/// element that is itself almost inverted remain.
 const MOST_UNFOLDING: u32 = 4;
 
 /// A mesh whose elements are refined one by one, again and again.
@@ -30,12 +32,12 @@ const MOST_UNFOLDING: u32 = 4;
 pub struct GradedMesh {
     /// Nodes, split sides and node sets, without those of closures.
     finer: Finer,
-    /// Elements, some of them with split sides.
+    /// The elements; some have split sides.
     elements: Vec<Part>,
-    /// Of the elements of the first mesh.
+    /// The halvings of the elements of the first mesh.
     halvings: Vec<Halving>,
     boundaries: BTreeMap<String, Vec<Edge>>,
-    /// Elements of the first mesh by group.
+    /// The elements of the first mesh, by group.
     groups: BTreeMap<String, Vec<u32>>,
     set_names: Vec<String>,
     added_midsides: Option<u32>,
@@ -46,14 +48,14 @@ pub struct GradedMesh {
 #[derive(Clone, Copy)]
 struct Part {
     element: Element,
-    /// That element.
+    /// The element of the first mesh that contains this part.
     origin: u32,
-    /// How often it was halved on the way to this part.
+    /// How often that element was halved to give this part.
     halved: u32,
 }
 
 impl GradedMesh {
-    /// From a mesh without hanging nodes.
+    /// Starts from a mesh without hanging nodes.
     pub fn new(mesh: &Mesh) -> Self {
         GradedMesh {
             finer: Finer::new(mesh),
@@ -73,7 +75,7 @@ impl GradedMesh {
         }
     }
 
-    /// Elements, each of which is one or, closed, a few of the mesh.
+    /// The number of elements; each is one element of the mesh or, if closed, several.
     pub fn elements(&self) -> usize {
         self.elements.len()
     }
@@ -106,14 +108,15 @@ impl GradedMesh {
         }
     }
 
-    /// Moves the nodes of a boundary onto its curve; where they are too far off it, they stay.
+    /// Moves the nodes of a boundary onto its curve; if they are too far from it, they stay.
     pub fn put_on_curve(&mut self, boundary: &str, curve: &Curve) {
         if let Some(edges) = self.boundaries.get(boundary) {
             let _ = put_on_curve(&mut self.finer.nodes, edges, curve);
         }
     }
 
-    /// The mesh without hanging nodes, and for each of its elements that of `self` which it is a part of.
+    /// The mesh without hanging nodes, and for each of its elements the number of the element of `self` that contains
+    /// it.
     pub fn closed(&self) -> (Mesh, Vec<u32>) {
         let mut finer = self.finer.clone();
         let (mut elements, mut parts) = (Vec::new(), Vec::new());
@@ -151,7 +154,7 @@ impl GradedMesh {
         (mesh, parts)
     }
 
-    /// Adds four parts of a part, or two halves of a long one.
+    /// Adds the four parts of a part, or the two halves of a long one.
     fn divide(&mut self, part: Part) {
         let Part {
             element,
@@ -196,7 +199,7 @@ impl GradedMesh {
         must_divide(element.family().corners(), split)
     }
 
-    /// The elements that closing would fold: those with sides curved as strongly.
+    /// The elements whose closure would be inverted, because their sides are too curved.
     fn folded(&self) -> Vec<bool> {
         let mut finer = self.finer.clone();
         let mut folds = |part: &Part| {
@@ -236,7 +239,7 @@ fn pieces(finer: &Finer, [a, b, mid]: Edge, into: &mut Vec<Edge>) {
     }
 }
 
-/// An element with some sides split as elements without: itself if none is.
+/// Divides an element with split sides into elements without; returns the element itself if it has none.
 fn closure(finer: &mut Finer, element: &Element) -> Vec<Element> {
     let split: Vec<usize> = element
         .sides()
@@ -257,12 +260,12 @@ fn closure(finer: &mut Finer, element: &Element) -> Vec<Element> {
     closed.unwrap_or_else(|| vec![*element])
 }
 
-/// The same quadrilateral, numbered from another corner.
+/// A quadrilateral numbered from another corner.
 fn turned(p: [u32; 8], by: usize) -> [u32; 8] {
     std::array::from_fn(|i| p[i / 4 * 4 + (i + by) % 4])
 }
 
-/// A triangle whose side `k` is split, as two.
+/// Two triangles in place of one whose side `k` is split.
 fn bisected(finer: &mut Finer, p: [u32; 6], k: usize) -> Option<Vec<Element>> {
     let [a, b, c, ab, bc, ca] = std::array::from_fn(|i| p[i / 3 * 3 + (i + k) % 3]);
     let (first, second) = finer.halves(ab, a)?;
@@ -273,7 +276,7 @@ fn bisected(finer: &mut Finer, p: [u32; 6], k: usize) -> Option<Vec<Element>> {
     ])
 }
 
-/// A quadrilateral whose first side is split, as three triangles.
+/// Three triangles in place of a quadrilateral whose first side is split.
 fn fan(finer: &mut Finer, p: [u32; 8]) -> Option<Vec<Element>> {
     let [a, b, c, d, ab, bc, cd, da] = p;
     let (first, second) = finer.halves(ab, a)?;
@@ -285,7 +288,7 @@ fn fan(finer: &mut Finer, p: [u32; 8]) -> Option<Vec<Element>> {
     ])
 }
 
-/// A quadrilateral whose first and third sides are split, as two.
+/// Two quadrilaterals in place of one whose first and third sides are split.
 fn halves(finer: &mut Finer, p: [u32; 8]) -> Option<Vec<Element>> {
     let [a, b, c, d, ab, bc, cd, da] = p;
     let (south, north) = (finer.halves(ab, a)?, finer.halves(cd, c)?);
@@ -296,7 +299,7 @@ fn halves(finer: &mut Finer, p: [u32; 8]) -> Option<Vec<Element>> {
     ])
 }
 
-/// A quadrilateral whose first and second sides are split, as three.
+/// Three quadrilaterals in place of one whose first and second sides are split.
 fn three(finer: &mut Finer, p: [u32; 8]) -> Option<Vec<Element>> {
     let [a, b, c, d, ab, bc, cd, da] = p;
     let (south, east) = (finer.halves(ab, a)?, finer.halves(bc, b)?);

@@ -92,7 +92,7 @@ pub fn grid_mesh(grid: &Grid) -> Mesh {
     }
 }
 
-/// Height of a polyline at x, linear between its points; y = 0 where there is none.
+/// The height of a polyline at x, linear between its points; y = 0 where there is none.
 fn height(line: &Option<Vec<[f64; 2]>>, x: f64) -> f64 {
     let Some(points) = line else { return 0.0 };
     let after = points
@@ -105,8 +105,8 @@ fn height(line: &Option<Vec<[f64; 2]>>, x: f64) -> f64 {
     y0 + (x - x0) / (x1 - x0) * (y1 - y0)
 }
 
-/// Where the strip is farthest from its polylines: x and the distance; `None` when every kink has a
-/// grid line.
+/// The place where the strip differs most from its polylines: x and the distance; `None` when every kink has a grid
+/// line.
 pub fn largest_cut(grid: &Grid) -> Option<(f64, f64)> {
     let rounding = 1e-9 * (grid.x[grid.x.len() - 1] - grid.x[0]);
     let mut worst: Option<(f64, f64)> = None;
@@ -153,7 +153,7 @@ pub fn check_grid(grid: &Grid, pointer: &str) -> Result<(), Vec<Violation>> {
     found.conclude(all.finish(()))
 }
 
-/// The lines in one direction.
+/// Checks the lines in one direction.
 fn check_lines(field: &str, lines: &[f64], found: &mut Findings) -> Checked {
     let mut all = AllChecks::default();
     if lines.len() < 2 {
@@ -177,7 +177,7 @@ fn check_lines(field: &str, lines: &[f64], found: &mut Findings) -> Checked {
     all.finish(())
 }
 
-/// The upper or lower edge of a strip.
+/// Checks the upper or lower edge of a strip.
 fn check_edge(field: &str, points: &[[f64; 2]], x: &[f64], found: &mut Findings) -> Checked {
     if points.len() < 2 {
         return Err(found.report(
@@ -210,7 +210,7 @@ fn check_edge(field: &str, points: &[[f64; 2]], x: &[f64], found: &mut Findings)
     }
 }
 
-/// Fractions of the height, and a positive height everywhere.
+/// Checks that a strip has fractions of the height, and a positive height everywhere.
 fn check_strip(grid: &Grid, found: &mut Findings) -> Checked {
     let mut all = AllChecks::default();
     if grid.y[0] != 0.0 || grid.y[grid.y.len() - 1] != 1.0 {

@@ -1,27 +1,27 @@
-//! How often the quadrilaterals of a mesh are halved across before they are divided into four.
+//! How often the quadrilaterals of a mesh are halved across their length before they are divided into four.
 //!
-//! A halved quadrilateral is split along two of its sides once more than along the others. A division passes that on: to
-//! follow its neighbour at a short side by one level, it is a level further ahead at a long one. Where triangles, whose
-//! sides are split all alike, lead from there back to the short side, divisions would go round without end.
+//! A halved quadrilateral is split along two of its sides once more than along the others. A division passes this on:
+//! to follow its neighbour at a short side by one level, it gets another level ahead at a long one. Where triangles,
+//! whose sides are all split equally, lead from there back to the short side, divisions would never end.
 //!
-//! So halvings are limited in advance, such that the elements of the first mesh have *levels* at which none has to be
-//! divided for its neighbours. With the same number added to all they are such levels again: no division can ever lead beyond the
-//! lowest of these that what is asked for stays below, and so divisions end.
+//! So halvings are limited in advance, such that the elements of the first mesh have *levels* at which none must be
+//! divided because of its neighbours. Adding the same number to all levels keeps this property. No division can then
+//! lead beyond the lowest such levels that contain the requested ones, so divisions end.
 
 use std::collections::HashMap;
 
 use super::Mesh;
 use crate::element::Element;
 
-/// A quadrilateral longer than this many times its width is halved, which brings its sides together.
+/// A quadrilateral longer than this many times its width is halved, which makes its sides more equal.
 const LONG: f64 = 3.0;
 
 /// The halvings of one element.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Halving {
-    /// The sides that are split: 0 for the first and third, 1 for the others.
+    /// The sides that a halving splits: 0 for the first and third, 1 for the others.
     pub(super) sides: usize,
-    /// How often; 0 for triangles.
+    /// The number of halvings; 0 for triangles.
     pub(super) times: u32,
 }
 
@@ -48,7 +48,7 @@ impl Halving {
         }
     }
 
-    /// How often a side is split more than the level says.
+    /// By how many levels a side is split more than the element.
     fn ahead(&self, side: usize) -> u32 {
         match side % 2 == self.sides {
             true => self.times,
@@ -57,8 +57,8 @@ impl Halving {
     }
 }
 
-/// Whether an element has to be divided for its neighbours: a half of one of its sides is split again, or all sides but
-/// one are split. `split`: how often each side is split by the neighbours, if at all.
+/// Whether an element must be divided because of its neighbours: a half of one of its sides is split again, or all
+/// sides but one are split. `split`: how often the neighbours split each side, if at all.
 pub(super) fn must_divide(corners: usize, split: impl Iterator<Item = u32>) -> bool {
     let (mut count, mut twice) = (0, false);
     for times in split {
@@ -68,7 +68,7 @@ pub(super) fn must_divide(corners: usize, split: impl Iterator<Item = u32>) -> b
     twice || count + 1 >= corners
 }
 
-/// The halvings of all elements: as many as their shape asks for, where that lets divisions end.
+/// The halvings of all elements: as many as their shape needs, within the limit that lets divisions end.
 pub(super) fn halvings(mesh: &Mesh) -> Vec<Halving> {
     let elements = mesh.elements.iter();
     let mut halvings: Vec<Halving> = elements.map(|element| Halving::of(mesh, element)).collect();
@@ -101,7 +101,7 @@ pub(super) fn halvings(mesh: &Mesh) -> Vec<Halving> {
     halvings
 }
 
-/// For each side of each element the element beyond it, and which of its sides that is.
+/// For each side of each element, the neighbouring element and the number of the side there.
 fn neighbours(mesh: &Mesh) -> Vec<Vec<Option<(usize, usize)>>> {
     let mut found: Vec<Vec<Option<(usize, usize)>>> = Vec::with_capacity(mesh.elements.len());
     let mut first: HashMap<u32, (usize, usize)> = HashMap::new();
@@ -125,7 +125,7 @@ mod tests {
     use crate::mesh::grid_mesh;
     use crate::problem::Grid;
 
-    /// Straight sides between corners.
+    /// A mesh with straight sides between corners.
     fn straight(corners: &[[f64; 2]], elements: &[&[u32]]) -> Mesh {
         let mut nodes = corners.to_vec();
         let mut mids: HashMap<[u32; 2], u32> = HashMap::new();
@@ -149,8 +149,8 @@ mod tests {
         }
     }
 
-    /// Three triangles lead from the long side of a quadrilateral to its short one: around it, four elements may differ by one
-    /// level each, and a fifth halving would have no end.
+    /// Halvings are limited where triangles lead from a long side of a quadrilateral to its short one: in such a circle
+    /// four elements may differ by one level each, and a fifth halving would have no end.
     #[test]
     fn halvings_are_limited_where_triangles_lead_from_a_long_side_to_a_short_one() {
         let corners = [
@@ -171,7 +171,7 @@ mod tests {
         assert!(within[1..].iter().all(|halving| halving.times == 0));
     }
 
-    /// In a grid the way back is as long as the way there.
+    /// In a grid halvings are not limited: cells are halved as often as their length requires.
     #[test]
     fn halvings_of_a_grid_are_as_many_as_its_cells_are_long() {
         let mut x = vec![0.0];

@@ -1,4 +1,4 @@
-//! Meshes written out in the problem.
+//! Builds meshes that are written out in the problem.
 
 use std::collections::{HashMap, HashSet};
 
@@ -46,7 +46,7 @@ fn check(input: InlineMesh, found: &mut Findings) -> Checked<Mesh> {
     })
 }
 
-/// Nodes and elements by their numbers: which nodes are in use.
+/// Checks nodes and elements by their numbers; returns which nodes are in use.
 fn numbers(input: &InlineMesh, found: &mut Findings) -> Checked<Vec<bool>> {
     let mut all = AllChecks::default();
     let count = input.nodes.len() as u32;
@@ -144,7 +144,7 @@ fn numbers(input: &InlineMesh, found: &mut Findings) -> Checked<Vec<bool>> {
     all.finish(used)
 }
 
-/// The edges of a boundary, each with the body on its right.
+/// Checks the edges of a boundary; returns them, each with the body on its right.
 fn directed(
     name: &str,
     edges: &[[u32; 3]],
@@ -194,7 +194,7 @@ fn directed(
 struct Side {
     elements: u32,
     mid: u32,
-    /// With the body on the right.
+    /// The same edge, with the body on its right.
     directed: [u32; 3],
 }
 

@@ -1,10 +1,10 @@
-//! Elements that are folded or numbered clockwise, as violations.
+//! Reports elements that are inverted or numbered clockwise.
 
 use super::Mesh;
 use crate::error::{AllChecks, Findings, Reason, Violation};
 
-/// Whether no element of an otherwise valid mesh is inverted. `pointer`: to an element by its
-/// number; `of`: which mesh, after that number. For [`Mesh::inverted_elements`] `at_nodes`.
+/// Checks that no element of an otherwise valid mesh is inverted. `pointer`: makes a JSON Pointer from an element's
+/// number. `of`: the words for the mesh after that number. `at_nodes`: as for [`Mesh::inverted_elements`].
 pub fn check_inverted(
     mesh: &Mesh,
     at_nodes: bool,

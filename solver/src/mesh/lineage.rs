@@ -1,7 +1,7 @@
-//! Which part of which side of the first mesh a side of a refined one is.
+//! Maps sides of a refined mesh to parts of sides of the first mesh.
 //!
-//! Names mean the first mesh, and so do forces and supports at its nodes, which keep their numbers. Those on all nodes of
-//! a side act on that side, into however many parts it is split.
+//! Names refer to the first mesh, and so do forces and supports at its nodes, which keep their numbers. Those on all
+//! nodes of a side act on that side, however many parts it is split into.
 
 use std::collections::HashMap;
 
@@ -10,9 +10,9 @@ use super::edge::Edge;
 /// How a mesh was made from the first one.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lineage {
-    /// Nodes of the first mesh; none: this is it.
+    /// The number of nodes of the first mesh; none: this is the first mesh.
     pub(super) first_nodes: Option<u32>,
-    /// Parts of its sides that are split, by their midside nodes.
+    /// The parts of its sides that are split, by their midside nodes.
     parts: HashMap<u32, Part>,
 }
 
@@ -23,12 +23,12 @@ pub struct Part {
     pub side: Edge,
     /// The part of it, as a side of this mesh.
     pub edge: Edge,
-    /// Where the part starts and ends on the side, −1 … 1 from the side's start to its end.
+    /// The range of the part on the side, −1 … 1 from the side's start to its end.
     pub range: [f64; 2],
 }
 
 impl Part {
-    /// The same part from the start of `edge` to its end, and with the side in that direction.
+    /// The part directed from the start of `edge` to its end, with the side in that direction.
     fn along(mut self, edge: &Edge) -> Part {
         if self.edge[0] != edge[0] {
             self.range.reverse();
@@ -42,7 +42,7 @@ impl Part {
         }
     }
 
-    /// The same part of the side in the direction of `side`.
+    /// The part with the side in the direction of `side`.
     pub(super) fn of(mut self, side: &Edge) -> Part {
         if self.side[0] != side[0] {
             self.range = self.range.map(|place| -place);
@@ -51,7 +51,7 @@ impl Part {
         self
     }
 
-    /// Places of the start, end and midside of the part on the side.
+    /// The places of the part's start, end and midside on the side.
     pub fn places(&self) -> [f64; 3] {
         let [start, end] = self.range;
         [start, end, 0.5 * (start + end)]
@@ -59,12 +59,12 @@ impl Part {
 }
 
 impl Lineage {
-    /// From now on the mesh is no longer the first one.
+    /// Marks the mesh as no longer the first one.
     pub(super) fn leave_first(&mut self, nodes: usize) {
         self.first_nodes.get_or_insert(nodes as u32);
     }
 
-    /// Of the mesh to be made from one of so many nodes.
+    /// The lineage of a mesh that is made from this one, which has this many nodes.
     pub(super) fn of_finer(&self, nodes: usize) -> Lineage {
         let mut finer = self.clone();
         finer.leave_first(nodes);
@@ -85,12 +85,12 @@ impl Lineage {
             .or_else(|| first.then(whole))
     }
 
-    /// A side is split at its middle; `halves`: the midsides of its two halves, from its start on.
+    /// Records that a side is split at its middle; `halves`: the midsides of its two halves, from its start on.
     pub(super) fn split(&mut self, edge: &Edge, halves: [u32; 2]) {
         self.split_at(edge, 0.0, halves);
     }
 
-    /// A side is split at the place ξ of it, −1 … 1, where its midside node then is.
+    /// Records that a side is split at the place ξ, −1 … 1, where its midside node is moved to.
     pub(super) fn split_at(&mut self, edge: &Edge, xi: f64, halves: [u32; 2]) {
         let Some(part) = self.part(edge) else { return };
         let [start, end, _] = part.places();

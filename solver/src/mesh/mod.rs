@@ -13,8 +13,8 @@
 //! | sides and nodes of the first mesh on a refined one | `lineage`, `first` |
 //! | a side divided where an obstacle ends | `divide` |
 //! | boundaries on their curves | `curved` |
-//! | folded elements | `inverted` |
-//! | nodes that were not merged | `coincident` |
+//! | inverted elements | `inverted` |
+//! | distinct nodes at one place | `coincident` |
 
 mod build;
 mod coincident;
@@ -53,39 +53,40 @@ use crate::solution::Warning;
 /// Nodes, elements and named boundaries, independent of their use.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Mesh {
-    /// Positions.
+    /// The positions of the nodes.
     pub nodes: Vec<[f64; 2]>,
-    /// Quadrilaterals and triangles.
+    /// The elements: quadrilaterals and triangles.
     pub elements: Vec<Element>,
     /// Surface edges by name, in runs from start to end ([`Mesh::order_boundaries`]).
     pub boundaries: BTreeMap<String, Vec<Edge>>,
     /// Elements by the name of their group.
     pub groups: BTreeMap<String, Vec<u32>>,
-    /// Nodes by the name of their set: those of the first mesh, and later ones on sides and in elements that it holds
-    /// all nodes of.
+    /// Nodes by the name of their set: those of the first mesh, and later ones on sides and in elements whose nodes are
+    /// all in the set.
     pub node_sets: BTreeMap<String, Vec<u32>>,
-    /// The first of the midside nodes that were added to elements with corners only, if there are any: they are the last
-    /// nodes of the first mesh. A stored mesh has it after the rest.
+    /// The first of the midside nodes that were added to elements with corners only, if there are any; they are the
+    /// last nodes of the first mesh. In a stored mesh this comes after the other fields.
     #[serde(skip)]
     pub added_midsides: Option<u32>,
-    /// How many nodes of a set were left out since they belong to no element. A stored mesh has it after the rest.
+    /// How many nodes of a set were left out because they belong to no element. In a stored mesh this comes after the
+    /// other fields.
     #[serde(skip)]
     pub nodes_left_out: BTreeMap<String, u32>,
-    /// How it was made from the first mesh, which is the one that is stored.
+    /// The relation to the first mesh, which is the one that is stored.
     #[serde(skip)]
     pub lineage: Lineage,
 }
 
-/// A mesh that a problem only names or quotes, read or fetched by its caller.
+/// A mesh that a problem only names or contains as text, read or fetched by the caller of the solver.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ExternalMesh {
     /// The mesh, before it is refined.
     pub mesh: Mesh,
-    /// What was changed when it was read; pointers are those of the problem.
+    /// Warnings about changes made when it was read; pointers are those of the problem.
     pub warnings: Vec<Warning>,
 }
 
-/// The result of reading such a mesh: the mesh, or all its violations. Pointers are those of the problem.
+/// The result of reading an external mesh: the mesh, or all its violations. Pointers are those of the problem.
 pub type External = Result<ExternalMesh, Vec<Violation>>;
 
 impl From<Mesh> for ExternalMesh {
@@ -98,14 +99,14 @@ impl From<Mesh> for ExternalMesh {
 }
 
 impl Mesh {
-    /// Brings the edges of all boundaries into their one order: run after run, each from its start to its end.
+    /// Puts the edges of all boundaries into one defined order: run after run, each from its start to its end.
     pub fn order_boundaries(&mut self) {
         for edges in self.boundaries.values_mut() {
             *edges = runs(edges).concat();
         }
     }
 
-    /// Node positions of an element.
+    /// The positions of an element's nodes.
     pub fn element_nodes(&self, element: &Element) -> [[f64; 2]; 8] {
         element.gather(|n| self.nodes[n as usize])
     }
@@ -120,13 +121,14 @@ impl Mesh {
         high - low
     }
 
-    /// Node positions of an edge.
+    /// The positions of an edge's nodes.
     pub fn edge_nodes(&self, edge: &Edge) -> [[f64; 2]; 3] {
         edge.map(|n| self.nodes[n as usize])
     }
 
-    /// Elements that are inverted somewhere: number, place, det J. Checked at the Gauss points of
-    /// the larger rule and, with `at_nodes`, at the nodes: a midside far off its middle folds the corner first.
+    /// Elements that are inverted somewhere: number, place and det J. They are checked at the Gauss points of the
+    /// larger rule and, with `at_nodes`, at the nodes: a midside node far from the middle inverts the element at a
+    /// corner first.
     pub fn inverted_elements(&self, at_nodes: bool) -> Vec<(usize, String, f64)> {
         let inverted = |(e, element): (usize, &Element)| {
             let (family, nodes) = (element.family(), self.element_nodes(element));
@@ -150,8 +152,8 @@ impl Mesh {
             .collect()
     }
 
-    /// The least ratio of smallest to largest det J within an element, and that element: 1 for a
-    /// parallelogram or a triangle with straight sides, near 0 for one that is almost folded.
+    /// The smallest ratio, over all elements, of the smallest to the largest det J within an element, and that element:
+    /// 1 for a parallelogram or a triangle with straight sides, near 0 for one that is almost inverted.
     pub fn worst_element(&self) -> (f64, usize) {
         let ratio = |element: &Element| {
             let (family, nodes) = (element.family(), self.element_nodes(element));
@@ -171,8 +173,8 @@ impl Mesh {
         )
     }
 
-    /// The parts that are connected by sides of elements, each as a list of its nodes. Parts that touch only in
-    /// a corner are separate, and share that node.
+    /// The parts that are connected by sides of elements, each as a list of its nodes. Parts that touch only in a
+    /// corner are separate although they share that node.
     pub fn connected_parts(&self) -> Vec<Vec<u32>> {
         // union–find over the elements; a side is known by its midside node
         let mut parent: Vec<u32> = (0..self.elements.len() as u32).collect();
@@ -225,8 +227,8 @@ fn find(parent: &mut [u32], node: u32) -> u32 {
     root
 }
 
-/// Edges sorted into runs, each from its start to its end, whatever their order. Where a boundary meets itself at a node,
-/// runs end; a closed loop has no start, and begins at its first edge.
+/// Edges sorted into runs, each from its start to its end, whatever their order. Where a boundary meets itself at a
+/// node, runs end; a closed loop has no start, and begins at its first edge.
 pub fn runs(edges: &[Edge]) -> Vec<Vec<Edge>> {
     // the edges that start at a node: how many, and one of them; and how many end there
     let mut at: HashMap<u32, (usize, usize, usize)> = HashMap::with_capacity(edges.len() + 1);

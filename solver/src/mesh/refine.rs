@@ -1,4 +1,4 @@
-//! Splitting every element in four, every side in two.
+//! Uniform refinement: every element is split into four, every side into two.
 
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
@@ -9,10 +9,10 @@ use crate::mesh::{Edge, Lineage, Mesh};
 /// New nodes lie half-way between the old ones, in master coordinates.
 const STEP: f64 = 0.5;
 
-/// Places a quarter from the sides of a triangle.
+/// The distance of new nodes from the sides of a triangle, in master coordinates.
 const QUARTER: f64 = 0.25;
 
-/// Every element becomes four, every edge two; new nodes lie on the parent's own map, so that
+/// Refines a mesh: every element becomes four, every edge two. New nodes lie on the parent element's map, so that
 /// curved sides keep their shape.
 pub fn refine(mesh: &Mesh) -> Mesh {
     let mut finer = Finer::new(mesh);
@@ -44,11 +44,11 @@ pub fn refine(mesh: &Mesh) -> Mesh {
     }
 }
 
-/// The finer mesh as it grows.
+/// The refined mesh while it is built.
 #[derive(Clone)]
 pub(super) struct Finer {
     pub(super) nodes: Vec<[f64; 2]>,
-    /// A side is known by its midside node: start corner, midside of the first half, of the second.
+    /// The halves of each side, by its midside node: start corner, midside of the first half, midside of the second.
     halves: Vec<Option<(u32, u32, u32)>>,
     pub(super) sets: Sets,
     pub(super) lineage: Lineage,
@@ -74,7 +74,7 @@ impl Finer {
         })
     }
 
-    /// The midsides of a side's two halves, from its start on.
+    /// Splits a side; returns the midsides of its two halves, from its start on.
     pub(super) fn split(&mut self, [a, b, mid]: Edge) -> (u32, u32) {
         // midsides of new sides are not in the list yet
         if self.halves.len() < self.nodes.len() {
@@ -99,7 +99,7 @@ impl Finer {
         }
     }
 
-    /// New nodes inside of an element, at places in master coordinates.
+    /// Adds nodes inside an element, at places in master coordinates.
     pub(super) fn inside<const N: usize>(
         &mut self,
         parent: &Element,
@@ -152,7 +152,7 @@ impl Finer {
     }
 }
 
-/// Which sets each node is in: a new node is in those that hold all nodes of its side or element.
+/// The node sets of each node: a new node is in those sets that contain all nodes of its side or element.
 #[derive(Clone)]
 pub(super) struct Sets {
     of_node: HashMap<u32, Vec<usize>>,

@@ -3,7 +3,7 @@
 use crate::elasticity::Section;
 use crate::mesh::Mesh;
 
-/// A radius below this part of the body's largest counts as 0: a mesh generator may miss the axis by rounding,
+/// A radius below this part of the body's largest counts as 0: mesh generators place nodes on the axis up to rounding,
 /// and the contact area of such a node is pure rounding error.
 const ROUNDING: f64 = 1e-12;
 

@@ -9,18 +9,18 @@ use crate::problem::{
 };
 use crate::solution::WarningCode;
 
-/// Sides face the same way if their normals differ by no more than this (degrees).
+/// Sides face in the same direction if their normals differ by no more than this (degrees).
 const SAME_DIRECTION: f64 = 1.0;
 
-/// More refinements than this exceed any memory; the caller limits the size itself.
+/// The largest number of refinements: more exceed any memory. The caller limits the size itself.
 const MOST_REFINEMENTS: u32 = 20;
 
 /// Stated errors are never below this part of a force: a smaller tolerance is never met.
 const LEAST_TOLERANCE: f64 = 1e-4;
 
 impl Checks {
-    /// The mesh with all its names, which mean parts of the first one; and then refined. A fault of a name alone is left in
-    /// `all`.
+    /// Makes the mesh with all its names, which refer to the first mesh, and refines it. A fault that concerns only a
+    /// name is recorded in `all`.
     pub(super) fn mesh(
         &mut self,
         input: &MeshInput,
@@ -54,7 +54,7 @@ impl Checks {
             self.warn(
                 WarningCode::StripCutsPolyline,
                 "/mesh/grid",
-                format!("The strip leaves its polyline by {distance:.3e} at x = {x}, between two grid lines. Put a grid line there."),
+                format!("The strip deviates from its polyline by {distance:.3e} at x = {x}, between two grid lines. Put a grid line there."),
             );
         }
         if input.grid().is_none() {
@@ -75,7 +75,7 @@ impl Checks {
         Ok(mesh)
     }
 
-    /// Further names for parts of boundaries and groups of elements.
+    /// Adds further names for parts of boundaries and groups of elements.
     fn names(&mut self, mesh: &mut Mesh, input: &MeshInput) -> Checked {
         let mut all = AllChecks::default();
         all.check(self.parts(mesh, input));
@@ -83,7 +83,7 @@ impl Checks {
         all.finish(())
     }
 
-    /// In an axisymmetric body x is the radius.
+    /// Checks that no radius is negative: in an axisymmetric body x is the radius.
     fn radii(&mut self, mesh: &Mesh, input: &MeshInput, analysis: &Analysis) -> Checked {
         let inside = |[r, _]: &[f64; 2]| *r < 0.0;
         let node = match analysis {
@@ -104,7 +104,8 @@ impl Checks {
         ))
     }
 
-    /// Adaptive refinement needs a tolerance, a mesh to begin with, and a contact whose results it looks at.
+    /// Checks adaptive refinement, which needs a tolerance, a mesh to start with, and a contact whose results it
+    /// follows.
     fn adaptive(&mut self, goal: &AdaptiveRefine, elements: usize, contacts: usize) -> Checked {
         let mut all = AllChecks::default();
         all.check(self.require(
@@ -112,7 +113,7 @@ impl Checks {
             "/mesh/refine/tolerance",
             goal.tolerance,
             "1e-4 < tolerance < 1",
-            "The largest relative error of a force, peak or extent; 0.01 is one percent. No error is known better than 1e-4.",
+            "The largest relative error of a force, peak or extent; 0.01 is one percent. No error is known more accurately than 1e-4.",
         ));
         if elements > MOST_ADAPTIVE_ELEMENTS {
             all.fail(self.report(
@@ -129,13 +130,13 @@ impl Checks {
                 Reason::NotUsed,
                 "adaptive refinement without a contact",
                 "a contact, or a number of refinements",
-                "Adaptive refinement looks at the forces, peak stresses and extents of contacts.",
+                "Adaptive refinement follows the forces, peak stresses and extents of contacts.",
             ));
         }
         all.finish(())
     }
 
-    /// Names for groups of elements.
+    /// Adds names for groups of elements.
     fn groups(&mut self, mesh: &mut Mesh, input: &MeshInput) -> Checked {
         let mut all = AllChecks::default();
         let size = [0, 1]
@@ -174,7 +175,7 @@ impl Checks {
         all.finish(())
     }
 
-    /// The given mesh, before it is refined.
+    /// The mesh as given, before it is refined.
     fn source(&mut self, source: &MeshSource, external: Option<External>) -> Checked<Mesh> {
         match source {
             MeshSource::Grid(grid) => {
@@ -196,7 +197,7 @@ impl Checks {
         }
     }
 
-    /// Whether no element is folded or numbered clockwise.
+    /// Checks that no element is inverted or numbered clockwise.
     fn upright(&mut self, mesh: &Mesh, source: &MeshSource) -> Checked {
         self.found.merge(match source {
             // a grid has straight sides: its corners need no check, and refinement does not fold it
@@ -210,7 +211,7 @@ impl Checks {
         })
     }
 
-    /// The caller gave no mesh for the one that the problem names or quotes.
+    /// Reports that the caller passed no mesh for the one that the problem names or contains as text.
     fn absent(&mut self, source: &MeshSource) -> Refused {
         match source {
             MeshSource::Stored(hash) => self.report(
@@ -223,14 +224,14 @@ impl Checks {
             _ => self.report(
                 "/mesh",
                 Reason::UnknownMesh,
-                "a quoted mesh that was not parsed",
+                "a mesh given as text that was not parsed",
                 "the parsed mesh",
                 "Pass the mesh that `files::external_mesh` reads.",
             ),
         }
     }
 
-    /// Names for parts of boundaries.
+    /// Adds names for parts of boundaries.
     fn parts(&mut self, mesh: &mut Mesh, input: &MeshInput) -> Checked {
         let mut all = AllChecks::default();
         let original = mesh.boundaries.clone();
@@ -347,7 +348,7 @@ impl Checks {
             Reason::UnknownNodeSet,
             name,
             expected,
-            "Node sets are `node_sets` of inline meshes, physical points of Gmsh files, *NSET of decks.",
+            "Node sets are `node_sets` of inline meshes, physical points of Gmsh files and *NSET of decks.",
         ))
     }
 
@@ -370,7 +371,7 @@ impl Checks {
         ))
     }
 
-    /// Whether a boundary has a start and an end, so that something can be given from one to the other.
+    /// Checks that a boundary has a start and an end, so that a value can be given from one to the other.
     pub(super) fn chain(&mut self, edges: &[Edge], pointer: String, hint: &str) -> Checked {
         let runs = mesh::runs(edges);
         let got = match &runs[..] {
@@ -394,7 +395,7 @@ impl Checks {
             BoundaryValue::Constant(value) => return Ok(vec![[value; 3]; edges.len()]),
             BoundaryValue::Linear(ends) => ends,
         };
-        let hint = "A value from start to end needs a connected boundary with both; name a part of it under /mesh/boundaries.";
+        let hint = "A value from start to end needs a connected boundary with two ends; name a part of it under /mesh/boundaries.";
         self.chain(edges, pointer, hint)?;
         let s = crate::contact::arc_lengths(mesh, edges);
         let length = s[s.len() - 1];
@@ -411,7 +412,7 @@ fn within(ranges: &[Option<[f64; 2]>; 2], place: &[f64; 2], size: f64) -> bool {
     })
 }
 
-/// Whether the normal of a side is the one that its part requires.
+/// Whether the normal of a side has the direction that its part requires.
 fn faces(part: &BoundaryPart, nodes: &[[f64; 2]; 3]) -> bool {
     let Some([x, y]) = part.normal else {
         return true;

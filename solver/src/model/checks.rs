@@ -6,7 +6,7 @@ use crate::solution::{Warning, WarningCode};
 /// Relative tolerance for directions along an axis and for equal prescribed values.
 pub(super) const ALIGNED: f64 = 1e-9;
 
-/// Every check is a method and returns whether it holds.
+/// The violations and warnings found so far. Every check is a method that returns whether it holds.
 #[derive(Default)]
 pub(super) struct Checks {
     pub(super) found: Findings,
@@ -53,7 +53,8 @@ impl Checks {
     }
 }
 
-/// What is expected where a name is unknown: one of those that the mesh has, or that it has none of the `kind`.
+/// The expected value where a name is unknown: one of those that the mesh has, or the remark that it has none of the
+/// `kind`.
 pub(super) fn one_of<'a>(kind: &str, names: impl ExactSizeIterator<Item = &'a String>) -> String {
     match names.len() {
         0 => format!("{kind}; this mesh has none"),
@@ -61,7 +62,7 @@ pub(super) fn one_of<'a>(kind: &str, names: impl ExactSizeIterator<Item = &'a St
     }
 }
 
-/// The names that exist, or the first of them.
+/// The existing names in a list, or the first of them.
 pub(super) fn known<'a>(names: impl ExactSizeIterator<Item = &'a String>) -> String {
     const SHOWN: usize = 20;
     let count = names.len();

@@ -13,61 +13,63 @@ use crate::problem::{Condition, NormalOf, Obstacle};
 /// An obstacle that is pushed along one direction.
 #[derive(Clone, Debug)]
 pub struct AlongDirection {
-    /// A unit vector.
+    /// The direction, a unit vector.
     pub direction: [f64; 2],
-    /// What is pushed: gaps are of first order in the indentation, and those of the displaced obstacle are not.
+    /// The obstacle that is pushed. Gaps are of first order in the indentation; those of the displaced obstacle are
+    /// not.
     pub obstacle: Arc<Obstacle>,
 }
 
 /// A contact boundary, its obstacle and its friction law.
 #[derive(Clone, Debug)]
 pub struct ContactModel {
-    /// Name of the boundary.
+    /// The name of the boundary.
     pub name: String,
-    /// JSON Pointer to the contact.
+    /// The JSON Pointer to the contact.
     pub pointer: String,
     /// Γ_C, with the normals that the contact uses.
     pub boundary: ContactBoundary,
-    /// Profile of the obstacle at each node, along the contact's normal (length).
+    /// The profile of the obstacle at each node, along the contact's normal (length).
     pub profile: Vec<f64>,
     /// The obstacle between the nodes and at its corners, in order of s.
     pub places: Vec<Place>,
-    /// The obstacle is a curve in space, whatever the shape of the body; else it follows the body's surface at a distance.
+    /// Whether the obstacle is a curve with a place of its own; else it follows the body's surface at a distance.
     pub in_space: bool,
-    /// Slope of the obstacle along the body's t at the first and at the last node.
+    /// The slope of the obstacle along the body's t, at the first and at the last node.
     pub end_slopes: [f64; 2],
-    /// Edges that an end of the obstacle cuts, which are no part of Γ_C, and the length of each that it covers.
+    /// Edges inside which the obstacle ends, which are not part of Γ_C, and the length of each that it covers.
     pub cut: Vec<(Edge, f64)>,
     /// How far the obstacle is pushed against the body (length).
     pub indentation: f64,
-    /// The parts of that push against the contact's normal and along its t, at each node: without a direction of its own 1
-    /// and 0 with the body's normal, and with the obstacle's the cosine and minus the sine of the slope.
+    /// The components of a unit push against the contact's normal and along its t, at each node. Without a direction
+    /// they are 1 and 0 for the body's normal, and the cosine and minus the sine of the slope for the obstacle's.
     pub push: Vec<[f64; 2]>,
-    /// The direction of the indentation, if it has one of its own.
+    /// The direction of the indentation, if one is given.
     pub along: Option<AlongDirection>,
     /// The body's own normal at each node.
     pub outward: Vec<[f64; 2]>,
     /// The obstacle's own displacement along the contact's t (length).
     pub tangential_displacement: f64,
-    /// Sliding changes neither gap nor place: a straight obstacle without ends along a whole straight side of the body.
+    /// Whether sliding changes neither gap nor place: a straight obstacle without ends along a whole straight side of
+    /// the body.
     pub endless: bool,
-    /// Whose normal it is.
+    /// Which normal the contact uses.
     pub normal: NormalOf,
     /// The contact condition.
     pub condition: Condition,
-    /// m where the profile is a power |c|^m: a contact's width then grows like δ^(1/m).
+    /// The exponent m if the profile is a power |c|^m: a contact's width then grows like δ^(1/m).
     pub power: Option<f64>,
-    /// Absent: frictionless.
+    /// The friction law; absent: frictionless.
     pub friction: Option<FrictionLaw<Average>>,
 }
 
 impl ContactModel {
-    /// Gap at a node (length) when the obstacle is pushed by `factor` times its indentation.
+    /// The gap at a node (length) when the obstacle is pushed by `factor` times its indentation.
     pub fn gap(&self, node: usize, factor: f64) -> f64 {
         self.gap_behind(node, factor * self.indentation)
     }
 
-    /// Gap at a node (length) when the obstacle is pushed that far.
+    /// The gap at a node (length) when the obstacle is pushed by `pushed` (length).
     pub fn gap_behind(&self, node: usize, pushed: f64) -> f64 {
         self.profile[node] - pushed * self.push[node][0]
     }
@@ -78,8 +80,8 @@ impl ContactModel {
         (held[0] * x + held[1] * y).abs() <= ALIGNED
     }
 
-    /// How far the indentation moves the obstacle along the surface of the body at a node (length); 0 without a direction
-    /// of its own.
+    /// How far the indentation moves the obstacle along the surface of the body at a node (length); 0 if no direction
+    /// is given.
     pub(super) fn pushed_along_body(&self, node: usize) -> f64 {
         let ([a, b], m, t) = (
             self.push[node],
@@ -90,13 +92,14 @@ impl ContactModel {
         self.indentation * (y * (b * t[0] - a * m[0]) - x * (b * t[1] - a * m[1]))
     }
 
-    /// d: the obstacle's displacement along the contact's t at a node (length).
+    /// The displacement d of the obstacle along the contact's t at a node (length).
     pub fn drag(&self, node: usize, level: &Level) -> f64 {
         let along = level.tangential_displacement * self.tangential_displacement;
         self.drag_behind(node, [level.indentation * self.indentation, along])
     }
 
-    /// The same when the obstacle is pushed and moved along t that far.
+    /// The displacement d of the obstacle along the contact's t at a node (length), for a given push and motion along
+    /// t.
     pub fn drag_behind(&self, node: usize, [pushed, along]: [f64; 2]) -> f64 {
         along + pushed * self.push[node][1]
     }

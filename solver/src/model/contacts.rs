@@ -1,4 +1,4 @@
-//! Contact boundaries and the obstacles they face.
+//! Checks of contact boundaries and the obstacles they face.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -25,23 +25,23 @@ pub(super) type Law = Option<FrictionLaw<Average>>;
 /// The sharpest corner between two contact edges without a warning: 20° (angle).
 const SHARPEST_TURN: f64 = 0.35;
 
-/// The sharpest that is accepted: 45° (angle).
+/// The sharpest corner between two contact edges that is accepted: 45° (angle).
 const SHARPEST_CORNER: f64 = 0.795;
 
 /// Largest nonlocal radius, in lengths of the contact boundary. Beyond it the average hardly depends
 /// on the contact, and between two lines of symmetry its cost grows with the radius.
 const LARGEST_RADIUS: f64 = 10.0;
 
-/// Slopes of obstacles above this are none that printed digits leave.
+/// Slopes of obstacles above this do not come from rounded coordinates in a file.
 const NO_SLOPE: f64 = 1e-3;
 
-/// Sine of the least angle between two normals at a common node, or a normal and a support: 6°. Below it the two
-/// directions are hardly independent.
+/// The sine of the smallest angle between two normals at a common node, or between a normal and a support: 6°. Below it
+/// the two directions are hardly independent.
 const LEAST_ANGLE: f64 = 0.1;
 
 impl Checks {
-    /// The valid contacts, and whether all are valid. `numbers`: for each contact the check of its obstacle's
-    /// numbers, and its friction law.
+    /// The valid contacts, and whether all are valid. `numbers`: for each contact, the result of checking its
+    /// obstacle's numbers, and its friction law.
     pub(super) fn contacts(
         &mut self,
         mesh: &Mesh,
@@ -97,8 +97,8 @@ impl Checks {
                 format!("{pointer}/boundary"),
                 Reason::Malformed,
                 format!("{:?}", contact.boundary),
-                "a name that can stand in an address: not empty, and neither . nor ..",
-                "Name the same edges otherwise in the mesh, or as a part under /mesh/boundaries.",
+                "a name that can be part of a URL: not empty, and neither . nor ..",
+                "Give these edges another name in the mesh, or name a part under /mesh/boundaries.",
             ));
         }
         obstacle?;
@@ -144,8 +144,8 @@ impl Checks {
         })
     }
 
-    /// Two contacts may have a common end, a corner, where the two normals are its axes; no other node belongs to
-    /// two of them.
+    /// Checks nodes of two contacts. Two contacts may have a common end, a corner, where the two normals are its axes;
+    /// no other node may belong to two contacts.
     fn shared_nodes(
         &mut self,
         model: &ContactModel,
@@ -175,7 +175,7 @@ impl Checks {
                         Reason::SharedNode,
                         format!("node {node} at ({x}, {y}), also in contact `{}`", other.name),
                         "contacts without common nodes, or with a common end at which two normals differ by more than 6°; none bonded, and not with algorithm `thesis`",
-                        "End one of them an edge earlier with `from` or `to`.",
+                        "End one of them one edge earlier with `from` or `to`.",
                     ));
                 }
                 corners.push(*node);
@@ -184,8 +184,9 @@ impl Checks {
         Ok(())
     }
 
-    /// A support along neither normal nor tangent: the normal and its direction become the axes of the node, if they
-    /// can. At a common end of two contacts the axes are their normals, and a support has to lie along one of them.
+    /// Checks supports along neither normal nor tangent: the normal and the support's direction become the axes of the
+    /// node, if possible. At a common end of two contacts the axes are their normals, and a support must be along one
+    /// of them.
     fn oblique_supports(
         &mut self,
         contacts: &[ContactModel],
@@ -219,7 +220,7 @@ impl Checks {
                         Reason::ObliqueSupport,
                         format!("node {node} at ({x}, {y}), normal ({:.4}, {:.4}), supported along one axis", n[0], n[1]),
                         "a support along the contact's normal or tangent, or along both axes; or at more than 6° to the normal, where the contact is not bonded, ends at no other contact and the algorithm is not `thesis`",
-                        "End the contact an edge before the support with `from` or `to`.",
+                        "End the contact one edge before the support with `from` or `to`.",
                     ));
                 }
             }
@@ -227,7 +228,7 @@ impl Checks {
         all.finish(())
     }
 
-    /// Whether the chain can carry a pressure, and its obstacle and friction are valid on it.
+    /// Checks that the chain can carry a pressure, and that its obstacle and friction are valid on it.
     fn sound(
         &mut self,
         boundary: &ContactBoundary,
@@ -290,7 +291,7 @@ impl Checks {
         all.finish(())
     }
 
-    /// Whether the nonlocal radius of a contact is a sensible one for its boundary.
+    /// Checks that the nonlocal radius of a contact suits the length of its boundary.
     pub(super) fn radius(
         &mut self,
         boundary: &ContactBoundary,
@@ -304,13 +305,13 @@ impl Checks {
                 Reason::OutOfRange,
                 radius,
                 format!("at most {most}, ten times the length of the contact boundary"),
-                "The radius is a material length, far below the size of the contact.",
+                "The radius is a material length, much smaller than the contact.",
             )),
             _ => Ok(()),
         }
     }
 
-    /// The part of the boundary that faces the obstacle, one chain, and the edges that its ends cut.
+    /// The part of the boundary that faces the obstacle, one chain, and the edges inside which the obstacle ends.
     pub(super) fn facing_run(
         &mut self,
         mesh: &Mesh,
@@ -392,8 +393,8 @@ impl Checks {
         Err(self.report(place, reason, got, expected, extent))
     }
 
-    /// A supported contact node must not be held inside the obstacle, at the end of any step; and a bonded one not
-    /// elsewhere than by its obstacle.
+    /// Checks that no support holds a contact node inside the obstacle at the end of any step, nor a bonded node away
+    /// from its obstacle.
     pub(super) fn supported_contact_nodes(
         &mut self,
         contact: &ContactModel,
@@ -437,7 +438,7 @@ impl Checks {
                             Reason::Conflict,
                             format!("node {node} at ({x}, {y}) held at {u} by a support"),
                             format!("{wanted}, where the bonded obstacle holds it"),
-                            "End the contact an edge before the support with `from` or `to`, or let both agree.",
+                            "End the contact one edge before the support with `from` or `to`, or let both agree.",
                         ));
                     }
                 }
@@ -468,7 +469,7 @@ impl Checks {
         }
     }
 
-    /// At a corner between two edges the normal is not unique.
+    /// Warns of corners between two edges, where the normal is not unique.
     fn corners(&mut self, contact: &ContactModel) {
         let boundary = &contact.boundary;
         for corner in 0..boundary.nodes.len() {
@@ -505,7 +506,7 @@ impl Checks {
     }
 }
 
-/// The directions, with their errors, of nodes that supports hold along one.
+/// The directions, with their errors, of nodes that supports hold along one direction.
 fn along_one_direction(fixed: &BTreeMap<u32, Held>) -> HeldDirections {
     let one = |(node, held): (&u32, &Held)| match *held {
         Held::Along {
@@ -516,14 +517,14 @@ fn along_one_direction(fixed: &BTreeMap<u32, Held>) -> HeldDirections {
     fixed.iter().filter_map(one).collect()
 }
 
-/// Divides sides of contacts at the ends of their obstacles, so that these lie on nodes and no edge is left out; the
-/// obstacles that are not `sound` are passed over, since all else is refused with them.
+/// Divides sides of contacts where their obstacles end, so that the ends are at nodes and no edge is left out.
+/// Obstacles that are not `sound` are skipped, since the problem is refused anyway.
 pub(super) fn put_nodes_at_ends<'a>(
     mesh: &mut Mesh,
     contacts: impl Iterator<Item = (&'a Contact, bool)>,
     steps: &[Step],
 ) {
-    /// Ends inside edges: two of an obstacle, and where a curve in space is hidden.
+    /// The most ends inside edges: two of an obstacle, and where a curve is hidden.
     const MOST_ENDS: usize = 16;
     let factors = steps
         .iter()
@@ -555,8 +556,8 @@ pub(super) fn put_nodes_at_ends<'a>(
     }
 }
 
-/// The contact nodes with oblique axes: where two contacts meet that both touch their normals, else the normal and the direction of a
-/// support that is neither normal nor tangent.
+/// The contact nodes with oblique axes: where two contacts meet that both touch, their normals; else the normal and the
+/// direction of a support that is neither normal nor tangent.
 pub(super) fn oblique(
     contacts: &[ContactModel],
     fixed: &BTreeMap<u32, Held>,
@@ -590,9 +591,9 @@ fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }
 
-/// Turns the normals to those of the obstacle if the contact uses them; returns the parts of a push against
-/// the body along normal and tangent. At the angle whose tangent is the slope p′ of the profile,
-/// m = (n − p′ t)/√(1 + p′²); the push is along −n.
+/// Turns the normals to those of the obstacle if the contact uses them; returns the components of a unit push along
+/// normal and tangent. At the angle whose tangent is the slope p′ of the profile, m = (n − p′ t)/√(1 + p′²); the push
+/// is along −n.
 fn turn_normals(
     boundary: &mut ContactBoundary,
     run: &FacingRun,
@@ -619,7 +620,7 @@ fn turn_normals(
     push
 }
 
-/// The parts of a unit push along one direction, against the contact's normal m and along its t, at each node.
+/// The components of a unit push along a direction, against the contact's normal m and along its t, at each node.
 fn push_along([x, y]: [f64; 2], boundary: &ContactBoundary) -> Vec<[f64; 2]> {
     let length = x.hypot(y);
     let parts = |i: usize| {
@@ -633,7 +634,7 @@ fn push_along([x, y]: [f64; 2], boundary: &ContactBoundary) -> Vec<[f64; 2]> {
     (0..boundary.nodes.len()).map(parts).collect()
 }
 
-/// The power of a profile.
+/// The exponent of a profile that is a power.
 fn power(obstacle: &Obstacle) -> Option<f64> {
     match obstacle {
         Obstacle::Circle { .. } | Obstacle::Parabola { .. } => Some(2.0),

@@ -1,6 +1,6 @@
-//! Common ends of two contacts. Where both touch, the node's displacement is measured along both normals, and no friction
-//! acts on it (formulation 3.3). Where only one touches, the other changes nothing: the node is that one's alone, with its
-//! normal and tangent, and what the other contact has there follows.
+//! Common ends of two contacts. Where both contacts touch, the node's displacement is measured along both normals, and
+//! no friction acts on it (formulation 3.3). Where only one touches, the node belongs to that one alone, with its
+//! normal and tangent; the displacements that the other contact needs there follow from these.
 
 use std::collections::BTreeMap;
 
@@ -9,11 +9,11 @@ use super::level::Level;
 use super::supports::Held;
 use crate::problem::Step;
 
-/// By common node: the contact, by its place in the model, that the node is taken to be of alone.
+/// For each common node that belongs to one contact alone: that contact, by its place in the model.
 pub type Alone = BTreeMap<u32, usize>;
 
-/// A first guess: the contact whose obstacle overlaps the body at the common node; if neither does, that which is nearer.
-/// Both if both do. A friction bound that is given acts wherever the body is.
+/// A first guess of the contact that each common node belongs to: the one whose obstacle overlaps the body there; if
+/// neither does, the nearer one; both if both do. A prescribed friction bound acts wherever the body is.
 pub(super) fn guess(
     contacts: &[ContactModel],
     fixed: &BTreeMap<u32, Held>,
@@ -45,7 +45,7 @@ pub(super) fn guess(
     alone
 }
 
-/// Nodes of two contacts, with both by their places in `contacts`; none of supported nodes, where both are needed.
+/// The nodes of two contacts, with both by their places in `contacts`; without supported nodes, which need both.
 pub(super) fn common(
     contacts: &[ContactModel],
     fixed: &BTreeMap<u32, Held>,

@@ -1,4 +1,4 @@
-//! Boundaries that are put on the curves that a problem names for them.
+//! Moves boundaries onto the curves that a problem names for them.
 
 use super::checks::{Checks, one_of};
 use crate::error::{AllChecks, Checked, Reason, escape};
@@ -6,7 +6,8 @@ use crate::mesh::{self, Mesh, OffCurve};
 use crate::problem::{Curve, CurveKind, MeshInput};
 
 impl Checks {
-    /// Moves nodes of boundaries onto their curves; `of`: which mesh, after the number of an element that this folds.
+    /// Moves nodes of boundaries onto their curves. `of`: the words for the mesh, for messages about an element that
+    /// this inverts.
     pub(super) fn curves(&mut self, mesh: &mut Mesh, input: &MeshInput, of: &str) -> Checked {
         let mut all = AllChecks::default();
         for (name, curve) in &input.curves {
@@ -71,7 +72,7 @@ impl Checks {
             } => (
                 Reason::Conflict,
                 format!(
-                    "node {node} at {:?}, {distance:.3e} off the circle",
+                    "node {node} at {:?}, {distance:.3e} from the circle",
                     at(node)
                 ),
                 format!("corners of elements within {most:.3e} of it, 1e-4 of the radius"),

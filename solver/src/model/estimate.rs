@@ -12,33 +12,33 @@ use crate::problem::{FrictionPoints, MeshSource, Problem, Refine};
 /// The cost of solving a problem on one core.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Estimate {
-    /// Displacements, supported ones included.
+    /// The number of displacement components, supported ones included.
     pub dofs: u64,
-    /// Peak memory (bytes), overestimated rather than underestimated.
+    /// The peak memory (bytes), overestimated rather than underestimated.
     pub memory_bytes: u64,
-    /// Time on one thread (seconds): as much or some times more on a machine of 2024, if friction needs no more iterations
-    /// than usual. Of adaptive refinement that of the largest mesh.
+    /// The time on one thread (seconds), between the actual time and several times that on a machine of 2024, if
+    /// friction needs no more iterations than usual. For adaptive refinement: the time of the largest mesh.
     pub run_s: f64,
 }
 
-/// Most elements of a mesh of adaptive refinement.
+/// The most elements of a mesh of adaptive refinement.
 pub const MOST_ADAPTIVE_ELEMENTS: usize = 60_000;
 
-/// Most elements of such a mesh at one contact: the dense system of the contact grows with their square.
+/// The most elements of such a mesh at one contact: the dense system of the contact grows with their square.
 pub const MOST_ADAPTIVE_CONTACT_ELEMENTS: usize = 600;
 
-/// Most elements of the mesh on which the last mesh of adaptive refinement is verified: as many as refinement itself may
-/// make, or as the first mesh split in two has.
+/// The most elements of the mesh on which the last mesh of adaptive refinement is verified: as many as refinement
+/// itself may make, or as the first mesh has after it is split in two.
 #[derive(Clone, Debug)]
 pub struct MostElements {
-    /// In all.
+    /// The most elements in total.
     pub elements: usize,
-    /// At each contact.
+    /// The most elements at each contact.
     pub at_contacts: Vec<usize>,
 }
 
 impl MostElements {
-    /// For refinement that begins with this model.
+    /// The limits for refinement that starts from this model.
     pub fn of(first: &Model) -> Self {
         let at_contact = |contact: &ContactModel| {
             MOST_ADAPTIVE_CONTACT_ELEMENTS.max(2 * contact.boundary.edge_count())
@@ -50,40 +50,40 @@ impl MostElements {
     }
 }
 
-/// Size of a stored mesh, for the estimate.
+/// The size of a stored mesh, for the estimate.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshSize {
-    /// Elements.
+    /// The number of elements.
     pub elements: u64,
-    /// Sides of each boundary.
+    /// The number of sides of each boundary.
     pub boundaries: BTreeMap<String, u64>,
 }
 
-/// What the cost depends on.
+/// The numbers that the cost depends on.
 #[derive(Clone, Copy, Debug, Default)]
 struct Size {
     nodes: f64,
-    /// Unknowns on all contacts.
+    /// The unknowns on all contacts.
     contact: f64,
-    /// Entries of all averages.
+    /// The entries of all averages.
     weights: f64,
-    /// Friction points on all contacts.
+    /// The friction points on all contacts.
     points: f64,
-    /// Nodes and friction points on all contacts, with results for each step.
+    /// The nodes and friction points on all contacts, with results for each step.
     profile: f64,
-    /// Contacts, each with a summary and warnings for each step.
+    /// The contacts, each with a summary and warnings for each step.
     contacts: f64,
     steps: f64,
     increments: f64,
-    /// The solution is computed once more so often.
+    /// How many more times the solution is computed.
     repeats: f64,
 }
 
-/// Bytes of a mesh file for one element, underestimated rather than overestimated: in the larger files that
-/// Gmsh writes an element of second order has about 150 with its nodes, one of first order 100.
+/// The number of bytes of a mesh file for one element, underestimated rather than overestimated: in the larger files
+/// that Gmsh writes, an element of second order has about 150 with its nodes, one of first order 100.
 const BYTES_PER_ELEMENT: f64 = 80.0;
 
-/// Most elements that can be numbered, with up to eight nodes each.
+/// The most elements that can be numbered, with up to eight nodes each.
 const MOST_ELEMENTS: f64 = u32::MAX as f64 / 8.0;
 
 /// Estimates memory and time by the number of elements alone: a first bound, not above [`Model::estimate`], which
@@ -148,8 +148,8 @@ pub fn estimate(problem: &Problem, stored: Option<&MeshSize>) -> Result<Estimate
 }
 
 impl Model {
-    /// What it will take to solve this model of `problem`: more rather than less than it does. Of adaptive refinement
-    /// the largest mesh. With `accuracy: verify` the mesh split in two is counted, too.
+    /// Estimates the cost of solving this model of `problem`, overestimated rather than underestimated. For adaptive
+    /// refinement it is that of the largest mesh. With `accuracy: verify` the refined mesh is counted too.
     pub fn estimate(&self, problem: &Problem) -> Estimate {
         let adaptive = matches!(problem.mesh.refine, Refine::Adaptive(_));
         let own = self.size(adaptive);
@@ -178,7 +178,7 @@ impl Model {
         }
     }
 
-    /// What this mesh alone takes.
+    /// The cost of this mesh alone.
     pub fn estimate_of_mesh(&self) -> Estimate {
         self.size(false).estimate(MARGIN)
     }
@@ -230,14 +230,15 @@ impl Model {
     }
 }
 
-/// Nodes of an element in a large mesh, overestimated.
+/// The number of nodes for each element of a large mesh, overestimated.
 const NODES: f64 = 3.1;
 
-/// How far the factors of meshes of other shapes lie above those that the fill is fitted to.
+/// How far the factors of meshes of other shapes exceed those that the estimate is fitted to.
 const MARGIN: f64 = 1.2;
 
 impl Size {
-    /// Every element split in two in each direction: an average reaches twice as many nodes from twice as many points.
+    /// The size after every element is split in two in each direction: an average reaches twice as many nodes from
+    /// twice as many points.
     fn split(&self) -> Size {
         let of_points = (POINT + BESIDE) * self.points;
         Size {
@@ -250,13 +251,13 @@ impl Size {
         }
     }
 
-    /// The bytes of a solution with its mesh and all steps, while another is computed.
+    /// The memory for a solution with its mesh and all steps, while another one is computed (bytes).
     fn held(&self) -> u64 {
         (500.0 * self.nodes + self.history()) as u64
     }
 
-    /// The constants of memory are those of `server/src/queue/tests/estimates.rs`, which compares estimates with
-    /// measurements; those of time of `tests/bench/estimates.py`.
+    /// The cost for this size. The constants of memory are compared with measurements by
+    /// `server/src/queue/tests/estimates.rs`, those of time by `tests/bench/estimates.py`.
     fn estimate(&self, margin: f64) -> Estimate {
         let dofs = 2.0 * self.nodes;
         let contact = self.contact;
@@ -281,27 +282,27 @@ impl Size {
         }
     }
 
-    /// Profiles and rows are held as numbers and as text; a step is also part of a partial result, which is a copy of
-    /// all steps so far and their text (bytes).
+    /// The memory for the history (bytes). Profiles and rows are held as numbers and as text; a step is also part of a
+    /// partial result, a copy of all steps so far and their text.
     fn history(&self) -> f64 {
         let of_step = 2e4 + PER_CONTACT * self.contacts + 1000.0 * self.profile;
         1.2e4 * self.increments + self.steps * of_step + 300.0 * self.profile
     }
 }
 
-/// What a step says of a contact beside its profiles: a summary and its warnings, and three profiles with what describes
-/// each as a part of the result (bytes).
+/// The memory for each contact of a step apart from its profiles (bytes): a summary and its warnings, and the
+/// descriptions of three profiles as parts of the result.
 const PER_CONTACT: f64 = 4e3;
 
-/// What even the smallest problem takes, most of it to compress its result (bytes).
+/// The memory for the smallest problem, most of it for compressing its result (bytes).
 const FLOOR: f64 = 393_216.0;
 
-/// Numbers along contacts.
+/// The numbers of the size that come from contacts.
 #[derive(Clone, Copy, Debug, Default)]
 struct Along {
     nodes: f64,
     points: f64,
-    /// Entries of the averages.
+    /// The entries of the averages.
     weights: f64,
 }
 
@@ -345,13 +346,13 @@ impl Along {
     }
 }
 
-/// Whether friction acts there.
+/// Whether friction acts at a contact.
 fn acts(contact: &ContactModel) -> bool {
     let law = contact.friction.as_ref();
     law.is_some_and(|law| law.bound.acts())
 }
 
-/// A contact of so many elements where every average reaches all nodes.
+/// The numbers of a contact with this many elements where every average reaches all nodes.
 fn every_average(elements: f64) -> Along {
     let (nodes, points) = (2.0 * elements + 1.0, 3.0 * elements);
     Along {
@@ -361,10 +362,10 @@ fn every_average(elements: f64) -> Along {
     }
 }
 
-/// What a friction point takes beside its average, in numbers.
+/// The memory for a friction point apart from its average, in numbers.
 const POINT: f64 = 24.0;
 
-/// Nodes beyond those within the radius that an average reaches.
+/// The number of nodes that an average reaches beyond those within the radius.
 const BESIDE: f64 = 4.0;
 
 #[cfg(test)]
@@ -403,7 +404,7 @@ mod tests {
         assert!(estimate(&problem(10, 6), None).unwrap().memory_bytes > 1 << 30);
     }
 
-    /// A contact under any name counts, and its dense matrices are most of what a long one takes.
+    /// A contact counts by its nodes and not by its name, and its dense matrices are most of the memory of a long one.
     #[test]
     fn a_contact_is_counted_by_its_nodes_and_not_by_its_name() {
         let problem = problem(0, 1001);

@@ -10,20 +10,20 @@ use crate::problem::{
 };
 use crate::solution::WarningCode;
 
-/// Most points of a table.
+/// The largest number of points of a table.
 const MOST_TABLE_POINTS: usize = 100_000;
 
-/// Most points of a polyline: each is looked at from every place of the boundary.
+/// The largest number of points of a polyline: each is tested from every place of the boundary.
 const MOST_LINE_POINTS: usize = 10_000;
 
-/// Fewest points that are smoothed.
+/// The smallest number of points for smoothing.
 const FEWEST_SMOOTHED: usize = 4;
 
-/// A standard deviation above this part of the range of all values is hardly the error of one of them.
+/// A standard deviation above this part of the range of all values can hardly be the error of one of them.
 const LARGE_DEVIATION: f64 = 0.1;
 
 impl Checks {
-    /// The direction of a push, which has a length; a body of revolution is pushed along its axis.
+    /// Checks the direction of a push, which must not be zero; a body of revolution is pushed along its axis.
     pub(super) fn push_direction(
         &mut self,
         analysis: &Analysis,
@@ -50,7 +50,7 @@ impl Checks {
         }
     }
 
-    /// The numbers of an obstacle.
+    /// Checks the numbers of an obstacle.
     pub(super) fn obstacle(&mut self, obstacle: &Obstacle, pointer: &str) -> Checked {
         let mut all = AllChecks::default();
         let at = |field: &str| format!("{pointer}/{field}");
@@ -118,7 +118,7 @@ impl Checks {
                         format!("{pointer}/points/{i}"),
                         Reason::RepeatedPoint,
                         format!("{:?} twice", points[i]),
-                        "points that differ from those before them",
+                        "points that differ from the previous ones",
                         "Remove one of them.",
                     ));
                 }
@@ -156,12 +156,12 @@ impl Checks {
                 Reason::TooMany,
                 format!("{count} points"),
                 format!("at most {most}"),
-                "Give every second or tenth point: a mesh resolves far fewer.",
+                "Give every second or tenth point: a mesh cannot resolve more.",
             )),
         }
     }
 
-    /// The smoothing of a table.
+    /// Checks the smoothing of a table.
     fn smoothing(
         &mut self,
         pointer: &str,
@@ -199,7 +199,7 @@ impl Checks {
         all.finish(())
     }
 
-    /// A deviation in another unit leaves a parabola of any profile.
+    /// Warns of a standard deviation that is probably in another unit, which would smooth any profile to a parabola.
     fn warn_of_smoothing(&mut self, pointer: &str, gap: &[f64], smoothing: &Smoothing) {
         let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
         let most = gap.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -213,7 +213,7 @@ impl Checks {
         }
     }
 
-    /// Increasing places, and one value for each.
+    /// Checks a table: increasing places, and one value for each.
     fn table(&mut self, x_at: &str, x: &[f64], y_at: &str, y: &[f64], what: &str) -> Checked {
         let mut all = AllChecks::default();
         if x.len() < 2 {
@@ -246,8 +246,8 @@ impl Checks {
         all.finish(())
     }
 
-    /// The friction law of a contact, if all its parts are given; and whether its numbers are in their range and
-    /// compatible with the contact.
+    /// Checks the friction law of a contact: all its parts are given, and its numbers are in their range and compatible
+    /// with the contact.
     pub(super) fn friction(
         &mut self,
         analysis: &Analysis,
@@ -293,7 +293,7 @@ impl Checks {
         (law, all.finish(()))
     }
 
-    /// A bound that follows from the pressure.
+    /// Checks a friction bound that follows from the pressure.
     fn pressure_bound(
         &mut self,
         friction: &Friction,
@@ -355,7 +355,7 @@ impl Checks {
         (law, all.finish(()))
     }
 
-    /// A prescribed bound, without the fields that would determine one.
+    /// Checks a prescribed bound, which excludes the fields that would determine one.
     fn prescribed_bound(
         &mut self,
         friction: &Friction,
@@ -374,7 +374,7 @@ impl Checks {
                 all.fail(self.report(
                     at(name),
                     Reason::NotUsed,
-                    "a value beside `bound`",
+                    "a value in addition to `bound`",
                     "one of the two",
                     "A prescribed bound does not depend on pressure; remove this field or `bound`.",
                 ));
@@ -400,7 +400,7 @@ impl Checks {
         (Some(BoundLaw::Prescribed(bound.clone())), all.finish(()))
     }
 
-    /// The transition from stick to slip.
+    /// Checks the transition from stick to slip.
     fn slip(&mut self, analysis: &Analysis, friction: &Friction, pointer: &str) -> Checked {
         let mut all = AllChecks::default();
         let at = |field: &str| format!("{pointer}/{field}");
@@ -429,7 +429,7 @@ impl Checks {
                 Reason::Unsupported,
                 "`conserving` with `measure: surface`",
                 "`unit_integral` or `peak_one`, or `measure: line`",
-                "Only averages along the boundary can be kept on it.",
+                "Only averages along the boundary can conserve the force on it.",
             ));
         }
         if friction.measure == Measure::Surface && !round {

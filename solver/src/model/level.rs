@@ -1,22 +1,22 @@
-//! Load levels: how far a load history has come.
+//! Load levels: how far a load history has progressed.
 
 use crate::problem::Step;
 
 /// A load level: factors on the values of the problem.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Level {
-    /// On every indentation.
+    /// The factor on every indentation.
     pub indentation: f64,
-    /// On every tangential displacement of an obstacle.
+    /// The factor on every tangential displacement of an obstacle.
     pub tangential_displacement: f64,
-    /// On all loads.
+    /// The factor on all loads.
     pub loads: f64,
-    /// On all prescribed displacements.
+    /// The factor on all prescribed displacements.
     pub supports: f64,
 }
 
 impl Level {
-    /// No loads and no motion.
+    /// The level with no loads and no motion.
     pub const ZERO: Level = Level {
         indentation: 0.0,
         tangential_displacement: 0.0,
@@ -24,7 +24,7 @@ impl Level {
         supports: 0.0,
     };
 
-    /// The end of a load step.
+    /// The level at the end of a load step.
     pub fn end_of(step: &Step) -> Level {
         Level {
             indentation: step.indentation,
@@ -34,7 +34,7 @@ impl Level {
         }
     }
 
-    /// All values as given.
+    /// The level with all values as given.
     pub const FULL: Level = Level {
         indentation: 1.0,
         tangential_displacement: 1.0,

@@ -1,4 +1,4 @@
-//! Loads on the mesh.
+//! Checks loads and places them on the mesh.
 
 use super::checks::Checks;
 use super::nodes::{FirstSides, Forces};
@@ -10,10 +10,10 @@ use crate::problem::{BoundaryValue, Load};
 /// A stress on a boundary.
 struct Stress {
     axes: LoadAxes,
-    /// −1: a pressure pushes against the normal.
+    /// The sign: −1 for a pressure, which pushes against the normal.
     sign: f64,
     values: [BoundaryValue; 2],
-    /// Names of the two values in the load.
+    /// The names of the two values in the load.
     fields: [&'static str; 2],
 }
 
@@ -36,7 +36,7 @@ impl Checks {
         all.finish(found)
     }
 
-    /// Adds one load to those `found`, or to those `at_nodes` of the first mesh.
+    /// Adds one load to `found`, or to the forces `at_nodes` of the first mesh.
     fn load(
         &mut self,
         mesh: &Mesh,
@@ -62,7 +62,7 @@ impl Checks {
                         Reason::UnusedNode,
                         format!("{count} nodes of `{nodes}` that belong to no element"),
                         "nodes of elements only",
-                        "The body would not feel the force on them: leave these nodes out of the set, or give them an element.",
+                        "A force on them would not act on the body: leave these nodes out of the set, or connect them to an element.",
                     ));
                 }
                 let set = self.node_set(mesh, nodes, pointer)?;
@@ -145,7 +145,8 @@ impl Checks {
         Ok(())
     }
 
-    /// The nodes of a boundary from its start; there must be `count` of them, on the first mesh (`true`) or on this one.
+    /// The nodes of a boundary from its start. There must be `count` of them, on the first mesh (`true`) or on this
+    /// one.
     fn nodes_in_order(
         &mut self,
         mesh: &Mesh,

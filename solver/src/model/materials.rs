@@ -1,4 +1,4 @@
-//! Materials, and which elements are made of them.
+//! Checks materials, and which elements are made of them.
 
 use super::checks::{Checks, one_of};
 use crate::elasticity::{self, Moduli, Section};
@@ -7,7 +7,7 @@ use crate::mesh::Mesh;
 use crate::problem::{Analysis, Elasticity, Material, Orthotropic};
 
 impl Checks {
-    /// The theory with the materials of all elements.
+    /// The analysis with the materials of all elements.
     pub(super) fn section(
         &mut self,
         analysis: Analysis,
@@ -72,7 +72,7 @@ impl Checks {
             format!("{pointer}/poissons_ratio"),
             nu,
             "−1 < Poisson's ratio < 0.5",
-            "For an incompressible body use 0.49999, which differs from it by some 1e-5; its elements do not lock.",
+            "For an incompressible body use 0.49999: results differ by some 1e-5, and the elements do not lock.",
         ));
         all.finish(elasticity::isotropic(analysis, e, nu))
     }
@@ -120,7 +120,7 @@ impl Checks {
                 Reason::OutOfRange,
                 format!("nu12 = {}{nu13}{nu23}", constants.nu12),
                 "constants of a stable material, e.g. nu12² < e1/e2",
-                "Some strain would need no energy. Check which of nu12 and nu21 is meant: nu12 = −ε_2/ε_1 under σ_1.",
+                "Some strain would need no energy. Check whether nu12 and nu21 were exchanged: nu12 = −ε_2/ε_1 under σ_1.",
             )
         })
     }
@@ -151,7 +151,7 @@ impl Checks {
                     pointer,
                     Reason::Overlap,
                     format!(
-                        "element {e}, which is made of material {} already",
+                        "element {e}, which already has material {}",
                         material_of[*e as usize]
                     ),
                     "one material for every element",
@@ -170,7 +170,7 @@ impl Checks {
                 Reason::WrongCount,
                 "a second material without a group",
                 "at most one material without a group",
-                "Name the group of elements that are made of it.",
+                "Name the group of elements with this material.",
             ));
         }
         let bare = material_of.iter().position(|m| *m == NONE);
@@ -192,7 +192,7 @@ impl Checks {
     }
 }
 
-/// A constant with its name, where it is given.
+/// A constant with its name, if it is given.
 fn named(name: &str, value: Option<f64>) -> String {
     value.map_or(String::new(), |value| format!(", {name} = {value}"))
 }

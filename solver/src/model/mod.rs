@@ -1,7 +1,7 @@
 //! All checks of a [`Problem`]: the only way to obtain a problem that can be solved.
 //!
-//! `Model::new` checks everything and reports all violations at once; the [`Model`] that it returns is
-//! numbered, and every room above relies on it.
+//! `Model::new` checks everything and reports all violations at once; the [`Model`] that it returns is numbered, and
+//! every room above relies on it.
 //!
 //! # Where to look
 //!
@@ -19,7 +19,7 @@
 //! | common ends of two contacts | `corners` |
 //! | obstacles that slide along the body | `sliding` |
 //! | rigid motions that nothing prevents | `freedom` |
-//! | nodes that were not merged | `unmerged` |
+//! | distinct nodes at one place | `unmerged` |
 //! | the axis of a body of revolution | `axis` |
 //! | load levels | `level` |
 //! | problems that differ in numbers only | `variable` |
@@ -66,7 +66,7 @@ use crate::mesh::{External, ExternalMesh, Mesh};
 use crate::problem::{Algorithm, Condition, History, Problem, SolverControls, Step};
 use crate::solution::Warning;
 
-/// A hollow is deeper than this part of the contact's length.
+/// The depth above which an obstacle counts as hollow, as a part of the contact's length.
 const HOLLOW: f64 = 1e-10;
 
 /// A problem that can be solved.
@@ -74,11 +74,11 @@ const HOLLOW: f64 = 1e-10;
 pub struct Model {
     /// The refined mesh.
     pub mesh: Mesh,
-    /// Theory and materials.
+    /// The analysis and the materials.
     pub section: Section,
-    /// The axis, in a body of revolution.
+    /// The axis of a body of revolution.
     pub axis: Axis,
-    /// Gauss points of an element in each direction.
+    /// The number of Gauss points of an element in each direction.
     pub quadrature: u32,
     /// Prescribed displacements by node.
     pub fixed: BTreeMap<u32, Held>,
@@ -89,27 +89,27 @@ pub struct Model {
     /// Contact nodes whose displacement is measured along two directions that are not perpendicular: the normals of two
     /// contacts that meet there, or the normal and the direction of a support.
     pub oblique: BTreeMap<u32, [[f64; 2]; 2]>,
-    /// Common ends of two contacts that are of one of them alone, since the other one does not touch there.
+    /// Common ends of two contacts that belong to one of them alone, since the other one does not touch there.
     pub alone: Alone,
-    /// Contact nodes on the axis that stay open under a hollow of the obstacle: their bounds and those of the midside nodes beside
-    /// them are plain ones (formulation 3.5).
+    /// Contact nodes on the axis that stay open under a hollow of the obstacle: the constraints at them and at the
+    /// midside nodes beside them are those of ordinary nodes (formulation 3.5).
     pub open_on_axis: BTreeSet<u32>,
-    /// The supports leave a rigid motion free, which contact must prevent.
+    /// Whether the supports leave a rigid motion free, which contact must prevent.
     pub held_by_contact: bool,
-    /// Load steps; none: one step to the values as given.
+    /// The load steps; none: one step to the given values.
     pub steps: Vec<Step>,
-    /// Tolerance and limits.
+    /// The tolerance and limits of the solver.
     pub controls: SolverControls,
     /// Warnings known before the solution.
     pub warnings: Vec<Warning>,
 }
 
 impl Model {
-    /// Checks and numbers a problem; `external` is its mesh, if the problem only names or quotes one.
+    /// Checks and numbers a problem. `external`: its mesh, if the problem only names it or contains it as text.
     ///
     /// # Errors
     ///
-    /// All violations of the problem at once, those of the external mesh among them; at most a hundred are listed.
+    /// All violations of the problem at once, including those of the external mesh; at most a hundred are listed.
     pub fn new(problem: &Problem, external: Option<External>) -> Result<Model, Vec<Violation>> {
         let mut checks = Checks::default();
         let model = checks.model(problem, Source::Given(external));
@@ -117,7 +117,7 @@ impl Model {
     }
 
     /// Checks and numbers a problem on a refined mesh, which has all names of the first one: adaptive refinement makes
-    /// one after the other, and verification splits the last in two.
+    /// a sequence of such meshes, and verification splits the last one in two.
     ///
     /// # Errors
     ///
@@ -136,12 +136,12 @@ impl Model {
         self.loads.body_force.map(|f| level.loads * f)
     }
 
-    /// Nodes of two contacts, with both by their places in the model; none of supported nodes, where both are needed.
+    /// The nodes of two contacts, with both by their places in the model; without supported nodes, which need both.
     pub fn common_nodes(&self) -> BTreeMap<u32, [usize; 2]> {
         corners::common(&self.contacts, &self.fixed)
     }
 
-    /// The same problem with other common nodes of one contact alone.
+    /// The same problem with other common nodes assigned to one contact alone.
     pub fn with_alone(&self, alone: Alone) -> Model {
         Model {
             oblique: contacts::oblique(&self.contacts, &self.fixed, &alone),
@@ -158,7 +158,7 @@ impl Model {
         }
     }
 
-    /// Whether an obstacle is hollow at the axis: before deformation it is further from the node there than from the midside
+    /// Whether an obstacle is hollow at the axis: before deformation the node there is further from it than the midside
     /// node beside it.
     pub fn hollow_at_axis(&self) -> bool {
         self.contacts.iter().any(|contact| {
@@ -172,7 +172,7 @@ impl Model {
         })
     }
 
-    /// Whether the end depends on the increments that lead to it: some friction is incremental.
+    /// Whether the result depends on the increments of the load path, because some friction is incremental.
     pub fn depends_on_path(&self) -> bool {
         let laws = self.contacts.iter().filter_map(|c| c.friction.as_ref());
         let mut acting = laws.filter(|law| law.bound.acts());
@@ -185,7 +185,7 @@ impl Model {
         freedom::motion_left(&self.mesh, &self.section, &self.fixed, hindered)
     }
 
-    /// All rigid motions that neither the supports nor the given holds prevent, but those that bend hinges.
+    /// All rigid motions that neither the supports nor the given holds prevent, except those that bend hinges.
     pub fn free_motions(&self, hindered: &[Hold]) -> Vec<RigidMotion> {
         freedom::free_motions(&self.mesh, &self.section, &self.fixed, hindered)
     }
@@ -193,9 +193,9 @@ impl Model {
 
 /// Where the mesh of a model comes from.
 enum Source {
-    /// The problem, or its caller.
+    /// The mesh is given by the problem or its caller.
     Given(Option<External>),
-    /// An earlier model of the problem, refined.
+    /// The mesh of an earlier model of the problem, refined.
     Ready(Mesh),
 }
 

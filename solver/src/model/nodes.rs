@@ -1,9 +1,9 @@
-//! Forces and displacements at nodes of the first mesh, on the mesh that it was refined to.
+//! Forces and displacements that are given at nodes of the first mesh, transferred to a refined mesh.
 //!
-//! Where they are given at all nodes of a side, they are the side's: a support holds it, as those nodes do on the first
-//! mesh, and forces become the traction on it that does the same work on all displacements that it has there. Both have a
-//! limit as the mesh is refined. At other nodes they stay what they are. The sides of elements with corners only, which got
-//! midsides when their file was read, have linear displacements in this.
+//! Where they are given at all nodes of a side, they apply to the whole side: a support holds it, as those nodes do on
+//! the first mesh, and forces become the traction that does the same work for all displacements of that side. Both have
+//! a limit as the mesh is refined. At other nodes they are kept. The sides of elements with corners only, which got
+//! midsides when their file was read, have linear displacements for this purpose.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,15 +15,15 @@ use crate::problem::{Load, Problem};
 /// Forces by node of the first mesh.
 pub(super) type Forces = BTreeMap<u32, [f64; 2]>;
 
-/// The sides of a first mesh, if they have other nodes now.
+/// The sides of a first mesh that have other nodes on the refined mesh.
 pub(super) struct FirstSides<'a> {
     mesh: &'a Mesh,
-    /// By midside.
+    /// The sides, by midside node.
     sides: BTreeMap<u32, FirstSide>,
 }
 
 impl<'a> FirstSides<'a> {
-    /// Only those of a problem that gives anything at nodes are looked for.
+    /// Finds these sides; only if the problem gives anything at nodes.
     pub(super) fn new(mesh: &'a Mesh, problem: &Problem) -> Self {
         let at_nodes = |load: &Load| matches!(load, Load::Force(..) | Load::Nodal(..));
         let given = problem.loads.iter().any(at_nodes)
@@ -38,8 +38,8 @@ impl<'a> FirstSides<'a> {
         FirstSides { mesh, sides }
     }
 
-    /// Forces at nodes of the first mesh as forces at nodes of this one: those of each load on the sides of the surface that
-    /// it names all nodes of; then what is left of all of them, which may be given node by node.
+    /// Transfers forces at nodes of the first mesh to this mesh: first each load on sides of the surface all of whose
+    /// nodes it names, then the rest of all loads, which may be given node by node.
     pub(super) fn carried(&self, loads: Vec<Forces>) -> Vec<(u32, [f64; 2])> {
         let mut found = Vec::new();
         let mut left = Forces::new();
@@ -62,7 +62,7 @@ impl<'a> FirstSides<'a> {
         found
     }
 
-    /// Takes the forces on all nodes of some of these sides, and adds them as forces on the nodes of their parts.
+    /// Removes the forces on all nodes of some of these sides, and adds them as forces on the nodes of their parts.
     fn spread(
         &self,
         forces: &mut Forces,
@@ -107,7 +107,7 @@ impl<'a> FirstSides<'a> {
         forces.retain(|node, _| !spent.contains(node));
     }
 
-    /// Displacements at all nodes of sides that are prescribed at all their nodes of the first mesh.
+    /// The displacements at all nodes of sides where they are prescribed at every node of the first mesh.
     pub(super) fn between(&self, prescribed: &BTreeMap<u32, f64>) -> Vec<(u32, f64)> {
         let mut found = Vec::new();
         for side in self.sides.values() {
@@ -128,15 +128,16 @@ impl<'a> FirstSides<'a> {
         found
     }
 
-    /// Whether a side's nodes are all given, but for a midside that its file did not have.
+    /// Whether all nodes of a side are given, apart from a midside that its file did not have.
     fn is_given(&self, [a, b, mid]: &Edge, given: impl Fn(u32) -> bool) -> bool {
         let raised = || self.mesh.is_raised(&[*a, *b, *mid]);
         given(*a) && given(*b) && (given(*mid) || raised())
     }
 }
 
-/// The forces on the start, end and midside of a part of a side, in one direction. `ends`, `middle`: those on the nodes of
-/// the side; without a middle the side has displacements that are linear. `places`: of the part's nodes on the side.
+/// The forces on the start, end and midside of a part of a side, in one direction. `ends`, `middle`: those on the nodes
+/// of the side; without a middle the side has linear displacements. `places`: the places of the part's nodes on the
+/// side.
 ///
 /// With the side's shape functions h_i(ξ), −1 ≤ ξ ≤ 1, and the forces F_i on its nodes, the traction per dξ is the
 /// combination q of the h_i with ∫ q h_i dξ = F_i. On a part of it, it has the forces ∫ q H_k dξ with the part's H_k.
@@ -170,8 +171,8 @@ fn on_part([start, end]: [f64; 2], middle: Option<f64>, places: [f64; 3]) -> [f6
 mod tests {
     use super::*;
 
-    /// On the side itself the forces are those given; on its parts they have the same sum and the same moment, of any order
-    /// that the side's displacements have.
+    /// Forces on parts do the work of those on the side: on the side itself they are unchanged, and on its parts they
+    /// have the same sum and the same moments, of any order that the side's displacements have.
     #[test]
     fn forces_on_parts_do_the_work_of_those_on_the_side() {
         let (ends, middle) = ([2.0, -7.0], 11.0);
@@ -199,7 +200,7 @@ mod tests {
         }
     }
 
-    /// The forces 1 : 4 : 1 of a uniform traction, and 1 : 1 of one on a linear side, are a uniform traction.
+    /// Forces in the ratio 1 : 4 : 1, and 1 : 1 on a linear side, are those of a uniform traction.
     #[test]
     fn forces_of_a_uniform_traction_are_that_traction() {
         let quarter = [-1.0, -0.5, -0.75];

@@ -1,4 +1,4 @@
-//! Checks of single numbers: finite, and in their range.
+//! Checks that single numbers are finite and in their range.
 
 use super::checks::Checks;
 use crate::element::{Element, Family};
@@ -11,7 +11,7 @@ use crate::problem::{
 };
 
 impl Checks {
-    /// NaN and infinity cannot come from JSON, but from protobuf.
+    /// Checks for NaN and infinity, which cannot come from JSON, but from protobuf.
     pub(super) fn finite(&mut self, problem: &Problem) -> Checked {
         let mut all = AllChecks::default();
         let (listed, more) = not_finite(problem, MOST_LISTED);
@@ -28,7 +28,7 @@ impl Checks {
         all.finish(())
     }
 
-    /// Lengths of lists: very long ones are a mistake, and each entry is checked edge by edge.
+    /// Checks the lengths of lists: very long ones are a mistake, and each entry is checked edge by edge.
     pub(super) fn counts(&mut self, problem: &Problem) -> Checked {
         let mut all = AllChecks::default();
         const MOST: usize = 1000;
@@ -55,7 +55,7 @@ impl Checks {
         all.finish(())
     }
 
-    /// Names of units must fit on an axis.
+    /// Checks the names of units, which must fit on an axis.
     pub(super) fn units(&mut self, units: Option<&Units>) -> Checked {
         const MOST: usize = 20;
         let Some(Units {
@@ -144,18 +144,18 @@ impl Checks {
 
     pub(super) fn steps(&mut self, steps: &[Step]) -> Checked {
         let mut all = AllChecks::default();
-        /// Far beyond practical use, and still a bounded time.
+        /// The most increments of one step: far more than is useful, and still a bounded time.
         const MOST_INCREMENTS: u32 = 10_000;
-        /// Of all steps: each leaves rows of history.
+        /// The most increments of all steps together: each adds rows to the history.
         const MOST_IN_ALL: u64 = 20_000;
         let total: u64 = steps.iter().map(|step| u64::from(step.increments)).sum();
         if total > MOST_IN_ALL {
             all.fail(self.report(
                 "/steps",
                 Reason::TooMany,
-                format!("{total} increments in all"),
+                format!("{total} increments in total"),
                 format!("at most {MOST_IN_ALL}"),
-                "Use fewer increments, or split it into several jobs.",
+                "Use fewer increments, or split the problem into several jobs.",
             ));
         }
         for (i, step) in steps.iter().enumerate() {
@@ -170,7 +170,8 @@ impl Checks {
         all.finish(())
     }
 
-    /// The thesis extrapolates stresses to the boundary from rows of Gauss points, which triangles lack.
+    /// Checks that the thesis's algorithm has quadrilaterals only: it extrapolates stresses to the boundary from rows
+    /// of Gauss points, which triangles lack.
     pub(super) fn thesis_elements(&mut self, problem: &Problem, mesh: &Mesh) -> Checked {
         let triangle = |element: &Element| element.family() == Family::Triangle;
         if problem.solver.algorithm == Algorithm::Thesis
@@ -187,7 +188,7 @@ impl Checks {
         Ok(())
     }
 
-    /// Options of the thesis's own iteration, and the contacts that it supports.
+    /// Checks the options of the thesis's own iteration, and that it supports the contacts.
     pub(super) fn thesis(&mut self, problem: &Problem) -> Checked {
         let mut all = AllChecks::default();
         let controls = &problem.solver;
@@ -250,7 +251,7 @@ impl Checks {
                     Reason::NotUsed,
                     "a direction",
                     "none: against the body's normal",
-                    "The thesis's obstacles move so; choose another algorithm.",
+                    "Obstacles of the thesis move against the body's normal; choose another algorithm.",
                 ));
             }
             if contact.friction.as_ref().is_some_and(|f| f.bound.is_some()) {

@@ -1,4 +1,4 @@
-//! Obstacles that slide along the body: what linear kinematics and lines of symmetry leave of that.
+//! Obstacles that slide along the body, and what linear kinematics and lines of symmetry permit.
 
 use std::collections::BTreeMap;
 
@@ -12,15 +12,15 @@ use crate::mesh::Mesh;
 use crate::problem::{Obstacle, Step};
 use crate::solution::WarningCode;
 
-/// Cosine of the angle between two sides up to which the surface goes on straight: 20°.
+/// The cosine of the largest angle between two sides at which the surface counts as straight: 20°.
 const STRAIGHT_ON: f64 = 0.94;
 
-/// The largest angle between normals of a straight side, whose nodes are printed with some digits: 0.06°.
+/// The largest angle between normals of a straight side, whose nodes have rounded coordinates: 0.06°.
 const STRAIGHT: f64 = 1e-3;
 
 impl Checks {
-    /// Warns of an obstacle that is dragged along a contact with a line of symmetry at its end: the other half, which is
-    /// not modelled, would be dragged the opposite way.
+    /// Warns of an obstacle that is dragged along a contact with a line of symmetry at its end: the other half, which
+    /// is not modelled, would be dragged the opposite way.
     pub(super) fn warn_of_dragged_symmetry(
         &mut self,
         contacts: &[ContactModel],
@@ -58,11 +58,11 @@ impl Checks {
             let (what, instead) = match on_axis(end) {
                 true => (
                     "the axis",
-                    "Leave it out: a body of revolution cannot be dragged across its axis.",
+                    "Remove the drag: a body of revolution cannot be dragged across its axis.",
                 ),
                 false => (
                     "a line of symmetry",
-                    "Model the whole body, or leave it out. If the support is a wall and no symmetry, end the contact an edge before it.",
+                    "Model the whole body, or remove the drag. If the support is a wall rather than a symmetry line, end the contact one edge before it.",
                 ),
             };
             self.warn(
@@ -74,12 +74,13 @@ impl Checks {
     }
 }
 
-/// A drag is radial if its radial part is more than this part of it.
+/// A drag is radial if its radial component is more than this part of it.
 const RADIAL: f64 = 1e-6;
 
 impl Checks {
-    /// Warns of an obstacle of revolution that is dragged away from the axis, or towards it: what is rigid can only move along
-    /// its axis. Along a cone that is a drag together with an indentation, whose radial parts cancel.
+    /// Warns of an obstacle of revolution that is dragged away from the axis or towards it: a rigid obstacle can only
+    /// move along its axis. Along a cone that motion is a drag together with an indentation, whose radial components
+    /// cancel.
     pub(super) fn warn_of_radial_drag(
         &mut self,
         contacts: &[ContactModel],
@@ -120,14 +121,14 @@ impl Checks {
             self.warn(
                 WarningCode::RadialDrag,
                 &format!("{}/tangential_displacement", contact.pointer),
-                format!("The obstacle is displaced along the contact by {d}, and with it away from the axis or towards it: a rigid body of revolution cannot widen or shrink, and only moves along its axis. Leave it out, or where only a sector slides, model it in plane strain."),
+                format!("The obstacle is displaced along the contact by {d}, which moves it away from the axis or towards it: a rigid body of revolution cannot widen or shrink, and can only move along its axis. Remove the displacement or, where only a sector slides, model the sector in plane strain."),
             );
         }
     }
 }
 
-/// Whether sliding changes neither gap nor place of a contact: a straight obstacle without ends along a straight side of
-/// the body, which ends in corners.
+/// Whether sliding changes neither gap nor place of a contact: a straight obstacle without ends along a straight side
+/// of the body with a corner at each end.
 pub(super) fn endless(
     mesh: &Mesh,
     boundary: &ContactBoundary,
@@ -148,7 +149,7 @@ pub(super) fn endless(
     unbounded && straight && even && parallel && !goes_on(mesh, boundary)
 }
 
-/// Whether the surface of the body goes on straight beyond an end of a boundary.
+/// Whether the surface of the body continues straight beyond an end of a boundary.
 fn goes_on(mesh: &Mesh, boundary: &ContactBoundary) -> bool {
     let nodes = &boundary.nodes;
     let ends = [

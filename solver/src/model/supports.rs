@@ -1,4 +1,4 @@
-//! Supports: the displacements that they prescribe at nodes.
+//! Checks supports, and determines the displacements that they prescribe at nodes.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ use crate::error::{AllChecks, Checked, Reason};
 use crate::mesh::{Edge, Mesh};
 use crate::problem::{BoundaryValue, Support};
 
-/// Where a support holds.
+/// The place where a support holds the body.
 enum Place<'a> {
     Edges(&'a [Edge]),
     Nodes(&'a [u32]),
@@ -23,11 +23,11 @@ enum Place<'a> {
 pub enum Held {
     /// The displacement along one direction.
     Along {
-        /// Unit vector.
+        /// The direction (unit vector).
         direction: [f64; 2],
-        /// Displacement along it (length).
+        /// The displacement along it (length).
         value: f64,
-        /// How far the direction may be off that of the surface (angle); 0 along x and y.
+        /// How far the direction may deviate from that of the surface (angle); 0 along x and y.
         #[serde(skip)]
         error: f64,
     },
@@ -36,7 +36,7 @@ pub enum Held {
 }
 
 impl Held {
-    /// The displacement along a direction (unit vector), where it is prescribed.
+    /// The prescribed displacement along a direction (unit vector), if there is one.
     pub fn along(&self, along: [f64; 2]) -> Option<f64> {
         match *self {
             Held::Both(u) => Some(u[0] * along[0] + u[1] * along[1]),
@@ -49,8 +49,8 @@ impl Held {
         }
     }
 
-    /// Adds a displacement prescribed along a direction with an error; `Err`: a different value is prescribed already. Directions
-    /// that differ by no more than their errors are one.
+    /// Adds a displacement prescribed along a direction with an error. `Err`: a different value is prescribed already.
+    /// Directions that differ by no more than their errors are equal.
     fn and(self, along: [f64; 2], value: f64, error: f64, rounding: f64) -> Result<Self, f64> {
         let ([a, b], first, own) = match self {
             Held::Along {
@@ -93,8 +93,8 @@ fn parallel(a: [f64; 2], b: [f64; 2]) -> bool {
 }
 
 impl Checks {
-    /// Prescribed displacements by node, of the valid supports; and whether all are valid. A body of revolution
-    /// cannot leave its axis: there u_r = 0, with or without a support.
+    /// The prescribed displacements by node, from the valid supports; and whether all supports are valid. A body of
+    /// revolution cannot leave its axis: there u_r = 0, with or without a support.
     pub(super) fn supports(
         &mut self,
         mesh: &Mesh,
@@ -145,7 +145,8 @@ impl Checks {
         (fixed, all.finish(()))
     }
 
-    /// Adds the displacements that a support prescribes to those `fixed` already; two values agree to `rounding`.
+    /// Adds the displacements that a support prescribes to `fixed`. Two values agree if they differ by at most
+    /// `rounding`.
     fn support(
         &mut self,
         mesh: &Mesh,
@@ -271,7 +272,7 @@ impl Checks {
         }
     }
 
-    /// A value at every node of the place; nodes of two edges come twice.
+    /// A value at every node of the place; nodes of two edges occur twice.
     fn at_nodes(
         &mut self,
         mesh: &Mesh,
@@ -300,10 +301,10 @@ impl Checks {
         }
     }
 
-    /// Unit outward normals at the nodes of a boundary, and how far they may be off (angle); the mean of both edges at a slight
-    /// corner, also at an end where the surface goes on smoothly.
+    /// Unit outward normals at the nodes of a boundary, and their possible errors (angle); the mean of both edges at a
+    /// slight corner, also at an end where the surface continues smoothly.
     fn normals(&mut self, mesh: &Mesh, edges: &[Edge], pointer: &str) -> Checked<HeldDirections> {
-        /// |n₁ + n₂|/2 at a turn of 45°.
+        /// The length |n₁ + n₂|/2 of the mean normal at a turn of 45°.
         const SHARPEST: f64 = 0.923;
         #[derive(Default)]
         struct Sum {
@@ -353,7 +354,7 @@ impl Checks {
     }
 }
 
-/// What supports of sets prescribe along x or y at nodes of the first mesh.
+/// The displacements that supports of node sets prescribe along x or y at nodes of the first mesh.
 fn at_given_nodes(mesh: &Mesh, supports: &[Support], field: &str) -> BTreeMap<u32, f64> {
     let mut prescribed = BTreeMap::new();
     for support in supports {

@@ -1,4 +1,4 @@
-//! Cracks that nobody asked for: nodes at the same place that a mesh generator did not merge.
+//! Unintended cracks: distinct nodes at the same place that a mesh generator did not merge.
 
 use std::collections::BTreeSet;
 
@@ -8,8 +8,8 @@ use crate::mesh::Mesh;
 use crate::solution::WarningCode;
 
 impl Checks {
-    /// Warns of nodes at the same place that are not connected. It is no fault, since a crack may be meant: where both of
-    /// its sides are contacts it is taken to be. (Parts that are free to move without each other are refused.)
+    /// Warns of nodes at the same place that are not connected. This is no fault, since a crack may be intended: if
+    /// both of its sides are contacts it is taken as such. (Parts that can move independently are refused.)
     pub(super) fn warn_of_unmerged(&mut self, mesh: &Mesh, contacts: &[ContactModel]) {
         let meant: BTreeSet<u32> = contacts
             .iter()
@@ -29,19 +29,19 @@ impl Checks {
             WarningCode::CoincidentNodes,
             "/mesh",
             format!(
-                "Two nodes, {first} and {second} counted from 0, are both at ({x}, {y}) and belong to different elements{others}: the body has a crack there, along which its parts do not hold each other. Merge them where the mesh was made, in Gmsh with `Coherence Mesh;` or `removeDuplicateNodes`, unless the crack is meant."
+                "Two nodes, {first} and {second} counted from 0, are both at ({x}, {y}) and belong to different elements{others}: the body has a crack there, along which its parts are not connected. Merge them where the mesh was made, in Gmsh with `Coherence Mesh;` or `removeDuplicateNodes`, unless the crack is intended."
             ),
         );
     }
 
-    /// What may be the cause where a body falls into parts, or a boundary into pieces; empty where all nodes are merged.
+    /// A possible cause where a body falls into parts, or a boundary into pieces; empty where all nodes are merged.
     pub(super) fn hint_to_merge(&self, mesh: &Mesh) -> String {
         let Some(&[first, second]) = self.unmerged.first() else {
             return String::new();
         };
         let [x, y] = mesh.nodes[first as usize];
         format!(
-            " Two nodes, {first} and {second} counted from 0, are both at ({x}, {y}) and not connected, {} such pairs in all: merge them where the mesh was made, in Gmsh with `Coherence Mesh;`.",
+            " Two nodes, {first} and {second} counted from 0, are both at ({x}, {y}) and not connected ({} such pairs in total): merge them where the mesh was made, in Gmsh with `Coherence Mesh;`.",
             self.unmerged.len()
         )
     }

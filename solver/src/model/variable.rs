@@ -1,4 +1,4 @@
-//! A model whose numbers change from problem to problem, while its body and its contact boundaries stay.
+//! A model whose numbers change from problem to problem, while its body and its contact boundaries stay the same.
 
 use super::checks::Checks;
 use super::{Model, contacts};
@@ -6,17 +6,17 @@ use crate::error::{AllChecks, Violation};
 use crate::problem::{Contact, Grid, MeshInput, MeshSource, Problem};
 use crate::solution::Warning;
 
-/// A model that takes over the laws of friction, indentations, drags, load steps and controls of other problems.
+/// A model that takes the laws of friction, indentations, drags, load steps and controls of other problems.
 pub struct VariableModel {
     model: Model,
-    /// Its problem, without the mesh.
+    /// The model's problem, without the mesh.
     problem: Problem,
     /// Warnings that do not depend on these numbers.
     lasting: Vec<Warning>,
 }
 
 impl VariableModel {
-    /// From a model and its problem.
+    /// Starts with a model and its problem.
     pub fn new(model: Model, problem: &Problem) -> Self {
         let mut lasting = model.warnings.clone();
         for warning in warnings(&model) {
@@ -34,7 +34,8 @@ impl VariableModel {
         &self.model
     }
 
-    /// Becomes the model of another problem whose mesh is not read. `None` if more than the variable numbers differ.
+    /// Changes to the model of another problem, whose mesh is not read. `None` if more than the variable numbers
+    /// differ.
     ///
     /// # Errors
     ///
@@ -80,7 +81,7 @@ impl VariableModel {
     }
 }
 
-/// What is said of contacts and their drag.
+/// The warnings about contacts and their drag.
 fn warnings(model: &Model) -> Vec<Warning> {
     let mut checks = Checks::default();
     checks.warn_about_contacts(&model.contacts);
@@ -88,7 +89,7 @@ fn warnings(model: &Model) -> Vec<Warning> {
     checks.warnings
 }
 
-/// A problem on a mesh of no meaning: that of the model is not part of it.
+/// The problem with an empty mesh, for comparisons without the mesh.
 fn without_mesh(problem: &Problem) -> Problem {
     let nothing = Grid {
         x: Vec::new(),
@@ -111,7 +112,7 @@ fn without_mesh(problem: &Problem) -> Problem {
     }
 }
 
-/// Whether two contacts are the same but for their law, indentation and drag.
+/// Whether two contacts are equal apart from their law, indentation and drag.
 fn same_boundary((a, b): (&Contact, &Contact)) -> bool {
     a.boundary == b.boundary
         && a.obstacle == b.obstacle
@@ -121,7 +122,7 @@ fn same_boundary((a, b): (&Contact, &Contact)) -> bool {
 }
 
 impl Checks {
-    /// The laws of a problem on the contacts of a model, with all checks of what may differ.
+    /// The laws of a problem on the contacts of a model, with checks of everything that may differ.
     fn numbers(
         &mut self,
         problem: &Problem,

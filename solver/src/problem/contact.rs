@@ -35,7 +35,8 @@ pub struct Contact {
     pub friction: Option<Friction>,
 }
 
-/// The normal that a contact uses. On a sloping obstacle the two differ, and so do the forces.
+/// The normal that a contact uses. On a sloping obstacle the body's and the obstacle's normal differ, and so do the
+/// forces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NormalOf {
@@ -55,15 +56,15 @@ pub enum Condition {
     Unilateral,
     /// u_n = gap and u_t = d on all of Γ_C; stresses of either sign.
     Bonded,
-    /// No obstacle: friction with a prescribed bound only.
+    /// No obstacle: only friction with a prescribed bound.
     None,
 }
 
-/// Declares the kinds of obstacle, each with the three fields that are common to all.
+/// Declares the kinds of obstacle, each with the three fields that all kinds have.
 macro_rules! obstacles {
     ($($(#[$doc:meta])* $kind:ident { $($(#[$attribute:meta])* $field:ident: $type:ty,)* })*) => {
-        /// Shape of a rigid obstacle: its distance from the boundary before it is pushed, as a
-        /// function of a coordinate c along the boundary; or a curve in space.
+        /// Shape of a rigid obstacle: its distance from the boundary before it is pushed, as a function of a coordinate
+        /// c along the boundary; or a curve in the plane.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
         pub enum Obstacle {
@@ -75,14 +76,14 @@ macro_rules! obstacles {
                 /// Where it ends; absent: at the end of the boundary.
                 #[serde(default, skip_serializing_if = "Option::is_none")]
                 to: Option<f64>,
-                /// The coordinate c.
+                /// The coordinate c along the boundary.
                 #[serde(default)]
                 along: Along,
             },)*
         }
 
         impl Obstacle {
-            /// `from`, `to` and `along`, which are common to all kinds.
+            /// The fields `from`, `to` and `along`, which all kinds have.
             pub fn span(&self) -> (Option<f64>, Option<f64>, Along) {
                 match *self {
                     $(Obstacle::$kind { from, to, along, .. } => (from, to, along),)*
@@ -97,9 +98,9 @@ obstacles! {
     Flat {}
     /// Profile R − √(R² − (c − center)²); there is no obstacle beyond R.
     Circle {
-        /// R > 0 (length).
+        /// Radius R > 0 (length).
         radius: f64,
-        /// Where the profile is zero.
+        /// Coordinate where the profile is zero.
         #[serde(default)]
         center: f64,
     }
@@ -107,23 +108,23 @@ obstacles! {
     Parabola {
         /// Radius of curvature at the apex, > 0 (length).
         radius: f64,
-        /// Where the profile is zero.
+        /// Coordinate where the profile is zero.
         #[serde(default)]
         center: f64,
     }
     /// Profile |c − center| tan(angle).
     Wedge {
-        /// Between face and surface, 0 < angle < 90 (degrees).
+        /// Angle between face and surface, 0 < angle < 90 (degrees).
         angle: f64,
-        /// Where the profile is zero.
+        /// Coordinate where the profile is zero.
         #[serde(default)]
         center: f64,
     }
     /// Profile |c − center| tan(angle): a wedge of revolution.
     Cone {
-        /// Between face and surface, 0 < angle < 90 (degrees).
+        /// Angle between face and surface, 0 < angle < 90 (degrees).
         angle: f64,
-        /// Where the profile is zero.
+        /// Coordinate where the profile is zero.
         #[serde(default)]
         center: f64,
     }
@@ -131,17 +132,17 @@ obstacles! {
     Tilted {
         /// Rise per length of c.
         slope: f64,
-        /// Where the profile is zero.
+        /// Coordinate where the profile is zero.
         #[serde(default)]
         center: f64,
     }
     /// Profile coefficient · |c − center|^exponent.
     Power {
-        /// > 0 (length^(1 − exponent)).
+        /// Coefficient > 0 (length^(1 − exponent)).
         coefficient: f64,
-        /// ≥ 1.
+        /// Exponent ≥ 1.
         exponent: f64,
-        /// Where the profile is zero.
+        /// Coordinate where the profile is zero.
         #[serde(default)]
         center: f64,
     }
@@ -152,7 +153,7 @@ obstacles! {
         half_width: f64,
         /// Radius of the rounding, > 0 (length).
         radius: f64,
-        /// Middle of the flat part.
+        /// Coordinate of the middle of the flat part.
         #[serde(default)]
         center: f64,
     }
@@ -160,42 +161,42 @@ obstacles! {
     Table {
         /// Coordinates c, strictly increasing; at most 100,000.
         x: Vec<f64>,
-        /// Profile there (length, any sign).
+        /// Profile at these coordinates (length, any sign).
         gap: Vec<f64>,
-        /// Between the points.
+        /// The shape between the points.
         #[serde(default, skip_serializing_if = "Interpolation::is_linear")]
         interpolation: Interpolation,
-        /// For a measured profile: the curve passes near the points instead of through them. Needs the
-        /// interpolation `cubic`.
+        /// For a measured profile: the curve passes near the points instead of through them. Requires the interpolation
+        /// `cubic`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         smoothing: Option<Smoothing>,
     }
-    /// A line in space through points; the profile is the distance along the body's normal.
+    /// A polyline or smooth curve through points; the profile is the distance along the body's normal.
     Polyline {
-        /// Its points `[x, y]`; at most 10,000.
+        /// The points `[x, y]`; at most 10,000.
         points: Vec<[f64; 2]>,
-        /// Between the points.
+        /// The shape between the points.
         #[serde(default, skip_serializing_if = "Interpolation::is_linear")]
         interpolation: Interpolation,
     }
-    /// A straight line in space, infinitely long; the profile is the distance along the body's normal.
+    /// A straight line, infinitely long; the profile is the distance along the body's normal.
     Line {
-        /// A point `[x, y]` of it.
+        /// A point `[x, y]` of the line.
         point: [f64; 2],
         /// Angle from x to the line, counter-clockwise (degrees).
         angle: f64,
     }
 }
 
-/// What lies between the points of an obstacle.
+/// The shape of an obstacle between its points.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Interpolation {
     /// Straight lines. Every point is a kink, at which the pressure has no limit as the mesh is refined.
     #[default]
     Linear,
-    /// A cubic spline, whose slope and curvature have no jumps. Of a table it reproduces parabolas and cubics
-    /// exactly (its ends are not-a-knot); of a polyline it runs by the length of the chords.
+    /// A cubic spline, whose slope and curvature have no jumps. For a table it reproduces parabolas and cubics exactly
+    /// (its ends are not-a-knot); for a polyline its parameter is the length of the chords.
     Cubic,
 }
 
@@ -234,11 +235,11 @@ pub struct Friction {
     /// Friction coefficient μ ≥ 0 (the thesis's ν). Required unless `bound` is set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coefficient: Option<f64>,
-    /// ρ ≥ 0 (length): the pressure is averaged over this distance. 0: Coulomb's local law. Required
-    /// unless `bound` is set.
+    /// Radius ρ ≥ 0 (length): the pressure is averaged over this distance. 0: Coulomb's local law. Required unless
+    /// `bound` is set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nonlocal_radius: Option<f64>,
-    /// ε > 0 (length): tangential displacement at which the friction bound is reached.
+    /// Elastic slip ε > 0 (length): the tangential displacement at which the friction bound is reached.
     pub elastic_slip: f64,
     /// Shape of the averaging kernel.
     #[serde(default)]
@@ -246,19 +247,19 @@ pub struct Friction {
     /// Scale of the averaging kernel.
     #[serde(default)]
     pub normalization: Normalization,
-    /// φ_ε, from stick to slip.
+    /// The transition φ_ε from stick to slip.
     #[serde(default)]
     pub transition: Transition,
-    /// Whether friction depends on the path.
+    /// Whether friction depends on the load path.
     #[serde(default)]
     pub history: History,
-    /// Where friction is evaluated.
+    /// The points where friction is evaluated.
     #[serde(default)]
     pub points: FrictionPoints,
-    /// What the kernel is integrated over in axisymmetry.
+    /// The domain of the averaging integral in axisymmetry.
     #[serde(default)]
     pub measure: Measure,
-    /// Added to μ S wherever S > 0, ≥ 0 (stress).
+    /// Cohesion ≥ 0 (stress), added to μ S wherever S > 0.
     #[serde(default)]
     pub cohesion: f64,
     /// Upper limit of τ, > 0 (stress); absent: no limit.
@@ -274,9 +275,9 @@ pub struct Friction {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum PrescribedBound {
-    /// The same everywhere.
+    /// The same value everywhere.
     Constant(f64),
-    /// Linear between points of arc length; zero outside of them.
+    /// A table over arc length, linear between points; zero outside.
     Table(BoundTable),
 }
 
@@ -286,11 +287,11 @@ pub enum PrescribedBound {
 pub struct BoundTable {
     /// Arc length from the start of the named boundary, strictly increasing.
     pub s: Vec<f64>,
-    /// τ there, ≥ 0 (stress).
+    /// Friction bound τ at these places, ≥ 0 (stress).
     pub bound: Vec<f64>,
 }
 
-/// Where friction is evaluated.
+/// The points where friction is evaluated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FrictionPoints {
@@ -298,18 +299,18 @@ pub enum FrictionPoints {
     /// tangential stress may oscillate inside stick.
     #[default]
     Gauss3,
-    /// At the nodes; it does not oscillate.
+    /// At the nodes; the tangential stress does not oscillate.
     Nodal,
 }
 
-/// What the averaging kernel is integrated over in axisymmetry.
+/// The domain of the averaging integral in axisymmetry.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {
     /// Arc length along the meridian, as in the thesis.
     #[default]
     Line,
-    /// The contact surface itself: rings of it.
+    /// The contact surface itself, as rings.
     Surface,
 }
 
@@ -317,10 +318,10 @@ pub enum Measure {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Kernel {
-    /// C exp(ρ²/(x² − ρ²)), thesis (1.2).
+    /// The bump C exp(ρ²/(x² − ρ²)), thesis (1.2).
     #[default]
     Bump,
-    /// C (1 − x²/ρ²).
+    /// The parabola C (1 − x²/ρ²).
     Parabola,
 }
 
@@ -333,12 +334,12 @@ pub enum Normalization {
     UnitIntegral,
     /// ω(0) = 1, the literal text of the thesis; friction then vanishes with ρ.
     PeakOne,
-    /// As `unit_integral`, divided by the part of the integral that lies on the contact boundary: no friction is lost beyond
-    /// an end of it, and at full sliding it is μ times the normal force. For `measure: line`.
+    /// As `unit_integral`, divided by the part of the integral that lies on the contact boundary: no friction is lost
+    /// beyond its ends, and at full sliding friction is μ times the normal force. For `measure: line`.
     Conserving,
 }
 
-/// φ_ε, thesis (1.7).
+/// The transition φ_ε from stick to slip, thesis (1.7).
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema, VariantArray,
 )]
@@ -351,7 +352,7 @@ pub enum Transition {
     Tanh,
 }
 
-/// Whether friction depends on the path.
+/// Whether friction depends on the load path.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum History {

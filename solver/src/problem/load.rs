@@ -24,16 +24,16 @@ pub enum Load {
     /// A stress along t on a boundary.
     Tangential(String, BoundaryValue),
     /// Forces on the nodes of a boundary (corner, midside, corner, …) from its start, before it is refined; in
-    /// axisymmetry on the whole ring.
+    /// axisymmetry forces on the whole ring.
     Nodal(String, Vec<[f64; 2]>),
-    /// A force on each node of a set, before the mesh is refined; in axisymmetry on the whole ring.
+    /// A force on each node of a set, before the mesh is refined; in axisymmetry the force on the whole ring.
     Force(String, [f64; 2]),
     /// A force per volume on the whole body.
     BodyForce([f64; 2]),
 }
 
 impl Load {
-    /// The boundary that it acts on, if any.
+    /// The boundary that the load acts on, if any.
     pub fn boundary(&self) -> Option<&str> {
         match self {
             Load::Pressure(boundary, _)
@@ -46,7 +46,7 @@ impl Load {
     }
 }
 
-/// The forms as JSON Schema: each requires its own fields and excludes those of the others.
+/// The allowed forms as JSON Schema: each requires its own fields and excludes those of the others.
 fn forms() -> [Schema; 6] {
     const FORMS: [(Option<&str>, &[&str]); 6] = [
         (Some("boundary"), &["pressure"]),
@@ -82,7 +82,7 @@ fn forms() -> [Schema; 6] {
     })
 }
 
-/// A load as it is written; [`Load`] checks which fields may stand together.
+/// The fields of a load as it is written; [`Load`] checks which of them may be combined.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LoadFields {
@@ -105,11 +105,11 @@ pub struct LoadFields {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tangential: Option<BoundaryValue>,
     /// Forces `[fx, fy]` on the boundary's nodes (corner, midside, corner, …) from its start, before it is refined; in
-    /// axisymmetry on the whole ring.
+    /// axisymmetry forces on the whole ring.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nodal: Option<Vec<[f64; 2]>>,
     /// Force `[fx, fy]` on each node of the set, before the mesh is refined: forces on all nodes of a side become a
-    /// traction on it; in axisymmetry on the whole ring.
+    /// traction on it; in axisymmetry the force on the whole ring.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force: Option<[f64; 2]>,
     /// Force per volume along x and y.
@@ -176,7 +176,7 @@ fn on_nodes(boundary: &Option<String>, nodes: &Option<String>) -> Result<String,
         _ => Err(Violation::new(
             "/nodes",
             Reason::Missing,
-            "no set of nodes, or a boundary with it",
+            "no set of nodes, or a boundary in addition",
             "the name of a set of nodes, and no boundary",
             "A `force` acts on each node of a set; on a boundary give `nodal` forces or a traction.",
         )),

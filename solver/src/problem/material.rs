@@ -14,9 +14,9 @@ use crate::error::{Reason, Violation};
     "else" = {"required": ["youngs_modulus", "poissons_ratio"]},
 ))]
 pub struct Material {
-    /// Its constants.
+    /// The elastic constants.
     pub elasticity: Elasticity,
-    /// The group of elements that are made of it; absent: all elements without another material.
+    /// The group of elements with this material; absent: all elements without another material.
     pub group: Option<String>,
     /// A name for readers.
     pub name: Option<String>,
@@ -25,31 +25,32 @@ pub struct Material {
 /// Constants of linear elasticity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Elasticity {
-    /// The same in all directions.
+    /// Elastic constants that are the same in all directions.
     Isotropic {
-        /// E > 0 (stress).
+        /// Young's modulus E > 0 (stress).
         youngs_modulus: f64,
-        /// −1 < ν < 0.5; above 0.48 elements take a formulation that does not lock.
+        /// Poisson's ratio, −1 < ν < 0.5; above 0.48 elements use a formulation that does not lock.
         poissons_ratio: f64,
     },
-    /// Three axes of symmetry, two of them in the plane.
+    /// Elastic constants with three axes of symmetry, two of them in the plane.
     Orthotropic(Orthotropic),
 }
 
-/// A material as it is written; [`Material`] checks which fields may stand together.
+/// The fields of a material as it is written; [`Material`] checks which of them may be combined.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MaterialFields {
-    /// E > 0 (stress).
+    /// Young's modulus E > 0 (stress).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub youngs_modulus: Option<f64>,
-    /// −1 < ν < 0.5; use 0.49999 for an incompressible material. Not the friction coefficient, which the thesis calls ν.
+    /// Poisson's ratio, −1 < ν < 0.5; use 0.49999 for an incompressible material. Not the friction coefficient, which
+    /// the thesis calls ν.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub poissons_ratio: Option<f64>,
-    /// Three axes of symmetry, two of them in the plane.
+    /// Elastic constants with three axes of symmetry, two of them in the plane.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orthotropic: Option<Orthotropic>,
-    /// The group of elements that are made of it; absent: all elements without another material.
+    /// The group of elements with this material; absent: all elements without another material.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
     /// A name for readers.
@@ -145,7 +146,7 @@ pub struct Orthotropic {
     pub e1: f64,
     /// Modulus along axis 2, > 0 (stress).
     pub e2: f64,
-    /// −ε_2/ε_1 under σ_1 alone.
+    /// Poisson's ratio −ε_2/ε_1 under σ_1 alone.
     pub nu12: f64,
     /// Shear modulus in the plane, > 0 (stress).
     pub g12: f64,
@@ -155,10 +156,10 @@ pub struct Orthotropic {
     /// Modulus along axis 3, > 0 (stress); required unless the analysis is plane stress.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub e3: Option<f64>,
-    /// −ε_3/ε_1 under σ_1 alone; required unless the analysis is plane stress.
+    /// Poisson's ratio −ε_3/ε_1 under σ_1 alone; required unless the analysis is plane stress.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nu13: Option<f64>,
-    /// −ε_3/ε_2 under σ_2 alone; required unless the analysis is plane stress.
+    /// Poisson's ratio −ε_3/ε_2 under σ_2 alone; required unless the analysis is plane stress.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nu23: Option<f64>,
 }

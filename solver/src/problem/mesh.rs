@@ -23,7 +23,7 @@ use crate::error::{Reason, Violation, either};
 pub struct MeshInput {
     /// The source of the elements.
     pub source: MeshSource,
-    /// How often every element is split into four, or the tolerance that the mesh is refined to.
+    /// How often every element is split into four, or the tolerance for adaptive refinement.
     pub refine: Refine,
     /// Further names for parts of boundaries.
     pub boundaries: BTreeMap<String, BoundaryPart>,
@@ -49,7 +49,7 @@ pub enum MeshSource {
 }
 
 impl MeshInput {
-    /// Elements from one source, as they are.
+    /// A mesh from one source, without refinement or further names.
     pub fn new(source: MeshSource) -> Self {
         MeshInput {
             source,
@@ -60,7 +60,7 @@ impl MeshInput {
         }
     }
 
-    /// The grid, if it is one.
+    /// The grid, if the mesh is one.
     pub fn grid(&self) -> Option<&Grid> {
         match &self.source {
             MeshSource::Grid(grid) => Some(grid),
@@ -68,7 +68,7 @@ impl MeshInput {
         }
     }
 
-    /// The grid, if it is one, to be changed.
+    /// The grid, if the mesh is one, for changes.
     pub fn grid_mut(&mut self) -> Option<&mut Grid> {
         match &mut self.source {
             MeshSource::Grid(grid) => Some(grid),
@@ -76,7 +76,7 @@ impl MeshInput {
         }
     }
 
-    /// The hash of the stored mesh, if it is one.
+    /// The hash of the stored mesh, if the mesh is one.
     pub fn stored(&self) -> Option<&str> {
         match &self.source {
             MeshSource::Stored(hash) => Some(hash),
@@ -85,7 +85,7 @@ impl MeshInput {
     }
 }
 
-/// A mesh as it is written; [`MeshInput`] checks that it has exactly one source.
+/// The fields of a mesh as it is written; [`MeshInput`] checks that it has exactly one source.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct MeshFields {
@@ -99,15 +99,15 @@ struct MeshFields {
     /// surfaces groups, physical points node sets.
     #[serde(default)]
     gmsh: Option<String>,
-    /// The text of an Abaqus or CalculiX deck: surfaces and, where their nodes span edges, node sets
-    /// become boundaries, element sets groups, node sets node sets. Its analysis is not used.
+    /// The text of an Abaqus or CalculiX deck: surfaces become boundaries, element sets groups, and node sets node sets
+    /// and, where their nodes span edges, also boundaries. The deck's analysis is not used.
     #[serde(default)]
     abaqus: Option<String>,
     /// The hash of a mesh that was uploaded to the service, `sha256:…`.
     #[serde(default)]
     stored: Option<String>,
-    /// How often every element is split into four (each time that many more unknowns), or the tolerance that the
-    /// mesh is refined to.
+    /// How often every element is split into four (which multiplies the unknowns by four each time), or the tolerance
+    /// for adaptive refinement.
     #[serde(default)]
     refine: Refine,
     /// Further names for parts of boundaries, e.g. `{"taper": {"side": "top", "x": [1, 3]}}`.
@@ -116,9 +116,9 @@ struct MeshFields {
     /// Names for groups of elements, e.g. `{"inclusion": {"x": [1, 2], "y": [-1, 0]}}`.
     #[serde(default)]
     groups: BTreeMap<String, ElementRange>,
-    /// Curves that boundaries lie on, by their names, e.g. `{"arc": {"kind": "circle", "center": [0, 0], "radius": 4}}`:
-    /// their nodes are put there, also those that refinement adds. Elements that only have corners have straight sides, and a
-    /// body made of them has corners that no curve has.
+    /// Curves that boundaries lie on, by the boundaries' names, e.g. `{"arc": {"kind": "circle", "center": [0, 0],
+    /// "radius": 4}}`: the boundaries' nodes are moved there, also those that refinement adds. Elements that only have
+    /// corners have straight sides, so that without a curve their body has corners.
     #[serde(default)]
     curves: BTreeMap<String, Curve>,
 }
@@ -198,7 +198,7 @@ impl Serialize for MeshInput {
 pub enum Refine {
     /// Every element is split in two in each direction, this many times.
     Times(u32),
-    /// Elements are refined where errors come from until all results are known to a tolerance.
+    /// Elements are refined where errors come from, until all results are within a tolerance.
     Adaptive(AdaptiveRefine),
 }
 
@@ -213,8 +213,8 @@ impl Default for Refine {
 #[serde(deny_unknown_fields)]
 pub struct AdaptiveRefine {
     /// Largest relative error of the forces, the peak stresses that have a limit, and the ends of contact and stick, as
-    /// in `summary.accuracy` (1e-4 < tolerance < 1): of a force or peak by its value, of a tangential force by the
-    /// friction force, of an end by the length of the contact.
+    /// in `summary.accuracy` (1e-4 < tolerance < 1): of a force or peak relative to its value, of a tangential force
+    /// relative to the friction force, of an end relative to the length of the contact.
     pub tolerance: f64,
 }
 
@@ -234,7 +234,7 @@ pub struct ElementRange {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Curve {
-    /// What it is.
+    /// The kind of curve.
     pub kind: CurveKind,
     /// Center `[x, y]` of a circle.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -248,8 +248,8 @@ pub struct Curve {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CurveKind {
-    /// A circle with `center` and `radius`. The corners of the boundary's elements have to lie on it to 1e-4 of the radius;
-    /// all nodes of the boundary are put there.
+    /// A circle with `center` and `radius`. The corners of the boundary's elements must lie on it to 1e-4 of the
+    /// radius; all nodes of the boundary are moved onto it.
     Circle,
     /// A smooth curve through the corners of the boundary's elements (a cubic spline), which stay where they are. The
     /// boundary must not turn by 45° or more at a node.
@@ -308,7 +308,7 @@ pub struct BoundaryPart {
     /// All three nodes of a side lie within this box, `[[x, y], [x, y]]`: two opposite corners.
     #[serde(default, skip_serializing_if = "Option::is_none", rename = "box")]
     pub corners: Option<[[f64; 2]; 2]>,
-    /// The outward normal of a side points this way `[x, y]` at all three nodes, to `angle`.
+    /// The outward normal of a side has the direction `[x, y]` at all three nodes, within `angle`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normal: Option<[f64; 2]>,
     /// Largest angle between a side's normal and `normal`; 1 when absent (degrees).

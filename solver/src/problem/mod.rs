@@ -1,8 +1,8 @@
-//! The question: plain data, exactly the JSON of the API.
+//! The problem: plain data, exactly the JSON of the API.
 //!
 //! Strict: unknown names are refused everywhere, and so are objects without exactly one of their forms. Only
-//! `analysis`, `mesh` and `materials` are required, and in `friction` only `elastic_slip` in all cases. What the fields
-//! *mean together* is checked in [`Model::new`](crate::model::Model::new); nothing here computes.
+//! `analysis`, `mesh` and `materials` are required, and in `friction` only `elastic_slip` in all cases. Combinations of
+//! fields are checked in [`Model::new`](crate::model::Model::new); nothing is computed here.
 
 mod contact;
 mod load;
@@ -54,7 +54,7 @@ pub struct Problem {
     /// Boundaries that face a rigid obstacle, Γ_C of thesis (1.14). Empty: a plain elastic problem.
     #[serde(default)]
     pub contacts: Vec<Contact>,
-    /// Load steps, one after the other. Empty: one step to the given values.
+    /// Load steps, one after another. Empty: one step to the given values.
     #[serde(default)]
     pub steps: Vec<Step>,
     /// Gauss points of an element in each direction, 3 or 2 (thesis 2.3); elements of nearly incompressible materials
@@ -71,13 +71,13 @@ pub struct Problem {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Units {
-    /// Of coordinates, displacements, radii.
+    /// Unit of coordinates, displacements and radii.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub length: Option<String>,
-    /// Of total forces.
+    /// Unit of total forces.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force: Option<String>,
-    /// Of moduli, pressures, stresses.
+    /// Unit of moduli, pressures and stresses.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stress: Option<String>,
 }
@@ -87,9 +87,9 @@ pub struct Units {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Analysis {
-    /// ε_z = 0; forces are per unit of thickness.
+    /// Plane strain, ε_z = 0; forces are per unit of thickness.
     PlaneStrain {},
-    /// σ_z = 0 in a sheet.
+    /// Plane stress, σ_z = 0 in a sheet.
     PlaneStress {
         /// Thickness of the sheet (length, > 0); forces include it.
         thickness: f64,
@@ -99,7 +99,7 @@ pub enum Analysis {
     Axisymmetric {},
 }
 
-/// Gauss points of an element in each direction, if a problem does not give them.
+/// The number of Gauss points of an element in each direction if a problem does not give one.
 pub fn default_quadrature() -> u32 {
     3
 }

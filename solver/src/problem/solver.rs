@@ -31,10 +31,10 @@ pub struct Step {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Spacing {
-    /// By equal amounts.
+    /// The indentation grows by equal amounts.
     #[default]
     Uniform,
-    /// So that the contact grows by equal widths: δ_k = δ (k/n)^m for a profile of power m.
+    /// The contact grows by equal widths: δ_k = δ (k/n)^m for a profile of power m.
     ContactWidth,
 }
 
@@ -69,16 +69,16 @@ impl Default for Step {
 pub struct SolverControls {
     /// The algorithm.
     pub algorithm: Algorithm,
-    /// All residuals are dimensionless; each must fall below this (0 < tolerance < 1).
+    /// The tolerance (0 < tolerance < 1), below which each of the dimensionless residuals must fall.
     pub tolerance: f64,
-    /// Most outer sweeps over the friction bound, per increment (≥ 1).
+    /// The most outer sweeps over the friction bound, per increment (≥ 1).
     pub max_iterations: u32,
     /// Solve once more from the bonded state, and report whether the two solutions agree.
     pub check_uniqueness: bool,
     /// Solve once more with twice the increments, and report how much the result changes.
     pub check_increments: bool,
-    /// How the errors in `summary.accuracy` are found; absent: `estimate`. `verify` solves once more on the mesh split in
-    /// two, which takes several times as long and as much memory.
+    /// How the errors in `summary.accuracy` are found; absent: `estimate`. `verify` solves once more with every element
+    /// split in two in each direction, which takes several times as long and as much memory.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accuracy: Option<AccuracyMode>,
     /// Options that the thesis leaves open; for `algorithm: thesis` only.
@@ -90,15 +90,15 @@ pub struct SolverControls {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Algorithm {
-    /// Sweeps; where they contract badly, accelerated; where that fails, Newton.
+    /// Sweeps over the friction bound; where they converge slowly, accelerated; where that fails, Newton's method.
     #[default]
     Auto,
     /// Sweeps over the friction bound, each a convex problem, with Anderson acceleration.
     FixedPoint,
-    /// One semi-smooth Newton iteration for everything, the averaging included.
+    /// One semi-smooth Newton iteration for contact, friction and averaging together.
     Newton,
-    /// The thesis's own iteration (3.1), to the letter. At the thesis's parameters it does not
-    /// solve the problem; the outcome is then `false_convergence`.
+    /// The thesis's own iteration (3.1), exactly as described there. At the thesis's parameters it does not solve the
+    /// problem; the outcome is then `false_convergence`.
     Thesis,
 }
 
@@ -109,13 +109,13 @@ pub enum AccuracyMode {
     /// Estimated on the mesh of the solution, at little cost.
     #[default]
     Estimate,
-    /// By solving once more with every element split in two in each direction; with `refine` of 1 or more also on the
-    /// mesh before the last refinement, which gives orders of convergence.
+    /// By a second solution with every element split in two in each direction; with `refine` of 1 or more also by one
+    /// on the mesh before the last refinement, which gives orders of convergence.
     Verify,
 }
 
 impl SolverControls {
-    /// The errors are to be verified.
+    /// Whether the errors are to be verified.
     pub fn verifies(&self) -> bool {
         self.accuracy == Some(AccuracyMode::Verify)
     }
@@ -133,12 +133,12 @@ pub struct ThesisOptions {
     pub friction_force: u32,
     /// The source of the normal stress.
     pub pressure: ThesisPressure,
-    /// Local Gauss points that the kernel is integrated with in each element, thesis 3.4.2, no further
-    /// than the next element; for extrapolated pressure only. 0: the mesh-free average of nodal values.
+    /// Number of local Gauss points for integrating the kernel in each element, thesis 3.4.2, no further than the next
+    /// element; for extrapolated pressure only. 0: the mesh-free average of nodal values.
     pub local_points: u32,
     /// Fraction of the new friction force that is applied (0 < relaxation ≤ 1).
     pub relaxation: f64,
-    /// Let friction oppose the motion, as in (1.8), instead of acting along t everywhere.
+    /// Whether friction opposes the motion, as in (1.8), instead of acting along t everywhere.
     pub signed: bool,
 }
 
@@ -159,7 +159,7 @@ impl Default for ThesisOptions {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ThesisPressure {
-    /// Nodal reactions / ∫h.
+    /// Nodal reactions divided by ∫h.
     #[default]
     Lumped,
     /// Stresses at internal Gauss points, extrapolated to the boundary, thesis 3.3.

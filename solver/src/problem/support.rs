@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum BoundaryValue {
-    /// The same everywhere.
+    /// The same value everywhere.
     Constant(f64),
-    /// `[start, end]`.
+    /// Linear from `[start, end]`.
     Linear([f64; 2]),
 }
 
@@ -22,7 +22,7 @@ pub struct Support {
     /// Name of the boundary.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub boundary: Option<String>,
-    /// Name of a set of nodes instead; a side is held where all its nodes are, before the mesh is refined.
+    /// Name of a set of nodes instead; a side is held where all its nodes are held, before the mesh is refined.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nodes: Option<String>,
     /// Displacement along x (length).

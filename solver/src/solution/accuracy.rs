@@ -4,18 +4,17 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use strum::IntoStaticStr;
 
-/// How far the numbers of a solution can be trusted: what the mesh, and too few increments, may have done to each, and a
-/// verdict.
+/// The accuracy of a solution: the error of each number due to the mesh and to too few increments, and a verdict.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Accuracy {
-    /// The verdict on the whole.
+    /// The verdict on the whole solution.
     pub verdict: Verdict,
-    /// Why it is not `good`, in words, the most serious reason first; what is good besides.
+    /// Why the verdict is not `good`, in words, the most serious reason first; also remarks on a `good` result.
     pub reasons: Vec<String>,
     /// Every force, extent and peak with its error.
     pub quantities: Vec<EstimatedQuantity>,
-    /// With `"accuracy": "verify"`: whether the problem was solved on the mesh split in two as well. If not, the errors are
-    /// estimates, and the first reason says why. Absent unless asked for.
+    /// With `"accuracy": "verify"`: whether the problem was also solved on the refined mesh. If not, the errors are
+    /// estimates, and the first reason says why. Absent unless requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub verified: Option<bool>,
 }
@@ -37,37 +36,38 @@ pub struct Accuracy {
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Verdict {
-    /// Every force is known to 1 %, every peak that has a limit and every extent to 5 %. Stated errors are at most three
-    /// quarters of that, since one in twenty is too small.
+    /// Every force is accurate to 1 %, every extent and every peak that has a limit to 5 %. Stated errors are at most
+    /// three quarters of that, since one in twenty is too small.
     Good,
-    /// To 5 % and 20 %; also where a contact has too many ends of stick to follow, or another number of ends on the mesh
-    /// split in two, or a warning says that the mesh is too coarse.
+    /// Forces are accurate to 5 %, extents and peaks to 20 %. Also the verdict where a contact has too many ends of
+    /// stick to state their errors, or another number of ends on the refined mesh, or a warning says that the mesh is
+    /// too coarse.
     Fair,
-    /// Something else is known to less than that, or not at all, or a second solution was found.
+    /// Some other number is less accurate than that or its error is unknown, or a second solution was found.
     Poor,
 }
 
 impl EstimatedQuantity {
-    /// The parts of the error that no mesh makes smaller.
+    /// The parts of the error that a finer mesh does not reduce.
     pub fn beside_mesh(&self) -> f64 {
         self.increments.unwrap_or(0.0) + self.direction.unwrap_or(0.0)
     }
 
-    /// The part of the error that the mesh causes.
+    /// The part of the error due to the mesh.
     pub fn of_mesh(&self) -> Option<f64> {
         Some(self.error? - self.beside_mesh())
     }
 }
 
 impl Verdict {
-    /// What it says, for people.
+    /// The meaning of the verdict, for people.
     pub fn in_words(self) -> &'static str {
         match self {
             Verdict::Good => {
                 "good: forces to 1 %, extents and peaks with a limit to 5 %, or better"
             }
             Verdict::Fair => "fair: forces to 5 %, extents and peaks with a limit to 20 %",
-            Verdict::Poor => "POOR: some numbers are not to be relied on",
+            Verdict::Poor => "POOR: some numbers are not reliable",
         }
     }
 }
@@ -75,37 +75,38 @@ impl Verdict {
 /// A number of the solution with its error.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EstimatedQuantity {
-    /// What it is.
+    /// The kind of quantity.
     pub quantity: QuantityName,
     /// The contact, by the name of its boundary.
     pub contact: String,
-    /// Its value, as in the summary.
+    /// The value, as in the summary.
     pub value: f64,
-    /// Its value on the mesh split in two; absent unless verified.
+    /// The value on the refined mesh; absent unless verified.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub finer: Option<f64>,
-    /// How much the two differ (≥ 0); of peak tangential stresses, the size of which may occur twice with both signs,
-    /// how much their sizes do.
+    /// The difference between the two values (≥ 0); for a peak tangential stress, whose size may occur twice with both
+    /// signs, the difference of their sizes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub difference: Option<f64>,
-    /// Observed order of convergence, log₂ of the difference to the mesh one refinement coarser over this one; absent where
-    /// there is no such mesh (`refine` of 0 or by a tolerance), or a difference is only rounding.
+    /// The observed order of convergence: log₂ of the difference to the mesh one refinement coarser divided by
+    /// `difference`. Absent where there is no such mesh (`refine` of 0 or by a tolerance), or a difference is only
+    /// rounding.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub order: Option<f64>,
-    /// The error that the mesh causes, under the incremental law the number of increments, and a linear `direction`, in the unit of the value;
-    /// absent where the quantity has no limit, or nothing is known.
+    /// The error in the unit of the value: due to the mesh, under the incremental law also to the number of increments,
+    /// and to a `direction` of the indentation. Absent where the quantity has no limit, or the error is unknown.
     pub error: Option<f64>,
-    /// The part of `error` that the increments cause; absent where nothing depends on them.
+    /// The part of `error` due to the number of increments; absent where the result does not depend on them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub increments: Option<f64>,
-    /// The part of `error` that an indentation along a `direction` causes, in which gaps are linear; absent where they are those of
-    /// the displaced obstacle.
+    /// The part of `error` due to an indentation along a `direction`, in which gaps are linear; absent where gaps are
+    /// exact.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub direction: Option<f64>,
-    /// The error as a part: of the value; of the friction force for a tangential one; of the length of the contact for
-    /// an extent.
+    /// The error relative to the value; for a tangential force relative to the friction force, for an extent relative
+    /// to the length of the contact.
     pub relative: Option<f64>,
-    /// How it was found.
+    /// How the error was found.
     pub method: ErrorMethod,
 }
 
@@ -126,21 +127,21 @@ pub struct EstimatedQuantity {
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum QuantityName {
-    /// ∫p.
+    /// The normal force ∫p.
     NormalForce,
-    /// ∫σ_t.
+    /// The tangential force ∫σ_t.
     TangentialForce,
-    /// ∫|σ_t|.
+    /// The friction force ∫|σ_t|.
     FrictionForce,
-    /// Largest pressure, as a stress.
+    /// The largest pressure, as a stress.
     PeakNormalStress,
-    /// Largest |σ_t|, with its sign.
+    /// The largest |σ_t|, with its sign.
     PeakTangentialStress,
-    /// Arc length at which an interval of contact begins.
+    /// The arc length at which an interval of contact begins.
     ContactStart,
-    /// Arc length at which it ends.
+    /// The arc length at which an interval of contact ends.
     ContactEnd,
-    /// Arc length between stick and slip.
+    /// An arc length between stick and slip.
     StickEnd,
 }
 
@@ -149,17 +150,17 @@ pub enum QuantityName {
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum ErrorMethod {
-    /// The errors of the stresses (recovered against computed), weighted by their influence on the quantity.
+    /// By the errors of the stresses (recovered against computed), weighted by their influence on the quantity.
     WeightedRecovery,
-    /// The distance between nodes.
+    /// By the distance between nodes.
     NodeSpacing,
-    /// The difference to the solution on the mesh split in two.
+    /// By the difference to the solution on the refined mesh, with every element split in two.
     MeshHalved,
-    /// There is no limit that a finer mesh would approach.
+    /// No error: the quantity has no limit as the mesh is refined.
     NoLimit,
-    /// More ends of stick than are followed: where stick and slip alternate from point to point, another mesh has them
-    /// elsewhere.
+    /// No error: there are too many ends of stick. Where stick and slip alternate from point to point, their places
+    /// depend on the mesh.
     TooMany,
-    /// The error is not known; the reasons of the verdict say why.
+    /// The error is unknown; the reasons of the verdict say why.
     Unknown,
 }

@@ -1,8 +1,8 @@
-//! The answer: plain data, exactly the JSON of the API.
+//! The solution: plain data, exactly the JSON of the API.
 //!
-//! Signs: stresses are negative in compression; forces are those on the body; `t` is the outward
-//! normal turned clockwise. Forces are those of the modelled part: a half model gives half, plane stress
-//! includes the thickness, axisymmetric totals include 2π.
+//! Signs: stresses are negative in compression; forces are those on the body; `t` is the outward normal turned
+//! clockwise. Forces are those of the modelled part: a half model gives half, plane stress includes the thickness,
+//! axisymmetric totals include 2π.
 
 mod accuracy;
 mod sample;
@@ -31,13 +31,16 @@ pub struct Solution {
     /// Columns along each contact boundary, by its name, at all points where the solution is known: the nodes, the points
     /// where friction acts, and the places of the peaks, with the values of the summary.
     pub profiles: BTreeMap<String, ContactProfile>,
-    /// The same columns at the nodes. Not part of the document and its digest: they are stored and served separately.
+    /// Columns along each contact boundary at the nodes only, like `profiles`. Not part of the document and its digest:
+    /// they are stored and served separately.
     #[serde(default, skip_serializing)]
     pub node_profiles: BTreeMap<String, ContactProfile>,
-    /// The same columns at the points where friction acts, see [`ContactProfile`]; not part of the document either.
+    /// Columns along each contact boundary at the points where friction acts only, see [`ContactProfile`]; not part of
+    /// the document.
     #[serde(default, skip_serializing)]
     pub friction_profiles: BTreeMap<String, ContactProfile>,
-    /// One entry per load step of the problem; summary, profiles and fields are those of the last.
+    /// One entry for each load step of the problem; summary, profiles and fields of the solution are those of the last
+    /// step.
     pub steps: Vec<StepSolution>,
     /// Displacements and stresses.
     pub fields: Fields,
@@ -70,35 +73,35 @@ impl Solution {
 /// The end of one load step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StepSolution {
-    /// Its name in the problem, or its number from 0.
+    /// The step's name in the problem, or its number from 0.
     pub name: String,
-    /// As in a whole solution.
+    /// Scalars, extents and warnings at the end of the step.
     pub summary: Summary,
-    /// Rows of this step.
+    /// The iterations of this step.
     pub history: Vec<Iteration>,
     /// Columns along each contact boundary, by its name.
     pub profiles: BTreeMap<String, ContactProfile>,
-    /// As in a whole solution; not part of the document either.
+    /// Columns along each contact boundary at the nodes only; not part of the document.
     #[serde(default, skip_serializing)]
     pub node_profiles: BTreeMap<String, ContactProfile>,
-    /// As in a whole solution; not part of the document either.
+    /// Columns along each contact boundary at the points where friction acts only; not part of the document.
     #[serde(default, skip_serializing)]
     pub friction_profiles: BTreeMap<String, ContactProfile>,
 }
 
-/// How an iteration ended.
+/// How the iterations ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// Contact set unchanged, every residual below the tolerance, or (warning `rounding_limits_residual`) no larger than
-    /// what rounding leaves of it.
+    /// The contact set is unchanged, and every residual is below the tolerance or (warning `rounding_limits_residual`)
+    /// no larger than rounding permits.
     Converged,
     /// `max_iterations` reached.
     NotConverged,
-    /// The contact set repeats itself without settling.
+    /// Contact states repeat in a cycle.
     ContactCycling,
-    /// The method's own tests are met, but the forces on the body do not balance, or (by the thesis's
-    /// own iteration) the true residual is above the tolerance.
+    /// The method's own criteria are met, but the forces on the body do not balance, or (by the thesis's own iteration)
+    /// the true residual is above the tolerance.
     FalseConvergence,
     /// The observer asked to stop; the last state is kept.
     Canceled,
@@ -111,23 +114,23 @@ pub enum Outcome {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(rename = "SolutionSummary")]
 pub struct Summary {
-    /// How far the numbers can be trusted; absent at the end of a load step that is not the last, and in results of
-    /// older versions. It is about the result and not a part of it: the digest leaves it out.
+    /// How far the numbers can be trusted; absent for a load step that is not the last, and in results of older
+    /// versions. It describes the result and is not part of it: the digest leaves it out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accuracy: Option<Accuracy>,
-    /// How it ended.
+    /// How the iterations ended.
     pub outcome: Outcome,
     /// True for `converged` only.
     pub converged: bool,
-    /// Y = ∫p ≥ 0 over all contacts (force).
+    /// Normal force ∫p ≥ 0 over all contacts (force).
     pub normal_force: f64,
-    /// T = ∫σ_t, positive along t, over all contacts (force).
+    /// Tangential force ∫σ_t, positive along t, over all contacts (force).
     pub tangential_force: f64,
-    /// ∫|σ_t| over all contacts (force).
+    /// Friction force ∫|σ_t| over all contacts (force).
     pub friction_force: f64,
-    /// The same and more for each contact boundary.
+    /// The scalars of each contact boundary.
     pub contacts: BTreeMap<String, ContactSummary>,
-    /// Rows of the history.
+    /// Number of rows of the history.
     pub iterations: u32,
     /// The stage that produced the final state.
     pub stage: Stage,
@@ -137,10 +140,10 @@ pub struct Summary {
     pub residuals: Residuals,
     /// Potential energy (1.21) of the final state with its own friction bound (force × length).
     pub energy: f64,
-    /// Work done against friction (force × length), never negative: ∫τ φ |e| with the slip e of this state, u_t − d in the
-    /// total law and u_t − d − g in the incremental one; there what sliding has dissipated in the increments before is
-    /// added, ∫τ |Δg|. The elastic slip counts with the stress that it ends with, although at most half of that was spent
-    /// on it: the work is too large by up to ε ∫τ.
+    /// Work done against friction (force × length), never negative: ∫τ φ |e| with the slip e of this state, u_t − d in
+    /// the total law and u_t − d − g in the incremental one; there the dissipation of earlier increments is added, ∫τ
+    /// |Δg|. The elastic slip counts with its final stress, although at most half of that was spent on it: the work is
+    /// too large by up to ε ∫τ.
     pub friction_work: f64,
     /// Energy of the strains, ½ ∫ σ : ε (force × length); absent in results of older versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -163,19 +166,19 @@ pub struct Summary {
     pub contact_dofs: u64,
 }
 
-/// A second solution of the same problem beside the first.
+/// A second solution of the same problem, compared with the first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Comparison {
-    /// True where the two agree: forces and friction bounds to 1e-6 (uniqueness only; for doubled
-    /// increments to `tolerance`), or to what rounding leaves of them.
+    /// True where the two agree: forces and friction bounds to 1e-6 (uniqueness only; for doubled increments to
+    /// `tolerance`), or within rounding.
     pub agrees: bool,
-    /// Whether the second one converged; if not, `agrees` has no meaning.
+    /// Whether the second solution converged; if not, `agrees` has no meaning.
     pub converged: bool,
-    /// ∫p of the second.
+    /// Normal force ∫p of the second solution.
     pub normal_force: f64,
-    /// ∫σ_t of the second.
+    /// Tangential force ∫σ_t of the second solution.
     pub tangential_force: f64,
-    /// ∫|σ_t| of the second.
+    /// Friction force ∫|σ_t| of the second solution.
     pub friction_force: f64,
     /// Largest relative difference of these forces.
     pub change: f64,
@@ -188,19 +191,19 @@ pub struct Refinement {
     pub elements: u64,
     /// Unknowns of the body.
     pub dofs: u64,
-    /// ∫p.
+    /// Normal force ∫p.
     pub normal_force: f64,
-    /// ∫σ_t.
+    /// Tangential force ∫σ_t.
     pub tangential_force: f64,
-    /// ∫|σ_t|.
+    /// Friction force ∫|σ_t|.
     pub friction_force: f64,
-    /// max|σ_t| over all contacts.
+    /// Largest |σ_t| over all contacts.
     pub peak_tangential_stress: f64,
-    /// max|σ_n| over all contacts; it does not converge at a sharp edge.
+    /// Largest |σ_n| over all contacts; it does not converge at a sharp edge.
     pub peak_normal_stress: f64,
     /// Largest relative change from the previous mesh; absent for the first.
     pub change: Option<f64>,
-    /// Largest relative error of the quantities that have a limit, as in `accuracy`; absent where one is not known, and
+    /// Largest relative error of the quantities that have a limit, as in `accuracy`; absent where one is unknown, and
     /// in results of older versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<f64>,
@@ -209,19 +212,19 @@ pub struct Refinement {
 /// Scalars of one contact boundary.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ContactSummary {
-    /// Whose normal was used.
+    /// The normal that was used.
     pub normal: NormalOf,
-    /// ∫p ≥ 0 (force).
+    /// Normal force ∫p ≥ 0 (force).
     pub normal_force: f64,
-    /// ∫σ_t, positive along t (force).
+    /// Tangential force ∫σ_t, positive along t (force).
     pub tangential_force: f64,
-    /// ∫|σ_t| (force).
+    /// Friction force ∫|σ_t| (force).
     pub friction_force: f64,
     /// Intervals `[s0, s1]` of arc length between the outermost nodes in contact.
     pub contact: Vec<[f64; 2]>,
-    /// Parts of them with |u_t − d| < ε.
+    /// Intervals of the contact that stick, |u_t − d| < ε.
     pub stick: Vec<[f64; 2]>,
-    /// The rest of them; the whole contact when it is frictionless.
+    /// Intervals of the contact that slip; the whole contact when it is frictionless.
     pub slip: Vec<[f64; 2]>,
     /// Largest pressure, as a stress (≤ 0), over the continuous profile; absent without contact.
     pub peak_normal_stress: Option<Peak>,
@@ -236,27 +239,27 @@ pub struct Peak {
     pub value: f64,
     /// Arc length from the start of the named boundary.
     pub s: f64,
-    /// Position.
+    /// Position x.
     pub x: f64,
-    /// Position.
+    /// Position y.
     pub y: f64,
 }
 
 /// Dimensionless residuals.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Residuals {
-    /// Largest force or complementarity defect for the friction bound in use / largest nodal reaction.
+    /// Largest force or complementarity defect for the friction bound in use, divided by the largest nodal reaction.
     pub kkt: f64,
-    /// max|τ − μ max(S_ρ(p), 0)| / max τ.
+    /// Largest |τ − μ max(S_ρ(p), 0)| divided by the largest τ.
     pub friction: f64,
-    /// As `kkt`, with the friction bound that the state itself implies.
+    /// As `kkt`, for the friction bound that the state itself implies.
     pub monolithic: f64,
-    /// |Σ forces| / Σ|forces|, from the stresses in the body.
+    /// Imbalance |Σ forces| / Σ|forces|, from the stresses in the body.
     pub equilibrium: f64,
 }
 
 impl Residuals {
-    /// Those of the iterations are at or below the tolerance.
+    /// Whether the residuals of the iterations are at or below the tolerance.
     pub fn within(&self, tolerance: f64) -> bool {
         self.kkt <= tolerance && self.friction <= tolerance && self.monolithic <= tolerance
     }
@@ -292,7 +295,7 @@ pub struct Warning {
 pub enum WarningCode {
     /// Lines of a mesh file that are not sides of the surface.
     LinesInside,
-    /// Rows of a deck that prescribe different displacements of one node, of which the last holds.
+    /// Rows of a deck that prescribe different displacements of one node; the last one is used.
     SupportsOverlap,
     /// 9-node quadrilaterals that became 8-node elements.
     CentreNodesDropped,
@@ -306,11 +309,11 @@ pub enum WarningCode {
     DeckDiffers,
     /// Nodes at the same place that are not connected: a crack.
     CoincidentNodes,
-    /// A strip that leaves its polyline between two grid lines.
+    /// A strip that deviates from its polyline between two grid lines.
     StripCutsPolyline,
     /// An obstacle that ends inside an edge.
     ObstacleCutsEdge,
-    /// A standard deviation that leaves little of a measured profile.
+    /// A standard deviation that smooths most of a measured profile away.
     SmoothingFlattens,
     /// A contact boundary with a corner between two edges.
     ContactTurns,
@@ -328,11 +331,11 @@ pub enum WarningCode {
     NoContact,
     /// Contact up to the end of the obstacle.
     ContactReachesObstacleEnd,
-    /// An averaged pressure, and friction with it, that reaches beyond an end of the contact boundary and is lost.
+    /// An averaged pressure that reaches beyond an end of the contact boundary, so that friction is lost there.
     FrictionLostAtEnd,
     /// An obstacle that reaches into the body between two nodes, or recedes from it.
     ObstacleBetweenNodes,
-    /// An obstacle that is pushed along its direction so far that its gaps, which are linear in that, are others.
+    /// An obstacle that is pushed so far along its direction that its gaps, which are linear in the push, are wrong.
     DirectionIsLinear,
     /// A kink of the obstacle, or a corner of the body, in the contact.
     KinkInContact,
@@ -350,19 +353,19 @@ pub enum WarningCode {
     NotConverged,
     /// Residuals that rounding keeps above the tolerance.
     RoundingLimitsResidual,
-    /// An iteration of the thesis that settles in a state that is not a solution.
+    /// An iteration of the thesis that converges to a state that is not a solution.
     FalseConvergence,
-    /// Contact and slip that repeat themselves.
+    /// Contact and slip states that repeat in a cycle.
     ContactCycling,
     /// Forces on the body that do not balance.
     OutOfBalance,
-    /// A body that slides away: loads along its contacts beyond what their friction can hold, and nothing else to hold it.
+    /// A body that slides away: loads along its contacts exceed their friction, and nothing else holds it.
     SlidesAway,
     /// A body that slides farther than its contact is long.
     LargeSlip,
     /// Strains in a contact beyond what linear elasticity describes.
     LargeStrain,
-    /// Displacements that are not small beside the body.
+    /// Displacements that are not small compared with the body.
     LargeDisplacement,
     /// A second solution that did not converge.
     UniquenessUnknown,
@@ -381,7 +384,7 @@ impl WarningCode {
     }
 }
 
-/// Where in the method an iteration belongs.
+/// The part of the method that an iteration belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema, IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
@@ -408,12 +411,12 @@ impl Stage {
     }
 }
 
-/// One line of history.
+/// One row of the history.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Iteration {
     /// Number of the row, from 1.
     pub k: u32,
-    /// Where in the method.
+    /// The part of the method.
     pub stage: Stage,
     /// Load step, from 0.
     pub step: u32,
@@ -425,15 +428,15 @@ pub struct Iteration {
     pub friction_residual: f64,
     /// R_F of thesis 3.5: relative change of the nodal normal stress; absent in the first row.
     pub r_f: Option<f64>,
-    /// The tolerance in force.
+    /// The tolerance that applies.
     pub tolerance: f64,
-    /// The contact set.
+    /// Nodes in contact and their changes.
     pub contact: ContactCount,
-    /// The friction points.
+    /// Numbers of friction points that slip and stick.
     pub friction: FrictionCount,
     /// Forces of this state.
     pub force: ForcePair,
-    /// q = |Δτ_k|/|Δτ_{k−1}|; absent in the first sweeps.
+    /// Contraction q = |Δτ_k|/|Δτ_{k−1}|; absent in the first sweeps.
     pub contraction: Option<f64>,
     /// Newton steps of the convex problem.
     pub inner: u32,
@@ -450,21 +453,21 @@ pub struct ContactCount {
     pub left: u32,
 }
 
-/// Friction points with a positive bound.
+/// Numbers of friction points with a positive bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct FrictionCount {
-    /// |u_t − d| ≥ ε.
+    /// Points that slip, |u_t − d| ≥ ε.
     pub slip: u32,
-    /// |u_t − d| < ε.
+    /// Points that stick, |u_t − d| < ε.
     pub stick: u32,
 }
 
 /// Total forces over all contacts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ForcePair {
-    /// ∫p.
+    /// Normal force ∫p.
     pub normal: f64,
-    /// ∫σ_t.
+    /// Tangential force ∫σ_t.
     pub tangential: f64,
 }
 
@@ -482,32 +485,32 @@ pub struct ForcePair {
 pub struct ContactProfile {
     /// Arc length from the start of the named boundary.
     pub s: Vec<f64>,
-    /// Position before deformation.
+    /// Position x before deformation.
     pub x: Vec<f64>,
-    /// Position before deformation.
+    /// Position y before deformation.
     pub y: Vec<f64>,
     /// Gap before deformation, obstacle profile − indentation, along the outward normal.
     pub gap: Vec<f64>,
-    /// u_n ≤ gap, along the outward normal.
+    /// Normal displacement u_n ≤ gap, along the outward normal.
     pub normal_displacement: Vec<f64>,
-    /// u_t, along t.
+    /// Tangential displacement u_t, along t.
     pub tangential_displacement: Vec<f64>,
-    /// σ_n ≤ 0 in compression.
+    /// Normal stress σ_n, ≤ 0 in compression.
     pub normal_stress: Vec<f64>,
-    /// σ_t on the body, along t.
+    /// Tangential stress σ_t on the body, along t.
     pub tangential_stress: Vec<f64>,
-    /// S_ρ(p), the averaged pressure.
+    /// Averaged pressure S_ρ(p).
     pub nonlocal_pressure: Vec<f64>,
-    /// τ = μ max(S_ρ, 0).
+    /// Friction bound τ = μ max(S_ρ, 0).
     pub friction_bound: Vec<f64>,
-    /// φ_ε(|u_t − d|), between 0 and 1.
+    /// Friction ratio φ_ε(|u_t − d|), between 0 and 1.
     pub friction_ratio: Vec<f64>,
-    /// State there.
+    /// State at the node or point.
     pub state: Vec<NodeState>,
 }
 
 impl ContactProfile {
-    /// The columns of numbers.
+    /// All columns of numbers.
     #[rustfmt::skip]
     fn columns(&self) -> [&Vec<f64>; 11] {
         let ContactProfile {
@@ -520,7 +523,7 @@ impl ContactProfile {
         ]
     }
 
-    /// The columns of numbers, to be written.
+    /// All columns of numbers, to be written.
     #[rustfmt::skip]
     fn columns_mut(&mut self) -> [&mut Vec<f64>; 11] {
         let ContactProfile {
@@ -541,7 +544,7 @@ impl ContactProfile {
         self.state.push(other.state[row]);
     }
 
-    /// Inserts a row of another profile before one of this.
+    /// Inserts a row of another profile before a row of this one.
     fn insert_row(&mut self, before: usize, other: &ContactProfile, row: usize) {
         for (to, from) in self.columns_mut().into_iter().zip(other.columns()) {
             to.insert(before, from[row]);
@@ -580,9 +583,9 @@ impl NodeState {
 /// Values at all nodes of the mesh, in its order.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Fields {
-    /// Position before deformation.
+    /// Position x before deformation.
     pub x: Vec<f64>,
-    /// Position before deformation.
+    /// Position y before deformation.
     pub y: Vec<f64>,
     /// Displacement along x.
     pub ux: Vec<f64>,
@@ -596,21 +599,22 @@ pub struct Fields {
     pub stress_xy: Vec<f64>,
     /// Recovered out-of-plane stress σ_zz (the hoop stress σ_θθ in axisymmetry).
     pub stress_zz: Vec<f64>,
-    /// −1 where the node lies on no contact boundary, else its state in the profile: 0 open, 1 stick,
-    /// 2 slip; the largest where contacts meet.
+    /// −1 where the node lies on no contact boundary, else its state in the profile: 0 open, 1 stick, 2 slip; the
+    /// largest number where contacts meet.
     pub contact_state: Vec<i8>,
     /// Eight or six node numbers per element: corners counter-clockwise, then midsides.
     pub elements: Vec<Element>,
-    /// Where the mesh is coarse for the stresses: of each element the norm (∫ (σ* − σ) : C⁻¹ (σ* − σ))^½ of its stresses
-    /// σ against the recovered ones σ* ((force × length)^½). It compares elements with each other and bounds nothing: how
-    /// far the results can be trusted is `accuracy` in the summary.
+    /// Where the mesh is coarse for the stresses: the norm (∫ (σ* − σ) : C⁻¹ (σ* − σ))^½ of each element's stresses σ
+    /// against the recovered ones σ* ((force × length)^½). It compares elements with each other and is no error bound:
+    /// see `accuracy` in the summary.
     pub element_error: Vec<f64>,
     /// Stresses at the integration points of every element, not averaged.
     pub gauss: GaussFields,
 }
 
 impl Fields {
-    /// Column by column: they are nearly all numbers of a large solution, and to serialize them takes ten times as long.
+    /// Whether all fields are finite. Checked column by column: they are nearly all numbers of a large solution, and
+    /// serializing them would take ten times as long.
     fn is_finite(&self) -> bool {
         let Fields {
             x,
@@ -653,19 +657,19 @@ impl Fields {
 /// first local coordinate running fastest; a triangle 7 for order 3 and 3 for order 2.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct GaussFields {
-    /// Points of an element in each direction.
+    /// Gauss points of an element in each direction.
     pub order: u32,
-    /// Position before deformation.
+    /// Position x before deformation.
     pub x: Vec<f64>,
-    /// Position before deformation.
+    /// Position y before deformation.
     pub y: Vec<f64>,
-    /// σ_xx (σ_rr).
+    /// Stress σ_xx (σ_rr).
     pub stress_xx: Vec<f64>,
-    /// σ_yy (σ_zz in axisymmetry).
+    /// Stress σ_yy (σ_zz in axisymmetry).
     pub stress_yy: Vec<f64>,
-    /// σ_xy (σ_rz).
+    /// Stress σ_xy (σ_rz).
     pub stress_xy: Vec<f64>,
-    /// σ_zz (σ_θθ in axisymmetry).
+    /// Stress σ_zz (σ_θθ in axisymmetry).
     pub stress_zz: Vec<f64>,
 }
 
@@ -678,41 +682,41 @@ pub enum Progress<'a> {
     Iteration(&'a Iteration),
     /// Adaptive refinement begins to solve on a mesh, or returns to the one before, whose results are final.
     Refinement {
-        /// Number of the mesh, from 1; that of the one before if it returns to it.
+        /// The number of the mesh, from 1.
         number: u32,
-        /// Its elements.
+        /// The number of its elements.
         elements: u64,
-        /// Largest relative error on the mesh before; absent for the first, and where it is not known.
+        /// Largest relative error on the mesh before; absent for the first mesh, and where the error is unknown.
         error: Option<f64>,
     },
     /// An iteration is done on a mesh that is the last only if its errors are within the tolerance; then all its
-    /// iterations are reported again. The next mesh counts from 1.
+    /// iterations are reported again. The iterations of the next mesh are counted from 1.
     Tentative(&'a Iteration),
     /// A warning, as soon as it is known; all are repeated in the summary.
     Warning(&'a Warning),
-    /// A load step that is not the last has ended: the solution so far, without fields. Only of
-    /// problems with several steps, and not on the meshes of adaptive refinement. The answer is ignored:
-    /// to stop, return so at the next iteration.
+    /// A load step that is not the last has ended: the solution so far, without fields. Sent for problems with several
+    /// steps only, and not on the meshes of adaptive refinement. The answer is ignored: stop at the next iteration
+    /// instead.
     Step(&'a Solution),
-    /// The solver is at work, and asks whether to continue.
+    /// The solver is working, and asks whether to continue.
     Pulse,
     /// The solver is about to take this much more memory at once, and asks whether it may.
     Needs {
-        /// Bytes.
+        /// The number of bytes.
         bytes: u64,
     },
-    /// The solver could go on with this much more memory, and asks whether there is room for it. If not it ends with what
-    /// it has: the answer does not stop it.
+    /// The solver could continue with this much more memory, and asks whether it is available. If not, it ends with the
+    /// results so far: the answer does not stop it.
     Room {
-        /// Bytes.
+        /// The number of bytes.
         bytes: u64,
     },
     /// The solver could share its next work with a second thread, and asks whether there is a processor for it. The answer
     /// changes no result, and does not stop the solver.
     SecondThread,
-    /// There was not so much memory: the solver goes on without, and cannot get far.
+    /// There was not enough memory: the solver continues without it, but will end soon.
     OutOfMemory {
-        /// Bytes that it needed.
+        /// The number of bytes that were needed.
         bytes: u64,
     },
 }

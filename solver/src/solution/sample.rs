@@ -1,16 +1,16 @@
-//! A stored profile at any number of points, without solving again.
+//! Evaluates a stored profile at any number of points, without solving again.
 
 use super::ContactProfile;
 use crate::element::edge3;
 
-/// A place counts as a node within this part of the whole length: the rounding of `s`.
+/// A place counts as a node within this part of the whole length, which is the rounding of `s`.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
-/// The columns of a profile at `count` places, equally spaced in arc length from the first node of
-/// Γ_C to the last; units and signs are those of [`ContactProfile`].
+/// The columns of a profile at `count` places, equally spaced in arc length from the first node of Γ_C to the last;
+/// units and signs are those of [`ContactProfile`].
 ///
-/// `profile` is at the nodes, `friction` at the friction points of the same Γ_C and the same step (it
-/// may be empty: results stored by older versions have none). Nothing is solved or averaged again.
+/// `profile` has values at the nodes, `friction` at the friction points of the same Γ_C and the same step (it may be
+/// empty: results stored by older versions have none). Nothing is solved or averaged again.
 ///
 /// - positions, gap, displacements and normal stress are the quadratics through the three nodes of an
 ///   edge: exact, since the solution is quadratic. (Contact uses the gap at nodes; between them the obstacle
@@ -45,7 +45,7 @@ pub fn sample(profile: &ContactProfile, friction: &ContactProfile, count: usize)
 }
 
 /// The columns of a profile at all points where the solution is known: the nodes, the points where friction acts, and
-/// the places of the peaks, each of one contact and in order of arc length. So the largest stresses of these columns are
+/// the places of the peaks, for one contact, each in order of arc length. So the largest stresses of these columns are
 /// the peaks. Between three nodes without tension there is none, as in [`sample`].
 pub fn at_all_points(
     profile: &ContactProfile,
@@ -69,12 +69,13 @@ pub fn at_all_points(
     all
 }
 
-/// Γ_C is a chain of edges: start, midside, end, and the end is the next one's start.
+/// The number of edges of a profile. Γ_C is a chain of edges, with nodes start, midside, end; each end is the next
+/// edge's start.
 fn edges(profile: &ContactProfile) -> usize {
     profile.s.len().saturating_sub(1) / 2
 }
 
-/// Nodes and friction points, in order of arc length.
+/// Values at nodes and friction points, in order of arc length.
 struct Known<'a> {
     nodes: &'a ContactProfile,
     values: ContactProfile,
@@ -141,7 +142,7 @@ impl<'a> Known<'a> {
     }
 }
 
-/// A normal stress on an edge: not a tension if none of its three nodes has one.
+/// The normal stress on an edge, without a tension if none of its three nodes has one.
 fn without_overshoot(nodes: &ContactProfile, edge: usize, stress: f64) -> f64 {
     let of_nodes = &nodes.normal_stress[2 * edge..=2 * edge + 2];
     match of_nodes.iter().all(|of_node| *of_node <= 0.0) {
@@ -150,12 +151,12 @@ fn without_overshoot(nodes: &ContactProfile, edge: usize, stress: f64) -> f64 {
     }
 }
 
-/// v at a place between s_j and s_{j+1}:
+/// The value v at a place between s_j and s_{j+1}:
 ///
 ///   v_j + (s − s_j) v[j, j+1] + (s − s_j)(s − s_{j+1}) b
 ///
-/// b the smaller of the second divided differences v[j−1, j, j+1] and v[j, j+1, j+2], 0 where their
-/// signs differ, and the only one at the ends.
+/// with b the smaller of the second divided differences v[j−1, j, j+1] and v[j, j+1, j+2], 0 where their signs differ,
+/// and the only one at the ends.
 fn curve(s: &[f64], v: &[f64], j: usize, at: f64) -> f64 {
     let slope = |i: usize| (v[i + 1] - v[i]) / (s[i + 1] - s[i]);
     let bend = |i: usize| (slope(i + 1) - slope(i)) / (s[i + 2] - s[i]);
@@ -187,7 +188,7 @@ mod tests {
         (quadratics(&nodes), quadratics(&points))
     }
 
-    /// Column number c is c + s/2 − s²/10 times a factor that keeps bound and ratio in their limits.
+    /// Columns of quadratics: number c is c + s/2 − s²/10 times a factor that keeps bound and ratio in their limits.
     fn quadratics(s: &[f64]) -> ContactProfile {
         let column = |c: f64| {
             s.iter()
@@ -256,7 +257,8 @@ mod tests {
         assert_eq!(sampled.state[4000], NodeState::Open);
     }
 
-    /// The parabola through −100, 0 and 0 has 12.5 between the last two.
+    /// There is no tension between nodes without one, although the parabola through −100, 0 and 0 has 12.5 between the
+    /// last two.
     #[test]
     fn there_is_no_tension_between_nodes_without_one() {
         let (mut nodal, mut friction) = profiles(&[0.0, 1.0]);
@@ -279,7 +281,7 @@ mod tests {
         assert_eq!(sampled.normal_stress[3], 12.5 + 0.375);
     }
 
-    /// φ has a corner at the end of stick, τ at the end of contact: neither may cause an oscillation.
+    /// Corners of the law (φ at the end of stick, τ at the end of contact) cause no oscillation.
     #[test]
     fn corners_of_the_law_stay_within_their_limits() {
         let (mut nodal, mut friction) = profiles(&[0.0, 1.0, 2.0, 3.0]);

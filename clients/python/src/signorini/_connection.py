@@ -41,7 +41,7 @@ class Connection:
             raise ValueError(f"the address of the service begins with http:// or https://, not {url!r}")
         if token is None:
             token = os.environ.get("SIGNORINI_TOKEN", "")
-        # read from a file, it ends with a line break; what is wrong with it is told without telling it
+        # read from a file, it ends with a line break; messages about an invalid token do not contain the token
         token = token.strip()
         if not (token.isascii() and token.isprintable()):
             raise ValueError("the token has characters that no token has: was it copied whole, and nothing else?")

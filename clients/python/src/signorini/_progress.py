@@ -111,7 +111,7 @@ class Waiting:
         self._shown = ""
 
     def _say(self, text: str) -> None:
-        """Writes, as far as the stream can: whatever a program has in the place of standard error, waiting goes on."""
+        """Writes to standard error; a stream that cannot be written does not stop the waiting."""
         if self._out is None or not text:
             return
         try:
@@ -133,7 +133,7 @@ class Waiting:
 
     def _write(self, line: str, ended: bool) -> None:
         if self._in_place:
-            # blanks over what is left of a longer line before
+            # blanks over the rest of a longer earlier line
             self._say("\r" + line + " " * max(0, len(self._shown) - len(line)))
             self._shown = line
             if ended:
@@ -143,7 +143,7 @@ class Waiting:
 
 
 def goes_on(what: str, again: str, ends_with_program: bool) -> str:
-    """What becomes of a job or sweep that nobody waits for any more, and how to wait again.
+    """A line that says that a job or sweep continues, and how to wait for it again.
 
     ends_with_program: whether it is that of a service whose jobs end with it, and that with the program
     """

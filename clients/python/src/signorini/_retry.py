@@ -63,7 +63,7 @@ class Attempts:
         self._first_failure: float | None = None
 
     def succeeded(self) -> None:
-        """The service was reached: what comes later is counted anew."""
+        """The service was reached: later failures are counted from zero."""
         if self._told:
             self._tell("the service answers again")
         self.failures = 0

@@ -149,7 +149,7 @@ class StaleVersion(Conflict):
 
 
 class QuotaExceeded(ApiError):
-    """The owner's share of the queue or of the disk is used up."""
+    """The owner's quota of the queue or of the disk is used up."""
 
 
 class RateLimited(ApiError):
@@ -197,7 +197,7 @@ class JobCanceled(JobFailed):
 
 
 class WaitTimeout(SignoriniError, TimeoutError):
-    """The time that the caller wanted to wait is over; the job or sweep goes on."""
+    """The caller's time to wait is over; the job or sweep continues."""
 
 
 class ConnectionLost(SignoriniError, ConnectionError):

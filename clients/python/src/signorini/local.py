@@ -54,7 +54,7 @@ class LocalServer:
                 stdout=subprocess.PIPE,
                 stderr=log,
                 text=True,
-                # Ctrl-C in the terminal is for this program; the service is told when the program ends
+                # Ctrl-C in the terminal is for this program; the service is stopped when the program ends
                 start_new_session=True,
             )
         assert self._process.stdout is not None
@@ -72,7 +72,7 @@ class LocalServer:
         return line
 
     def kill(self) -> None:
-        """Ends it as a power cut would, for tests; `start()` goes on with the same store at the same address."""
+        """Kills the service as a power cut would, for tests; `start()` restarts it with the same store and address."""
         assert self._process is not None
         self._process.kill()
         self._reap()

@@ -86,7 +86,7 @@ __all__ = [
 
 @dataclass(kw_only=True, repr=False)
 class PlaneStrain(Part):
-    """ε_z = 0; forces are per unit of thickness."""
+    """Plane strain, ε_z = 0; forces are per unit of thickness."""
 
     kind: Literal["plane_strain"] = "plane_strain"
 
@@ -101,7 +101,7 @@ class PlaneStrain(Part):
 
 @dataclass(kw_only=True, repr=False)
 class PlaneStress(Part):
-    """σ_z = 0 in a sheet.
+    """Plane stress, σ_z = 0 in a sheet.
 
     thickness: Thickness of the sheet (length, > 0); forces include it.
     """
@@ -147,11 +147,11 @@ class Orthotropic(Part):
     e1: Modulus along axis 1, > 0 (stress).
     e2: Modulus along axis 2, > 0 (stress).
     g12: Shear modulus in the plane, > 0 (stress).
-    nu12: −ε_2/ε_1 under σ_1 alone.
+    nu12: Poisson's ratio −ε_2/ε_1 under σ_1 alone.
     angle: Angle from x to axis 1, counter-clockwise (degrees).
     e3: Modulus along axis 3, > 0 (stress); required unless the analysis is plane stress.
-    nu13: −ε_3/ε_1 under σ_1 alone; required unless the analysis is plane stress.
-    nu23: −ε_3/ε_2 under σ_2 alone; required unless the analysis is plane stress.
+    nu13: Poisson's ratio −ε_3/ε_1 under σ_1 alone; required unless the analysis is plane stress.
+    nu23: Poisson's ratio −ε_3/ε_2 under σ_2 alone; required unless the analysis is plane stress.
     """
 
     e1: float
@@ -183,12 +183,12 @@ class Orthotropic(Part):
 class Material(Part):
     """A linear elastic material: isotropic (`youngs_modulus` and `poissons_ratio`) or `orthotropic`.
 
-    group: The group of elements that are made of it; absent: all elements without another material.
+    group: The group of elements with this material; absent: all elements without another material.
     name: A name for readers.
-    orthotropic: Three axes of symmetry, two of them in the plane.
-    poissons_ratio: −1 < ν < 0.5; use 0.49999 for an incompressible material. Not the friction coefficient, which
-        the thesis calls ν.
-    youngs_modulus: E > 0 (stress).
+    orthotropic: Elastic constants with three axes of symmetry, two of them in the plane.
+    poissons_ratio: Poisson's ratio, −1 < ν < 0.5; use 0.49999 for an incompressible material. Not the friction
+        coefficient, which the thesis calls ν.
+    youngs_modulus: Young's modulus E > 0 (stress).
     """
 
     group: str | None = None
@@ -224,7 +224,7 @@ class BoundaryPart(Part):
 
     angle: Largest angle between a side's normal and `normal`; 1 when absent (degrees).
     box: All three nodes of a side lie within this box, `[[x, y], [x, y]]`: two opposite corners.
-    normal: The outward normal of a side points this way `[x, y]` at all three nodes, to `angle`.
+    normal: The outward normal of a side has the direction `[x, y]` at all three nodes, within `angle`.
     side: The boundary to take a part of; absent: the whole surface.
     x: All three nodes of a side lie within this range of x.
     y: All three nodes of a side lie within this range of y.
@@ -254,8 +254,8 @@ class BoundaryPart(Part):
 CurveKind = Literal["circle", "spline"]
 """Kinds of curves that boundaries lie on.
 
-`circle`: A circle with `center` and `radius`. The corners of the boundary's elements have to lie on it to 1e-4 of
-the radius; all nodes of the boundary are put there.
+`circle`: A circle with `center` and `radius`. The corners of the boundary's elements must lie on it to 1e-4 of the
+radius; all nodes of the boundary are moved onto it.
 
 `spline`: A smooth curve through the corners of the boundary's elements (a cubic spline), which stay where they are.
 The boundary must not turn by 45° or more at a node."""
@@ -265,7 +265,7 @@ The boundary must not turn by 45° or more at a node."""
 class Curve(Part):
     """A curve that a boundary lies on.
 
-    kind: What it is.
+    kind: The kind of curve.
     center: Center `[x, y]` of a circle.
     radius: Radius of a circle, > 0 (length).
     """
@@ -397,8 +397,8 @@ class AdaptiveRefine(Part):
     """The goal of adaptive refinement.
 
     tolerance: Largest relative error of the forces, the peak stresses that have a limit, and the ends of contact
-        and stick, as in `summary.accuracy` (1e-4 < tolerance < 1): of a force or peak by its value, of a tangential
-        force by the friction force, of an end by the length of the contact.
+        and stick, as in `summary.accuracy` (1e-4 < tolerance < 1): of a force or peak relative to its value, of a
+        tangential force relative to the friction force, of an end relative to the length of the contact.
     """
 
     tolerance: float
@@ -421,19 +421,19 @@ class MeshInput(Part):
     """The body cut into elements: exactly one of `grid`, `inline`, `gmsh`, `abaqus`, `stored`; and names for parts of
     it.
 
-    abaqus: The text of an Abaqus or CalculiX deck: surfaces and, where their nodes span edges, node sets become
-        boundaries, element sets groups, node sets node sets. Its analysis is not used.
+    abaqus: The text of an Abaqus or CalculiX deck: surfaces become boundaries, element sets groups, and node sets
+        node sets and, where their nodes span edges, also boundaries. The deck's analysis is not used.
     boundaries: Further names for parts of boundaries, e.g. `{"taper": {"side": "top", "x": [1, 3]}}`.
-    curves: Curves that boundaries lie on, by their names, e.g. `{"arc": {"kind": "circle", "center": [0, 0],
-        "radius": 4}}`: their nodes are put there, also those that refinement adds. Elements that only have corners
-        have straight sides, and a body made of them has corners that no curve has.
+    curves: Curves that boundaries lie on, by the boundaries' names, e.g. `{"arc": {"kind": "circle", "center": [0,
+        0], "radius": 4}}`: the boundaries' nodes are moved there, also those that refinement adds. Elements that
+        only have corners have straight sides, so that without a curve their body has corners.
     gmsh: The text of a Gmsh mesh (MSH 2.2 or 4.1, ASCII): physical curves become boundaries, physical surfaces
         groups, physical points node sets.
     grid: A grid of lines, with the boundaries `left`, `right`, `bottom`, `top`.
     groups: Names for groups of elements, e.g. `{"inclusion": {"x": [1, 2], "y": [-1, 0]}}`.
     inline: Nodes and elements, written out.
-    refine: How often every element is split into four (each time that many more unknowns), or the tolerance that
-        the mesh is refined to.
+    refine: How often every element is split into four (which multiplies the unknowns by four each time), or the
+        tolerance for adaptive refinement.
     stored: The hash of a mesh that was uploaded to the service, `sha256:…`.
     """
 
@@ -476,7 +476,7 @@ Along = Literal["x", "arc_length"]
 class Flat(Part):
     """Profile 0: a flat face.
 
-    along: The coordinate c.
+    along: The coordinate c along the boundary.
     from_: Where the obstacle begins; absent: at the start of the boundary.
     to: Where it ends; absent: at the end of the boundary.
     """
@@ -502,9 +502,9 @@ class Flat(Part):
 class Circle(Part):
     """Profile R − √(R² − (c − center)²); there is no obstacle beyond R.
 
-    radius: R > 0 (length).
-    along: The coordinate c.
-    center: Where the profile is zero.
+    radius: Radius R > 0 (length).
+    along: The coordinate c along the boundary.
+    center: Coordinate where the profile is zero.
     from_: Where the obstacle begins; absent: at the start of the boundary.
     to: Where it ends; absent: at the end of the boundary.
     """
@@ -535,8 +535,8 @@ class Parabola(Part):
     """Profile (c − center)² / (2 radius).
 
     radius: Radius of curvature at the apex, > 0 (length).
-    along: The coordinate c.
-    center: Where the profile is zero.
+    along: The coordinate c along the boundary.
+    center: Coordinate where the profile is zero.
     from_: Where the obstacle begins; absent: at the start of the boundary.
     to: Where it ends; absent: at the end of the boundary.
     """
@@ -566,9 +566,9 @@ class Parabola(Part):
 class Wedge(Part):
     """Profile |c − center| tan(angle).
 
-    angle: Between face and surface, 0 < angle < 90 (degrees).
-    along: The coordinate c.
-    center: Where the profile is zero.
+    angle: Angle between face and surface, 0 < angle < 90 (degrees).
+    along: The coordinate c along the boundary.
+    center: Coordinate where the profile is zero.
     from_: Where the obstacle begins; absent: at the start of the boundary.
     to: Where it ends; absent: at the end of the boundary.
     """
@@ -598,9 +598,9 @@ class Wedge(Part):
 class Cone(Part):
     """Profile |c − center| tan(angle): a wedge of revolution.
 
-    angle: Between face and surface, 0 < angle < 90 (degrees).
-    along: The coordinate c.
-    center: Where the profile is zero.
+    angle: Angle between face and surface, 0 < angle < 90 (degrees).
+    along: The coordinate c along the boundary.
+    center: Coordinate where the profile is zero.
     from_: Where the obstacle begins; absent: at the start of the boundary.
     to: Where it ends; absent: at the end of the boundary.
     """
@@ -631,8 +631,8 @@ class Tilted(Part):
     """Profile slope · (c − center).
 
     slope: Rise per length of c.
-    along: The coordinate c.
-    center: Where the profile is zero.
+    along: The coordinate c along the boundary.
+    center: Coordinate where the profile is zero.
     from_: Where the obstacle begins; absent: at the start of the boundary.
     to: Where it ends; absent: at the end of the boundary.
     """
@@ -662,10 +662,10 @@ class Tilted(Part):
 class Power(Part):
     """Profile coefficient · |c − center|^exponent.
 
-    coefficient: > 0 (length^(1 − exponent)).
-    exponent: ≥ 1.
-    along: The coordinate c.
-    center: Where the profile is zero.
+    coefficient: Coefficient > 0 (length^(1 − exponent)).
+    exponent: Exponent ≥ 1.
+    along: The coordinate c along the boundary.
+    center: Coordinate where the profile is zero.
     from_: Where the obstacle begins; absent: at the start of the boundary.
     to: Where it ends; absent: at the end of the boundary.
     """
@@ -700,8 +700,8 @@ class RoundedFlat(Part):
 
     half_width: Half the width of the flat part, ≥ 0 (length).
     radius: Radius of the rounding, > 0 (length).
-    along: The coordinate c.
-    center: Middle of the flat part.
+    along: The coordinate c along the boundary.
+    center: Coordinate of the middle of the flat part.
     from_: Where the obstacle begins; absent: at the start of the boundary.
     to: Where it ends; absent: at the end of the boundary.
     """
@@ -730,12 +730,12 @@ class RoundedFlat(Part):
 
 
 Interpolation = Literal["linear", "cubic"]
-"""What lies between the points of an obstacle.
+"""The shape of an obstacle between its points.
 
 `linear`: Straight lines. Every point is a kink, at which the pressure has no limit as the mesh is refined.
 
-`cubic`: A cubic spline, whose slope and curvature have no jumps. Of a table it reproduces parabolas and cubics
-exactly (its ends are not-a-knot); of a polyline it runs by the length of the chords."""
+`cubic`: A cubic spline, whose slope and curvature have no jumps. For a table it reproduces parabolas and cubics
+exactly (its ends are not-a-knot); for a polyline its parameter is the length of the chords."""
 
 
 @dataclass(kw_only=True, repr=False)
@@ -761,12 +761,12 @@ class Smoothing(Part):
 class Table(Part):
     """Profile by a table of points; there is no obstacle outside of it.
 
-    gap: Profile there (length, any sign).
+    gap: Profile at these coordinates (length, any sign).
     x: Coordinates c, strictly increasing; at most 100,000.
-    along: The coordinate c.
+    along: The coordinate c along the boundary.
     from_: Where the obstacle begins; absent: at the start of the boundary.
-    interpolation: Between the points.
-    smoothing: For a measured profile: the curve passes near the points instead of through them. Needs the
+    interpolation: The shape between the points.
+    smoothing: For a measured profile: the curve passes near the points instead of through them. Requires the
         interpolation `cubic`.
     to: Where it ends; absent: at the end of the boundary.
     """
@@ -798,12 +798,12 @@ class Table(Part):
 
 @dataclass(kw_only=True, repr=False)
 class Polyline(Part):
-    """A line in space through points; the profile is the distance along the body's normal.
+    """A polyline or smooth curve through points; the profile is the distance along the body's normal.
 
-    points: Its points `[x, y]`; at most 10,000.
-    along: The coordinate c.
+    points: The points `[x, y]`; at most 10,000.
+    along: The coordinate c along the boundary.
     from_: Where the obstacle begins; absent: at the start of the boundary.
-    interpolation: Between the points.
+    interpolation: The shape between the points.
     to: Where it ends; absent: at the end of the boundary.
     """
 
@@ -830,11 +830,11 @@ class Polyline(Part):
 
 @dataclass(kw_only=True, repr=False)
 class Line(Part):
-    """A straight line in space, infinitely long; the profile is the distance along the body's normal.
+    """A straight line, infinitely long; the profile is the distance along the body's normal.
 
     angle: Angle from x to the line, counter-clockwise (degrees).
-    point: A point `[x, y]` of it.
-    along: The coordinate c.
+    point: A point `[x, y]` of the line.
+    along: The coordinate c along the boundary.
     from_: Where the obstacle begins; absent: at the start of the boundary.
     to: Where it ends; absent: at the end of the boundary.
     """
@@ -862,7 +862,7 @@ class Line(Part):
 
 Obstacle = Union[Flat, Circle, Parabola, Wedge, Cone, Tilted, Power, RoundedFlat, Table, Polyline, Line]
 """Shape of a rigid obstacle: its distance from the boundary before it is pushed, as a function of a coordinate c along
-the boundary; or a curve in space."""
+the boundary; or a curve in the plane."""
 
 
 Condition = Literal["unilateral", "bonded", "none"]
@@ -872,14 +872,14 @@ Condition = Literal["unilateral", "bonded", "none"]
 
 `bonded`: u_n = gap and u_t = d on all of Γ_C; stresses of either sign.
 
-`none`: No obstacle: friction with a prescribed bound only."""
+`none`: No obstacle: only friction with a prescribed bound."""
 
 
 @dataclass(kw_only=True, repr=False)
 class BoundTable(Part):
     """A friction bound by arc length.
 
-    bound: τ there, ≥ 0 (stress).
+    bound: Friction bound τ at these places, ≥ 0 (stress).
     s: Arc length from the start of the named boundary, strictly increasing.
     """
 
@@ -901,7 +901,7 @@ PrescribedBound = Union[float, BoundTable]
 
 
 History = Literal["total", "incremental"]
-"""Whether friction depends on the path.
+"""Whether friction depends on the load path.
 
 `total`: Friction depends on the total displacement, as in the thesis.
 
@@ -912,17 +912,17 @@ docs/formulation.md 1.5. For the linear transition only."""
 Kernel = Literal["bump", "parabola"]
 """Shape of the averaging kernel ω_ρ, thesis 1.2.1.
 
-`bump`: C exp(ρ²/(x² − ρ²)), thesis (1.2).
+`bump`: The bump C exp(ρ²/(x² − ρ²)), thesis (1.2).
 
-`parabola`: C (1 − x²/ρ²)."""
+`parabola`: The parabola C (1 − x²/ρ²)."""
 
 
 Measure = Literal["line", "surface"]
-"""What the averaging kernel is integrated over in axisymmetry.
+"""The domain of the averaging integral in axisymmetry.
 
 `line`: Arc length along the meridian, as in the thesis.
 
-`surface`: The contact surface itself: rings of it."""
+`surface`: The contact surface itself, as rings."""
 
 
 Normalization = Literal["unit_integral", "peak_one", "conserving"]
@@ -933,20 +933,20 @@ Normalization = Literal["unit_integral", "peak_one", "conserving"]
 `peak_one`: ω(0) = 1, the literal text of the thesis; friction then vanishes with ρ.
 
 `conserving`: As `unit_integral`, divided by the part of the integral that lies on the contact boundary: no friction
-is lost beyond an end of it, and at full sliding it is μ times the normal force. For `measure: line`."""
+is lost beyond its ends, and at full sliding friction is μ times the normal force. For `measure: line`."""
 
 
 FrictionPoints = Literal["gauss3", "nodal"]
-"""Where friction is evaluated.
+"""The points where friction is evaluated.
 
 `gauss3`: At three Gauss points per edge. On a coarse mesh and with a small elastic slip the tangential stress may
 oscillate inside stick.
 
-`nodal`: At the nodes; it does not oscillate."""
+`nodal`: At the nodes; the tangential stress does not oscillate."""
 
 
 Transition = Literal["linear", "tanh"]
-"""φ_ε, thesis (1.7).
+"""The transition φ_ε from stick to slip, thesis (1.7).
 
 `linear`: min(|u|/ε, 1), thesis (1.7b).
 
@@ -958,20 +958,20 @@ class Friction(Part):
     """The nonlocal, nonlinear friction law of Oden and Pires, thesis (1.8): σ_t = −τ φ_ε(|u_t − d|) sign(u_t − d), τ =
     min(shear_cap, cohesion + coefficient · S_ρ(p)) where S_ρ(p) > 0; or with a prescribed `bound` τ.
 
-    elastic_slip: ε > 0 (length): tangential displacement at which the friction bound is reached.
+    elastic_slip: Elastic slip ε > 0 (length): the tangential displacement at which the friction bound is reached.
     bound: A prescribed τ ≥ 0 (Tresca's law) instead of coefficient, radius, cohesion and cap. It acts on all of
         Γ_C, with or without contact.
     coefficient: Friction coefficient μ ≥ 0 (the thesis's ν). Required unless `bound` is set.
-    cohesion: Added to μ S wherever S > 0, ≥ 0 (stress).
-    history: Whether friction depends on the path.
+    cohesion: Cohesion ≥ 0 (stress), added to μ S wherever S > 0.
+    history: Whether friction depends on the load path.
     kernel: Shape of the averaging kernel.
-    measure: What the kernel is integrated over in axisymmetry.
-    nonlocal_radius: ρ ≥ 0 (length): the pressure is averaged over this distance. 0: Coulomb's local law. Required
-        unless `bound` is set.
+    measure: The domain of the averaging integral in axisymmetry.
+    nonlocal_radius: Radius ρ ≥ 0 (length): the pressure is averaged over this distance. 0: Coulomb's local law.
+        Required unless `bound` is set.
     normalization: Scale of the averaging kernel.
-    points: Where friction is evaluated.
+    points: The points where friction is evaluated.
     shear_cap: Upper limit of τ, > 0 (stress); absent: no limit.
-    transition: φ_ε, from stick to slip.
+    transition: The transition φ_ε from stick to slip.
     """
 
     elastic_slip: float
@@ -1008,7 +1008,8 @@ class Friction(Part):
 
 
 NormalOf = Literal["body", "obstacle"]
-"""The normal that a contact uses. On a sloping obstacle the two differ, and so do the forces.
+"""The normal that a contact uses. On a sloping obstacle the body's and the obstacle's normal differ, and so do the
+forces.
 
 `body`: The body's outward normal, as in the thesis.
 
@@ -1074,9 +1075,9 @@ class Load(Part):
     body_force: Force per volume along x and y.
     boundary: Name of the boundary; absent for `force` and `body_force`.
     force: Force `[fx, fy]` on each node of the set, before the mesh is refined: forces on all nodes of a side
-        become a traction on it; in axisymmetry on the whole ring.
+        become a traction on it; in axisymmetry the force on the whole ring.
     nodal: Forces `[fx, fy]` on the boundary's nodes (corner, midside, corner, …) from its start, before it is
-        refined; in axisymmetry on the whole ring.
+        refined; in axisymmetry forces on the whole ring.
     nodes: Name of a set of nodes, for `force`.
     normal: Stress along the outward normal: positive pulls.
     pressure: Stress against the outward normal: positive pushes into the body.
@@ -1116,27 +1117,27 @@ AccuracyMode = Literal["estimate", "verify"]
 
 `estimate`: Estimated on the mesh of the solution, at little cost.
 
-`verify`: By solving once more with every element split in two in each direction; with `refine` of 1 or more also on
-the mesh before the last refinement, which gives orders of convergence."""
+`verify`: By a second solution with every element split in two in each direction; with `refine` of 1 or more also by
+one on the mesh before the last refinement, which gives orders of convergence."""
 
 
 Algorithm = Literal["auto", "fixed_point", "newton", "thesis"]
 """The algorithm, docs/formulation.md section 4.
 
-`auto`: Sweeps; where they contract badly, accelerated; where that fails, Newton.
+`auto`: Sweeps over the friction bound; where they converge slowly, accelerated; where that fails, Newton's method.
 
 `fixed_point`: Sweeps over the friction bound, each a convex problem, with Anderson acceleration.
 
-`newton`: One semi-smooth Newton iteration for everything, the averaging included.
+`newton`: One semi-smooth Newton iteration for contact, friction and averaging together.
 
-`thesis`: The thesis's own iteration (3.1), to the letter. At the thesis's parameters it does not solve the problem;
-the outcome is then `false_convergence`."""
+`thesis`: The thesis's own iteration (3.1), exactly as described there. At the thesis's parameters it does not solve
+the problem; the outcome is then `false_convergence`."""
 
 
 ThesisPressure = Literal["lumped", "extrapolated"]
 """The source of the normal stress in the thesis's iteration.
 
-`lumped`: Nodal reactions / ∫h.
+`lumped`: Nodal reactions divided by ∫h.
 
 `extrapolated`: Stresses at internal Gauss points, extrapolated to the boundary, thesis 3.3."""
 
@@ -1148,11 +1149,11 @@ class ThesisOptions(Part):
     contact_guess: First guess of the contact Γ_C*: `[s0, s1]` of arc length by boundary; absent: all of Γ_C.
     friction_force: Way of evaluating the friction force, thesis 3.2: 1 at the boundary's own Gauss points, 2 along
         the two nearest rows of internal Gauss points, extrapolated linearly to the boundary.
-    local_points: Local Gauss points that the kernel is integrated with in each element, thesis 3.4.2, no further
+    local_points: Number of local Gauss points for integrating the kernel in each element, thesis 3.4.2, no further
         than the next element; for extrapolated pressure only. 0: the mesh-free average of nodal values.
     pressure: The source of the normal stress.
     relaxation: Fraction of the new friction force that is applied (0 < relaxation ≤ 1).
-    signed: Let friction oppose the motion, as in (1.8), instead of acting along t everywhere.
+    signed: Whether friction opposes the motion, as in (1.8), instead of acting along t everywhere.
     """
 
     contact_guess: dict[str, Pair] | None = None
@@ -1180,14 +1181,14 @@ class ThesisOptions(Part):
 class SolverControls(Part):
     """Options of the solution: algorithm, tolerance and limits.
 
-    accuracy: How the errors in `summary.accuracy` are found; absent: `estimate`. `verify` solves once more on the
-        mesh split in two, which takes several times as long and as much memory.
+    accuracy: How the errors in `summary.accuracy` are found; absent: `estimate`. `verify` solves once more with
+        every element split in two in each direction, which takes several times as long and as much memory.
     algorithm: The algorithm.
     check_increments: Solve once more with twice the increments, and report how much the result changes.
     check_uniqueness: Solve once more from the bonded state, and report whether the two solutions agree.
-    max_iterations: Most outer sweeps over the friction bound, per increment (≥ 1).
+    max_iterations: The most outer sweeps over the friction bound, per increment (≥ 1).
     thesis: Options that the thesis leaves open; for `algorithm: thesis` only.
-    tolerance: All residuals are dimensionless; each must fall below this (0 < tolerance < 1).
+    tolerance: The tolerance (0 < tolerance < 1), below which each of the dimensionless residuals must fall.
     """
 
     accuracy: AccuracyMode | None = None
@@ -1216,9 +1217,9 @@ class SolverControls(Part):
 Spacing = Literal["uniform", "contact_width"]
 """How the indentation grows inside a step.
 
-`uniform`: By equal amounts.
+`uniform`: The indentation grows by equal amounts.
 
-`contact_width`: So that the contact grows by equal widths: δ_k = δ (k/n)^m for a profile of power m."""
+`contact_width`: The contact grows by equal widths: δ_k = δ (k/n)^m for a profile of power m."""
 
 
 @dataclass(kw_only=True, repr=False)
@@ -1264,7 +1265,7 @@ class Support(Part):
     tangent; other displacements stay free.
 
     boundary: Name of the boundary.
-    nodes: Name of a set of nodes instead; a side is held where all its nodes are, before the mesh is refined.
+    nodes: Name of a set of nodes instead; a side is held where all its nodes are held, before the mesh is refined.
     un: Displacement along the outward normal (length).
     ut: Displacement along t, the outward normal turned clockwise (length).
     ux: Displacement along x (length).
@@ -1297,9 +1298,9 @@ class Units(Part):
     """Names of the client's units, as axes show them (each at most 20 characters): `{"length": "mm", "force": "N",
     "stress": "MPa"}`. Absent: no unit is shown.
 
-    force: Of total forces.
-    length: Of coordinates, displacements, radii.
-    stress: Of moduli, pressures, stresses.
+    force: Unit of total forces.
+    length: Unit of coordinates, displacements and radii.
+    stress: Unit of moduli, pressures and stresses.
     """
 
     force: str | None = None
@@ -1329,7 +1330,7 @@ class Problem(WholeProblem):
     quadrature: Gauss points of an element in each direction, 3 or 2 (thesis 2.3); elements of nearly incompressible
         materials always have 3.
     solver: Algorithm, tolerance and limits.
-    steps: Load steps, one after the other. Empty: one step to the given values.
+    steps: Load steps, one after another. Empty: one step to the given values.
     supports: Prescribed displacements, Γ_D of thesis (1.12).
     title: A title for readers; it does not enter `input_hash`.
     units: Names of the units, for figures; no number is converted.

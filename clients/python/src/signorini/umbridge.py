@@ -74,8 +74,8 @@ def serve(models: Sequence[Model], host: str = "127.0.0.1", port: int = 4242, th
     """Serves models until the program is interrupted or told to stop (SIGTERM). Prints the address; port 0 is a free
     one.
 
-    Whoever reaches the port evaluates the models with the client's token. Raises OSError if the port is taken. Threads
-    that wait for a job go on until it ends.
+    Anyone who can reach the port evaluates the models with the client's token. Raises OSError if the port is taken.
+    Threads that wait for a job continue until it ends.
     """
     with socket.create_server((host, port)) as listening:
         print(f"http://{host}:{listening.getsockname()[1]}", flush=True)
@@ -124,7 +124,7 @@ async def _admitted(request: Any) -> Any:
 
 
 async def _unless(stopping: asyncio.Event, work: Awaitable[Any]) -> Any:
-    """An answer, or an error if the server stops before there is one: its job goes on in the service."""
+    """An answer, or an error if the server stops before there is one: the job continues in the service."""
     answering, stop = asyncio.ensure_future(work), asyncio.ensure_future(stopping.wait())
     await asyncio.wait({answering, stop}, return_when=asyncio.FIRST_COMPLETED)
     stop.cancel()

@@ -1,5 +1,5 @@
-//! The letters of figures: those of DejaVu Sans, regular and bold, one after another from the left, with kerning. There are no
-//! ligatures, and scripts that run from the right or join their letters are not set as they ought to be.
+//! The letters of figures: those of DejaVu Sans, regular and bold, one after another from the left, with kerning. There
+//! are no ligatures; scripts that run from the right or join their letters are not set correctly.
 
 use tiny_skia::{Path, PathBuilder};
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
@@ -8,15 +8,15 @@ use ttf_parser::{Face, GlyphId, OutlineBuilder};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Letter {
     pub(super) char: char,
-    /// Which of `Fonts`.
+    /// The font's place in `Fonts`.
     pub(super) font: usize,
     pub(super) glyph: GlyphId,
-    /// Where it begins, from the start of the line.
+    /// The start of the letter, from the start of the line.
     pub(super) place: f32,
     pub(super) width: f32,
 }
 
-/// A font, with the name that it has in a PDF.
+/// A font, with its name in a PDF.
 pub(super) struct Font {
     pub(super) name: &'static str,
     pub(super) bytes: &'static [u8],
@@ -29,12 +29,12 @@ impl Font {
         Ok(Font { name, bytes, face })
     }
 
-    /// A length in the units of the font, in heights of the font.
+    /// Converts a length from the units of the font to heights of the font (em).
     pub(super) fn em(&self, units: i16) -> f32 {
         f32::from(units) / f32::from(self.face.units_per_em())
     }
 
-    /// How much nearer or farther than its width a letter stands after another.
+    /// The kerning: the change of the distance between two letters.
     fn kerning(&self, left: GlyphId, right: GlyphId) -> f32 {
         let tables = self.face.tables().kern.iter();
         let mut parts = tables
@@ -45,7 +45,7 @@ impl Font {
     }
 }
 
-/// Regular and bold.
+/// The regular and the bold font.
 pub(super) struct Fonts(pub(super) [Font; 2]);
 
 impl Fonts {
@@ -84,7 +84,7 @@ impl Fonts {
         (letters, end)
     }
 
-    /// The outlines of letters of a size, on a line that begins at `start` in the direction `along`; y is down.
+    /// The outlines of letters of a size, on a line that begins at `start` in the direction `along`; y points down.
     pub(super) fn outlines(
         &self,
         letters: &[Letter],
@@ -109,7 +109,7 @@ impl Fonts {
     }
 }
 
-/// Puts outlines of letters where they are on the page.
+/// Moves outlines of letters to their place on the page.
 struct Pen {
     path: PathBuilder,
     scale: f32,

@@ -1,7 +1,7 @@
-//! Figures as PNG and PDF, made of their SVG: `svg` reads it, `pixels` and `pdf` draw.
+//! Figures as PNG and PDF, made from their SVG: `svg` reads it, `pixels` and `pdf` draw.
 //!
 //! Letters are those of DejaVu Sans, which the program contains: a figure is the same on every machine, with or without
-//! fonts. Letters that it lacks become empty boxes.
+//! fonts. Letters that this font lacks become empty boxes.
 
 mod letters;
 mod pdf;
@@ -13,19 +13,19 @@ use roxmltree::Document;
 
 use super::style::Size;
 
-/// What a figure is written as.
+/// The format of a figure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Image {
-    /// Vectors, for a browser.
+    /// SVG: vectors, for a browser.
     #[default]
     Svg,
-    /// Pixels, 300 to an inch.
+    /// PNG: pixels, 300 per inch.
     Png,
-    /// Vectors, for LaTeX; the letters can be searched.
+    /// PDF: vectors, for LaTeX; the text can be searched.
     Pdf,
 }
 
-/// Largest SVG that is converted (bytes): what is made of it while it is drawn takes several times as much.
+/// The largest SVG that is converted (bytes); drawing it takes several times this memory.
 const LARGEST: usize = 4 << 20;
 
 /// Writes a drawn figure as a file of the given kind.
@@ -41,7 +41,7 @@ pub fn write(svg: String, size: Size, image: Image) -> Result<Vec<u8>, String> {
     };
     if svg.len() > LARGEST {
         return Err(format!(
-            "it is too large to be converted ({} MB of SVG, at most {}): ask for .svg",
+            "the figure is too large to be converted ({} MB of SVG, at most {}): request .svg",
             svg.len().div_ceil(1 << 20),
             LARGEST >> 20
         ));
@@ -114,18 +114,18 @@ mod tests {
         assert!(pixels < 1.01 * pixels::MOST_PIXELS, "{pixels}");
         for image in [Image::Png, Image::Pdf] {
             let refused = write(height(200_000), Size::Page, image).unwrap_err();
-            assert!(refused.contains("ask for .svg"), "{refused}");
+            assert!(refused.contains("request .svg"), "{refused}");
         }
     }
 
     #[test]
-    fn what_is_too_large_is_refused_and_stays_svg() {
+    fn a_figure_that_is_too_large_is_refused_and_available_as_svg() {
         let mut svg = drawn(Size::Page);
         svg.push_str(&" ".repeat(LARGEST));
         assert!(
             write(svg.clone(), Size::Page, Image::Pdf)
                 .unwrap_err()
-                .contains("ask for .svg")
+                .contains("request .svg")
         );
         assert!(write(svg, Size::Page, Image::Svg).is_ok());
     }

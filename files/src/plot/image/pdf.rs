@@ -1,4 +1,4 @@
-//! A figure as a page of PDF: paths, and letters that can be searched, of the part of the fonts that it needs.
+//! Writes a figure as a page of PDF: paths, and text that can be searched, with the needed part of the fonts embedded.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{DefaultHasher, Hasher};
@@ -19,27 +19,27 @@ use super::svg::{self, Canvas, Line, Paint, Stroke};
 use crate::plot::Size;
 
 const POINTS_PER_INCH: f64 = 72.0;
-/// Highest page that readers of PDF show (points).
+/// The largest height of a page that PDF readers show (points).
 const HIGHEST: f32 = 14_400.0;
-/// Lengths of letters in a PDF, to the height of their font.
+/// The units of lengths in a PDF font, per height of the font.
 const PER_EM: f32 = 1000.0;
-/// Names of the fonts on the page.
+/// The names of the fonts on the page.
 const FONTS: [Name<'static>; 2] = [Name(b"F0"), Name(b"F1")];
-/// The numbers of glyphs are those of the embedded part.
+/// The numbering of glyphs, which is that of the embedded part.
 const NUMBERING: SystemInfo<'static> = SystemInfo {
     registry: Str(b"Adobe"),
     ordering: Str(b"Identity"),
     supplement: 0,
 };
 
-/// The figure as PDF of its size on paper.
+/// Writes the figure as PDF with its size on paper.
 pub(super) fn pdf(figure: &Document<'_>, fonts: &Fonts, size: Size) -> Result<Vec<u8>, String> {
     let [wide, high] = svg::size(figure)?;
     let width = (size.inches() * POINTS_PER_INCH) as f32;
     let scale = width / wide;
     let height = high * scale;
     if height > HIGHEST {
-        return Err("it is higher than a page of PDF may be: ask for .svg".to_owned());
+        return Err("the figure is higher than a page of PDF may be: request .svg".to_owned());
     }
     let mut page = Page {
         content: Content::new(),
@@ -103,7 +103,7 @@ pub(super) fn pdf(figure: &Document<'_>, fonts: &Fonts, size: Size) -> Result<Ve
     Ok(pdf.finish())
 }
 
-/// Opacities are graphics states with a name each.
+/// The name of the graphics state for an opacity.
 fn opacity_name((what, thousandths): (char, u16)) -> String {
     format!("{what}{thousandths}")
 }
@@ -118,7 +118,7 @@ fn compressed(bytes: &[u8]) -> Result<Vec<u8>, String> {
 #[derive(Default)]
 struct Part {
     glyphs: GlyphRemapper,
-    /// By their numbers in the part: the first letter that each stands for, and its width.
+    /// By the glyph's number in the part: the first letter that it stands for, and its width.
     letters: BTreeMap<u16, (char, f32)>,
 }
 
@@ -177,8 +177,8 @@ impl Part {
         Ok(())
     }
 
-    /// Six letters that say which part it is: another one of the same font has others, so that programs that join
-    /// documents keep both.
+    /// Six letters that identify the part: different parts of the same font have different ones, so that programs that
+    /// join documents keep both.
     fn tag(&self) -> String {
         let mut hasher = DefaultHasher::new();
         for glyph in self.glyphs.remapped_gids() {
@@ -197,13 +197,13 @@ impl Part {
 struct Page {
     content: Content,
     parts: [Part; 2],
-    /// Those that there are (thousandths), of what is filled and of lines.
+    /// The opacities in use (thousandths), for fills and for lines.
     opacities: BTreeSet<(char, u16)>,
     clipped: bool,
 }
 
 impl Page {
-    /// Opacity and colour of what is filled (`F`) or of lines (`S`).
+    /// Sets opacity and colour of fills (`F`) or of lines (`S`).
     fn paint(&mut self, what: char, paint: Paint) {
         let state = (what, (paint.opacity * 1000.0).round() as u16);
         self.opacities.insert(state);

@@ -1,4 +1,4 @@
-//! A figure in pixels, as PNG.
+//! Draws a figure in pixels, as PNG.
 
 use roxmltree::Document;
 use tiny_skia::{
@@ -11,17 +11,17 @@ use crate::plot::Size;
 
 const DOTS_PER_INCH: f64 = 300.0;
 const LEAST_DOTS_PER_INCH: f64 = 100.0;
-/// Pixels at most: a figure of many panels has fewer to an inch, and with too few it could not be read. Each takes eight bytes
-/// while it is drawn.
+/// The largest number of pixels: a figure of many panels has fewer per inch, until it could not be read. Each takes
+/// eight bytes while it is drawn.
 pub(super) const MOST_PIXELS: f64 = 8e6;
 
-/// The figure as PNG of its size on paper.
+/// Writes the figure as PNG with its size on paper.
 pub(super) fn png(figure: &Document<'_>, fonts: &Fonts, size: Size) -> Result<Vec<u8>, String> {
     let [width, height] = svg::size(figure)?.map(f64::from);
     let wanted = size.inches() * DOTS_PER_INCH / width;
     let scale = wanted.min((MOST_PIXELS / (width * height)).sqrt());
     if scale < wanted * LEAST_DOTS_PER_INCH / DOTS_PER_INCH {
-        return Err("it is too high for pixels that could be read: ask for .svg".to_owned());
+        return Err("the figure is too high to be readable as pixels: request .svg".to_owned());
     }
     let [columns, rows] = [width, height].map(|side| (side * scale).round().max(1.0) as u32);
     let mut canvas = Pixels {
@@ -62,9 +62,9 @@ pub(super) fn png(figure: &Document<'_>, fonts: &Fonts, size: Size) -> Result<Ve
 
 struct Pixels<'a> {
     pixels: Pixmap,
-    /// What was drawn before, and the rectangle that alone is drawn on now (units of the drawing).
+    /// The picture before clipping, and the rectangle that is drawn on now (units of the drawing).
     clip: Option<(Pixmap, [f32; 4])>,
-    /// From the units of the drawing to pixels.
+    /// The transformation from the units of the drawing to pixels.
     scale: Transform,
     fonts: &'a Fonts,
 }
@@ -128,8 +128,8 @@ impl Canvas for Pixels<'_> {
 }
 
 impl Pixels<'_> {
-    /// Outside of a rectangle (left, top, right, bottom) the pixels are again what they were: a mask while drawing would
-    /// shift the colours where shapes touch.
+    /// Restores the pixels outside a rectangle (left, top, right, bottom) to the picture before: a mask while drawing
+    /// would shift the colours where shapes touch.
     fn restore(&mut self, before: &Pixmap, inside: [f32; 4]) {
         let width = self.pixels.width() as usize;
         let scales = [self.scale.sx, self.scale.sy, self.scale.sx, self.scale.sy];

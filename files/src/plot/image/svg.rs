@@ -1,40 +1,40 @@
-//! The SVG of a figure, shape by shape: what plotters and `body` write of it, and no more. Anything else is an error rather than
-//! left out.
+//! Reads the SVG of a figure, shape by shape: only the elements that plotters and `body` write. Anything else is an
+//! error rather than left out.
 
 use roxmltree::{Document, Node};
 use tiny_skia::{FillRule, Path, PathBuilder, Rect};
 
 use super::letters::{Fonts, Letter};
 
-/// What a figure is drawn on. Places and lengths are in units of the drawing, y is down.
+/// A surface that a figure is drawn on. Places and lengths are in units of the drawing, y points down.
 pub(super) trait Canvas {
-    /// The inside of a path, and a line along it.
+    /// Fills a path and draws a line along it.
     fn shape(
         &mut self,
         path: &Path,
         inside: Option<(FillRule, Paint)>,
         line: Option<(Stroke, Paint)>,
     );
-    /// Letters on a line.
+    /// Draws letters on a line.
     fn letters(&mut self, line: &Line<'_>, paint: Paint);
-    /// What follows is seen inside of this alone; everywhere with `None`.
+    /// Clips everything that follows to a rectangle; `None` ends that.
     fn clip(&mut self, to: Option<Rect>);
 }
 
-/// A colour, from 0 (not seen) to 1 opaque.
+/// A colour with opacity, from 0 (invisible) to 1 (opaque).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Paint {
     pub(super) rgb: [u8; 3],
     pub(super) opacity: f32,
 }
 
-/// How a line is drawn: with square ends and mitred joins where they are not round.
+/// The style of a line: with square ends and mitred joins where they are not round.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Stroke {
     pub(super) width: f32,
     pub(super) round_ends: bool,
     pub(super) round_joins: bool,
-    /// The lengths of dashes and of the gaps between them; a whole line without any.
+    /// The lengths of dashes and of the gaps between them; empty for a solid line.
     pub(super) dashes: Vec<f32>,
 }
 
@@ -44,7 +44,7 @@ pub(super) struct Line<'a> {
     pub(super) letters: &'a [Letter],
     pub(super) size: f32,
     pub(super) start: [f32; 2],
-    /// Its direction, of length 1.
+    /// The direction of the line, of length 1.
     pub(super) along: [f32; 2],
 }
 
@@ -65,7 +65,7 @@ pub(super) fn draw(
     content(figure.root_element(), [0.0; 2], fonts, canvas)
 }
 
-/// What an element contains, moved by `from`.
+/// Draws the content of an element, moved by `from`.
 fn content(
     parent: Node<'_, '_>,
     from: [f32; 2],
@@ -155,7 +155,7 @@ fn outline(node: Node<'_, '_>, from: [f32; 2]) -> Result<Option<Path>, String> {
     Ok(path.finish())
 }
 
-/// The commands of a path: `M` and `L` with places; `l` and `q` with steps from the last place; `z`.
+/// Adds the commands of a path: `M` and `L` with places; `l` and `q` with steps from the last place; `z`.
 fn commands(path: &str, from: [f32; 2], to: &mut PathBuilder) -> Result<(), String> {
     let mut here = from;
     let mut commands = path
@@ -195,7 +195,7 @@ fn commands(path: &str, from: [f32; 2], to: &mut PathBuilder) -> Result<(), Stri
     Ok(())
 }
 
-/// A text of several sizes on a line that goes up and down.
+/// Draws a text of several sizes on a line with subscripts.
 fn text(
     node: Node<'_, '_>,
     from: [f32; 2],
@@ -245,8 +245,8 @@ fn text(
     Ok(())
 }
 
-/// The words of a text by the element that they are in. Ends of lines are blanks; of blanks one after another the first is
-/// kept, and none at the ends of the text.
+/// The words of a text with the elements that they are in. Line ends count as blanks; only the first of several blanks
+/// is kept, and none at the ends of the text.
 fn words<'a, 'input>(text: Node<'a, 'input>) -> Vec<(Node<'a, 'input>, String)> {
     let mut words: Vec<(Node<'a, 'input>, String)> = Vec::new();
     let mut blank = true;
@@ -267,7 +267,7 @@ fn words<'a, 'input>(text: Node<'a, 'input>) -> Vec<(Node<'a, 'input>, String)> 
     words
 }
 
-/// A length that may be in heights of letters.
+/// A length, which may be given in heights of letters.
 fn length(text: &str, size: f32) -> Result<f32, String> {
     if let Some(heights) = text.strip_suffix("em") {
         Ok(number(heights)? * size)
@@ -279,7 +279,7 @@ fn length(text: &str, size: f32) -> Result<f32, String> {
     }
 }
 
-/// The colour that something is drawn in; `None` if it is not drawn.
+/// The colour of a fill or line; `None` if it is not drawn.
 fn paint(node: Node<'_, '_>, what: &str) -> Result<Option<Paint>, String> {
     let Some(colour) = inherited(node, what).filter(|colour| *colour != "none") else {
         return Ok(None);
@@ -303,7 +303,7 @@ fn rectangle(node: Node<'_, '_>, from: [f32; 2]) -> Result<[f32; 4], String> {
     Ok([from[0] + x, from[1] + y, value("width")?, value("height")?])
 }
 
-/// That of an element, or of the nearest one around it that has it.
+/// The attribute of an element, or of the nearest element around it that has it.
 fn inherited<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
     node.ancestors().find_map(|node| node.attribute(name))
 }
@@ -418,7 +418,7 @@ stress  σ<tspan dy="4" font-size="14">xx</tspan><tspan dy="-4"> (MPa)
     }
 
     #[test]
-    fn what_is_not_known_is_an_error() {
+    fn an_unknown_element_is_an_error() {
         for (content, reason) in [
             ("<ellipse/>", "it contains <ellipse>"),
             (

@@ -1,4 +1,4 @@
-//! `signorini cancel`, `retry` and `rm`: the commands that change jobs.
+//! The commands `signorini cancel`, `retry` and `rm`, which change jobs.
 
 use clap::Args;
 use reqwest::Method;
@@ -31,7 +31,7 @@ pub(in crate::cli) struct Cancel {
     service: Connection,
 }
 
-/// Asks each to stop. One that has ended already is no error, and is printed as it is.
+/// Runs `cancel`: asks each job to stop. A job that has ended already is no error, and is printed as it is.
 pub(super) async fn cancel(arguments: Cancel) -> anyhow::Result<Exit> {
     let service = arguments.service.open()?;
     let mut documents = vec![];
@@ -54,7 +54,7 @@ pub(in crate::cli) struct Retry {
     #[arg(required = true, value_parser = job)]
     ids: Vec<JobId>,
 
-    /// Seconds that it may run, in place of the first job's
+    /// The most seconds that a new job may run [default: those of the first job]
     #[arg(long, value_name = "SECONDS")]
     timeout: Option<f64>,
 
@@ -70,7 +70,7 @@ fn job(text: &str) -> Result<JobId, String> {
         .ok_or_else(|| "expected the id of a job, as `signorini ls` prints them: job_…".into())
 }
 
-/// Submits the problem of each anew, and prints the new jobs.
+/// Runs `retry`: submits the problem of each job again, and prints the new jobs.
 pub(super) async fn retry(arguments: Retry) -> anyhow::Result<Exit> {
     let service = arguments.service.open()?;
     let mut documents: Vec<Value> = vec![];
@@ -97,7 +97,7 @@ pub(in crate::cli) struct Remove {
     #[arg(required = true)]
     ids: Vec<Id>,
 
-    /// Only their meshes, displacements and stresses, which are most of what they keep: of jobs
+    /// Delete only the meshes, displacements and stresses of jobs, which are most of their data
     #[arg(long)]
     fields: bool,
 
@@ -105,11 +105,11 @@ pub(in crate::cli) struct Remove {
     service: Connection,
 }
 
-/// Deletes each, and prints their ids.
+/// Runs `rm`: deletes each job or sweep, and prints their ids.
 pub(super) async fn remove(arguments: Remove) -> anyhow::Result<Exit> {
     let service = arguments.service.open()?;
     if arguments.fields && arguments.ids.iter().any(|id| matches!(id, Id::Sweep(_))) {
-        eprintln!("signorini: --fields is for jobs: a sweep keeps no fields");
+        eprintln!("signorini: --fields is for jobs: a sweep has no fields");
         return Ok(Exit::Invalid);
     }
     for id in arguments.ids {

@@ -1,4 +1,4 @@
-//! Curves in a terminal, drawn with the dots of braille characters.
+//! Charts in a terminal, drawn with braille characters.
 
 use std::ops::Range;
 
@@ -21,24 +21,24 @@ pub(super) struct Curve {
 /// Curves over one axis.
 pub(super) struct Chart {
     pub(super) title: String,
-    /// The quantity of the horizontal axis.
+    /// The name of the horizontal axis.
     pub(super) across: String,
     pub(super) curves: Vec<Curve>,
     /// The vertical axis.
     pub(super) scale: Scale,
-    /// A line below the title.
+    /// A line of text below the title.
     pub(super) note: Option<String>,
 }
 
 /// The vertical axis.
 pub(super) enum Scale {
-    /// From here to there; what of a curve is beyond is not drawn.
+    /// A range; parts of a curve beyond it are not drawn.
     Within(Range<f64>),
     /// Powers of ten; values that are not positive are left out.
     Logarithmic,
 }
 
-/// Curves in their order: told apart also by who sees no red or no green.
+/// The colours of curves in their order; they can be distinguished without red or green.
 const COLOURS: [(Color, &str); 3] = [
     (Color::Cyan, "36"),
     (Color::Yellow, "33"),
@@ -46,7 +46,7 @@ const COLOURS: [(Color, &str); 3] = [
 ];
 
 impl Chart {
-    /// The figure, as lines of so many characters.
+    /// The chart as `height` lines of `width` characters.
     pub(super) fn draw(&self, width: u16, height: u16, in_colour: bool) -> String {
         let visible: Vec<Vec<(f64, f64)>> = self
             .curves
@@ -112,7 +112,7 @@ impl Chart {
         )
     }
 
-    /// The title, and the names of the curves in their colours; below them the note.
+    /// The title, and the names of the curves in their colours, with the note below them.
     fn heading(&self, in_colour: bool) -> String {
         let names = self.curves.iter().zip(COLOURS);
         let names =
@@ -137,7 +137,7 @@ impl Chart {
     }
 }
 
-/// From the least to the most; wider than a point.
+/// The range from the smallest to the largest value, wider than a point.
 fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
         (low.min(value), high.max(value))
@@ -150,7 +150,7 @@ fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     [low - pad, high + pad]
 }
 
-/// Three digits.
+/// A number with three digits.
 fn short(value: f64) -> String {
     match value.abs() {
         0.0 => "0".into(),
@@ -162,7 +162,7 @@ fn short(value: f64) -> String {
     }
 }
 
-/// A text as a terminal is told of its colour.
+/// A text with the escape sequence of its colour.
 fn coloured(text: &str, code: &str, in_colour: bool) -> String {
     match in_colour {
         true => format!("\x1b[{code}m{text}\x1b[0m"),
@@ -170,7 +170,7 @@ fn coloured(text: &str, code: &str, in_colour: bool) -> String {
     }
 }
 
-/// The characters of a buffer, with their colours as a terminal is told of them.
+/// The characters of a buffer, with the escape sequences of their colours.
 fn text_of(buffer: &Buffer, in_colour: bool) -> String {
     let mut text = String::new();
     for y in 0..buffer.area.height {
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_draw_is_said() {
+    fn a_chart_without_curves_says_so() {
         let none = Chart {
             title: "Convergence".into(),
             across: "iteration".into(),

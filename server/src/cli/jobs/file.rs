@@ -1,4 +1,4 @@
-//! A problem or a sweep in a file, as it is submitted; and what is wrong with it, line by line.
+//! Reads a problem or a sweep from a file for submission, and reports its violations with their lines.
 
 use std::{
     collections::BTreeMap,
@@ -17,25 +17,25 @@ use super::super::{
 };
 use crate::error::ApiError;
 
-/// Violations of which each is told.
+/// The largest number of violations that are printed.
 const MOST_TOLD: usize = 100;
 
-/// What a file asks for.
+/// What a file submits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Job,
     Sweep,
 }
 
-/// A file that is to be submitted.
+/// A file to be submitted.
 pub(super) struct Submitted {
     path: PathBuf,
-    /// As it stands in the file: lines are counted there.
+    /// The text of the file, for counting lines.
     text: String,
     pub(super) kind: Kind,
-    /// The fields of the request as text, so that every number is sent as it was written.
+    /// The fields of the request as text, so that every number is sent as written.
     pub(super) fields: BTreeMap<String, Box<RawValue>>,
-    /// What stands before the pointers of a request, and not before those of the file.
+    /// The prefix of pointers in the request that is not part of pointers in the file.
     envelope: &'static str,
 }
 
@@ -128,17 +128,17 @@ impl Submitted {
         })
     }
 
-    /// The request, as JSON.
+    /// The request as JSON.
     pub(super) fn body(&self) -> anyhow::Result<String> {
         Ok(serde_json::to_string(&self.fields)?)
     }
 
-    /// A pointer into the request, as one into the file.
+    /// Converts a pointer into the request to one into the file.
     pub(super) fn in_file<'a>(&self, pointer: &'a str) -> &'a str {
         pointer.strip_prefix(self.envelope).unwrap_or(pointer)
     }
 
-    /// Tells what is wrong with it, with the line where each fault stands.
+    /// Prints the violations, with the line of each.
     pub(super) fn tell(&self, violations: &[Violation]) {
         let many = match violations.len() {
             1 => "violation",
@@ -170,7 +170,7 @@ impl Submitted {
         }
     }
 
-    /// Tells the violations for which the service has refused it, if there are any; the error is returned as it came.
+    /// Prints the violations for which the service has refused the file, if there are any; returns the error unchanged.
     pub(super) fn refused(&self, error: anyhow::Error) -> anyhow::Error {
         if let Some(CallError::Refused(refusal)) = error.downcast_ref() {
             let Refusal { violations, .. } = &**refusal;

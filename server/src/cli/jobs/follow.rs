@@ -1,4 +1,4 @@
-//! Following a job or a sweep to its end, also while the service is restarted.
+//! Follows a job or a sweep to its end, also while the service is restarted.
 
 use std::{ops::ControlFlow, time::Duration};
 
@@ -18,23 +18,24 @@ use super::{
 };
 use crate::job::{Job, Reason, Status};
 
-/// A service that was there is looked for again so long, with pauses that grow.
+/// How long a service that was reached before is tried again, with growing pauses.
 const PATIENCE: Duration = Duration::from_secs(300);
 const FIRST_PAUSE: Duration = Duration::from_millis(250);
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
-/// Seconds that one request waits at most, of those that the service allows: a proxy may cut off what is silent for a minute.
+/// The longest time of one waiting request, in seconds, within the limit of the service: a proxy may cut a connection
+/// that is silent for a minute.
 const WAIT_S: f64 = 30.0;
 
-/// An answer that is due at the end of the time to wait may come so much later.
+/// How much later an answer that is due at the end of the time to wait may come.
 const GRACE: Duration = Duration::from_secs(5);
 
-/// Since when the service was not reached.
+/// A time in which the service cannot be reached.
 struct Outage {
-    /// It has answered before, or a connection to it was open.
+    /// Whether the service has answered before, or a connection to it was open.
     known: bool,
     since: Option<Instant>,
     pause: Duration,
-    /// When the time to wait is over.
+    /// The end of the time to wait.
     deadline: Option<Instant>,
 }
 
@@ -55,8 +56,8 @@ impl Outage {
         };
     }
 
-    /// Waits before the next attempt, not beyond the deadline, or gives up: with an error that will not pass, or a service that
-    /// never was there.
+    /// Waits before the next attempt, at most until the deadline; or gives up, if the error is permanent or the service
+    /// was never reached.
     async fn bear(&mut self, error: anyhow::Error) -> anyhow::Result<()> {
         let passing = match error.downcast_ref() {
             Some(CallError::Unreachable { connected, .. }) => {
@@ -83,15 +84,15 @@ impl Outage {
     }
 }
 
-/// How a wait ends.
+/// The result of waiting.
 pub(super) enum Waited {
     /// The job or sweep has ended.
     Ended(Value),
-    /// The time is over; what the service last said, if it has said anything.
+    /// The time to wait is over; the last answer of the service, if there was one.
     TimedOut(Option<Value>),
 }
 
-/// Waits until it has ended, or until the deadline.
+/// Waits until the job or sweep has ended, or until the deadline.
 pub(super) async fn wait(
     service: &Service,
     id: Id,
@@ -122,7 +123,7 @@ pub(super) async fn wait(
             Ok(document) => {
                 let Some(status) = status_of(&document) else {
                     bail!(
-                        "what {path} answers has no status: is the address that of a signorini service?"
+                        "the answer to {path} has no status: is this the address of a signorini service?"
                     );
                 };
                 if status.is_terminal() {
@@ -142,12 +143,12 @@ pub(super) async fn wait(
     }
 }
 
-/// How a job or a sweep is.
+/// The status of a job or a sweep.
 fn status_of(document: &Value) -> Option<Status> {
     document["status"].as_str()?.parse().ok()
 }
 
-/// Hears all events, each once, until there is no further one.
+/// Passes on all events, each once, until there are no more.
 pub(super) async fn events(
     service: &Service,
     id: Id,
@@ -169,7 +170,7 @@ pub(super) async fn events(
         let kind = answer.headers().get(header::CONTENT_TYPE);
         if !kind.is_some_and(|kind| kind.as_bytes().starts_with(b"text/event-stream")) {
             bail!(
-                "what {path} answers is no stream of events: is the address that of a signorini service?"
+                "the answer to {path} is no stream of events: is this the address of a signorini service?"
             );
         }
         outage.over();
@@ -193,7 +194,7 @@ pub(super) async fn events(
     }
 }
 
-/// How a command ends that was to see a job to its end.
+/// The exit code of a command that waited for the end of a job.
 pub(super) fn exit_of(job: &Job) -> Exit {
     match (job.status, job.reason) {
         (Status::Canceled, _) => Exit::Canceled,
@@ -206,7 +207,7 @@ pub(super) fn exit_of(job: &Job) -> Exit {
     }
 }
 
-/// The same of a document that is a job or a sweep.
+/// The exit code of a command that waited for the end of this job or sweep.
 pub(super) fn exit_of_document(id: Id, document: &Value) -> anyhow::Result<Exit> {
     if let Id::Job(_) = id {
         return Ok(exit_of(&super::listing::job(document)?));
@@ -214,7 +215,7 @@ pub(super) fn exit_of_document(id: Id, document: &Value) -> anyhow::Result<Exit>
     Ok(exit_of_sweep(document))
 }
 
-/// The same of a sweep.
+/// The exit code of a command that waited for the end of a sweep.
 pub(super) fn exit_of_sweep(document: &Value) -> Exit {
     let failed = document["members"]["failed"].as_u64().unwrap_or_default();
     match status_of(document) {
@@ -225,7 +226,7 @@ pub(super) fn exit_of_sweep(document: &Value) -> Exit {
     }
 }
 
-/// Ends the process at Ctrl-C, as the signal itself would, and says that what was followed goes on.
+/// Ends the process at Ctrl-C, as the signal itself would, and says that the job or sweep continues.
 pub(super) async fn detached<T>(
     id: Id,
     work: impl Future<Output = anyhow::Result<T>>,
@@ -233,7 +234,7 @@ pub(super) async fn detached<T>(
     tokio::select! {
         done = work => done,
         _ = tokio::signal::ctrl_c() => {
-            eprintln!("\n{id} goes on; `signorini watch {id}` follows it again, `signorini cancel {id}` ends it");
+            eprintln!("\n{id} continues; `signorini watch {id}` follows it again, `signorini cancel {id}` ends it");
             std::process::exit(130)
         }
     }

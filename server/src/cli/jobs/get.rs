@@ -1,4 +1,4 @@
-//! `signorini get`.
+//! The command `signorini get`.
 
 use clap::Args;
 
@@ -22,7 +22,7 @@ pub(in crate::cli) struct Arguments {
     service: Connection,
 }
 
-/// Prints all that is known of each.
+/// Runs the command: prints everything that is known about each job or sweep.
 pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     let service = arguments.service.open()?;
     let mut documents = vec![];

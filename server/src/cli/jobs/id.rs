@@ -1,4 +1,4 @@
-//! What a client command is about: a job or a sweep.
+//! The id that a client command takes: that of a job or a sweep.
 
 use std::{fmt, str::FromStr};
 
@@ -12,7 +12,7 @@ pub(super) enum Id {
 }
 
 impl Id {
-    /// Its path in the service.
+    /// The path of the job or sweep in the service.
     pub(super) fn path(self) -> String {
         match self {
             Id::Job(id) => format!("/v1/jobs/{id}"),

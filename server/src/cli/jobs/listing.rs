@@ -1,4 +1,4 @@
-//! Jobs and sweeps as they are printed.
+//! Prints jobs and sweeps.
 
 use std::{borrow::Cow, collections::BTreeSet};
 
@@ -13,15 +13,15 @@ use crate::{
     time::Time,
 };
 
-/// How answers are printed.
+/// Options for printing answers.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
 pub(super) struct Shown {
-    /// How to print it: json as the service answers, jsonl a line for each, csv a row for each
+    /// How to print: json is the service's answer, jsonl has a line and csv a row for each
     #[arg(short, long, value_enum, default_value_t = Format::Table)]
     format: Format,
 
-    /// Print ids only, one a line
+    /// Print only ids, one on each line
     #[arg(short, long, conflicts_with = "format")]
     quiet: bool,
 }
@@ -34,16 +34,16 @@ pub(super) enum Format {
     Csv,
 }
 
-/// What is printed.
+/// Documents to be printed.
 pub(super) enum Found {
-    /// It was asked for by itself: a document in JSON.
+    /// A single document that was requested by its id.
     One(Value),
     /// A list, even if it has one entry.
     Many(Vec<Value>),
 }
 
 impl Found {
-    /// What was asked for by this many ids.
+    /// The documents for this many ids.
     pub(super) fn of(mut documents: Vec<Value>) -> Found {
         match documents.len() {
             1 => Found::One(documents.remove(0)),
@@ -64,7 +64,7 @@ impl Shown {
         self.format == Format::Table && !self.quiet
     }
 
-    /// Jobs or sweeps, a row for each.
+    /// Prints jobs or sweeps, one row each.
     pub(super) fn print(&self, found: &Found) -> anyhow::Result<()> {
         let documents = found.documents();
         let text = match (self.format, found) {
@@ -78,7 +78,7 @@ impl Shown {
         Ok(output::print(&text)?)
     }
 
-    /// The same, but as a table all that is known of each.
+    /// Prints jobs or sweeps; as a table with everything that is known about each.
     pub(super) fn print_whole(&self, found: &Found) -> anyhow::Result<()> {
         if !self.is_table() {
             return self.print(found);
@@ -104,7 +104,7 @@ fn is_sweep(document: &Value) -> bool {
     document["members"].is_object()
 }
 
-/// Nothing for what is absent; a text without quotation marks.
+/// The text of a field: empty if it is absent, without quotation marks.
 fn text(document: &Value, key: &str) -> String {
     match &document[key] {
         Value::Null => String::new(),
@@ -147,7 +147,7 @@ fn lines(documents: &[Value]) -> anyhow::Result<String> {
     Ok(table(headings, &rows))
 }
 
-/// What is to be known of a job at first sight.
+/// The most important remarks about a job.
 fn notes(job: &Job) -> String {
     let mut notes = vec![];
     match (&job.queue, &job.progress) {
@@ -181,7 +181,7 @@ fn notes(job: &Job) -> String {
     notes.join("; ")
 }
 
-/// How many members of a sweep have ended.
+/// The number of members of a sweep that have ended, in words.
 fn members(sweep: &Value) -> String {
     let count = |key: &str| sweep["members"][key].as_u64().unwrap_or_default();
     let ended = count("succeeded") + count("failed") + count("canceled");
@@ -191,7 +191,7 @@ fn members(sweep: &Value) -> String {
     }
 }
 
-/// A length of time.
+/// A duration for people.
 pub(super) fn seconds(seconds: f64) -> String {
     match seconds {
         s if s < 10.0 => format!("{s:.3} s"),
@@ -208,7 +208,7 @@ fn shortened(text: &str, most: usize) -> String {
     }
 }
 
-/// All of a job, a line for each fact.
+/// All facts about a job, one on each line.
 fn card(job: &Job) -> String {
     let time = |time: &Option<Time>| time.map(|time| time.to_string());
     let mut lines = vec![("job", Some(job.id.to_string()))];
@@ -306,7 +306,7 @@ fn sweep_card(sweep: &Value) -> String {
     report::lines(lines.into_iter().flatten())
 }
 
-/// The columns of the list: what is in a job or sweep by itself, and is not a list.
+/// The list as CSV: the columns are the simple values of a job or sweep, but no lists.
 fn csv(documents: &[Value]) -> anyhow::Result<String> {
     const TEXTS: [&str; 14] = [
         "id",

@@ -1,4 +1,4 @@
-//! `signorini ls`.
+//! The command `signorini ls`.
 
 use clap::Args;
 use form_urlencoded::Serializer;
@@ -15,31 +15,32 @@ use crate::job::Status;
 #[command(after_help = "Examples:\n  signorini ls --status queued,running\n  \
     signorini ls --label study=radius -n 0 -f csv > study.csv\n  signorini rm $(signorini ls --status failed -q)")]
 pub(in crate::cli) struct Arguments {
-    /// Sweeps instead of jobs
+    /// List sweeps instead of jobs
     #[arg(long, conflicts_with_all = ["status", "name", "owner", "labels", "sweep"])]
     sweeps: bool,
 
-    /// Only with this status: queued, running, succeeded, failed, canceled; can be repeated, or a list with commas
+    /// List only jobs with this status: queued, running, succeeded, failed, canceled; can be repeated, or a list with
+    /// commas
     #[arg(long, value_delimiter = ',', value_name = "STATUS", value_parser = status)]
     status: Vec<Status>,
 
-    /// Only with this name
+    /// List only jobs with this name
     #[arg(long)]
     name: Option<String>,
 
-    /// Only of this owner
+    /// List only jobs of this owner
     #[arg(long)]
     owner: Option<String>,
 
-    /// Only with this label; can be repeated
+    /// List only jobs with this label; can be repeated
     #[arg(long = "label", value_name = "KEY=VALUE", value_parser = label)]
     labels: Vec<(String, String)>,
 
-    /// Only the jobs of this sweep
+    /// List only the jobs of this sweep
     #[arg(long, value_name = "ID")]
     sweep: Option<String>,
 
-    /// At most so many, the newest first; 0: all
+    /// List at most this many, the newest first; 0: all
     #[arg(short = 'n', long, default_value_t = 20, value_name = "N")]
     limit: usize,
 

@@ -32,14 +32,15 @@ use super::exit::Exit;
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
     /// Submit problems and sweeps to a running service. Exit code: 0 accepted, 2 invalid, 5 no connection, 7 no valid
-    /// token, 8 share used up or queue full
+    /// token, 8 quota used up or queue full
     Submit(Box<submit::Arguments>),
-    /// Print a job's iterations as they are made, until it ends. Exit code: 0 succeeded, 1 failed, 3 canceled, 9 not
+    /// Print a job's iterations while it runs, until it ends. Exit code: 0 succeeded, 1 failed, 3 canceled, 9 not
     /// converged
     Watch(watch::Arguments),
-    /// Wait until jobs end. Exit code: the worst of 0 succeeded, 1 failed, 3 canceled, 4 the time is over, 9 not converged
+    /// Wait until jobs end. Exit code: the worst of 0 succeeded, 1 failed, 3 canceled, 4 not ended in time, 9 not
+    /// converged
     Wait(wait::Arguments),
-    /// Print all that is known of jobs
+    /// Print everything that is known about jobs
     Get(get::Arguments),
     /// List jobs, newest first
     Ls(Box<ls::Arguments>),
@@ -49,7 +50,7 @@ pub(super) enum Command {
     Plot(plot::Arguments),
     /// Ask jobs to stop
     Cancel(change::Cancel),
-    /// Submit the problem of a job again, to be solved anew
+    /// Submit the problem of a job again, to be solved once more
     Retry(change::Retry),
     /// Delete jobs and sweeps that have ended
     Rm(change::Remove),

@@ -1,4 +1,4 @@
-//! `signorini plot`: figures in the terminal, or as files.
+//! The command `signorini plot`: figures in the terminal, or as files.
 
 use std::{
     io::IsTerminal,
@@ -33,8 +33,8 @@ pub(in crate::cli) struct Arguments {
     /// The job
     id: Id,
 
-    /// The figure: profile, convergence, mesh or deformed; without it profile and convergence. In the terminal only these two
-    /// are drawn
+    /// The figure: profile, convergence, mesh or deformed; without it profile and convergence. Only these two are drawn
+    /// in the terminal
     plot: Option<Plot>,
 
     /// Write it to this file instead: .svg, .png or .pdf
@@ -60,7 +60,7 @@ pub(in crate::cli) struct Arguments {
     service: Connection,
 }
 
-/// Characters of a figure whose reader is no terminal.
+/// The size of a figure in characters if the output is no terminal.
 const SIZE: (u16, u16) = (80, 18);
 
 pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
@@ -94,7 +94,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
             }
             None => {
                 eprintln!(
-                    "signorini: {name} is not drawn in a terminal: write it by -o FILE.svg, or look at it by --open"
+                    "signorini: {name} cannot be drawn in a terminal: write it with -o FILE.svg, or open it with --open"
                 );
                 return Ok(Exit::Invalid);
             }
@@ -171,11 +171,11 @@ fn number_of_step(result: &Value, wanted: &str) -> Option<u32> {
     number.and_then(|number| u32::try_from(number).ok())
 }
 
-/// That there is no such load step, and which there are.
+/// The message that there is no such load step, with the existing ones.
 fn no_step(result: &Value, id: JobId, wanted: &str) -> String {
     let names = names_of_steps(result);
     match names.is_empty() {
-        true => format!("{id} has no load steps; leave out --step"),
+        true => format!("{id} has no load steps; remove --step"),
         false => format!(
             "{id} has no load step {wanted:?}; it has, by name or by number from 0: {}",
             names.join(", ")
@@ -188,7 +188,8 @@ fn names_of_steps(result: &Value) -> Vec<&str> {
     steps.filter_map(|step| step["name"].as_str()).collect()
 }
 
-/// The stresses along each contact boundary, at the end of this step or of the last one: the part and the axis of figures.
+/// Charts of the stresses along each contact boundary at the end of this step, or of the last one, with the same range
+/// as figures.
 async fn profiles(
     service: &Service,
     id: JobId,
@@ -217,7 +218,7 @@ async fn profiles(
         ];
         anyhow::ensure!(
             columns.iter().all(|column| column.len() == profile.s.len()),
-            "the profile of {boundary:?} is not that of this version of signorini: its columns differ in length"
+            "the profile of {boundary:?} does not fit this version of signorini: its columns differ in length"
         );
         let view = ProfileView::of(boundary, &profile, Some(&summary));
         let points = |values: &[f64]| {
@@ -257,7 +258,7 @@ async fn profiles(
     Ok(figures)
 }
 
-/// The residuals by iteration, of this step or of all.
+/// A chart of the residuals by iteration, of this step or of all.
 async fn convergence(service: &Service, id: JobId, step: Option<u32>) -> anyhow::Result<Chart> {
     // of one step all rows are wanted, of all steps no more than can be seen
     let thinned = if step.is_some() {

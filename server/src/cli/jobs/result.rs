@@ -1,4 +1,4 @@
-//! `signorini result`.
+//! The command `signorini result`.
 
 use std::{
     io::Write,
@@ -36,7 +36,7 @@ pub(in crate::cli) struct Arguments {
     /// The job or the sweep
     id: Id,
 
-    /// Print the stresses along the contact boundary; of several contacts, of the one with this name
+    /// Print the stresses along the contact boundary; if there are several, along the one with this name
     #[arg(long, value_name = "BOUNDARY", num_args = 0..=1, default_missing_value = "")]
     profile: Option<String>,
 
@@ -44,15 +44,15 @@ pub(in crate::cli) struct Arguments {
     #[arg(long, conflicts_with = "profile")]
     history: bool,
 
-    /// Of the profile: its points, as all, nodes, friction, or a number of evenly spaced ones
+    /// Points of the profile: all, nodes, friction, or a number of evenly spaced ones
     #[arg(long, value_name = "POINTS")]
     points: Option<String>,
 
-    /// Of the profile: the load step, by its name or its number from 0 [default: the last]
+    /// Load step of the profile, by its name or its number from 0 [default: the last]
     #[arg(long, value_name = "STEP")]
     step: Option<String>,
 
-    /// How to print it: csv and jsonl are those of the profile, unless --history
+    /// How to print it: csv and jsonl print the profile, unless --history is given
     #[arg(short, long, value_enum, default_value_t = Format::Table)]
     format: Format,
 
@@ -68,11 +68,11 @@ pub(in crate::cli) struct Arguments {
     service: Connection,
 }
 
-/// What is said of a partial result.
+/// The remark about a partial result.
 pub(super) const PARTIAL: &str =
     "signorini: the result is partial: the job has not ended, or did not converge";
 
-/// What the service answers for a result.
+/// The scalars in the service's answer for a result.
 #[derive(Deserialize)]
 struct Scalars {
     summary: Summary,
@@ -154,7 +154,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
             (None, []) => bail!("the problem has no contact, and so no profile"),
             (None, several) => {
                 eprintln!(
-                    "signorini: name a contact boundary by --profile: {}",
+                    "signorini: name a contact boundary with --profile: {}",
                     several.join(", ")
                 );
                 return Ok(Exit::Invalid);
@@ -181,7 +181,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
 }
 
 impl Arguments {
-    /// The query of a profile.
+    /// The query for a profile.
     fn of_profile(&self, format: &str) -> String {
         let mut query = Serializer::new(String::new());
         query.append_pair("format", format);
@@ -190,8 +190,8 @@ impl Arguments {
         query.finish()
     }
 
-    /// Where below the job the service has what is to be written to a file; `None`: it is in the result. An error says what is
-    /// wrong with the options.
+    /// The path below the job where the service has the content of a file; `None`: it is in the result. The error names
+    /// the invalid option.
     fn route(&self, output: &Output) -> Result<Option<String>, String> {
         let part = &output.part;
         let profile = matches!(part, Part::Profile(_));
@@ -231,7 +231,7 @@ impl Arguments {
     }
 }
 
-/// The service's word for it; a table is made of JSON.
+/// The service's name for a format of rows; a table is made from JSON.
 fn of_rows(format: Format) -> &'static str {
     match format {
         Format::Table | Format::Json => "json",
@@ -240,7 +240,7 @@ fn of_rows(format: Format) -> &'static str {
     }
 }
 
-/// Prints an answer as it comes, or as a table.
+/// Prints an answer as it arrives, or as a table.
 async fn print(
     service: &Service,
     path: &str,
@@ -271,7 +271,7 @@ async fn of_sweep(service: &Service, base: &str, arguments: &Arguments) -> anyho
         || arguments.step.is_some()
     {
         eprintln!(
-            "signorini: a sweep has a table; submit a member as a job of its own for its profile (POST …/members/N/job)"
+            "signorini: a sweep has only a table; for a profile, submit a member as a job of its own (POST …/members/N/job)"
         );
         return Ok(Exit::Invalid);
     }
@@ -303,7 +303,8 @@ async fn of_sweep(service: &Service, base: &str, arguments: &Arguments) -> anyho
     Ok(Exit::Ok)
 }
 
-/// Writes the table of a sweep to a file, or to standard output: all members, though the service has JSON by pages.
+/// Writes the table of a sweep to a file, or to standard output: with all members, although the service returns JSON in
+/// pages.
 async fn table(
     service: &Service,
     base: &str,
@@ -343,7 +344,7 @@ struct Page {
     next_page_token: Option<String>,
 }
 
-/// Writes one part to its file.
+/// Writes one part of the result to its file.
 async fn save(
     service: &Service,
     output: &Output,
@@ -365,13 +366,13 @@ async fn save(
     }
 }
 
-/// Writes a file when the whole answer has arrived.
+/// Writes a file; it appears when the whole answer has arrived.
 pub(super) fn download(service: &Service, path: &Path, answer: Response) -> anyhow::Result<()> {
     output::replace(path, |out| write(service, answer, out))
         .with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// Writes an answer piece by piece: fields may be larger than the memory. The writing waits, as `replace` does.
+/// Writes an answer piece by piece, since fields may be larger than the memory. This blocks, like `replace`.
 fn write(service: &Service, mut answer: Response, out: &mut dyn Write) -> anyhow::Result<()> {
     loop {
         let piece = block_in_place(|| Handle::current().block_on(answer.chunk()));

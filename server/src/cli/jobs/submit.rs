@@ -1,4 +1,4 @@
-//! `signorini submit`.
+//! The command `signorini submit`.
 
 use std::{collections::BTreeMap, path::PathBuf};
 
@@ -25,8 +25,8 @@ use super::{
     A submission that is repeated because its answer was lost creates no second job."
 )]
 pub(in crate::cli) struct Arguments {
-    /// Problems or sweeps: JSON files, decks of Abaqus or CalculiX (.inp), or - for standard input. A file may also be a whole
-    /// request, with the problem as `problem` beside name, labels and limits
+    /// Problems or sweeps: JSON files, decks of Abaqus or CalculiX (.inp), or - for standard input. A file may also be
+    /// a whole request, with `problem`, name, labels and limits
     #[arg(required = true)]
     files: Vec<PathBuf>,
 
@@ -42,11 +42,11 @@ pub(in crate::cli) struct Arguments {
     #[arg(long, allow_hyphen_values = true, value_name = "N")]
     priority: Option<i32>,
 
-    /// Seconds that it may run
+    /// The most seconds that the job may run
     #[arg(long, value_name = "SECONDS")]
     timeout: Option<f64>,
 
-    /// Seconds that it may wait in the queue
+    /// The most seconds that the job may wait in the queue
     #[arg(long, value_name = "SECONDS")]
     queue_ttl: Option<f64>,
 
@@ -58,11 +58,11 @@ pub(in crate::cli) struct Arguments {
     #[arg(long, value_name = "KEY")]
     key: Option<String>,
 
-    /// Wait until all have ended; the exit code is then that of `signorini wait`
+    /// Wait until all have ended; the exit code is that of `signorini wait`
     #[arg(long)]
     wait: bool,
 
-    /// Print the iterations as they are made, of one file
+    /// Print the iterations while the job runs, for one file
     #[arg(long, conflicts_with_all = ["wait", "format", "quiet"])]
     watch: bool,
 
@@ -75,15 +75,15 @@ pub(in crate::cli) struct Arguments {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Cache {
-    /// It may
+    /// An earlier result may be used
     Use,
-    /// It is solved anew, and its result may answer later jobs
+    /// The problem is solved again, and its result may be used by later jobs
     Refresh,
-    /// It is solved anew, and its result answers no other job
+    /// The problem is solved again, and its result is not used by other jobs
     Off,
 }
 
-/// `KEY=VALUE`.
+/// Reads a label `KEY=VALUE`.
 pub(super) fn label(text: &str) -> Result<(String, String), String> {
     let parts = text.split_once('=').filter(|(key, _)| !key.is_empty());
     let (key, value) = parts.ok_or("expected KEY=VALUE, such as study=radius")?;
@@ -150,7 +150,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
 }
 
 impl Arguments {
-    /// Puts the options into the request, over what it has there.
+    /// Puts the options into the request, in place of those that it has.
     fn add_to(&self, submitted: &mut Submitted) -> anyhow::Result<()> {
         let fields = &mut submitted.fields;
         let mut set = |name: &str, value: Box<RawValue>| fields.insert(name.into(), value);
@@ -184,13 +184,17 @@ impl Arguments {
     }
 }
 
-/// An object of the request that an option adds to.
+/// An object in the request, to which an option adds an entry.
 fn object<T: serde::de::DeserializeOwned>(
     found: Option<&RawValue>,
 ) -> anyhow::Result<BTreeMap<String, T>> {
     match found {
-        Some(raw) => serde_json::from_str(raw.get())
-            .with_context(|| format!("what the file has there cannot be added to: {}", raw.get())),
+        Some(raw) => serde_json::from_str(raw.get()).with_context(|| {
+            format!(
+                "the option cannot be combined with the value in the file: {}",
+                raw.get()
+            )
+        }),
         None => Ok(BTreeMap::new()),
     }
 }

@@ -1,4 +1,4 @@
-//! `signorini validate`.
+//! The command `signorini validate`.
 
 use std::path::PathBuf;
 
@@ -25,7 +25,7 @@ pub(in crate::cli) struct Arguments {
     /// The problem: a JSON file, a deck of Abaqus or CalculiX (.inp), or - for standard input
     file: PathBuf,
 
-    /// Print the answer of the service
+    /// Print the answer of the service as JSON
     #[arg(long)]
     json: bool,
 
@@ -33,7 +33,7 @@ pub(in crate::cli) struct Arguments {
     service: Connection,
 }
 
-/// Prints what it is estimated to cost, or all its violations with their lines. Nothing is stored.
+/// Runs the command: prints the estimated cost, or all violations with their lines. Nothing is stored.
 pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     let service = arguments.service.open()?;
     let submitted = Submitted::read(&arguments.file)?;

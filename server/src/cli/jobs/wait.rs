@@ -1,4 +1,4 @@
-//! `signorini wait`.
+//! The command `signorini wait`.
 
 use std::time::Duration;
 
@@ -24,7 +24,7 @@ pub(in crate::cli) struct Arguments {
     #[arg(required = true)]
     ids: Vec<Id>,
 
-    /// Seconds to wait at most, for all of them together [default: until they end]
+    /// The most seconds to wait for all of them together [default: until they end]
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     timeout: Option<Duration>,
 
@@ -47,7 +47,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     all(&service, &arguments.ids, deadline, &arguments.shown).await
 }
 
-/// Waits for all, prints them as they are then, and ends as the worst of them.
+/// Waits for all, prints their final state, and exits with the worst of their codes.
 pub(super) async fn all(
     service: &Service,
     ids: &[Id],

@@ -1,4 +1,5 @@
-//! `signorini watch`: a job's iterations as they are made, a line for each, and a curve of the residual.
+//! The command `signorini watch`: prints a job's iterations while it runs, one on each line, and a curve of the
+//! residual.
 
 use std::{io::IsTerminal, ops::ControlFlow};
 
@@ -27,13 +28,13 @@ use crate::{
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  signorini watch job_…\n  signorini watch -f jsonl job_… > events.jsonl\n\n\
-    Ctrl-C ends the command; the job goes on."
+    Ctrl-C ends the command; the job continues."
 )]
 pub(in crate::cli) struct Arguments {
     /// The job or the sweep
     id: Id,
 
-    /// How to print it: jsonl is the events as the service sends them
+    /// How to print: jsonl is the events as the service sends them
     #[arg(short, long, value_enum, default_value_t = Format::Table)]
     format: Format,
 
@@ -52,7 +53,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     follow(&service, arguments.id, arguments.format).await
 }
 
-/// Prints the events until the last one.
+/// Runs the command: prints the events until the last one.
 pub(super) async fn follow(service: &Service, id: Id, format: Format) -> anyhow::Result<Exit> {
     let mut watched = Watched {
         view: View::new(To::Output),
@@ -93,7 +94,7 @@ pub(super) async fn follow(service: &Service, id: Id, format: Format) -> anyhow:
     }
 }
 
-/// A job or a sweep as its events tell it.
+/// The state of a job or a sweep, as its events describe it.
 struct Watched {
     view: View,
     format: Format,
@@ -128,7 +129,7 @@ impl Watched {
         let time = run_s.map_or(String::new(), |time| format!(" in {}", seconds(time)));
         let text = match (job.status, &job.failure) {
             (Status::Succeeded, _) if job.cached_from.is_some() => {
-                "succeeded: answered by an earlier result".into()
+                "succeeded: answered with an earlier result".into()
             }
             (Status::Succeeded, _) => format!("succeeded{time}"),
             (Status::Canceled, _) => format!("canceled{time}"),
@@ -145,7 +146,7 @@ impl Watched {
         Ok(())
     }
 
-    /// An event of a sweep: a member that has ended, or the sweep itself.
+    /// Prints an event of a sweep: a member that has ended, or the sweep itself.
     fn member(&mut self, event: &Value) -> anyhow::Result<Option<Exit>> {
         if event["type"] == "done" {
             let sweep = &event["sweep"];
@@ -169,7 +170,7 @@ impl Watched {
             .map(|(path, value)| format!("{path} = {}", value.json()));
         let values: Vec<String> = values.collect();
         let force = row.normal_force.map_or(String::new(), |force| {
-            format!("  Y {}", report::number(force))
+            format!("  normal force {}", report::number(force))
         });
         let status = <&str>::from(row.status);
         self.view.line(&format!(

@@ -1,4 +1,4 @@
-//! The worker process: solves one task after the other, until its input ends.
+//! The worker process: solves one task after another, until its input ends.
 
 use std::{
     io::{self, Read},
@@ -26,8 +26,8 @@ use super::{
 };
 use crate::{memory::Allowance, run::Solve, store::Parts};
 
-/// What a solver may use beyond its share before the system refuses it memory: its program, buffers, and what the
-/// allocator keeps. The share itself is watched by the solver's own thread, which can say what it needed.
+/// The memory that a process may use beyond its share before the system refuses more: its program, buffers, and memory
+/// kept by the allocator. The solver's own thread checks the share itself, and can say how much it needed.
 const MARGIN_BYTES: u64 = 64 << 20;
 
 /// Solves tasks until the input ends.
@@ -143,7 +143,7 @@ fn send_parts(parts: Parts, service: &mut UnixStream) -> io::Result<()> {
     Ok(())
 }
 
-/// Lets the system refuse memory beyond the share of a task.
+/// Makes the system refuse memory beyond the share of a task.
 fn limit_memory(share: u64) -> io::Result<()> {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let data = status.lines().find_map(|line| line.strip_prefix("VmData:"));

@@ -1,9 +1,10 @@
-//! Solving in a process of its own: what kills the solver costs only its job.
+//! Solves jobs in separate processes, so that a crash of the solver costs only its job.
 //!
-//! A worker process is the same program (`signorini worker`), started beforehand and kept for many jobs. It talks with
-//! the service over a socket, which is its standard input: nothing that is printed can get in between. It ends when
-//! the service closes that socket, or dies. In the service it is served by the blocking task of a worker, which passes
-//! the reports on as if it solved the job itself, and kills a process that does not stop when it is asked to.
+//! A worker process is the same program (`signorini worker`), started in advance and kept for many jobs. It
+//! communicates with the service over a socket, which is its standard input, so that printed text cannot get in
+//! between. It ends when the service closes that socket, or dies. In the service, the blocking task of a worker serves
+//! the process: it passes on the reports as if it solved the job itself, and kills a process that does not stop when
+//! asked.
 
 mod child;
 mod parent;
@@ -23,48 +24,48 @@ use crate::{
 pub use child::run as run_worker_process;
 pub use parent::Processes;
 
-/// To a worker process.
+/// A message to a worker process.
 #[derive(Debug, Serialize, Deserialize)]
 enum Order {
-    /// Solve a problem; if it is on a stored mesh, that follows.
+    /// Solve a problem; if it is on a stored mesh, the mesh follows.
     Solve { task: Task, on_mesh: bool },
     /// Stop solving, and report the last state.
     Stop,
 }
 
-/// What a worker process is to solve.
+/// A task for a worker process.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Task {
     pub(super) problem: String,
-    /// The members of a sweep that are solved with it.
+    /// The members of a sweep that are solved together with it.
     pub(super) members: Option<MembersTask>,
     /// The stored mesh that the problem refers to; it follows the order.
     #[serde(skip)]
     pub(super) mesh: Option<Vec<u8>>,
-    /// Bytes that it may use.
+    /// The memory that it may use (bytes).
     pub(super) share: u64,
-    /// Whether there was a processor for a second thread when the task began.
+    /// Whether a processor for a second thread was free when the task began.
     pub(super) second_thread: bool,
 }
 
-/// From a worker process.
+/// A message from a worker process.
 #[derive(Debug, Serialize, Deserialize)]
 enum Reply {
-    /// It has begun, and waits for a task.
+    /// The process has started, and waits for a task.
     Ready,
-    /// An event. The service notes the time: clocks of processes may differ.
+    /// An event. The service sets its time, since clocks of processes may differ.
     Event(Payload),
-    /// A member of a sweep. The service notes the time.
+    /// A member of a sweep. The service sets its time.
     Member(Box<MemberRow>),
-    /// There is one load level on one grid.
+    /// The problem has one load level on one grid.
     OneLevel,
-    /// It needs more memory than its share, and stops.
+    /// The task needs more memory than its share, and stops.
     OutOfMemory(Outgrown),
-    /// A part of a result: its content follows.
+    /// A part of a result; its content follows.
     Part(Part),
     /// The parts so far are a partial result.
     Partial,
-    /// The parts so far are the result.
+    /// The parts so far are the final result.
     Solved {
         ending: Ending,
         unverified: bool,
@@ -74,7 +75,7 @@ enum Reply {
     NoSolution(NoSolution),
 }
 
-/// A message begins with its length, and that of the bytes that follow it.
+/// The size of a message's header: its length, and the length of the bytes that follow it.
 const HEADER: usize = 16;
 
 /// Writes a message and the bytes that follow it.
@@ -89,8 +90,8 @@ fn send(out: &mut impl Write, message: &impl Serialize, content: &[u8]) -> io::R
     out.write_all(content)
 }
 
-/// Removes the first message and the bytes that follow it from what was received; none if it is not complete yet. One
-/// of more than `longest` bytes is an error: nothing of it is waited for.
+/// Removes the first message and the bytes that follow it from the received data; none if it is not complete yet. A
+/// message of more than `longest` bytes is an error at once.
 fn take<T: DeserializeOwned>(
     received: &mut Vec<u8>,
     longest: u64,
@@ -146,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_message_is_an_error() {
+    fn an_invalid_message_is_an_error() {
         let mut received = vec![];
         send(&mut received, &"Nonsense", b"").unwrap();
         assert!(take::<Reply>(&mut received, 1000).is_err());

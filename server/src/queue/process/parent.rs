@@ -1,4 +1,4 @@
-//! The other side of worker processes: starts them, gives them tasks, passes on what they report, kills them.
+//! The service's side of worker processes: starts them, gives them tasks, passes on their reports, kills them.
 
 use std::{
     io::{self, BufRead, BufReader, Read},
@@ -24,24 +24,24 @@ use super::{
 };
 use crate::{store::Parts, time::Time};
 
-/// How often it is asked whether to stop while a process reports nothing.
+/// How often it is checked whether to stop while a process reports nothing.
 const PULSE: Duration = Duration::from_millis(20);
-/// How long a process may take to stop when it is asked to; then it is killed. A solver takes less (see `Breaks` in
+/// How long a process may take to stop when asked; after that it is killed. A solver takes less (see `Interrupt` in
 /// `solver`), and its worker is free a second after the end of the job.
 const STOP_GRACE: Duration = Duration::from_millis(750);
-/// How long one may take to start; on a busy machine it takes some ten milliseconds.
+/// How long a process may take to start; on a busy machine it takes some ten milliseconds.
 const LONGEST_START: Duration = Duration::from_secs(10);
-/// How long to wait before one that could not be started is tried again.
+/// The pause before a process that could not be started is tried again.
 const START_PAUSE: Duration = Duration::from_secs(1);
-/// The longest message beside what follows it: the row of an iteration, a warning, the end of a job.
+/// The longest message without the bytes that follow it: the row of an iteration, a warning, the end of a job.
 const LONGEST_MESSAGE: u64 = 16 << 20;
-/// How long it may leave an order unread.
+/// How long a process may leave a message unread.
 const UNREAD: Duration = Duration::from_secs(10);
 
-/// How a worker process is started.
+/// Makes the command that starts a worker process.
 pub(super) type Start = fn() -> Command;
 
-/// Worker processes: those without a task are kept for the next one.
+/// Worker processes; those without a task are kept for the next one.
 #[derive(Debug)]
 pub struct Processes {
     start: Start,
@@ -49,7 +49,7 @@ pub struct Processes {
 }
 
 impl Processes {
-    /// None yet.
+    /// No processes yet.
     pub fn new(start: Start) -> Processes {
         Processes {
             start,
@@ -57,7 +57,7 @@ impl Processes {
         }
     }
 
-    /// Starts some, so that the first tasks need not wait for them.
+    /// Starts some processes, so that the first tasks need not wait for them.
     pub(in crate::queue) fn prepare(&self, count: u16) {
         // they start at the same time
         let spawned: Vec<_> = (0..count).map(|_| Process::spawn(self.start)).collect();
@@ -70,7 +70,7 @@ impl Processes {
         }
     }
 
-    /// Solves a task in a process; `tell` is called as by `solve_and_report`. On a blocking thread.
+    /// Solves a task in a process; `tell` is called as by `solve_and_report`. Call this on a blocking thread.
     pub(in crate::queue) fn solve(
         &self,
         task: Task,
@@ -85,15 +85,15 @@ impl Processes {
             }
             // dropped, and with that killed: the next task gets another one
             Err(Unusable::Unwilling) => {
-                info!("a worker process did not stop, and was killed");
+                info!("a worker process did not stop and was killed");
                 Err(NoSolution::Stopped)
             }
             Err(Unusable::Dead(error)) => Err(process.cause_of_death(&error, share)),
         }
     }
 
-    /// One that waits, or a new one. The machine may have no process, file or memory left for a while: it is tried again
-    /// until the job is to stop.
+    /// A waiting process, or a new one. The machine may temporarily have no process, file or memory left: starting is
+    /// retried until the job is to stop.
     fn take(&self, tell: &mut impl FnMut(Told) -> ControlFlow<()>) -> Result<Process, NoSolution> {
         loop {
             let idle = self.idle().pop();
@@ -129,17 +129,17 @@ impl Processes {
 struct Process {
     child: Child,
     socket: UnixStream,
-    /// What was received and not used yet.
+    /// The received data that were not used yet.
     received: Vec<u8>,
-    /// Reads its standard error; returns how many bytes the system refused, if it died of that.
+    /// Reads the process's standard error; returns how many bytes the system refused, if the process died of that.
     stderr: Option<JoinHandle<Option<u64>>>,
 }
 
-/// Why a process is of no use any more.
+/// Why a process cannot be used any more.
 enum Unusable {
-    /// It did not stop when it was asked to.
+    /// It did not stop when asked.
     Unwilling,
-    /// It died.
+    /// It died, with this error on the socket.
     Dead(io::Error),
 }
 
@@ -176,13 +176,13 @@ impl Process {
         Ok(process)
     }
 
-    /// Waits until it is ready: before, a signal that is meant for the service would end it.
+    /// Waits until the process is ready: before that, a signal for the service would end it.
     fn ready(mut self) -> io::Result<Process> {
         let began = Instant::now();
         while began.elapsed() < LONGEST_START {
             match self.next(LONGEST_MESSAGE)? {
                 Some((Reply::Ready, _)) => return Ok(self),
-                Some(_) => return Err(io::Error::other("it does not say that it is ready")),
+                Some(_) => return Err(io::Error::other("it did not report that it is ready")),
                 None => {}
             }
         }
@@ -249,7 +249,7 @@ impl Process {
         }
     }
 
-    /// The next reply, of so many bytes at most; `None`: there has been none for a while.
+    /// The next reply, of at most `longest` bytes; `None` if there has been none for a while.
     fn next(&mut self, longest: u64) -> io::Result<Option<(Reply, Vec<u8>)>> {
         let mut some = [0; 64 << 10];
         loop {
@@ -269,7 +269,7 @@ impl Process {
         }
     }
 
-    /// Why there is no result of a process that died.
+    /// Why a process died without a result.
     fn cause_of_death(mut self, error: &io::Error, share: u64) -> NoSolution {
         use io::ErrorKind::{BrokenPipe, ConnectionReset, UnexpectedEof};
         let dead = matches!(error.kind(), UnexpectedEof | ConnectionReset | BrokenPipe);
@@ -283,7 +283,9 @@ impl Process {
         }
         NoSolution::Lost(match status {
             Ok(status) if dead => how_it_ended(status),
-            _ => format!("it was killed, since it could not be understood: {error}"),
+            _ => format!(
+                "the worker process was killed, since its messages could not be read: {error}"
+            ),
         })
     }
 }
@@ -296,7 +298,7 @@ impl Drop for Process {
     }
 }
 
-/// Logs what a process prints; returns how many bytes the system refused, which the standard library says before it
+/// Logs the output of a process; returns how many bytes the system refused, which the standard library prints before it
 /// aborts.
 fn log_lines(stderr: ChildStderr) -> Option<u64> {
     const LONGEST: u64 = 1 << 10;
@@ -320,9 +322,13 @@ fn how_it_ended(status: ExitStatus) -> String {
     const KILL: i32 = 9;
     match (status.signal(), status.code()) {
         (Some(KILL), _) => {
-            "it was killed by signal 9, as the system does when memory runs out".into()
+            "the worker process was killed by signal 9, as the system does when memory runs out"
+                .into()
         }
-        (Some(signal), _) => format!("it was ended by signal {signal}"),
-        (None, code) => format!("it ended with exit code {}", code.unwrap_or_default()),
+        (Some(signal), _) => format!("the worker process was ended by signal {signal}"),
+        (None, code) => format!(
+            "the worker process ended with exit code {}",
+            code.unwrap_or_default()
+        ),
     }
 }

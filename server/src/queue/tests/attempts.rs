@@ -1,4 +1,4 @@
-//! How attempts end: by themselves, canceled, timed out, requeued when the service stops.
+//! Tests of how attempts end: by themselves, canceled, timed out, requeued when the service stops.
 
 use solver::{phase::Phase, problem::AccuracyMode};
 
@@ -139,7 +139,7 @@ async fn a_canceled_running_job_keeps_its_last_state() {
     );
 }
 
-/// Verifies until it is stopped.
+/// A solver that verifies until it is stopped.
 fn verify_until_stopped(
     problem: &Problem,
     mesh: Option<External>,
@@ -158,7 +158,8 @@ fn verify_until_stopped(
     })
 }
 
-/// A limit on a job is one on its verification; the solution is kept, with what is estimated.
+/// A job that is stopped while it verifies keeps its solution with the estimated errors: a time limit applies to the
+/// verification, too.
 #[tokio::test]
 async fn a_job_that_is_stopped_while_it_verifies_keeps_its_solution() {
     let rig = rig(verify_until_stopped).await;
@@ -197,7 +198,7 @@ async fn a_job_that_is_stopped_while_it_verifies_keeps_its_solution() {
     }
 }
 
-/// Converges to a state whose forces do not balance.
+/// A solver that converges to a state whose forces do not balance.
 fn unbalanced(
     _: &Problem,
     _: Option<External>,
@@ -236,7 +237,7 @@ async fn a_job_whose_forces_do_not_balance_fails_and_keeps_its_result() {
     );
 }
 
-/// Solves in one long phase, with nothing to report.
+/// A solver with one long phase and nothing to report.
 fn busy(
     _: &Problem,
     _: Option<External>,
@@ -264,7 +265,7 @@ async fn a_pulse_is_answered_and_not_recorded() {
     assert_eq!(kinds, ["status", "status", "done"]);
 }
 
-/// Like a long factorisation: it does not react for a second.
+/// A solver that does not react for a second, as in a long factorisation.
 fn unresponsive(
     problem: &Problem,
     _: Option<External>,
@@ -338,7 +339,8 @@ async fn a_drain_requeues_a_running_job_without_using_up_an_attempt() {
     );
 }
 
-/// The drain could not be stored: the next start of the service finds the job running.
+/// A job that could not be requeued when the service stopped is not canceled: the next start of the service finds it
+/// running.
 #[tokio::test]
 async fn a_job_that_could_not_be_requeued_is_not_canceled() {
     let rig = rig(fake::solve_until_stopped).await;
@@ -464,7 +466,7 @@ async fn a_job_that_times_out_is_ended_by_force_if_its_solver_does_not_react() {
     assert_eq!(rig.queue.state().idle, 0, "its worker waits for the solver");
 }
 
-/// Eight steps that take no time: their results are stored once, and not eight times.
+/// Partial results of eight steps that take no time are stored once, and not after each.
 #[tokio::test]
 async fn partial_results_of_many_quick_steps_are_not_stored_after_each() {
     fn quick_steps(
@@ -514,7 +516,7 @@ async fn partial_results_of_many_quick_steps_are_not_stored_after_each() {
     );
 }
 
-/// The events of the job cannot be stored for a while.
+/// A full disk, on which the events of a job cannot be stored for a while, delays the job and does not end it.
 #[tokio::test]
 async fn a_full_disk_delays_a_job_and_does_not_end_it() {
     let rig = rig(fake::solve_until_stopped).await;

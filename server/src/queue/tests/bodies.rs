@@ -1,4 +1,4 @@
-//! Jobs on bodies that are kept: when there is one, and that it changes no bit of a result.
+//! Tests of jobs on kept bodies: when a body is reused, and that reuse changes no bit of a result.
 
 use std::{
     ops::ControlFlow,
@@ -25,7 +25,7 @@ fn budget() -> Arc<Budget> {
     Budget::new(1 << 40, 2, 100 * MIB)
 }
 
-/// A sheet of two materials with all that a body may depend on, and most of what it does not.
+/// A problem of a sheet of two materials with everything that a body may depend on, and most of what it does not.
 fn sheet() -> Value {
     json!({
         "title": "sheet",
@@ -64,7 +64,7 @@ fn sheet() -> Value {
     })
 }
 
-/// A body of revolution, nearly incompressible, whose contact takes the normals of the obstacle.
+/// A problem of a nearly incompressible body of revolution whose contact uses the normals of the obstacle.
 fn ring() -> Value {
     json!({
         "analysis": {"kind": "axisymmetric"},
@@ -80,7 +80,7 @@ fn ring() -> Value {
     })
 }
 
-/// Every place in a value, by its pointer, and the values that may stand there instead; None: nothing does.
+/// Every place in a value, by its pointer, with other values for it; None: the value is removed.
 fn changes(value: &Value, pointer: &str, found: &mut Vec<(String, Option<Value>)>) {
     const WORDS: &[&str] = &[
         "plane_strain",
@@ -152,12 +152,12 @@ fn changed(problem: &Value, pointer: &str, value: Option<Value>) -> Value {
     problem
 }
 
-/// What a change means for the body.
+/// The effect of a change on the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Body {
     Same,
     Other,
-    /// As it turns out on the mesh: two ranges may have the same sides, and two obstacles face the same nodes.
+    /// It depends on the mesh: two ranges may have the same sides, and two obstacles face the same nodes.
     Either,
 }
 
@@ -183,7 +183,7 @@ fn expected(pointer: &str, problem: &Problem) -> Body {
     }
 }
 
-/// Solves a problem with what is kept; its summary, or why there is none.
+/// Solves a problem with the kept bodies; its summary, or why there is none.
 fn solved(problem: &Value, budget: Option<&Budget>) -> Result<Summary, String> {
     let allowance = Allowance {
         share: u64::MAX,
@@ -258,7 +258,7 @@ fn every_change_of_a_problem_finds_the_body_or_not_and_has_the_result_of_its_own
     }
 }
 
-/// Solves a problem until its solver tells that this phase begins; then does that.
+/// Solves a problem until its solver reports this phase; then runs the action.
 fn until(
     phase: Phase,
     budget: &Budget,
@@ -304,7 +304,7 @@ fn the_body_of_a_job_that_is_canceled_in_its_iterations_is_kept() {
     assert!(solved(&sheet(), Some(&budget)).unwrap().body_reused);
 }
 
-/// A block that is solved within a second, of which nearly all memory is its body.
+/// A problem that is solved within a second and whose body takes nearly all of its memory.
 fn block(lines: usize) -> Value {
     let mut block = sheet();
     let places =
@@ -316,12 +316,12 @@ fn block(lines: usize) -> Value {
     block
 }
 
-/// On a thread of its own, as jobs are.
+/// Runs work on a thread of its own, as jobs are.
 fn elsewhere<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     std::thread::scope(|scope| scope.spawn(work).join().unwrap())
 }
 
-/// Bytes that a thread uses which has prepared a problem, and those of the body.
+/// The memory of a thread that has prepared a problem, and that of the body (bytes).
 fn prepared(problem: &Value, budget: &Budget) -> (u64, u64) {
     elsewhere(|| {
         let problem = files::parse(&problem.to_string()).unwrap();
@@ -367,7 +367,7 @@ fn a_job_has_no_more_memory_after_it_freed_the_body_of_another() {
     );
 }
 
-/// The least share of memory within which a problem is solved, to 64 KiB.
+/// The smallest share of memory within which a problem is solved, to 64 KiB.
 fn least_share(problem: &Value, bodies: impl Fn() -> Option<Arc<Budget>> + Sync) -> u64 {
     let text = problem.to_string();
     let fits = |share| {
@@ -401,7 +401,8 @@ fn least_share(problem: &Value, bodies: impl Fn() -> Option<Arc<Budget>> + Sync)
     enough
 }
 
-/// So what is told to a job before it is accepted also holds for one that keeps its body, or finds it kept.
+/// A job that keeps its body, or finds it kept, needs no more memory than on its own, so that its estimate is valid in
+/// all cases.
 #[test]
 fn a_job_that_keeps_its_body_or_finds_it_needs_no_more_than_on_its_own() {
     let problem = block(40);

@@ -1,4 +1,4 @@
-//! Jobs of the same input: answered by earlier results, and coalesced.
+//! Tests of jobs with the same input: answered with earlier results, and coalesced.
 
 use super::*;
 
@@ -29,7 +29,7 @@ async fn an_earlier_result_answers_at_once_and_outlives_its_job() {
 }
 
 #[tokio::test]
-async fn a_job_without_the_cache_is_solved_anew_and_its_result_may_answer_no_other() {
+async fn a_job_without_the_cache_is_solved_again_and_its_result_is_not_reused() {
     let rig = rig(fake::solve).await;
     rig.queue.start();
     let off = rig.submit().await;
@@ -151,7 +151,7 @@ async fn coalesced_jobs_count_as_waiting_and_one_of_higher_priority_is_detached(
     assert_eq!(rig.store.waiting(), 0);
 }
 
-/// A waiting job, which may have watchers, is answered in the commit of another submission.
+/// A waiting job that is answered in the commit of another submission is reported as changed to its watchers.
 #[tokio::test]
 async fn a_job_answered_in_the_commit_of_another_submission_is_reported_as_changed() {
     let rig = rig(fake::solve).await; // its workers never start: jobs are claimed here

@@ -1,4 +1,5 @@
-//! What a problem is told to need, against what it takes: from its text to the stored form of its result.
+//! Compares the estimated memory of problems with the memory that they take, from their text to the stored form of
+//! their result.
 
 use serde_json::{Value, json};
 
@@ -14,7 +15,7 @@ use crate::{
     },
 };
 
-/// Problems of different shapes, by what is large in them.
+/// Problems of different shapes, named by what is large in them.
 fn problems() -> Vec<(String, Value)> {
     let mut problems = vec![];
     for (name, text) in [
@@ -128,7 +129,7 @@ fn problems() -> Vec<(String, Value)> {
     problems
 }
 
-/// A strip one element wide that touches with all of its long side, which has a name of its own.
+/// A problem of a strip one element wide with contact along its whole long side, under a boundary name of its own.
 fn wall(lines: u32, radius: f64) -> Value {
     let y: Vec<u32> = (0..lines).collect();
     json!({
@@ -145,7 +146,7 @@ fn wall(lines: u32, radius: f64) -> Value {
     })
 }
 
-/// A strip whose upper side touches at so many places, in so many load steps.
+/// A problem of a strip with this many contacts on its upper side, and this many load steps.
 fn row_of_contacts(contacts: u32, steps: u32, friction: bool) -> Value {
     let count = f64::from(contacts);
     let x: Vec<f64> = (0..=2 * contacts)
@@ -189,7 +190,7 @@ fn within(share: u64) -> Allowance<'static> {
     }
 }
 
-/// What solving a problem has taken at most, and what it was told to.
+/// The largest memory that solving a problem took, and its estimate.
 fn taken_and_told(problem: &Value) -> (u64, u64) {
     let text = problem.to_string();
     let parsed = files::parse(&text).unwrap();
@@ -216,7 +217,7 @@ fn taken_and_told(problem: &Value) -> (u64, u64) {
     (taken as u64, told.memory_bytes)
 }
 
-/// An estimate is not below what a problem takes, and not three times as much.
+/// Checks that estimates are not below the memory that problems take, and not three times as much.
 fn compare(problems: Vec<(String, Value)>) {
     let mut wrong = vec![];
     // the first one also makes what all share for the life of the process
@@ -243,9 +244,10 @@ fn estimates_lie_between_what_is_taken_and_three_times_that() {
     compare(problems);
 }
 
-/// With `SIGNORINI_SOAK` set (`tests/reliability/unit.py long_contacts`) also those that take minutes, and up to 1 GiB.
+/// Estimates of long contacts are upper bounds. With `SIGNORINI_SOAK` set (`tests/reliability/unit.py long_contacts`)
+/// it also checks those that take minutes, and up to 1 GiB.
 #[test]
-fn estimates_of_long_contacts_do_too() {
+fn estimates_of_long_contacts_are_upper_bounds() {
     let lines: &[u32] = match std::env::var_os("SIGNORINI_SOAK") {
         Some(_) => &[300, 500, 1000, 1500],
         None => &[300],
@@ -254,7 +256,8 @@ fn estimates_of_long_contacts_do_too() {
     compare(lines.iter().map(named).collect());
 }
 
-/// A job that outgrows its share ends at the next question: its solver sees a stop, and the worker why.
+/// A job that needs more memory than its share is stopped at the next check: its solver sees a stop, and the worker the
+/// reason.
 #[test]
 fn a_job_that_needs_more_than_its_share_is_stopped() {
     let text = wall(300, 2.0).to_string();
@@ -283,7 +286,8 @@ fn a_job_that_needs_more_than_its_share_is_stopped() {
     );
 }
 
-/// A verification that outgrows the share ends alone: the job has its solution, and was not asked to stop.
+/// A verification that needs more memory than the share ends alone: the job keeps its solution, and was not asked to
+/// stop.
 #[test]
 fn a_verification_that_needs_more_than_the_share_leaves_the_solution() {
     let mut problem = wall(100, 2.0);

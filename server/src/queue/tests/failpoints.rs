@@ -1,5 +1,5 @@
-//! Every boundary between two stages of a job, with a panic and, where there may be one, an error: that costs the job
-//! at most, and neither the job beside it, nor a later one, nor a worker.
+//! Tests of every boundary between two stages of a job, with a panic and, where there may be one, an error: it costs
+//! the job at most, but no other job and no worker.
 
 use futures_util::StreamExt;
 use solver::problem::AccuracyMode;
@@ -8,10 +8,10 @@ use strum::VariantArray;
 use super::*;
 use crate::failpoint::{self, Failing, Point};
 
-/// How long anything may take: a job that was lost is found within a second.
+/// How long a test may wait: a lost job is found within a second.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// Solves and verifies, and finds a partial result.
+/// A solver with a verification and a partial result.
 fn solve_with_a_step(
     problem: &Problem,
     mesh: Option<External>,
@@ -26,7 +26,7 @@ fn solve_with_a_step(
     }
 }
 
-/// Whether an error of the store or the machine may happen there; elsewhere only the program itself may fail.
+/// Whether an error of the store or the machine may happen at a point; elsewhere only the program itself may fail.
 fn may_be_an_error(point: Point) -> bool {
     match point {
         Point::Accepted
@@ -55,7 +55,8 @@ fn may_be_an_error(point: Point) -> bool {
     }
 }
 
-/// Two workers. If they start later, the dispatcher claims the first jobs; otherwise their submissions do.
+/// Runs jobs on two workers with a failure at a point. If the workers start later, the dispatcher claims the first
+/// jobs; otherwise their submissions do.
 async fn fail_at(point: Point, failing: Failing, start_later: bool) {
     let case = format!("{point:?}, {failing:?}, workers start later: {start_later}");
     let rig = rig_of(solve_with_a_step, 2).await;

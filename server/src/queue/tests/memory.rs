@@ -1,10 +1,10 @@
-//! The memory budget of running jobs.
+//! Tests of the memory budget of running jobs.
 
 use super::*;
 
 const MIB: u64 = 1 << 20;
 
-/// Two workers, and a budget of 100 MiB.
+/// A queue of two workers with a budget of 100 MiB.
 async fn rig_of_100_mib(solve: Solve) -> Rig {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
@@ -18,7 +18,7 @@ async fn rig_of_100_mib(solve: Solve) -> Rig {
     }
 }
 
-/// A job of an input of its own, which is estimated to need so much.
+/// A job with an input of its own whose estimate is this much memory.
 fn needing(mib: u64) -> NewJob {
     NewJob {
         input_hash: format!("sha256:{mib}"),
@@ -64,7 +64,7 @@ async fn a_job_of_more_than_the_budget_runs_alone() {
     rig.until_at_work(&small).await;
 }
 
-/// A solver that needs more than its share, and obeys when it is told to stop.
+/// A solver that needs more than its share, and stops when it is told to.
 fn solve_greedily(
     _: &Problem,
     _: Option<External>,
@@ -94,7 +94,7 @@ async fn a_job_that_outgrows_its_share_fails_with_figures_and_its_worker_goes_on
     }
 }
 
-/// A solver that asks whether there is room for more, and returns what it has if not.
+/// A solver that asks for more memory, and returns its result so far if there is none.
 fn solve_with_what_there_is(
     _: &Problem,
     _: Option<External>,

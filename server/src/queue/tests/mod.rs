@@ -1,4 +1,4 @@
-//! The queue with substitutes for the solver, which fail in ways that the real one rarely does.
+//! Tests of the queue with substitutes for the solver, which fail in ways that the real one rarely does.
 #![allow(clippy::unwrap_used)]
 
 mod attempts;
@@ -63,7 +63,7 @@ async fn rig_of(solve: Solve, workers: u16) -> Rig {
     }
 }
 
-/// A job that is solved on its own.
+/// A job that no other job shares a result with.
 fn new(priority: i32) -> NewJob {
     let problem = fake::problem();
     NewJob {
@@ -104,7 +104,7 @@ impl Rig {
         accepted.jobs.into_iter().next().unwrap()
     }
 
-    /// Waits until its solver has reported something.
+    /// Waits until the job's solver has reported something.
     async fn until_at_work(&self, job: &Job) {
         self.until(job, |event| matches!(event.payload, Payload::Iteration(_)))
             .await;
@@ -166,7 +166,7 @@ impl Rig {
     }
 }
 
-/// A job with the same input as the others, which may be answered with their result.
+/// A job with the same input as others of this kind, which may be answered with their result.
 fn same() -> NewJob {
     NewJob {
         cache: Cache::Use,

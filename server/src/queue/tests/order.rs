@@ -1,4 +1,4 @@
-//! The jobs that wait: their order, the pause of the queue, and how long they may wait.
+//! Tests of waiting jobs: their order, the pause of the queue, and how long they may wait.
 
 use super::*;
 

@@ -1,13 +1,13 @@
-//! Solvers in processes of their own: what kills one costs only its job (R21).
+//! Tests of solvers in separate processes: a crash of one costs only its job (R21).
 
 use std::process::Command;
 
 use super::*;
 
-/// Tells the test below that it is to serve as a worker process.
+/// The environment variable that makes the test below serve as a worker process.
 const SERVES: &str = "SIGNORINI_TEST_WORKER_PROCESS";
 
-/// Runs the tests of this program again: the one that serves.
+/// The command that runs this test program as a worker process.
 fn worker_process() -> Command {
     let mut command = Command::new(std::env::current_exe().unwrap());
     let this = "queue::tests::processes::serve_as_a_worker_process";
@@ -22,12 +22,12 @@ fn serve_as_a_worker_process() {
     }
 }
 
-/// What a solver does instead of solving: the modulus of the problem is the place in this list.
+/// The ways in which a solver fails; the modulus of the problem is the index in this list.
 const POISONS: [&str; 8] = [
     "", "harmless", "abort", "overflow", "exit", "panic", "allocate", "loop",
 ];
 
-/// Does what the modulus says.
+/// Fails in the way that the modulus selects.
 fn poisoned(
     problem: &Problem,
     external: Option<External>,
@@ -82,7 +82,7 @@ fn poison(name: &str) -> NewJob {
 }
 
 impl Rig {
-    /// How such a job ends, while one after it succeeds.
+    /// How a job with this failure ends, while the next one succeeds.
     async fn end_of(&self, name: &str) -> Job {
         let job = self.submit_as(poison(name)).await;
         let next = self.submit_as(poison("harmless")).await;
@@ -116,7 +116,7 @@ async fn a_process_solves_as_a_thread_does_and_is_kept() {
 }
 
 #[tokio::test]
-async fn what_kills_the_process_costs_only_its_job() {
+async fn a_crash_of_the_process_costs_only_its_job() {
     let rig = processes().await;
     for (name, how) in [
         ("abort", "signal 6"),

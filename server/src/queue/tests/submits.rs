@@ -1,4 +1,4 @@
-//! Submissions: keys, and refused submissions beside accepted ones.
+//! Tests of submissions: keys, and refused submissions next to accepted ones.
 
 use super::*;
 

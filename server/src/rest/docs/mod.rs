@@ -13,14 +13,14 @@ use crate::{
 
 const PAGE: &str = include_str!("index.html");
 
-/// Type and content of a file that the page loads.
+/// The type and content of a file that the page loads.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct File {
     kind: &'static str,
     content: &'static str,
 }
 
-/// Such a file in a path. `build/main.rs` extracts the files of Swagger UI from its archive.
+/// A file of the page, in a path. `build/main.rs` extracts the files of Swagger UI from its archive.
 pub(super) const FILE: Variable<Words<File>> = Variable {
     name: "file",
     kind: "file of the page",
@@ -61,8 +61,8 @@ pub(super) async fn file(_: Call, file: File) -> Result<impl IntoResponse, ApiEr
     Ok((headers(file.kind), file.content))
 }
 
-/// The page may load files from this service and send requests to it, and to no other. Swagger UI sets styles on its
-/// elements, and its stylesheet contains its icons.
+/// Headers with which the page may load files from this service and send requests to it, but to no other. Swagger UI
+/// sets styles on its elements, and its stylesheet contains its icons.
 fn headers(kind: &'static str) -> [(HeaderName, &'static str); 4] {
     [
         (header::CONTENT_TYPE, kind),

@@ -1,4 +1,4 @@
-//! Bodies, described by JSON Schema.
+//! The bodies of operations, described by JSON Schema.
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde_json::{Value, json};
@@ -26,8 +26,8 @@ pub(super) fn bytes(media: &'static str) -> Content {
     vec![(media, anything)]
 }
 
-/// A stream of server-sent events, the data of each a `T` as JSON. The schema is that of one event: OpenAPI
-/// 3.1 cannot describe the stream.
+/// A stream of server-sent events whose data are `T` as JSON. The schema is that of one event: OpenAPI 3.1 cannot
+/// describe the stream.
 pub(super) fn stream<T: JsonSchema>() -> Content {
     vec![("text/event-stream", |generator| {
         let data = generator.subschema_for::<T>();
@@ -56,14 +56,14 @@ pub(super) fn the_problem() -> Content {
     )]
 }
 
-/// A body that submits a job, as an example.
+/// An example of a body that submits a job.
 pub(super) fn submission() -> Value {
     let problem = include_str!("../../../../examples/rectangular_punch.json");
     let problem: Value = serde_json::from_str(problem).unwrap_or_default();
     json!({ "problem": problem })
 }
 
-/// A body that submits a sweep, as an example.
+/// An example of a body that submits a sweep.
 pub(super) fn sweep() -> Value {
     let mut example = submission();
     json!({
@@ -80,7 +80,7 @@ pub(super) fn anything(_: &mut SchemaGenerator) -> Schema {
     Schema::default()
 }
 
-/// Data in each of the formats; `T` is their JSON.
+/// Data in each of the formats; `T` is their JSON form.
 pub(super) fn data<T: JsonSchema>(formats: &[Format]) -> Content {
     let schema = |format: &Format| -> SchemaOf {
         match format {

@@ -17,17 +17,17 @@ pub(super) fn etag() -> Description {
     header(
         "ETag",
         text(),
-        "The version, as a weak entity tag: it stays while there is only progress",
+        "The version, as a weak entity tag: progress alone does not change it",
     )
 }
 
-/// Whether a result is final.
+/// Whether a result is partial or final.
 pub(super) fn result_available() -> Description {
     let words = json!({ "type": "string", "enum": ["none", "partial", "final"] });
     header(
         "Result-Available",
         words,
-        "As in the job: partial if it has not ended or has not converged; none while only its iterations are there",
+        "As in the job: partial if it has not ended or has not converged; none while there are only iterations",
     )
 }
 
@@ -43,7 +43,7 @@ pub(super) fn replayed() -> Description {
     header(
         "Idempotency-Replayed",
         yes,
-        "The key or id was used before: nothing new was submitted",
+        "The key or id was used before, so nothing new was submitted",
     )
 }
 

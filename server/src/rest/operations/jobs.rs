@@ -1,4 +1,4 @@
-//! Jobs: submit, get, list, wait, watch, edit, cancel, delete.
+//! The operations on jobs: submit, get, list, wait, watch, edit, cancel, delete.
 
 use super::{
     content::{json, lines, merge_patch, nothing, stream, submission, the_problem},
@@ -26,7 +26,7 @@ use crate::{
     },
 };
 
-/// Makes a request repeatable.
+/// The header that makes a request safe to repeat.
 pub(super) const KEY: Header<Keys> = Header(IDEMPOTENCY_KEY);
 
 pub(super) fn operations() -> Vec<Operation> {
@@ -91,20 +91,20 @@ pub(super) fn operations() -> Vec<Operation> {
             .fails(&[Code::InvalidProblem, Code::StaleVersion, Code::StorageFull]),
         post(CANCEL, "/v1/jobs/{id}/cancel", (ID,), jobs::cancel)
             .rpcs(&["CancelJob"])
-            .summary("Asks a job to stop; it is terminal within half a second")
+            .summary("Asks a job to stop, which ends within half a second")
             .answers(200, "The effect, and the job", json::<jobs::Canceled>())
             .with([etag()])
             .fails(&[Code::StorageFull]),
         post(SUBMIT, "/v1/jobs/{id}/retry", (ID, KEY, PREFER), submit::retry)
             .rpcs(&["RetryJob"])
-            .summary("Submits the problem of an ended job again: a new job, with the old one as its parent, that is solved without the cache; a body changes its limits and priority")
+            .summary("Submits the problem of an ended job again as a new job, with the old one as its parent, and without the cache; a body changes its limits and priority")
             .optional_body(json::<Retry>())
             .submits()
             .fails(&[Code::JobActive]),
         delete(CANCEL, "/v1/jobs/{id}", (ID,), jobs::delete)
             .rpcs(&["DeleteJob"])
             .summary("Deletes a job that has ended, with its events and its result")
-            .answers(204, "It is deleted; for 7 days its id answers 410, at most for the last 100,000 jobs", nothing())
+            .answers(204, "Deleted; its id answers 410 for 7 days (kept for the last 100,000 deleted jobs)", nothing())
             .fails(&[Code::JobActive, Code::StorageFull]),
         post(CANCEL, "/v1/jobs/cancel", (FILTERS,), jobs::cancel_many)
             .rpcs(&["CancelJobs"])
@@ -133,10 +133,10 @@ pub(super) const SUBMITTING: &[Code] = &[
 ];
 
 impl Operation {
-    /// Answers with the submitted job: when it has ended, at once, or with its events.
+    /// Adds the answers with the submitted job: when it has ended, at once, or with its events.
     pub(super) fn submits(self) -> Self {
         let accepted = [json::<Job>(), stream::<Event>(), lines()].concat();
-        self.answers(201, "The terminal job: it ended within the wait", json::<Job>())
+        self.answers(201, "The job, which has ended within the wait", json::<Job>())
             .with([location(), etag(), preference_applied()])
             .sometimes_with(replayed())
             .answers(

@@ -1,4 +1,4 @@
-//! Stored meshes.
+//! The operations on stored meshes.
 
 use super::{
     content::{bytes, json, nothing},
@@ -38,7 +38,7 @@ pub(super) fn operations() -> Vec<Operation> {
         delete(CANCEL, "/v1/meshes/{hash}", (HASH,), meshes::delete)
             .rpcs(&["DeleteMesh"])
             .summary("Deletes a stored mesh that no waiting or running job needs")
-            .answers(204, "It is deleted", nothing())
+            .answers(204, "Deleted", nothing())
             .fails(&[Code::JobActive, Code::StorageFull]),
     ]
 }

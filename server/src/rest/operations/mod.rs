@@ -26,13 +26,13 @@ pub(super) use operation::{Answer, Content, Operation};
 use super::call::AppState;
 use crate::caller::Access;
 
-/// Who may read the description of the API, over either protocol.
+/// The access to the description of the API, over either protocol.
 pub(super) const DESCRIPTION: Access = operation::READ;
 
 /// The groups in the order in which they are documented: name, subject and operations.
 pub(super) const GROUPS: [Group; 6] = [
     ("jobs", "Submit, get, list, watch, cancel", jobs::operations),
-    ("results", "What a job has computed", results::operations),
+    ("results", "The results of a job", results::operations),
     (
         "sweeps",
         "One problem with many values: solved together, read as one table",
@@ -85,7 +85,7 @@ mod tests {
         pb,
     };
 
-    /// The rpcs of the contract itself, not of the code generated from it.
+    /// The rpcs of the contract itself, rather than of the code generated from it.
     fn rpcs() -> BTreeSet<String> {
         let files = prost_types::FileDescriptorSet::decode(pb::DESCRIPTORS)
             .unwrap()
@@ -163,7 +163,7 @@ mod tests {
         }
     }
 
-    /// A handler receives a variable by its name.
+    /// Every variable of a path is read and every parameter is read once: a handler receives a variable by its name.
     #[test]
     fn every_variable_of_a_path_is_read_and_every_parameter_is_read_once() {
         for Operation {
@@ -184,7 +184,7 @@ mod tests {
         }
     }
 
-    /// The operations that tests claim to cover: by a line `/// Operations: CreateJob, GetJob` above a test, or by such
+    /// The operations that tests claim to cover, by a line `/// Operations: CreateJob, GetJob` above a test, or by such
     /// a line after `#` in a script.
     fn tested() -> BTreeSet<String> {
         let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests");

@@ -29,16 +29,16 @@ pub(in crate::rest) struct Operation {
     pub(in crate::rest) method: &'static str,
     /// The path, with its variables in braces.
     pub(in crate::rest) path: &'static str,
-    /// Who may use it.
+    /// Who may use the operation.
     pub(in crate::rest) access: Access,
     pub(super) route: MethodRouter<AppState>,
-    /// Name of its group.
+    /// The name of its group.
     pub(in crate::rest) group: &'static str,
-    /// The corresponding rpcs, the closest one first; empty if it exists over REST only.
+    /// The corresponding rpcs, the closest one first; empty for an operation over REST only.
     pub(in crate::rest) rpcs: &'static [&'static str],
-    /// Name of the operation: that of the first rpc, if there is one.
+    /// The name of the operation: that of the first rpc, if there is one.
     pub(in crate::rest) id: &'static str,
-    /// One line, without a full stop.
+    /// The summary: one line, without a full stop.
     pub(in crate::rest) summary: &'static str,
     /// The parameters, as its input describes them.
     pub(in crate::rest) parameters: Vec<Description>,
@@ -49,7 +49,7 @@ pub(in crate::rest) struct Operation {
     pub(in crate::rest) example: Option<Value>,
     /// The successful answers.
     pub(in crate::rest) answers: Vec<Answer>,
-    /// It refuses unknown parameters.
+    /// Whether it refuses unknown parameters.
     strict: bool,
     errors: Vec<Code>,
 }
@@ -69,7 +69,7 @@ pub(in crate::rest) type Content = Vec<(&'static str, SchemaOf)>;
 /// Makes the schema of a type with a generator, which collects the schemas that it refers to.
 pub(in crate::rest) type SchemaOf = fn(&mut SchemaGenerator) -> Schema;
 
-/// The handler receives the values of `input`, so that it cannot use a parameter that is not listed.
+/// An operation. The handler receives the values of `input`, so that it cannot use a parameter that is not listed.
 fn operation<T, H>(
     access: Access,
     (method, filter): (&'static str, MethodFilter),
@@ -127,38 +127,38 @@ pub(super) fn probe<H: Handler<()>>(path: &'static str, handler: H) -> Operation
 }
 
 impl Operation {
-    /// The corresponding rpcs.
+    /// Sets the corresponding rpcs.
     pub(super) fn rpcs(mut self, rpcs: &'static [&'static str]) -> Self {
         self.rpcs = rpcs;
         self.id = rpcs.first().copied().unwrap_or_default();
         self
     }
 
-    /// An operation over REST only, with this name.
+    /// Makes this an operation over REST only, with this name.
     pub(super) fn rest_only(mut self, id: &'static str) -> Self {
         self.id = id;
         self
     }
 
-    /// The name of a second operation for the same rpc.
+    /// Sets the name of a second operation for the same rpc.
     pub(super) fn named(mut self, id: &'static str) -> Self {
         self.id = id;
         self
     }
 
-    /// One line, without a full stop.
+    /// Sets the summary: one line, without a full stop.
     pub(super) fn summary(mut self, summary: &'static str) -> Self {
         self.summary = summary;
         self
     }
 
-    /// The body of a request.
+    /// Sets the body of a request.
     pub(super) fn body(mut self, body: Content) -> Self {
         self.body = Some(body);
         self
     }
 
-    /// A body that may be left out.
+    /// Sets a body that may be left out.
     pub(super) fn optional_body(self, body: Content) -> Self {
         Operation {
             needs_body: false,
@@ -166,13 +166,13 @@ impl Operation {
         }
     }
 
-    /// An example of the body.
+    /// Sets an example of the body.
     pub(super) fn example(mut self, body: Value) -> Self {
         self.example = Some(body);
         self
     }
 
-    /// A successful answer.
+    /// Adds a successful answer.
     pub(super) fn answers(mut self, status: u16, meaning: &'static str, content: Content) -> Self {
         self.answers.push(Answer {
             status,
@@ -183,7 +183,7 @@ impl Operation {
         self
     }
 
-    /// Headers that the previous answer always has.
+    /// Adds headers that the previous answer always has.
     pub(super) fn with(mut self, headers: impl IntoIterator<Item = Description>) -> Self {
         if let Some(answer) = self.answers.last_mut() {
             answer
@@ -193,7 +193,7 @@ impl Operation {
         self
     }
 
-    /// A header that the previous answer may have.
+    /// Adds a header that the previous answer may have.
     pub(super) fn sometimes_with(mut self, header: Description) -> Self {
         if let Some(answer) = self.answers.last_mut() {
             answer.headers.push((header, false));
@@ -201,13 +201,13 @@ impl Operation {
         self
     }
 
-    /// Errors besides those that follow from the input and the body.
+    /// Adds errors other than those that follow from the input and the body.
     pub(super) fn fails(mut self, codes: &[Code]) -> Self {
         self.errors.extend(codes);
         self
     }
 
-    /// The errors that it may answer with, each once.
+    /// The errors that the operation may answer with, each once.
     pub(in crate::rest) fn errors(&self) -> Vec<Code> {
         let mut codes = vec![
             Code::BadRequest,

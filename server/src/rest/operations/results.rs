@@ -1,4 +1,4 @@
-//! The results of a job, as data and as figures.
+//! The operations on the results of a job, as data and as figures.
 
 use solver::solution::{ContactProfile, Fields};
 
@@ -43,7 +43,7 @@ pub(super) fn operations() -> Vec<Operation> {
             results::history,
         )
         .rpcs(&["ListIterations"])
-        .summary("Returns the iterations of a job's last attempt, a row each")
+        .summary("Returns the iterations of a job's last attempt, one row each")
         .file("The rows", data::<Vec<TimedIteration>>(Format::OF_TABLES)),
         get(
             READ,
@@ -67,7 +67,7 @@ pub(super) fn operations() -> Vec<Operation> {
         .fails(NO_RESULT),
         delete(CANCEL, "/v1/jobs/{id}/fields", (ID,), results::delete_fields)
             .rpcs(&["DeleteFields"])
-            .summary("Deletes mesh, displacements and stresses of a job that has ended, most of what it keeps; summary, history and profiles stay")
+            .summary("Deletes mesh, displacements and stresses of a job that has ended, which are most of its data; summary, history and profiles remain")
             .answers(204, "Deleted", nothing())
             .fails(&[Code::Deleted, Code::JobActive]),
         get(
@@ -88,11 +88,11 @@ fn figures() -> Content {
     media.flat_map(bytes).collect()
 }
 
-/// The errors if there is nothing to return.
+/// The errors if there is no result.
 const NO_RESULT: &[Code] = &[Code::NoResult, Code::ResultNotReady];
 
 impl Operation {
-    /// Answers with a file, with a part of it, or with 304 if the client has it.
+    /// Adds the answers with a file, with a part of it, or with 304 if the client has it.
     pub(super) fn file(self, meaning: &'static str, content: Content) -> Self {
         let tag = || header("ETag", text(), "The file's SHA-256");
         let name = || header("Content-Disposition", text(), "A name for the file");

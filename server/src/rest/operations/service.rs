@@ -1,4 +1,4 @@
-//! Checking a problem, the queue, errors, the description of the API, and the probes.
+//! The operations for checking a problem, the queue, errors, the description of the API, and the probes.
 
 use super::{
     content::{bytes, json, submission},
@@ -34,12 +34,12 @@ pub(super) fn operations() -> Vec<Operation> {
             .answers(200, "Its state", json::<QueueState>()),
         post(ADMIN, "/v1/queue/pause", (), service::pause)
             .rpcs(&["PauseQueue"])
-            .summary("Starts no more jobs until the queue is resumed, also after a restart; running jobs continue")
+            .summary("Pauses the queue: no more jobs are started until it is resumed, also after a restart; running jobs continue")
             .answers(200, "The state of the queue", json::<QueueState>())
             .fails(&[Code::StorageFull]),
         post(ADMIN, "/v1/queue/resume", (), service::resume)
             .rpcs(&["ResumeQueue"])
-            .summary("Starts jobs again")
+            .summary("Resumes the queue: jobs are started again")
             .answers(200, "The state of the queue", json::<QueueState>())
             .fails(&[Code::StorageFull]),
         get(READ, "/v1/info", (), service::info)
@@ -48,12 +48,12 @@ pub(super) fn operations() -> Vec<Operation> {
             .answers(200, "Version and limits", json::<Info>()),
         get(IDENTIFIED, "/v1/me", (), service::me)
             .rpcs(&["GetCaller"])
-            .summary("Returns the caller: their owner name, scopes, and share of the queue")
+            .summary("Returns the caller: their owner name, scopes, and limits")
             .answers(200, "The caller", json::<Me>()),
         get(ADMIN, "/v1/owners", (), service::owners)
             .rpcs(&["ListOwners"])
-            .summary("Returns what every owner has in the service: jobs, bytes, and what waits and runs")
-            .answers(200, "The owners, who keeps most first", json::<service::Owners>()),
+            .summary("Returns the use of the service by every owner: stored jobs and bytes, queued and running jobs")
+            .answers(200, "The owners, those with the most stored bytes first", json::<service::Owners>()),
         get(OPEN, "/v1/errors/{code}", (CODE,), service::error)
             .rest_only("GetError")
             .summary("Explains a kind of error and what to do, for programs or as a page")
@@ -76,11 +76,11 @@ pub(super) fn operations() -> Vec<Operation> {
             .answers(200, "The protocol buffers", bytes("text/plain")),
         get(READ, "/docs", (), docs::page)
             .rest_only("GetDocs")
-            .summary("Shows a page with this description, where it can be tried out; it works offline")
+            .summary("Shows a page with this description, on which requests can be tried out; it works offline")
             .answers(200, "The page", bytes("text/html")),
         get(READ, "/docs/{file}", (FILE,), docs::file)
             .rest_only("GetDocsFile")
-            .summary("Returns a file that this page loads")
+            .summary("Returns a file that the page at /docs loads")
             .answers(200, "The file", PARTS.map(bytes).concat()),
         get(READ, "/metrics", (), service::metrics)
             .rest_only("GetMetrics")
@@ -92,11 +92,11 @@ pub(super) fn operations() -> Vec<Operation> {
             .answers(200, "ok", bytes("text/plain")),
         probe("/readyz", service::readyz)
             .rest_only("Ready")
-            .summary("Answers 200 as long as the service accepts jobs and can read them; the first line is ok or degraded")
-            .answers(200, "ok; or degraded, and what does not work: a full disk, damaged records", bytes("text/plain"))
+            .summary("Answers 200 while the service accepts jobs and can read them; the first line is ok or degraded")
+            .answers(200, "ok; or degraded with the reason, such as a full disk or damaged records", bytes("text/plain"))
             .fails(&[Code::CorruptData, Code::Draining, Code::StorageLost]),
     ]
 }
 
-/// Media types of the files of the page.
+/// The media types of the files of the page.
 const PARTS: [&str; 3] = ["text/css", "text/javascript", "text/plain"];

@@ -1,4 +1,4 @@
-//! Sweeps: many problems that differ in a few values.
+//! The operations on sweeps: many problems that differ in a few values.
 
 use super::{
     content::{self, data, json, lines, nothing, stream},
@@ -53,7 +53,7 @@ pub(super) fn operations() -> Vec<Operation> {
             sweeps::results,
         )
         .rpcs(&["ListSweepMembers"])
-        .summary("Returns the table of a sweep, a row for each member by number, which fills while it runs: in pages as JSON, whole in the other formats")
+        .summary("Returns the table of a sweep with a row for each member, which fills while the sweep runs: in pages as JSON, as a whole in the other formats")
         .file("The rows", data::<sweeps::Rows>(Format::OF_TABLES))
         .fails(&[Code::BadPageToken]),
         get(READ, "/v1/sweeps/{id}/events",
@@ -67,14 +67,14 @@ pub(super) fn operations() -> Vec<Operation> {
         .fails(&[Code::NotAcceptable, Code::Draining]),
         post(CANCEL, "/v1/sweeps/{id}/cancel", (ID,), sweeps::cancel)
             .rpcs(&["CancelSweep"])
-            .summary("Asks all jobs of a sweep to stop; the rows that it has are kept")
+            .summary("Asks all jobs of a sweep to stop; finished rows are kept")
             .answers(200, "The sweep", json::<Sweep>())
             .with([etag()])
             .fails(&[Code::StorageFull]),
         delete(CANCEL, "/v1/sweeps/{id}", (ID,), sweeps::delete)
             .rpcs(&["DeleteSweep"])
             .summary("Deletes a sweep that has ended, with its jobs and rows")
-            .answers(204, "It is deleted; for 7 days its id answers 410", nothing())
+            .answers(204, "Deleted; its id answers 410 for 7 days", nothing())
             .fails(&[Code::JobActive, Code::StorageFull]),
         post(SUBMIT, "/v1/sweeps/{id}/members/{number}/job",
             (ID, NUMBER, KEY, PREFER),

@@ -1,4 +1,4 @@
-//! Tokens.
+//! The operations on tokens.
 
 use super::{
     content::json,
@@ -27,12 +27,12 @@ pub(super) fn operations() -> Vec<Operation> {
             .answers(200, "The tokens", json::<tokens::List>()),
         delete(ADMIN, "/v1/tokens/{token}", (TOKEN,), tokens::revoke)
             .rpcs(&["RevokeToken"])
-            .summary("Revokes a token: from then on it is refused; it stays in the list")
+            .summary("Revokes a token, which is refused from then on; it remains in the list")
             .answers(200, "The revoked token", json::<Token>())
             .fails(&[Code::StorageFull]),
         post(ADMIN, "/v1/tokens/{token}/rotate", (TOKEN,), tokens::rotate)
             .rpcs(&["RotateToken"])
-            .summary("Gives a token another secret: from then on the old one is refused")
+            .summary("Gives a token a new secret; the old one is refused from then on")
             .answers(200, "The token and its new secret", json::<NewToken>())
             .fails(&[Code::StorageFull]),
     ]

@@ -217,7 +217,7 @@ async fn fields_are_deleted_by_themselves_and_with_the_last_job_that_has_them() 
 }
 
 #[tokio::test]
-async fn fields_go_with_the_last_job_that_has_them_also_if_others_have_the_rest() {
+async fn fields_are_deleted_with_the_last_job_that_has_them() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
     let first = solved(&store, "ada", "1", 10_000).await;

@@ -8,13 +8,13 @@ use crate::algorithm::system::{State, System};
 use crate::elasticity::Dof;
 use crate::solution::{Observer, Progress};
 
-/// A reaction below this part of the problem's own force is none.
+/// A reaction below this part of the problem's own force counts as zero.
 const NO_FORCE: f64 = 1e-30;
 
-/// After a step that leaves more than this part of the residual the next is damped.
+/// A step that leaves more than this part of the residual is followed by a damped one.
 const STALLED: f64 = 0.7;
 
-/// Steps of the active set before falling back.
+/// The largest number of steps before the other method takes over.
 const ACTIVE_SET_STEPS: u32 = 30;
 
 /// Guesses the active set, solves with one Newton step, and corrects the guess.
@@ -84,17 +84,18 @@ pub(super) fn run(
     })
 }
 
-/// A state after a step.
+/// The state after a step.
 struct Next {
     state: State,
     elastic_force: Vec<f64>,
-    /// The contact set differs from the one before.
+    /// Whether the contact set changed.
     changed: bool,
     residual: f64,
 }
 
-/// A step with the last factor if that serves, else with a new one: what the older one has led to is not kept then. A
-/// `damped` step ends where J is least along it: whole ones may go to and fro between stick and slip.
+/// A step with the factor that was used last, if that is good enough, else with a new factor and without the result of
+/// the old one. A `damped` step ends where J is smallest along it, since whole steps may alternate between stick and
+/// slip.
 fn step_from(
     (system, bound, factors): (&System<'_>, &[f64], &mut Factors),
     (state, elastic_force): (&State, &[f64]),
@@ -102,7 +103,7 @@ fn step_from(
     damped: bool,
     observe: &mut Observer<'_>,
 ) -> Option<Next> {
-    /// The part of the residual that a step with an older factor may leave: one with a new factor costs as much as
+    /// The part of the residual that a step with an older factor may leave. A step with a new factor costs as much as
     /// several.
     const SERVES: f64 = 0.1;
     let free: Vec<usize> = free_dofs(system, |i| state.active[i]);
@@ -132,8 +133,8 @@ fn step_from(
     }
 }
 
-/// Keeps nodes that are pressed, adds nodes that have passed the obstacle; true on any change. `force`: Ŝ v − f̂;
-/// friction acts along t only, and does not enter the reactions.
+/// Removes nodes that are pulled from the active set and adds nodes that have passed the obstacle; true on any change.
+/// `force`: Ŝ v − f̂. Friction acts along t only and does not enter the reactions.
 pub(in crate::algorithm) fn update_active(
     system: &System<'_>,
     force: &[f64],

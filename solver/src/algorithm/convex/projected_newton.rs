@@ -8,11 +8,11 @@ use crate::elasticity::Dof;
 use crate::friction::FrictionLaw;
 use crate::solution::{Observer, Progress};
 
-/// Steps of projected Newton; a dozen are usual.
+/// The largest number of steps; a dozen are usual.
 const PROJECTED_STEPS: u32 = 300;
 
-/// Projected Newton (Bertsekas): hold the nodes that press against the obstacle, step in the
-/// others, and let the step end on the obstacle where it would pass it.
+/// Projected Newton (Bertsekas): hold the nodes that press against the obstacle, step in the others, and cut the step
+/// off at the obstacle where it would pass it.
 pub(super) fn run(
     system: &System<'_>,
     bound: &[f64],
@@ -88,7 +88,7 @@ pub(super) fn run(
     best
 }
 
-/// Puts v where the constraints allow it.
+/// Projects v onto the constraints.
 fn project(system: &System<'_>, v: &mut [f64]) {
     for node in &system.nodes {
         let Dof::Free(dof) = node.normal else {
@@ -110,7 +110,7 @@ fn pressed(system: &System<'_>, v: &[f64], force: &[f64]) -> Vec<bool> {
     system.nodes.iter().map(state).collect()
 }
 
-/// Bertsekas' set: nodes so near to the obstacle, for the force on them, that a step would reach it.
+/// Bertsekas' set: nodes so close to the obstacle, considering the force on them, that a step would reach it.
 fn binding(system: &System<'_>, v: &[f64], force: &[f64]) -> Vec<bool> {
     // nearness is measured by the natural residual: it shrinks as the solution is approached
     let mut natural: f64 = 0.0;
@@ -174,7 +174,7 @@ fn line_search(
     false
 }
 
-/// The α in (0, 1] with the least J along v + α d; 1 where d does not lead downhill.
+/// The α in (0, 1] with the smallest J along v + α d; 1 where d is no direction of descent.
 pub(in crate::algorithm) fn least_along(
     system: &System<'_>,
     bound: &[f64],
@@ -190,11 +190,11 @@ pub(in crate::algorithm) fn least_along(
     }
 }
 
-/// J along a line v + α d.
+/// J along the line v + α d, as a function of α.
 struct Along<'a> {
     slope: f64,
     curvature: f64,
-    /// w τ, u_t − d, its change along d, and the law, at the friction points with a bound and a change.
+    /// At each friction point with a bound and a change: w τ, u_t − d, its change along d, and the law.
     friction: Vec<(f64, f64, f64, &'a FrictionLaw)>,
 }
 
@@ -255,7 +255,7 @@ impl<'a> Along<'a> {
         self.slope + 0.5 * self.curvature + friction
     }
 
-    /// The α in (0, most] with the least J: the derivative grows, so its root is bracketed.
+    /// The α in (0, most] with the smallest J: the derivative grows, so its root is bracketed.
     fn minimum(&self, most: f64) -> f64 {
         if self.derivative(most) <= 0.0 {
             return most;

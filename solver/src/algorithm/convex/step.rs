@@ -1,19 +1,19 @@
-//! Parts of both methods: the gradient of J, and nodes that are held.
+//! Parts that both methods use: the gradient of J, and nodes that are held.
 
 use crate::algorithm::system::{State, System};
 use crate::elasticity::Dof;
 
 /// The best approximation of the minimiser.
 pub struct Minimum {
-    /// The state.
+    /// The state with the smallest J found.
     pub state: State,
-    /// Newton steps taken.
+    /// The number of Newton steps.
     pub steps: u32,
-    /// Ŝ v − f̂ of it.
+    /// The elastic force Ŝ v − f̂ of that state.
     pub elastic_force: Vec<f64>,
-    /// Its KKT residual.
+    /// The KKT residual of that state.
     pub residual: f64,
-    /// What is left of it above the tolerance is rounding.
+    /// Whether a residual above the tolerance is only rounding.
     pub rounded: bool,
 }
 

@@ -1,5 +1,5 @@
 //! What the nodes of a contact do not see: an obstacle that reaches into the body between them or recedes from it; and
-//! kinks of the obstacle and corners of the body, at which the pressure has no limit.
+//! kinks of the obstacle and corners of the body, where the pressure has no limit.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{LN_2, PI};
@@ -13,19 +13,20 @@ use crate::friction::BoundLaw;
 use crate::problem::{Condition, NormalOf};
 use crate::solution::{Outcome, Warning, WarningCode};
 
-/// A place between nodes at which the obstacle reaches into the body, and nothing resists it, or recedes from a body that
-/// touches it on both sides: a node is needed there.
+/// A place between nodes where a node is needed: either the obstacle reaches into the body without resistance, or it
+/// recedes from a body that touches it on both sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Missed {
     /// The contact, by its place in the model.
     pub patch: usize,
     /// Arc length from the start of the named boundary.
     pub s: f64,
-    /// How far the obstacle reaches into the body there; negative: how far it recedes (length).
+    /// How far the obstacle reaches into the body there (length); negative where it recedes.
     pub penetration: f64,
     /// Distance between the nodes on either side (length).
     pub spacing: f64,
-    /// The force that would push a node to the obstacle there / largest nodal reaction; infinite where nothing touches.
+    /// The force that would push a node to the obstacle there, divided by the largest nodal reaction; infinite where
+    /// nothing touches.
     pub severity: f64,
 }
 
@@ -33,18 +34,19 @@ pub struct Missed {
 /// resolved has up to 0.4, a smooth obstacle up to 0.11 (the random problems of `tests/verification`).
 const SERIOUS: f64 = 0.5;
 
-/// What crests add where the hollows between them do not touch, in amplitudes of full contact: 1.1 where they almost do.
+/// The factor on the pressure of a wave whose crests touch while the hollows between them do not; 1.1 would be enough
+/// where they almost do.
 const PARTIAL: f64 = 1.5;
 
-/// What the obstacle does between the nodes counts if it adds more than this part to the peak of the pressure. A circle adds
-/// less on any mesh that resolves its contact.
+/// A shape of the obstacle between the nodes counts if it adds more than this part to the peak of the pressure. A
+/// circle adds less on any mesh that resolves its contact.
 const SLIGHT: f64 = 1e-3;
 
-/// Where no error of a peak would contain it, what the obstacle does between the nodes is told if it adds more than this part of
-/// the mean pressure: peaks of a `fair` result are known to as much.
+/// Where no stated error of a peak contains it, a shape of the obstacle between the nodes is reported if it adds more
+/// than this part of the mean pressure, which is the accuracy of peaks of a `fair` result.
 const TELLING: f64 = 0.2;
 
-/// Rises within less than this part of the distance of the nodes are not steeper than over it.
+/// A slope is measured over at least this part of the distance of the nodes.
 const SHORTEST: f64 = 1.0 / 16.0;
 
 /// Penetration counts as more than rounding above this part of the length of the contact.
@@ -53,14 +55,14 @@ const ROUNDING: f64 = 1e-9;
 /// A kink shapes the pressure if each halving of the mesh adds more than this part to its peak.
 const SHAPING: f64 = 0.01;
 
-/// A shape of the obstacle between the nodes of an edge that they do not see.
+/// A shape of the obstacle between the nodes of an edge that the nodes do not see.
 pub(super) struct Wave {
     pub(super) edge: usize,
-    /// How far it is off the parabola through the nodes (length).
+    /// The distance of the obstacle from the parabola through the nodes (length).
     height: f64,
     /// Distance between the nodes on either side (length).
     spacing: f64,
-    /// What it may add to the pressure (stress).
+    /// The pressure that it may add (stress).
     pub(super) pressure: f64,
 }
 
@@ -72,18 +74,18 @@ pub(super) struct Kink {
     change: f64,
     /// The angle by which the body's surface turns there; 0 where it is smooth.
     turn: f64,
-    /// What each halving of the mesh adds to the pressure there (stress).
+    /// The pressure that each halving of the mesh adds there (stress).
     growth: f64,
     /// Distance between the nodes on either side (length).
     spacing: f64,
-    /// At a line of symmetry, and at least in part by the mirror image.
+    /// Whether the kink is on a line of symmetry and due, at least in part, to the mirror image.
     mirrored: bool,
 }
 
 impl PatchView<'_> {
-    /// Where the obstacle reaches into the body between the nodes or recedes from it, at most one place for each edge, the
-    /// deepest first. Only of what the nodes do not see: a smooth obstacle is a parabola between them, and what that leaves
-    /// open at the ends of contact belongs to the errors of the mesh.
+    /// Places where the obstacle reaches into the body between the nodes or recedes from it, at most one for each edge,
+    /// the deepest first. Only what the nodes do not see counts: a smooth obstacle is a parabola between them, and its
+    /// error at the ends of contact belongs to the errors of the mesh.
     pub(in crate::algorithm) fn missed(&self) -> Vec<Missed> {
         let contact = self.patch.contact;
         let mut found: Vec<(usize, Missed)> = Vec::new();
@@ -142,9 +144,10 @@ impl PatchView<'_> {
         found
     }
 
-    /// The shape of the obstacle between the nodes of an edge that they do not see, at the edges where there is one. A wave of
-    /// height h and length λ presses with the amplitude π E* h/(2 λ) on a half-plane in full contact; where it touches with its
-    /// crests only, with more. It is as long as the nodes are apart, or shorter if it is steeper than that.
+    /// The shape of the obstacle between the nodes of an edge that they do not see, at the edges where there is one. A
+    /// wave of height h and length λ presses with the amplitude π E* h/(2 λ) on a half-plane in full contact, and with
+    /// more where only its crests touch. Its length is taken as the distance of the nodes, or shorter if it is steeper
+    /// than that.
     pub(super) fn unseen_waves(&self) -> Vec<Wave> {
         let contact = self.patch.contact;
         if contact.condition != Condition::Unilateral {
@@ -201,8 +204,8 @@ impl PatchView<'_> {
         found
     }
 
-    /// The edges with waves that matter and that no stated error contains: where the peak of the pressure has no limit it has no
-    /// error, and is no measure of them. A kink between the nodes is told as such.
+    /// The edges with waves that matter and that no stated error contains: where the peak of the pressure has no limit,
+    /// no error is stated for it. A kink between the nodes has a warning of its own.
     fn waves_without_error(&self) -> Vec<usize> {
         let contact = self.patch.contact;
         let mut waves = self.unseen_waves();
@@ -227,8 +230,9 @@ impl PatchView<'_> {
         waves.iter().map(|wave| wave.edge).collect()
     }
 
-    /// What an unseen wave may add to |σ_t|: μ times what is left in S_ρ of a wave twice as long, the longest that nodes do not see,
-    /// in that part that the largest slip reaches. The wave itself moves the surface along t by less than its height.
+    /// The stress that an unseen wave may add to |σ_t|: μ times the amplitude that averaging leaves of a wave twice as
+    /// long, the longest that nodes do not see, times the part of full friction at the largest slip. The wave itself
+    /// moves the surface along t by less than its height.
     pub(super) fn friction_of(&self, wave: &Wave) -> f64 {
         let Some(law) = &self.patch.law else {
             return 0.0;
@@ -270,10 +274,10 @@ impl PatchView<'_> {
         } = worst;
         let message = match *penetration > 0.0 {
             true => format!(
-                "The obstacle reaches {penetration:.3e} into the body between two nodes, at s = {s:.4}{others}: they are {spacing:.3e} apart, and nothing resists it there. Forces and peaks are not those of this obstacle. Put a grid line there, or refine the mesh until the nodes see it."
+                "The obstacle reaches {penetration:.3e} into the body between two nodes, at s = {s:.4}{others}: the nodes are {spacing:.3e} apart, and between them nothing resists it. Forces and peaks are not those of this obstacle. Put a grid line there, or refine the mesh until it resolves the obstacle."
             ),
             false => format!(
-                "The obstacle recedes by {:.3e} between two nodes that touch it, at s = {s:.4}{others}: they are {spacing:.3e} apart, and the body presses there as if it were smooth. Forces and peaks are not those of this obstacle. Refine the mesh until the nodes see it.",
+                "The obstacle recedes by {:.3e} between two nodes that touch it, at s = {s:.4}{others}: the nodes are {spacing:.3e} apart, and the body presses there as if the obstacle were smooth. Forces and peaks are not those of this obstacle. Refine the mesh until it resolves the obstacle.",
                 -penetration
             ),
         };
@@ -347,8 +351,8 @@ impl PatchView<'_> {
         });
     }
 
-    /// Corners of the body in contact or beside it, where the obstacle has none: the node, the angle of the turn, and by how much
-    /// the slope of the gap changes. An obstacle that follows the body's surface has its corners.
+    /// Corners of the body in contact or beside it where the obstacle has none: the node, the angle of the turn, and
+    /// the change of the slope of the gap. An obstacle that follows the body's surface has its corners.
     fn body_corners(&self) -> Vec<(usize, f64, f64)> {
         let contact = self.patch.contact;
         if !contact.in_space || contact.condition != Condition::Unilateral {
@@ -366,12 +370,13 @@ impl PatchView<'_> {
         corners.filter_map(corner).collect()
     }
 
-    /// What each halving of the mesh adds to the pressure where the slope of the gap changes (stress).
+    /// The pressure that each halving of the mesh adds where the slope of the gap changes (stress).
     fn growth(moduli: &[f64], edge: usize, change: f64) -> f64 {
         0.5 / PI * LN_2 * moduli[edge] * change
     }
 
-    /// Corners that point into the body keep the obstacle off: what the nodes show as one contact is one on each side of them.
+    /// Warns of corners that point into the body: the obstacle does not reach into them, so that the one contact which
+    /// the nodes show is really two, one on each side.
     fn warn_of_notches(&self, warnings: &mut Vec<Warning>) {
         let mut notches = self.body_corners();
         notches.retain(|(_, _, change)| *change < 0.0);
@@ -394,16 +399,16 @@ impl PatchView<'_> {
             code: WarningCode::KinkInContact,
             pointer: self.patch.contact.pointer.clone(),
             message: format!(
-                "The body has a corner in the contact that points into it, at s = {s:.4}: its surface turns by {:.2}°{count}. The obstacle does not reach into it, and on finer meshes the contact is one on each side of it, with other peaks. If the corners only come from straight sides of elements on a curve, mesh it with elements of second order, or name the curve under /mesh/curves.",
+                "The body has a reentrant corner in the contact, at s = {s:.4}: its surface turns by {:.2}°{count}. The obstacle does not reach into the corner, and on finer meshes the contact splits into one on each side of it, with other peaks. If the corners only come from straight sides of elements on a curve, mesh it with elements of second order, or name the curve under /mesh/curves.",
                 turn.to_degrees()
             ),
         });
     }
 
-    /// Kinks in contact that shape the pressure: of the obstacle, also where it is mirrored at a line of symmetry, and corners of
-    /// the body.
-    /// Beside a kink with the change of slope Δ the pressure of a half-plane with the contact modulus E* grows like
-    /// E* Δ/(2π) · ln(1/distance); on the axis of a cone like E* Δ/4 · ln(1/distance).
+    /// Kinks in contact that shape the pressure: kinks of the obstacle, also where it meets its mirror image at a line
+    /// of symmetry, and corners of the body. Beside a kink with the change of slope Δ the pressure of a half-plane with
+    /// the contact modulus E* grows like E* Δ/(2π) · ln(1/distance); on the axis of a cone like E* Δ/4 ·
+    /// ln(1/distance).
     pub(super) fn kinks(&self) -> Vec<Kink> {
         let contact = self.patch.contact;
         if contact.condition != Condition::Unilateral {
@@ -503,7 +508,7 @@ impl PatchView<'_> {
         own.into_iter().fold(0.0, f64::max)
     }
 
-    /// The nodes on either side of a place; twice the same at a node.
+    /// The nodes on either side of a place; at a node, that node twice.
     fn beside(&self, place: &Place) -> [usize; 2] {
         let [start, end, middle] = edge_nodes(place.edge);
         match place.xi {
@@ -553,7 +558,8 @@ impl PatchView<'_> {
     }
 }
 
-/// The first and the last of some points (place, height) and those between at which the height ceases to rise or to fall.
+/// The first and the last of some points (place, height), and those between at which the height stops rising or
+/// falling.
 fn turning_points(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
     let mut found: Vec<(f64, f64)> = Vec::new();
     for point in points {

@@ -1,24 +1,25 @@
-//! What a push along a direction of its own leaves open: gaps are linear in the indentation, as if the obstacle kept the normal
-//! and the slope that each node faced before, and those of the displaced obstacle are not.
+//! The error of a push along a direction that is not the normal: gaps are linear in the indentation, as if the obstacle
+//! kept the normal and the slope that each node faced before, while those of the displaced obstacle differ.
 
 use super::{DisplacedGaps, DisplacedNode, PatchView};
 use crate::contact::Displaced;
 use crate::problem::{Condition, NormalOf};
 use crate::solution::{Warning, WarningCode};
 
-/// What is told: a difference whose mean over the pressure is more than this part of the largest gap or overlap in contact, which
-/// changes forces by as much or twice as much; or an end of the contact that is more than this part of its length off.
+/// What is reported: a difference whose mean over the pressure exceeds this part of the largest gap or overlap in
+/// contact, which changes forces by as much or twice as much; or an end of the contact that is wrong by more than this
+/// part of its length.
 const TOLD_OF_FORCES: f64 = 0.004;
 const TOLD_OF_ENDS: f64 = 0.025;
 
-/// Parts of the length of the contact boundary that are rounding: those of the place on a curve.
+/// Differences up to this part of the length of the contact boundary are rounding in the place on a curve.
 const ROUNDING: f64 = 1e-8;
 
-/// What a node takes, in multiplications.
+/// The work for one node, in multiplications.
 const WORK_OF_A_NODE: f64 = 2e3;
 
 impl PatchView<'_> {
-    /// Without a direction, nothing.
+    /// The gaps of the displaced obstacle relative to the linear ones; empty without a direction.
     pub(in crate::algorithm) fn displaced_gaps(&self) -> &DisplacedGaps {
         self.displaced_gaps.get_or_init(|| {
             let contact = self.patch.contact;
@@ -52,7 +53,8 @@ impl PatchView<'_> {
         })
     }
 
-    /// u_n ≤ gap is a condition on the displacement along m; where m is the obstacle's, the displaced obstacle has another one.
+    /// The constraint of the displaced obstacle relative to the linear one at a node. u_n ≤ gap is a condition on the
+    /// displacement along the body's normal m, where the displaced obstacle may have another normal.
     fn beside_linear(
         &self,
         i: usize,
@@ -86,7 +88,8 @@ impl PatchView<'_> {
         })
     }
 
-    /// The largest difference at a node in contact, and the largest gap or overlap there (lengths), if the difference is to be told.
+    /// The largest difference at a node in contact, and the largest gap or overlap there (lengths), if the difference
+    /// is large enough for a warning.
     fn told(&self) -> Option<(f64, f64)> {
         let found = self.displaced_gaps();
         let level = self.system.level.indentation;
@@ -120,8 +123,9 @@ impl PatchView<'_> {
         (0..self.count()).map(overlap).fold(0.0, f64::max)
     }
 
-    /// What the difference changes where contact begins or ends at a node (length): as much as the linear gap changes by it on
-    /// the way from where it is least. An obstacle of which nothing is left there ends elsewhere.
+    /// The error of an end of contact at a node (length): how far the linear gap, from its smallest value on, must go
+    /// to change by the difference there. Where the displaced obstacle does not face the node any more it ends
+    /// elsewhere.
     pub(super) fn displaced_end(&self, end: usize) -> f64 {
         let found = self.displaced_gaps();
         let level = self.system.level.indentation;
@@ -144,7 +148,7 @@ impl PatchView<'_> {
         found.past_end.max((more / slope).min(all)).min(all)
     }
 
-    /// From the first node in contact to the last.
+    /// The length from the first node in contact to the last.
     pub(super) fn contact_length(&self) -> f64 {
         let s = &self.patch.contact.boundary.s;
         let first = (0..self.count()).find(|i| self.active(*i));
@@ -155,7 +159,7 @@ impl PatchView<'_> {
         }
     }
 
-    /// The part of the contact that the displaced obstacle does not cover, or covers beside it.
+    /// The part of the contact that the displaced obstacle does not cover, or covers in addition.
     pub(super) fn displaced_part(&self) -> f64 {
         let past_end = self.displaced_gaps().past_end;
         match past_end > 0.0 {
@@ -165,14 +169,14 @@ impl PatchView<'_> {
     }
 
     pub(super) fn warn_of_displaced(&self, warnings: &mut Vec<Warning>) {
-        let instead = "Gaps are linear in the indentation. Draw the obstacle where the push leaves it, with an `indentation` of 0, or push it by less.";
+        let instead = "Gaps are linear in the indentation. Draw the obstacle in its final position with an `indentation` of 0, or push it less far.";
         let overlap = self.overlap_without_contact();
         let message = match (overlap > 0.0, self.told()) {
             (true, _) => format!(
                 "Nothing touches, but the obstacle that is pushed along its `direction` would reach {overlap:.3e} into the body. {instead}"
             ),
             (false, Some((most, largest))) => format!(
-                "The obstacle is pushed along its `direction` so far that where it touches its gaps are off by up to {most:.3e}; the largest gap or overlap there is {largest:.3e}. {instead} What it changes is in the stated errors."
+                "The obstacle is pushed so far along its `direction` that gaps in the contact are wrong by up to {most:.3e}; the largest gap or overlap there is {largest:.3e}. {instead} The stated errors include the effect."
             ),
             (false, None) => return,
         };

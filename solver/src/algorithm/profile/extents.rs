@@ -1,4 +1,4 @@
-//! Forces of a contact, where it touches, sticks and slips, and its peaks.
+//! Forces and peaks of a contact, and where it touches, sticks and slips.
 
 use std::cmp::Ordering;
 
@@ -12,7 +12,7 @@ use crate::solution::{ContactSummary, Peak};
 /// Samples per edge in the search for a peak, before it is narrowed down.
 const SAMPLES: usize = 16;
 
-/// Intervals of arc length.
+/// Extents as intervals of arc length.
 struct Extents {
     contact: Vec<[f64; 2]>,
     stick: Vec<[f64; 2]>,
@@ -46,7 +46,7 @@ impl PatchView<'_> {
         }
     }
 
-    /// Contact between its outermost nodes, and its division by |e| < ε.
+    /// The contact between its outermost nodes, divided into stick and slip by |e| < ε.
     fn extents(&self) -> Extents {
         let s = &self.patch.contact.boundary.s;
         let (mut contact, mut stick, mut slip) =
@@ -125,7 +125,7 @@ impl PatchView<'_> {
         edges.flat_map(on).collect()
     }
 
-    /// Those on one edge.
+    /// The places on one edge at which |e| = ε.
     fn turns_on(&self, edge: usize) -> Vec<f64> {
         let Some(law) = &self.patch.law else {
             return Vec::new();
@@ -161,7 +161,7 @@ impl PatchView<'_> {
         Some(self.peak(-value + 0.0, edge, xi))
     }
 
-    /// The largest pressure, its edge, and its place there.
+    /// The largest pressure, with its edge and its place there.
     pub(super) fn highest_pressure(&self) -> Option<(f64, usize, f64)> {
         let edges = 0..self.patch.contact.boundary.edge_count();
         let in_contact = edges.filter(|edge| edge_nodes(*edge).iter().any(|&i| self.active(i)));
@@ -194,12 +194,12 @@ impl PatchView<'_> {
         Some(self.peak(value, edge, xi))
     }
 
-    /// σ_t where it is largest, its edge, and its place there.
+    /// The σ_t that is largest in size, with its edge and its place there.
     pub(super) fn highest_traction(&self) -> Option<(f64, usize, f64)> {
         if self.patch.law.is_none() && self.tractions.is_none() {
             return None;
         }
-        /// Relative: solutions within the tolerance differ by less.
+        /// Relative difference of two values that count as equal: solutions within the tolerance differ by less.
         const EQUAL: f64 = 1e-9;
         let step = 2.0 / SAMPLES as f64;
         let (mut highest, mut most) = (None, 0.0f64);

@@ -1,4 +1,4 @@
-//! Materials that meet under a contact: the pressure may have no limit there.
+//! Junctions: materials that meet under a contact, where the pressure may have no limit.
 
 use std::f64::consts::{LN_2, TAU};
 
@@ -12,7 +12,7 @@ use crate::solution::{Warning, WarningCode};
 /// A junction shapes the pressure if each halving of the mesh adds more than this part to its peak.
 const SHAPING: f64 = 0.01;
 
-/// Angles that differ by less are one: of sides of elements that meet in a node.
+/// Angles that differ by less are equal: those of sides of elements that meet in a node.
 const SAME_ANGLE: f64 = 1e-6;
 
 impl PatchView<'_> {
@@ -110,8 +110,8 @@ impl PatchView<'_> {
         })
     }
 
-    /// Whether a node sticks on edges over which the strain would move it by more than ε: as far as the mesh sees, nothing
-    /// moves there.
+    /// Whether a node sticks on edges over which the strain would move it by more than ε: as far as the mesh sees,
+    /// nothing slides there.
     fn sticks_unresolved(&self, i: usize) -> bool {
         let Some(law) = &self.patch.law else {
             return false;
@@ -127,8 +127,8 @@ impl PatchView<'_> {
         self.system.nodes[self.patch.first + i].on_axis
     }
 
-    /// The wedges of material around a node, counter-clockwise from the side before it to the one behind it; at an end of the
-    /// boundary from or to the other surface of the body.
+    /// The wedges of material around a node, counter-clockwise from the edge before it to the edge after it; at an end
+    /// of the boundary, from or to the next side of the body's surface.
     fn wedges_at(&self, i: usize) -> Option<Vec<Wedge>> {
         let (model, boundary) = (self.system.model, &self.patch.contact.boundary);
         let node = boundary.nodes[i];

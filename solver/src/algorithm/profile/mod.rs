@@ -1,5 +1,4 @@
-//! One contact in the final state: its columns; its forces, extents, peaks and warnings are in files of
-//! their own.
+//! The profile of one contact in the final state. Forces, extents, peaks and warnings are in files of their own.
 //!
 //! # Where to look
 //!
@@ -43,21 +42,23 @@ pub(super) struct PatchView<'a> {
     v: &'a [f64],
     finished: &'a Finished,
     forces: &'a Forces,
-    /// u_t − d at the nodes.
+    /// The displacement relative to the obstacle, u_t − d, at the nodes.
     relative: Vec<f64>,
     /// The largest pressure at a node (stress).
     largest: f64,
     /// Arc lengths between which the pressure is not zero; empty where nothing touches.
     pressed: Option<[f64; 2]>,
-    /// g at start, end and midside of every edge; 0 in the total law.
+    /// The anchors g at start, end and midside of every edge; 0 under the total law.
     anchors: Vec<[f64; 3]>,
-    /// Where materials meet in the contact, once that is known.
+    /// The junction with the fastest growth of the pressure, computed when first needed.
     worst_junction: OnceCell<Option<Junction>>,
-    /// What a direction of the indentation leaves open, once that is known.
+    /// The gaps of an obstacle that is pushed along a direction, computed when first needed.
     displaced_gaps: OnceCell<DisplacedGaps>,
-    /// Told what work was done (multiplications); false: nobody needs the rest, which may be anything.
+    /// Called with the work done (multiplications). If it returns false, the results will not be used and may be
+    /// anything.
     go_on: &'a dyn Fn(f64) -> bool,
-    /// σ_t likewise, if it does not follow from the law: in the thesis's own iteration and in bonded contacts.
+    /// σ_t at start, end and midside of every edge where it does not follow from the law: in the thesis's own iteration
+    /// and in bonded contacts.
     tractions: Option<Vec<[f64; 3]>>,
 }
 
@@ -67,11 +68,11 @@ pub(super) struct Junction {
     s: f64,
     /// λ, if the pressure grows like a power of the distance, r^(λ−1); else like its logarithm.
     exponent: Option<f64>,
-    /// What each halving of the mesh adds to the pressure there (stress).
+    /// The pressure that each halving of the mesh adds there (stress).
     growth: f64,
 }
 
-/// What a displaced obstacle is at a contact node beside the linear one.
+/// The displaced obstacle at a contact node, compared with the linear one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DisplacedNode {
     /// By how much the gap along the contact's normal is larger (length).
@@ -80,12 +81,12 @@ pub struct DisplacedNode {
     pub turn: f64,
 }
 
-/// The same of a contact.
+/// The displaced obstacle at all nodes of a contact, compared with the linear one.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(in crate::algorithm) struct DisplacedGaps {
-    /// By node; nothing where it is not known.
+    /// By node; zero where it is unknown.
     pub(in crate::algorithm) nodes: Vec<DisplacedNode>,
-    /// How far the obstacle is displaced along t at a node in contact that it does not face any more (length).
+    /// The largest displacement of the obstacle along t at a node in contact that it does not face any more (length).
     past_end: f64,
 }
 
@@ -97,7 +98,7 @@ pub(super) struct Forces {
 }
 
 impl Forces {
-    /// Of a final state.
+    /// The nodal forces of a final state.
     pub(super) fn new(system: &System<'_>, finished: &Finished) -> Self {
         let elastic_force = &finished.elastic_force;
         let reactions = system.reactions_of(&finished.state, elastic_force);
@@ -160,7 +161,7 @@ impl<'a> PatchView<'a> {
         view
     }
 
-    /// From the first edge with a pressure to the last.
+    /// The arc lengths from the first edge with a pressure to the last.
     fn pressed(&self) -> Option<[f64; 2]> {
         let (s, pressures) = (&self.patch.contact.boundary.s, self.own_pressures());
         let first = pressures.iter().position(|p| *p != 0.0)?;
@@ -168,8 +169,8 @@ impl<'a> PatchView<'a> {
         Some([s[first.saturating_sub(2)], s[(last + 2).min(s.len() - 1)]])
     }
 
-    /// Values at friction points, carried to start, end and midside of every edge: the parabola
-    /// through its three Gauss points, or the nodes' own.
+    /// Interpolates values at friction points to start, end and midside of every edge: by the parabola through its
+    /// three Gauss points, or directly for points at the nodes.
     fn carried_to_nodes(&self, value: &dyn Fn(usize) -> f64) -> Vec<[f64; 3]> {
         let points = &self.system.points;
         let own: Vec<usize> = (0..points.len())
@@ -199,7 +200,7 @@ impl<'a> PatchView<'a> {
             .collect()
     }
 
-    /// Friction acts at Gauss points, three an edge.
+    /// Whether friction acts at Gauss points, three on each edge, rather than at nodes.
     fn at_gauss_points(&self) -> bool {
         let friction = self.patch.contact.friction.as_ref();
         friction.is_some_and(|f| f.points == FrictionPoints::Gauss3)
@@ -209,7 +210,7 @@ impl<'a> PatchView<'a> {
         self.patch.contact.boundary.nodes.len()
     }
 
-    /// Whether friction may act: in contact, or without an obstacle.
+    /// Whether friction may act at a node: in contact, or without an obstacle.
     fn engaged(&self, i: usize) -> bool {
         self.active(i) || self.patch.contact.condition == Condition::None
     }
@@ -227,7 +228,7 @@ impl<'a> PatchView<'a> {
         self.forces.pressures[self.patch.first + i]
     }
 
-    /// e = u_t − d − g along an edge.
+    /// The slip e = u_t − d − g at a place of an edge.
     fn slip_at(&self, edge: usize, xi: f64) -> f64 {
         let relative = edge_nodes(edge).map(|i| self.relative[i]);
         let h = edge3::shape(xi);
@@ -241,7 +242,7 @@ impl<'a> PatchView<'a> {
         &self.forces.pressures[self.system.range(self.patch)]
     }
 
-    /// Whether friction may act somewhere on an edge: a pressure is no further than ρ.
+    /// Whether friction may act somewhere on an edge: there is pressure within the distance ρ.
     fn may_rub(&self, edge: usize) -> bool {
         let reach = self.patch.law.as_ref().and_then(|law| law.bound.reach());
         let [start, end, _] = self.patch.contact.boundary.edge_arc(edge);
@@ -252,7 +253,7 @@ impl<'a> PatchView<'a> {
         }
     }
 
-    /// S_ρ and τ at arc length s.
+    /// The averaged pressure S_ρ and the bound τ at arc length s.
     fn averaged_and_bound(&self, s: f64) -> (f64, f64) {
         let Some(law) = &self.patch.law else {
             return (0.0, 0.0);
@@ -343,7 +344,7 @@ impl<'a> PatchView<'a> {
         profile
     }
 
-    /// The columns where friction acts, see [`ContactProfile`]; `nodal` are those at the nodes.
+    /// The columns where friction acts, see [`ContactProfile`]; `nodal`: the columns at the nodes.
     pub(super) fn friction_profile(&self, nodal: &ContactProfile) -> ContactProfile {
         let (points, tractions) = (&self.system.points, &self.finished.tractions);
         let own: Vec<usize> = (0..points.len())
@@ -370,7 +371,8 @@ impl<'a> PatchView<'a> {
         profile
     }
 
-    /// The columns at the places of the peaks, by the law there, in order of arc length; `nodal` are those at the nodes.
+    /// The columns at the places of the peaks, by the law there, in order of arc length; `nodal`: the columns at the
+    /// nodes.
     pub(super) fn peak_profile(&self, nodal: &ContactProfile) -> ContactProfile {
         let pressure = self.highest_pressure();
         let traction = self.highest_traction();
@@ -390,7 +392,8 @@ impl<'a> PatchView<'a> {
         profile
     }
 
-    /// Adds the columns at ξ of an edge, with the σ_t given; open if one of the nodes beside it is.
+    /// Adds the columns at a place ξ of an edge, with the given σ_t. The place is open if one of the nodes beside it
+    /// is.
     fn push_place(
         &self,
         profile: &mut ContactProfile,

@@ -1,4 +1,4 @@
-//! The quantities of a contact for which an error is stated, and what they depend on.
+//! The quantities of a contact for which an error is stated, and their derivatives.
 
 use super::PatchView;
 use super::between::Wave;
@@ -9,41 +9,44 @@ use crate::element::edge3;
 use crate::friction::BoundLaw;
 use crate::solution::{Outcome, QuantityName};
 
-/// A quantity of a contact.
+/// A quantity of a contact, and the parts of its error.
 pub struct Quantity {
-    /// What it is.
+    /// The kind of quantity.
     pub name: QuantityName,
     /// The contact, by its place in the model.
     pub patch: usize,
-    /// Its value.
+    /// The value in the solution.
     pub value: f64,
-    /// Its derivatives; none where only the place of the nodes matters.
+    /// The derivatives; none where the quantity depends only on the place of the nodes.
     pub gradient: Option<Gradient>,
-    /// Its error per change of what `gradient` is of; 1 but for the end of stick, which moves with the slip there.
+    /// The change of the quantity per change of the function that `gradient` belongs to. It is 1 except for an end of
+    /// stick, which moves with the slip there.
     pub factor: f64,
-    /// What the place of nodes alone leaves open, in the unit of the value: the distance to the next node at an end of
-    /// contact or of stick; at a peak of the pressure how far a smooth curve through the nodes around it is off; at a peak of
-    /// σ_t what friction turns around it; in friction forces what cancels within edges, what is beside singularities,
-    /// and stick between points.
+    /// The error due to the place of the nodes, in the unit of the value. At an end of contact or of stick: the
+    /// distance to the next node. At a peak of the pressure: its distance from a smooth curve through the nodes around
+    /// it. At a peak of σ_t: the change of friction where the motion turns near it. In friction forces: cancellation
+    /// within edges, singularities, and stick between points.
     pub spacing: f64,
-    /// What the law has between the points where friction acts, likewise: in friction forces; beside a peak of the pressure
-    /// a jump of σ_t; at a peak of σ_t the change of its bound.
+    /// The error because the law is evaluated at friction points only, in the unit of the value. In friction forces:
+    /// the law between the points. Beside a peak of the pressure: a jump of σ_t. At a peak of σ_t: the change of its
+    /// bound.
     pub between: f64,
-    /// What the part of the contact beyond its last node means, where an end of the obstacle lies inside an edge and that edge
-    /// is left out: its length for extents, else the quantity times that length in lengths of the contact.
-    pub cut: f64,
-    /// What a direction of the indentation leaves open beside what [`Reported::displaced`](crate::algorithm::Reported) says of it by
-    /// `gradient`, in the unit of the value.
+    /// The error by truncation, where the obstacle ends inside an edge and that edge is left out: for extents the
+    /// length that is left out, else the quantity times that length divided by the length of the contact.
+    pub truncation: f64,
+    /// The error of an indentation along a direction, in the unit of the value, in addition to that by `gradient` and
+    /// [`Reported::displaced`](crate::algorithm::Reported).
     pub displaced: f64,
-    /// Of a peak: the pressure of a shape of the obstacle between the nodes that they do not see.
+    /// For a peak: the pressure of a shape of the obstacle between the nodes that they do not see; else 0.
     pub unseen: f64,
-    /// The edges of the contact that `spacing` comes from, with their parts in any unit.
+    /// The edges of the contact that contribute to `spacing`, with their parts in any unit.
     pub spacing_at: Vec<(usize, f64)>,
-    /// The edges that `between` comes from, likewise.
+    /// The edges of the contact that contribute to `between`, with their parts in any unit.
     pub between_at: Vec<(usize, f64)>,
-    /// The edges between whose nodes the obstacle has a shape of its own, likewise.
+    /// The edges between whose nodes the obstacle has a shape that they do not see, with their parts in any unit.
     pub unseen_at: Vec<(usize, f64)>,
-    /// Parts of the contact like the one that is modelled: two where it goes on beyond a line of symmetry.
+    /// The number of equal parts of the contact, of which one is modelled: two where it continues beyond a line of
+    /// symmetry.
     pub images: f64,
     /// Whether an error can be stated.
     pub estimable: Estimable,
@@ -52,13 +55,13 @@ pub struct Quantity {
 /// Whether an error of a quantity can be stated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Estimable {
-    /// It can.
+    /// An error can be stated.
     Yes,
-    /// No finer mesh approaches a limit of it.
+    /// The quantity has no limit as the mesh is refined.
     NoLimit,
-    /// It is an end of stick, of which there are more than are followed.
+    /// An end of stick in a contact with more ends than have a stated error.
     TooMany,
-    /// The obstacle reaches into the body between the nodes or recedes from it: what that changes is not known.
+    /// The obstacle reaches into the body between the nodes or recedes from it, with an unknown effect.
     Unseen,
 }
 
@@ -67,22 +70,24 @@ pub(super) struct EndOfContact {
     name: QuantityName,
     /// The outermost node in contact.
     pub(super) node: usize,
-    /// Where that is.
+    /// The arc length of that node.
     s: f64,
-    /// From there to the end of the obstacle, if that lies inside the next edge, which is left out of the contact (length).
-    cut: f64,
-    /// From there to the next node (length).
+    /// The length from there to the end of the obstacle, if it ends inside the next edge, which is left out of the
+    /// contact.
+    truncation: f64,
+    /// The distance from there to the next node (length).
     pub(super) spacing: f64,
-    /// The edge that this lies on.
+    /// The edge between these two nodes.
     pub(super) edge: usize,
 }
 
-/// Ends of stick that are followed: each costs as much as another recovery of the stresses. A rough obstacle has hundreds, and
-/// where stick and slip alternate from point to point, another mesh has them elsewhere: no error is stated for more.
+/// The most ends of stick of a contact that have stated errors: each costs as much as another recovery of the stresses.
+/// A rough obstacle has hundreds, and where stick and slip alternate from point to point, their places depend on the
+/// mesh.
 const MOST_STICK_ENDS: usize = 8;
 
-/// A slip that changes by less than this part of ε along an edge is ε on all of it, to rounding, and stick does not end
-/// there: the incremental law leaves it so where the load rests.
+/// A slip that equals ε along a whole edge and changes by less than this part of it is constant up to rounding: no end
+/// of stick. The incremental law leads to this where the load rests.
 const STEADY: f64 = 1e-6;
 
 fn limited(has_limit: bool) -> Estimable {
@@ -93,7 +98,7 @@ fn limited(has_limit: bool) -> Estimable {
 }
 
 impl PatchView<'_> {
-    /// Forces, peaks and extents. None where σ_t does not follow from the law: in a false state of the thesis's own
+    /// Forces, peaks and extents. None where σ_t does not follow from the law, as in a false state of the thesis's own
     /// iteration.
     pub(in crate::algorithm) fn quantities(&self) -> Vec<Quantity> {
         if self.finished.own_tractions && self.finished.outcome != Outcome::Converged {
@@ -102,7 +107,7 @@ impl PatchView<'_> {
         let mut found = self.forces();
         found.extend(self.peaks());
         found.extend(self.ends());
-        self.add_cuts(&mut found);
+        self.add_truncation(&mut found);
         self.add_unseen(&mut found);
         self.add_displaced(&mut found);
         if !self.missed().is_empty() || self.overlap_without_contact() > 0.0 {
@@ -115,21 +120,23 @@ impl PatchView<'_> {
         found
     }
 
-    /// What parts of edges that are left out of the contact mean for the quantities that do not begin or end there.
-    fn add_cuts(&self, quantities: &mut [Quantity]) {
+    /// Adds the error by truncation to the quantities other than the extents that begin or end there.
+    fn add_truncation(&self, quantities: &mut [Quantity]) {
         let ends = self.ends_of_contact();
-        let cut: f64 = ends.iter().map(|end| end.cut).sum();
+        let truncation: f64 = ends.iter().map(|end| end.truncation).sum();
         // a contact of one node is not resolved at all
         let part = match (ends.first(), ends.last()) {
-            (Some(first), Some(last)) if cut > 0.0 => (cut / (last.s - first.s)).min(1.0),
+            (Some(first), Some(last)) if truncation > 0.0 => {
+                (truncation / (last.s - first.s)).min(1.0)
+            }
             _ => 0.0,
         };
         let rubbed = self.system.circumference * self.prescribed_friction_left_out();
         let friction = self.summary().friction_force;
         for quantity in quantities {
-            quantity.cut = match quantity.name {
+            quantity.truncation = match quantity.name {
                 QuantityName::ContactStart | QuantityName::ContactEnd => continue,
-                QuantityName::StickEnd => cut,
+                QuantityName::StickEnd => truncation,
                 QuantityName::TangentialForce | QuantityName::FrictionForce => {
                     rubbed.max(part * friction)
                 }
@@ -138,7 +145,7 @@ impl PatchView<'_> {
         }
     }
 
-    /// What a direction of the indentation means where the displaced obstacle ends elsewhere.
+    /// Adds the error of an indentation along a direction where the displaced obstacle ends elsewhere.
     fn add_displaced(&self, quantities: &mut [Quantity]) {
         let part = self.displaced_part();
         for quantity in quantities {
@@ -151,7 +158,7 @@ impl PatchView<'_> {
         }
     }
 
-    /// What the shape of the obstacle between the nodes means for the peaks.
+    /// Adds the error of peaks by the shape of the obstacle between the nodes.
     fn add_unseen(&self, quantities: &mut [Quantity]) {
         let waves = self.unseen_waves();
         let most = |of_wave: &dyn Fn(&Wave) -> f64| waves.iter().map(of_wave).fold(0.0, f64::max);
@@ -176,8 +183,8 @@ impl PatchView<'_> {
         }
     }
 
-    /// The friction that a prescribed bound, which acts whether or not the body touches, has on what is left out (force,
-    /// without 2π).
+    /// The friction force of a prescribed bound on the part of the contact that is left out (force, without 2π). Such a
+    /// bound acts whether or not the body touches.
     fn prescribed_friction_left_out(&self) -> f64 {
         let Some(law) = self.patch.law.as_ref() else {
             return 0.0;
@@ -215,7 +222,7 @@ impl PatchView<'_> {
             factor: 1.0,
             spacing: 0.0,
             between: 0.0,
-            cut: 0.0,
+            truncation: 0.0,
             displaced: 0.0,
             unseen: 0.0,
             spacing_at: Vec::new(),
@@ -226,7 +233,7 @@ impl PatchView<'_> {
         }
     }
 
-    /// Ends of the boundary on lines of symmetry, beyond which the contact goes on.
+    /// The number of ends of the boundary on lines of symmetry, beyond which the contact continues.
     pub(super) fn mirrored_ends(&self) -> usize {
         let goes_on = |i: &usize| self.engaged(*i) && self.symmetric(*i);
         [0, self.count() - 1].iter().filter(|i| goes_on(i)).count()
@@ -334,24 +341,26 @@ impl PatchView<'_> {
         found
     }
 
-    /// The pressure grows without limit at a sharp end of the obstacle, where materials meet and, slowly, at a kink.
+    /// Whether the pressure grows without limit: at a sharp end of the obstacle, where materials meet and, slowly, at a
+    /// kink.
     pub(super) fn pressure_without_limit(&self) -> bool {
         let sharp = |i: usize| self.active(i) && self.may_be_sharp(i);
         sharp(0) || sharp(self.count() - 1) || !self.kinks().is_empty() || self.junction().is_some()
     }
 
-    /// The bound follows the pressure itself, and not its average.
+    /// Whether the bound follows the pressure itself instead of its average.
     pub(super) fn averages_nothing(&self) -> bool {
         let friction = self.patch.contact.friction.as_ref();
         friction.is_some_and(|law| law.bound.radius() == Some(0.0))
     }
 
-    /// The ends of contact lie between two nodes; those of stick move with the slip.
+    /// The ends of contact and of stick, as quantities. An end of contact lies between two nodes; an end of stick moves
+    /// with the slip.
     fn ends(&self) -> Vec<Quantity> {
         let ends = self.ends_of_contact().into_iter();
         let quantity = |end: EndOfContact| Quantity {
             spacing: end.spacing,
-            cut: end.cut,
+            truncation: end.truncation,
             displaced: self.displaced_end(end.node),
             spacing_at: vec![(end.edge, 1.0)],
             ..self.quantity(end.name, end.s, None)
@@ -394,7 +403,7 @@ impl PatchView<'_> {
         found
     }
 
-    /// de/dξ.
+    /// The derivative de/dξ of the slip along an edge.
     fn slope_of_slip(&self, edge: usize, xi: f64) -> f64 {
         let step = 1e-4;
         (self.slip_at(edge, xi + step) - self.slip_at(edge, xi - step)) / (2.0 * step)
@@ -411,7 +420,7 @@ impl PatchView<'_> {
                     name: QuantityName::ContactStart,
                     node: i,
                     s: s[i],
-                    cut: if i == 0 { self.left_out(0) } else { 0.0 },
+                    truncation: if i == 0 { self.left_out(0) } else { 0.0 },
                     spacing: if i == 0 { 0.0 } else { s[i] - s[i - 1] },
                     edge: i.saturating_sub(1) / 2,
                 });
@@ -421,7 +430,7 @@ impl PatchView<'_> {
                     name: QuantityName::ContactEnd,
                     node: i,
                     s: s[i],
-                    cut: if i == last { self.left_out(last) } else { 0.0 },
+                    truncation: if i == last { self.left_out(last) } else { 0.0 },
                     spacing: if i == last { 0.0 } else { s[i + 1] - s[i] },
                     edge: i.min(last - 1) / 2,
                 });
@@ -430,7 +439,7 @@ impl PatchView<'_> {
         found
     }
 
-    /// A point at which the law is evaluated beside those of the solution, with the anchor of its place.
+    /// A point for evaluating the law at any place, with the anchor interpolated there.
     fn point(&self, edge: usize, xi: f64) -> Point {
         let shape = edge3::shape(xi);
         let s = edge3::interpolate(&shape, &self.patch.contact.boundary.edge_arc(edge));

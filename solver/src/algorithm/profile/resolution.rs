@@ -1,5 +1,5 @@
-//! What the distances between nodes, and between the points where friction acts, leave open in the quantities of a
-//! contact: parts of the errors that are stated, beside those by recovery.
+//! Errors of a contact's quantities due to the distances between nodes and between friction points, in addition to
+//! those by recovery.
 
 use std::collections::BTreeSet;
 
@@ -8,23 +8,23 @@ use crate::element::edge3;
 use crate::element::gauss::GAUSS_3;
 use crate::friction::BoundLaw;
 
-/// Halvings of an edge in the search for a jump: to 1/256 of a quarter of it.
+/// Halvings of an edge in the search for a jump: down to 1/256 of a quarter of it.
 const HALVINGS: u32 = 8;
 
-/// Nodes that a smooth curve through the pressure around its peak is laid through. Of curves through five and through seven,
-/// a cubic through seven goes best with the errors of random problems (`tests/verification/catalogue.rs`).
+/// The number of nodes around the peak of the pressure for a smooth curve. A cubic through seven agrees best with the
+/// errors of random problems, among curves through five and through seven (`tests/verification/catalogue.rs`).
 const AROUND: usize = 7;
 
-/// Coefficients of a cubic.
+/// The number of coefficients of a cubic.
 const CUBIC: usize = 4;
 
-/// How far around a peak of σ_t friction may turn, in half edges: calibrated.
+/// The distance from a peak of σ_t, in half edges, within which the direction of friction may change: calibrated.
 const TURN_REACH: f64 = 0.75;
 
-/// Part of the change of friction from one full slip to the other that the points there follow: calibrated.
+/// The part of the change of friction from full slip to opposite slip that the points resolve: calibrated.
 const FOLLOWED: f64 = 0.3;
 
-/// What a kink leaves open in the friction force, as a part of that on the edges beside it: calibrated.
+/// The error of the friction force at a kink, as a part of the force on the edges beside it: calibrated.
 const AT_KINKS: f64 = 0.2;
 
 impl PatchView<'_> {
@@ -43,8 +43,9 @@ impl PatchView<'_> {
         }
     }
 
-    /// How far the largest pressure is off that of a smooth curve beside it: a cubic through the [`AROUND`] nearest nodes in
-    /// contact, mirror images included, by least squares (stress). All of it where there are too few nodes for a cubic.
+    /// The distance of the largest pressure from a smooth curve (stress): a cubic through the [`AROUND`] nearest nodes
+    /// in contact, mirror images included, by least squares. The whole pressure where there are too few nodes for a
+    /// cubic.
     pub(super) fn off_smooth_pressure(&self, largest: f64, edge: usize, xi: f64) -> f64 {
         let arc = self.patch.contact.boundary.edge_arc(edge);
         let peak = edge3::interpolate(&edge3::shape(xi), &arc);
@@ -63,7 +64,8 @@ impl PatchView<'_> {
         (highest_of_cubic(&within) - largest).abs()
     }
 
-    /// Arc length, pressure and length of the nodes in contact on the edges near one, with those beyond a line of symmetry.
+    /// Arc length, pressure and length of the nodes in contact on the edges near `edge`, including those beyond a line
+    /// of symmetry.
     fn pressed_nodes_near(&self, edge: usize) -> Vec<[f64; 3]> {
         let s = &self.patch.contact.boundary.s;
         let last = self.count() - 1;
@@ -92,8 +94,8 @@ impl PatchView<'_> {
         found
     }
 
-    /// What part of friction's change from one full slip to the other happens around a place, beyond what the points there
-    /// follow: between them u_t is a parabola, and a peak of σ_t may be that parabola's.
+    /// The part of friction's change from full slip to opposite slip that happens around a place, beyond what the
+    /// points there resolve: between them u_t is a parabola, and a peak of σ_t may be due to that parabola.
     pub(super) fn turn_around(&self, edge: usize, xi: f64) -> f64 {
         const STEPS: i32 = 6;
         let Some(law) = &self.patch.law else {
@@ -107,7 +109,7 @@ impl PatchView<'_> {
         (0.5 * (high - low) - FOLLOWED).max(0.0)
     }
 
-    /// An edge and those beside it.
+    /// An edge and its neighbours.
     pub(super) fn neighbours(&self, edge: usize) -> std::ops::RangeInclusive<usize> {
         let last = self.patch.contact.boundary.edge_count() - 1;
         edge.saturating_sub(1)..=(edge + 1).min(last)
@@ -119,9 +121,9 @@ impl PatchView<'_> {
         places.iter().map(|place| place.weight).sum()
     }
 
-    /// How far σ_t jumps within a small part of an edge (stress). Beside a jump the pressure grows like the logarithm of
-    /// the distance, down to the length over which σ_t changes: the change over the steepest half, the steepest quarter
-    /// and so on, added up, is the jump times the logarithm of what part of the edge it takes.
+    /// How much σ_t jumps within a small part of an edge (stress). Beside a jump the pressure grows like the logarithm
+    /// of the distance, down to the length over which σ_t changes. The sum of the changes over the steepest half, the
+    /// steepest quarter and so on is the jump times the logarithm of the part of the edge that it takes.
     pub(super) fn jump_within(&self, edge: usize) -> f64 {
         let stress = |xi: f64| self.tangential_stress_at(edge, xi);
         let steepest = |quarter: u32| {
@@ -143,7 +145,7 @@ impl PatchView<'_> {
         (0..4).map(steepest).fold(0.0, f64::max)
     }
 
-    /// How much τ changes over half an edge on either side of a place (stress): a peak of σ_t is where stick ends, and
+    /// How much τ changes over half an edge on either side of a place (stress): a peak of σ_t is at an end of stick and
     /// moves with it.
     pub(super) fn change_of_bound(&self, edge: usize, xi: f64) -> f64 {
         let bound = |view: &Self, edge: usize, xi: f64| {
@@ -156,9 +158,9 @@ impl PatchView<'_> {
         change(xi - 1.0).max(change(xi + 1.0))
     }
 
-    /// What is left open in the friction force, with its edges (force, without 2π): cohesion acts up to the end of the
-    /// contact, which lies between two nodes; at a kink of the obstacle the pressure has no limit; and no friction point may
-    /// feel that a part sticks ([`Self::unseen_stick`]).
+    /// The error of the friction force by edge (force, without 2π). Cohesion acts up to the end of the contact, which
+    /// lies between two nodes; at a kink of the obstacle the pressure has no limit; and a part that sticks may lie
+    /// between the friction points ([`Self::unseen_stick`]).
     pub(super) fn open_friction(&self) -> Vec<(usize, f64)> {
         let Some(law) = &self.patch.law else {
             return Vec::new();
@@ -179,8 +181,9 @@ impl PatchView<'_> {
         found
     }
 
-    /// What kinks leave open, by the edges beside them (force, without 2π). How a kink lies between the nodes makes friction
-    /// too large or too small: what several edges with kinks leave open adds up like the parts of a random sum.
+    /// The error of the friction force at kinks, by the edges beside them (force, without 2π). Depending on its place
+    /// between the nodes, a kink makes friction too large or too small, so that the errors of several edges add up like
+    /// random numbers.
     fn open_at_kinks(&self) -> Vec<(usize, f64)> {
         let with_kinks: BTreeSet<usize> = self.kinks().iter().map(|kink| kink.edge).collect();
         let beside: BTreeSet<usize> = with_kinks
@@ -192,8 +195,8 @@ impl PatchView<'_> {
         beside.into_iter().map(open).collect()
     }
 
-    /// Where the motion turns, a part of the contact sticks. If all of it lies between two points where friction acts, or
-    /// between a line of symmetry and the first of them, none feels it: the friction there, by edges (force, without 2π).
+    /// The friction on parts that stick where the motion turns, if the whole part lies between two friction points, or
+    /// between a line of symmetry and the first point, so that no point is inside; by edges (force, without 2π).
     fn unseen_stick(&self) -> Vec<(usize, f64)> {
         let Some(law) = &self.patch.law else {
             return Vec::new();
@@ -237,8 +240,8 @@ impl PatchView<'_> {
         self.weight(edge) * mean(|xi| self.tangential_stress_at(edge, xi).abs())
     }
 
-    /// What the points where friction acts leave out: the differences of ∫σ_t over each edge, by the points and by many
-    /// more (force, without 2π).
+    /// The error of the friction force because the law is evaluated at the friction points only: the difference between
+    /// ∫σ_t over each edge by these points and by many more (force, without 2π).
     pub(super) fn between_points(&self) -> Vec<f64> {
         let boundary = &self.patch.contact.boundary;
         if self.patch.law.is_none() {
@@ -262,8 +265,8 @@ impl PatchView<'_> {
     }
 }
 
-/// The largest value, within half of the reach of its points, of the cubic through points (place, value, weight), places
-/// between −1 and 1, by least squares.
+/// The largest value of a cubic through points (place between −1 and 1, value, weight) by least squares, within half of
+/// the reach of the points.
 fn highest_of_cubic(points: &[[f64; 3]]) -> f64 {
     const SAMPLES: usize = 41;
     let sample = |k: usize| -0.5 + k as f64 / (SAMPLES - 1) as f64;
@@ -295,7 +298,7 @@ fn highest_of_cubic(points: &[[f64; 3]]) -> f64 {
     curve.into_iter().fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// The mean of a value over an edge, by many places.
+/// The mean of a value over an edge, from many places.
 fn mean(value: impl Fn(f64) -> f64) -> f64 {
     const SAMPLES: usize = 16;
     let sample = |k: usize| value(-1.0 + (2 * k + 1) as f64 / SAMPLES as f64);

@@ -6,29 +6,29 @@ use crate::friction::{Average, BoundLaw, FrictionLaw};
 use crate::problem::{Condition, Measure, Normalization};
 use crate::solution::{Outcome, Warning, WarningCode};
 
-/// Error of a smooth peak times the square of the number of elements across.
+/// The relative error of a smooth peak, times the square of the number of elements across the contact.
 const SMOOTH_PEAK: f64 = 0.28;
 
 /// Stick tractions oscillate if more than this part of the friction force cancels inside edges.
 const OSCILLATING: f64 = 3e-3;
 
-/// Friction below this part of the normal force, or below ten tolerances of it, is not known: rounding and the iterations
-/// leave as much of none. (The residuals are relative to the largest reaction.)
+/// Friction below this part of the normal force, or below ten times the tolerance, cannot be distinguished from zero:
+/// rounding and the iterations leave that much. (The residuals are relative to the largest reaction.)
 const UNKNOWN: f64 = 1e-9;
 
-/// Unless it is more than this part of what the bound allows: then the bound determines it, however small.
+/// Friction above this part of what the bound allows is meaningful however small it is.
 const SLIGHT: f64 = 1e-3;
 
 /// One edge may contribute this part, because the motion may turn there.
 const TURN: f64 = 0.02;
 
-/// More than this part of the friction must not be lost at the ends without a word.
+/// The largest part of the friction that may be lost at the ends without a warning.
 const MOST_LOST: f64 = 0.05;
 
-/// A node may press so far from the obstacle, as a part of the largest displacement along the normal.
+/// The largest distance from the obstacle at which a node may press, as a part of the largest normal displacement.
 const MOST_EARLY: f64 = 0.01;
 
-/// With fewer edges than this across a contact, of which a half may be modelled, its pressure is not reliable.
+/// With fewer edges than this across a contact, of which half may be modelled, its pressure is not reliable.
 const FEWEST_EDGES: usize = 6;
 
 impl PatchView<'_> {
@@ -104,7 +104,7 @@ impl PatchView<'_> {
                     "The body never touches the obstacle: the smallest gap is {smallest:.6e}. There is contact if the indentation is above {needed:.6e}."
                 ),
                 false => format!(
-                    "No node touches the obstacle, which reaches into the body between two of them: the smallest gap at a node is {smallest:.6e}. One touches if the indentation is above {needed:.6e}."
+                    "No node touches the obstacle, although it reaches into the body between two nodes: the smallest gap at a node is {smallest:.6e}. A node touches if the indentation is above {needed:.6e}."
                 ),
             };
             warn(WarningCode::NoContact, message);
@@ -135,7 +135,7 @@ impl PatchView<'_> {
             warn(
                 WarningCode::MeshTooCoarseForContact,
                 format!(
-                    "Only {across} whole element(s) lie in the contact; at least {FEWEST_EDGES} are needed for a pressure to rely on. {} Refine the mesh there.",
+                    "Only {across} whole element(s) lie in the contact; at least {FEWEST_EDGES} are needed for a reliable pressure. {} Refine the mesh there.",
                     self.peak_uncertainty(across)
                 ),
             );
@@ -144,7 +144,7 @@ impl PatchView<'_> {
             warn(
                 WarningCode::MeshTooCoarseForContact,
                 format!(
-                    "The node on the axis is open, and the midside node beside it presses while it is still {opening:.3e} from the obstacle: what the obstacle leaves free at the axis lies within the first element, where the pressure and the displacements are wrong. Refine the mesh there, or end the obstacle's profile where it begins."
+                    "The node on the axis is open, and the midside node beside it is pressed although it is still {opening:.3e} away from the obstacle: the gap at the axis lies within the first element, where the pressure and the displacements are wrong. Refine the mesh there, or end the obstacle's profile where it begins."
                 ),
             );
         }
@@ -154,7 +154,7 @@ impl PatchView<'_> {
             warn(
                 WarningCode::ContactReachesObstacleEnd,
                 format!(
-                    "The body presses against the very end of the obstacle, s = {s:.4}. At a sharp edge the pressure grows without limit as the mesh is refined: forces converge, and σ_t does for nonlocal_radius > 0, but the peak of σ_n does not. If the obstacle goes on there, extend it."
+                    "The body presses against the end of the obstacle, s = {s:.4}. At a sharp edge the pressure grows without limit as the mesh is refined: forces converge, and σ_t does for nonlocal_radius > 0, but the peak of σ_n does not. If the obstacle continues there, extend it."
                 ),
             );
         }
@@ -220,22 +220,22 @@ impl PatchView<'_> {
         if whole > 0.0 { lost / whole } else { 0.0 }
     }
 
-    /// The possible error of the peak pressure with so few elements in contact. The worst of many meshes
-    /// of Hertz's cylinder is .28/n², n elements across the whole contact (`tests/verification`).
+    /// The possible error of the peak pressure with so few elements in contact, as a sentence. The worst of many meshes
+    /// of Hertz's cylinder is .28/n², with n elements across the whole contact (`tests/verification`).
     fn peak_uncertainty(&self, across: usize) -> String {
         let mut ends = [0, self.count() - 1].into_iter();
         if across == 0 {
-            "Nothing is known of its peak.".to_owned()
+            "The error of its peak is unknown.".to_owned()
         } else if ends.any(|i| self.active(i) && self.may_be_sharp(i)) {
             "At the obstacle's end its peak has no limit.".to_owned()
         } else {
             let off = 100.0 * SMOOTH_PEAK / (across * across) as f64;
-            format!("A smooth pressure's peak is then off by up to {off:.1} %.")
+            format!("The peak of a smooth pressure is then wrong by up to {off:.1} %.")
         }
     }
 
-    /// Inside an edge the tangential stress changes its sign where the motion turns, mostly once. Any
-    /// other cancellation inside edges is an oscillation of stick tractions, and `friction_force` is too large by
+    /// Warns of stick tractions that oscillate. Inside an edge the tangential stress changes its sign where the motion
+    /// turns, mostly once. Any other cancellation inside edges is an oscillation, and `friction_force` is too large by
     /// about that part.
     fn warn_of_oscillation(&self, warnings: &mut Vec<Warning>) {
         let (canceling, total) = self.oscillation();
@@ -251,8 +251,8 @@ impl PatchView<'_> {
         }
     }
 
-    /// Whether a friction force (without 2π) is what rounding leaves of none: where nothing slides, as under a uniform
-    /// pressure with ν = 0, it has any sign.
+    /// Whether a friction force (without 2π) is only rounding: where nothing slides, as under a uniform pressure with ν
+    /// = 0, it has any sign.
     fn is_noise(&self, friction: f64) -> bool {
         let (system, p) = (self.system, self.p);
         let pressed = system.normal_force(system.range(self.patch), &self.forces.reactions);
@@ -267,8 +267,8 @@ impl PatchView<'_> {
         friction <= known * scale && friction <= SLIGHT * most
     }
 
-    /// The part of the friction force that cancels inside edges though the motion does not turn there, and the whole
-    /// (force, without 2π).
+    /// The part of the friction force that cancels inside edges where the motion does not turn, and the whole friction
+    /// force (both without 2π).
     pub(super) fn oscillation(&self) -> (f64, f64) {
         let points = self.system.points.iter().zip(&self.finished.tractions);
         let own: Vec<f64> = points
@@ -314,8 +314,8 @@ impl PatchView<'_> {
         }
     }
 
-    /// How far from the obstacle a midside node presses beside an open node on the axis, by u₁ − u₀/8 ≤ s₁ − s₀/8 (formulation
-    /// 3.5); none where that is little beside the displacements.
+    /// The distance from the obstacle at which the midside node beside an open node on the axis is pressed, by u₁ −
+    /// u₀/8 ≤ s₁ − s₀/8 (formulation 3.5); none if that is small compared with the displacements.
     fn pressed_beside_open_axis(&self) -> Option<f64> {
         let first = self.patch.first;
         let moved = |i: usize| self.system.normal_displacement(self.v, first + i).abs();
@@ -331,13 +331,14 @@ impl PatchView<'_> {
             .filter(|opening| *opening > MOST_EARLY * largest)
     }
 
-    /// A node on a line of symmetry: on the axis, or held along the tangent.
+    /// Whether a node lies on a line of symmetry: on the axis, or held along the tangent.
     pub(super) fn symmetric(&self, i: usize) -> bool {
         let node = &self.system.nodes[self.patch.first + i];
         node.on_axis || node.symmetric()
     }
 
-    /// A node at which the obstacle may end: neither on a line of symmetry nor in a corner, where another obstacle touches too.
+    /// Whether the obstacle may end at a node: one that is not on a line of symmetry and not in a corner that another
+    /// obstacle touches too.
     pub(super) fn may_be_sharp(&self, i: usize) -> bool {
         let (system, node) = (self.system, self.patch.contact.boundary.nodes[i]);
         let others = (0..system.patches.len()).filter(|p| *p != self.p);
@@ -349,7 +350,7 @@ impl PatchView<'_> {
         !self.symmetric(i) && !touched
     }
 
-    /// The largest |σ_t| that a prescribed bound exerts on edges of which no node touches.
+    /// The largest |σ_t| that a prescribed bound exerts on edges without a node in contact.
     fn bound_beyond_contact(&self) -> Option<f64> {
         let BoundLaw::Prescribed(_) = self.patch.contact.friction.as_ref()?.bound else {
             return None;
@@ -362,8 +363,8 @@ impl PatchView<'_> {
         (largest > 0.0).then_some(largest)
     }
 
-    /// The edge under the peak of σ_t, if it is longer than ρ; not if all edges are, which is warned of before
-    /// solving.
+    /// The length of the edge under the peak of σ_t, with ρ, if it is longer than ρ. None if all edges are longer,
+    /// which has a warning before the solution.
     fn unresolved_radius(&self) -> Option<(f64, f64)> {
         let contact = &self.patch.contact;
         let radius = contact.friction.as_ref()?.bound.averaged_over()?;

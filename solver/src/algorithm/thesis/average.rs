@@ -9,14 +9,14 @@ pub(super) struct Stretch<'a> {
     pub(super) from: f64,
     /// Arc length of its end.
     pub(super) to: f64,
-    /// σ_n at the points of the rule.
+    /// σ_n at the points of the integration rule.
     pub(super) values: &'a [f64],
 }
 
-/// ∫ω_ρ(|s − y|) σ_n(y) dy over the stretches given (stress).
+/// The average ∫ω_ρ(|s − y|) σ_n(y) dy over the given pieces (stress).
 ///
-/// The part of each element under the kernel has `local_points` Gauss points of its own, onto which
-/// σ_n is carried linearly, 3.4.2 (i). ρ = 0 is the value at s.
+/// The part of each element under the kernel has `local_points` Gauss points of its own, to which σ_n is interpolated
+/// linearly, 3.4.2 (i). For ρ = 0 it is the value at s.
 pub(super) fn nonlocal(
     law: &BoundLaw,
     stretches: &[Stretch<'_>],
@@ -51,7 +51,7 @@ pub(super) fn nonlocal(
     sum
 }
 
-/// A line through the values at the Gauss points nearest to ζ.
+/// The value at ζ of the line through the values at the Gauss points nearest to it.
 pub(super) fn linear(rule: &[(f64, f64)], values: &[f64], zeta: f64) -> f64 {
     let k = usize::from(rule.len() > 2 && zeta > 0.0);
     let (a, b) = (rule[k].0, rule[k + 1].0);
@@ -64,7 +64,7 @@ mod tests {
     use crate::friction::{Average, Averaging, Chain};
     use crate::problem::{Kernel, Measure, Normalization};
 
-    /// A linear stress over two elements; the kernel within both: the average is the value itself.
+    /// The average of a linear stress over two elements is the value itself, where the kernel lies within both.
     #[test]
     fn a_linear_stress_is_averaged_to_itself_within_two_elements() {
         let law = BoundLaw::Pressure {

@@ -1,22 +1,22 @@
-//! The friction of the thesis's iteration: a load that is one iteration old.
+//! The friction of the thesis's iteration: a load computed from the previous iteration.
 
 use crate::problem::ThesisOptions;
 
-/// Friction at every friction point.
+/// The friction bound and traction at every friction point.
 #[derive(Clone)]
 pub(super) struct Friction {
-    /// τ = μ max(S, 0) (stress).
+    /// The bound τ = μ max(S, 0) (stress).
     pub(super) bound: Vec<f64>,
-    /// σ_t on the body, along t (stress); F̂ is its load with the opposite sign.
+    /// The traction σ_t on the body, along t (stress); F̂ is its load with the opposite sign.
     pub(super) traction: Vec<f64>,
 }
 
-/// σ_t / τ from φ: against the motion with option `signed`, else along +t.
+/// The ratio σ_t / τ for a given φ: against the motion with option `signed`, else along +t.
 pub(super) fn signed_ratio(phi: f64, options: &ThesisOptions) -> f64 {
     if options.signed { -phi } else { phi.abs() }
 }
 
-/// Applies a part of the new friction force.
+/// Moves the friction force towards the new one by a part of the difference.
 pub(super) fn relax(friction: &mut Friction, new: Friction, part: f64) {
     let mix = |old: &mut Vec<f64>, new: Vec<f64>| {
         old.iter_mut()

@@ -1,16 +1,15 @@
-//! The thesis's own iteration (3.1), to the letter.
+//! The thesis's own iteration (3.1), exactly as described there.
 //!
-//! It is kept because the thesis is our source, and because it shows what the other algorithms correct:
-//! at the thesis's parameters it does not solve the problem (formulation 4.5). Friction enters as a
-//! load that is one iteration old, and the gain of that loop, μS/ε × tangential compliance, is in the
-//! hundreds. Without the sign it settles in a false state of full slip, friction pushing along the
-//! motion; with the sign it falls into a cycle of two. So the residuals of the result are those of
-//! the true problem, and the outcome is `FalseConvergence` when they are large.
+//! It exists because the thesis is our source, and because it shows which faults the other algorithms correct: at the
+//! thesis's parameters it does not solve the problem (formulation 4.5). Friction enters as a load that is one iteration
+//! old, and the gain of that loop, μS/ε × tangential compliance, is in the hundreds. Without the sign it converges to a
+//! false state of full slip, friction pushing along the motion; with the sign it falls into a cycle of two. So the
+//! residuals of the result are those of the true problem, and the outcome is `FalseConvergence` when they are large.
 //!
-//! Readings: f̂ is a stress along t, so that K u = F − F̂ with σ_n < 0 pushes the body along +t; the
-//! pressure is `lumped` (R/∫h) or `extrapolated` from internal Gauss points (3.3, file `rows`); it is
-//! averaged by the mesh-free W, or with `local_points` as in 3.4.2 (file `average`); a Gauss point lies on
-//! Γ_C* where the nodes on both sides of it do; R_F is divided by the relaxation factor.
+//! Where the thesis leaves a choice: f̂ is a stress along t, so that K u = F − F̂ with σ_n < 0 pushes the body along
+//! +t; the pressure is `lumped` (R/∫h) or `extrapolated` from internal Gauss points (3.3, file `rows`); it is averaged
+//! by the mesh-free W, or with `local_points` as in 3.4.2 (file `average`); a Gauss point lies on Γ_C* where the nodes
+//! on both sides of it do; R_F is divided by the relaxation factor.
 
 mod average;
 mod friction;
@@ -19,8 +18,8 @@ mod rows;
 use crate::algorithm::convex::close;
 use crate::algorithm::factors::{dense, free_dofs};
 use crate::algorithm::finished::End;
+use crate::algorithm::recorder::{Measured, Recorder, Row, relative_change};
 use crate::algorithm::system::{ContactNode, State, System};
-use crate::algorithm::track::{Measured, Row, Track, relative_change};
 use crate::elasticity::Dof;
 use crate::linear::solve_positive_definite;
 use crate::problem::{ThesisOptions, ThesisPressure};
@@ -28,15 +27,16 @@ use crate::solution::{Observer, Outcome, Progress, Stage};
 use friction::{Friction, relax, signed_ratio};
 use rows::Rows;
 
-/// Where the thesis's own test is met but the true residual is not small yet, the iteration goes on as long as that falls by
-/// this part of the relaxation in a row: R_F is that of one full step, and a relaxed iteration on its way to a solution may
-/// meet it a thousand rows before the residual does. In a false state the residual stays.
+/// Where the thesis's own test is met but the true residual is still large, the iteration continues while the residual
+/// falls in each row by at least this part of the relaxation. R_F measures one full step, so that a relaxed iteration
+/// on its way to a solution may meet the test a thousand rows before the residual does. In a false state the residual
+/// does not fall.
 const STILL_FALLING: f64 = 0.1;
 
-/// Iterates; returns the final state with the tractions used for it.
-pub(super) fn run(track: &mut Track<'_, '_>, observe: &mut Observer<'_>) -> (End, Vec<f64>) {
-    let system = track.system;
-    let options = track.controls.thesis.clone().unwrap_or_default();
+/// Runs the iteration; returns the final state with the tractions used for it.
+pub(super) fn run(recorder: &mut Recorder<'_, '_>, observe: &mut Observer<'_>) -> (End, Vec<f64>) {
+    let system = recorder.system;
+    let options = recorder.controls.thesis.clone().unwrap_or_default();
     let rows = Rows::new(system);
     let nothing = vec![0.0; system.points.len()];
     let mut friction = Friction {
@@ -47,7 +47,7 @@ pub(super) fn run(track: &mut Track<'_, '_>, observe: &mut Observer<'_>) -> (End
     let mut normal_stress: Option<Vec<f64>> = None;
     let mut end: Option<(End, Vec<f64>)> = None;
     let (mut stopped, mut residual_before) = (false, f64::INFINITY);
-    for _ in 0..track.controls.max_iterations {
+    for _ in 0..recorder.controls.max_iterations {
         // steps 1 and 2; the iteration ends where the system cannot be solved
         let Some(v) = solve(system, &state.active, &friction.traction, observe) else {
             stopped = observe(Progress::Pulse).is_break();
@@ -65,7 +65,7 @@ pub(super) fn run(track: &mut Track<'_, '_>, observe: &mut Observer<'_>) -> (End
         let r_f = normal_stress
             .as_ref()
             .map(|before| relative_change(&row_values.node_stress, before) / options.relaxation);
-        let settled = unchanged && r_f.is_some_and(|r_f| r_f <= track.controls.tolerance);
+        let settled = unchanged && r_f.is_some_and(|r_f| r_f <= recorder.controls.tolerance);
         normal_stress = Some(row_values.node_stress);
 
         let measured = Measured::new(system, state.clone(), friction.bound.clone());
@@ -77,10 +77,10 @@ pub(super) fn run(track: &mut Track<'_, '_>, observe: &mut Observer<'_>) -> (End
             tractions: friction.traction.clone(),
             own_r_f: r_f,
         };
-        let answer = track.record(&measured, row, observe);
+        let answer = recorder.record(&measured, row, observe);
         // with relaxation the same states recur on the way to a solution; only full steps cycle
         let cycle = if options.relaxation == 1.0 {
-            track.note(&state, r_f.unwrap_or(1.0))
+            recorder.note(&state, r_f.unwrap_or(1.0))
         } else {
             None
         };
@@ -88,7 +88,7 @@ pub(super) fn run(track: &mut Track<'_, '_>, observe: &mut Observer<'_>) -> (End
         let falling = residual <= (1.0 - STILL_FALLING * options.relaxation) * residual_before;
         residual_before = residual;
         let outcome = match (settled, answer.is_break(), &cycle) {
-            (true, _, _) if residual <= track.controls.tolerance => Outcome::Converged,
+            (true, _, _) if residual <= recorder.controls.tolerance => Outcome::Converged,
             (true, false, None) if falling => Outcome::NotConverged,
             (true, _, _) => Outcome::FalseConvergence,
             (_, true, _) => Outcome::Canceled,
@@ -123,7 +123,7 @@ pub(super) fn run(track: &mut Track<'_, '_>, observe: &mut Observer<'_>) -> (End
     (End { outcome, ..end }, tractions)
 }
 
-/// Γ_C*⁽¹⁾: the user's guess by arc length, else all of Γ_C.
+/// The first contact set Γ_C*⁽¹⁾: the user's guess by arc length, else all of Γ_C.
 fn first_guess(system: &System<'_>, options: &ThesisOptions) -> State {
     let mut state = system.rest();
     for patch in &system.patches {
@@ -136,7 +136,7 @@ fn first_guess(system: &System<'_>, options: &ThesisOptions) -> State {
     state
 }
 
-/// Steps 1 and 2. u_n = s on Γ_C*, σ_n = 0 off it, and K u = F − F̂.
+/// Steps 1 and 2 of the thesis's iteration: u_n = s on Γ_C*, σ_n = 0 off it, and K u = F − F̂.
 fn solve(
     system: &System<'_>,
     active: &[bool],
@@ -153,8 +153,8 @@ fn solve(
     system.add_traction_force(traction, &mut force);
     let rhs: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
     let entry = |i: usize, j: usize| system.stiffness.at(free[i], free[j]);
-    let solved = dense(free.len(), observe, |breaks| {
-        solve_positive_definite(free.len(), entry, &rhs, breaks)
+    let solved = dense(free.len(), observe, |interrupt| {
+        solve_positive_definite(free.len(), entry, &rhs, interrupt)
     })?;
     free.iter()
         .zip(solved)
@@ -162,7 +162,7 @@ fn solve(
     state.v.iter().all(|x| x.is_finite()).then_some(state.v)
 }
 
-/// Step 4. A node of Γ_C* with σ_n > 0 leaves it; a node off it with u_n ≥ s enters.
+/// Step 4 of the thesis's iteration: a node of Γ_C* with σ_n > 0 leaves it; a node off it with u_n ≥ s enters.
 fn next_contact(system: &System<'_>, state: &State, node_stress: &[f64]) -> Vec<bool> {
     let stays = |(i, node): (usize, &ContactNode)| match node.normal {
         Dof::Fixed(_) => false,
@@ -172,7 +172,8 @@ fn next_contact(system: &System<'_>, state: &State, node_stress: &[f64]) -> Vec<
     system.nodes.iter().enumerate().map(stays).collect()
 }
 
-/// Step 5. f̂ = τ φ along Γ_C*, 0 off it; along +t, or against the motion with option `signed`.
+/// Step 5 of the thesis's iteration: f̂ = τ φ along Γ_C*, 0 off it; along +t, or against the motion with option
+/// `signed`.
 fn new_friction(
     system: &System<'_>,
     state: &State,

@@ -22,17 +22,17 @@ use crate::elasticity::Deformed;
 use crate::element::{Family, edge3, gauss, quad8};
 use crate::problem::{ThesisOptions, ThesisPressure};
 
-/// The elements that Γ_C runs along.
+/// The two rows of Gauss points in the elements that Γ_C runs along.
 pub(super) struct Rows {
     edges: Vec<EdgeRows>,
-    /// Gauss points of one direction.
+    /// The Gauss points of one direction.
     rule: &'static [(f64, f64)],
 }
 
 /// One contact edge and its element.
 struct EdgeRows {
     patch: usize,
-    /// Number of the edge in its patch.
+    /// The number of the edge in its contact.
     edge: usize,
     element: usize,
     /// Master coordinates of the edge's start, end and midside.
@@ -47,16 +47,16 @@ impl EdgeRows {
     }
 }
 
-/// Values of a state at the rows and at the boundary.
+/// The values of a state at the rows and at the boundary.
 pub(super) struct RowValues {
     /// σ_n at every contact node (≤ 0 in compression).
     pub(super) node_stress: Vec<f64>,
-    /// φ with its sign, extrapolated to every friction point.
+    /// The ratio φ with its sign, extrapolated to every friction point.
     pub(super) phi: Vec<f64>,
     /// By edge: σ_n on both rows at every Gauss point, and φ likewise.
     stress: Vec<[Vec<f64>; 2]>,
     row_phi: Vec<[Vec<f64>; 2]>,
-    /// Patch and number of each edge.
+    /// The contact and the number of each edge.
     edges: Vec<(usize, usize)>,
     rule: &'static [(f64, f64)],
 }
@@ -94,7 +94,7 @@ impl Rows {
         }
     }
 
-    /// Evaluates a state, as far as the options need it.
+    /// Evaluates a state at the rows, as far as the options need it.
     pub(super) fn evaluate(
         &self,
         system: &System<'_>,
@@ -170,12 +170,12 @@ impl Rows {
     }
 }
 
-/// Depths of the two nearest rows below an edge.
+/// The depths of the two nearest rows below an edge, in master coordinates.
 fn depths(rule: &[(f64, f64)]) -> [f64; 2] {
     [1.0 + rule[0].0, 1.0 + rule[1].0]
 }
 
-/// From both rows to the boundary, linearly.
+/// Extrapolates values on both rows to the boundary, linearly.
 fn to_boundary(rule: &[(f64, f64)], [near, far]: &[Vec<f64>; 2]) -> Vec<f64> {
     let [d1, d2] = depths(rule);
     let part = d1 / (d2 - d1);
@@ -209,7 +209,7 @@ impl RowValues {
             .collect()
     }
 
-    /// Values on the rows of every edge, carried to the friction points.
+    /// Extrapolates values on the rows of every edge to the friction points.
     fn to_points(&self, system: &System<'_>, rows: &[[Vec<f64>; 2]]) -> Vec<f64> {
         let boundary: Vec<Vec<f64>> = rows
             .iter()
@@ -218,7 +218,7 @@ impl RowValues {
         self.at_points(system, &boundary)
     }
 
-    /// Values at the boundary's Gauss points of every edge, at the friction points.
+    /// Interpolates values at the boundary's Gauss points of every edge to the friction points.
     fn at_points(&self, system: &System<'_>, boundary: &[Vec<f64>]) -> Vec<f64> {
         let mut values = Vec::with_capacity(system.points.len());
         for point in &system.points {
@@ -231,9 +231,9 @@ impl RowValues {
         values
     }
 
-    /// Step 5 with extrapolated stresses. Way 1 of 3.2 carries σ_n and φ to the boundary and
-    /// evaluates f̂ there; way 2 evaluates f̂ on both rows and carries it to the boundary (carrying
-    /// its nodal integrals is the same: both are linear, with equal weights on all rows).
+    /// Step 5 of the thesis's iteration with extrapolated stresses. Way 1 of 3.2 carries σ_n and φ to the boundary and
+    /// evaluates f̂ there; way 2 evaluates f̂ on both rows and carries it to the boundary (carrying its nodal integrals
+    /// is the same: both are linear, with equal weights on all rows).
     pub(super) fn friction(&self, system: &System<'_>, options: &ThesisOptions) -> Friction {
         let averaged = |stress: &[Vec<f64>]| self.bound(system, stress, options);
         if options.friction_force == 1 {
@@ -260,7 +260,7 @@ impl RowValues {
         }
     }
 
-    /// τ at the Gauss points of every edge, from σ_n there.
+    /// The bound τ at the Gauss points of every edge, from σ_n there.
     fn bound(
         &self,
         system: &System<'_>,

@@ -18,7 +18,7 @@ use crate::problem::Condition;
 use parts::{Free, MOST_HINGED, MOST_IN_MECHANISMS, Motion, Part, Parts, Unheld};
 
 impl Checks {
-    /// Every part of the body must be held against rigid motions, by supports or by contacts (if they touch).
+    /// Checks that every part of the body is held against rigid motions, by supports or by contacts (if they touch).
     /// True if a contact is needed for that.
     pub(super) fn freedom(
         &mut self,
@@ -40,8 +40,8 @@ impl Checks {
         all.finish(true)
     }
 
-    /// A body that only contact holds along a motion, all of it on one side, must be pressed there by a load: an obstacle that
-    /// is pushed against it pushes it away. `loads`: at every node.
+    /// Checks that a body which only contact holds along a motion, all of it on one side, is pressed there by a load:
+    /// pushing an obstacle against it would only move it away. `loads`: at every node.
     pub(super) fn pressed(
         &mut self,
         mesh: &Mesh,
@@ -61,9 +61,9 @@ impl Checks {
             return Err(self.report(
                 "/supports",
                 Reason::FreeBody,
-                format!("a body that contact holds {words} on one side only, and that nothing presses against it"),
+                format!("a body that can move away {words} from the contact that holds it on one side only, with nothing to press it there"),
                 "supports or contacts against every rigid motion, or a load that presses the body against its contact",
-                format!("An obstacle that is pushed against the body only pushes it away. Add a support with {}.", towards(words)),
+                format!("Pushing the obstacle against the body only moves the body away. Add a support with {}.", towards(words)),
             ));
         }
         Ok(())
@@ -78,8 +78,8 @@ impl Checks {
                 return self.report(
                     "/mesh",
                     Reason::TooMany,
-                    format!("{count} parts that hang together at single nodes only, e.g. at node {node} ({x}, {y}), and are not held one by one"),
-                    format!("at most {MOST_HINGED} of them in one mechanism, and {MOST_IN_MECHANISMS} in all"),
+                    format!("{count} parts that are connected at single nodes only, e.g. at node {node} ({x}, {y}), and not each held by itself"),
+                    format!("at most {MOST_HINGED} such parts in one mechanism, and {MOST_IN_MECHANISMS} in total"),
                     "Elements that share a side (all three nodes of it) form one part: join them along sides, or support each part.",
                 );
             }
@@ -113,12 +113,12 @@ impl Checks {
         };
         if count > 1 {
             hint.push_str(
-                " Parts hold each other along a side that they share, all three nodes of it; at a single node they are hinged, and without common nodes apart.",
+                " Parts hold each other along a side that they share with all three nodes; at a single node they are hinged, and without common nodes they are separate.",
             );
         }
         hint.push_str(&self.hint_to_merge(mesh));
         if !without_contacts {
-            hint.push_str(" A contact holds along its normal, and along its tangent if it has friction or is bonded.");
+            hint.push_str(" A contact holds the body along its normal, and along its tangent if it has friction or is bonded.");
         }
         self.report(
             "/supports",
@@ -143,7 +143,7 @@ fn in_words(parts: &Parts<'_>, free: &Free) -> (String, u32, bool) {
     (words, node.copied().unwrap_or_default(), turns)
 }
 
-/// Whether a motion moves all nodes of contacts away from their obstacles or all towards them, and none along.
+/// Whether a motion moves all nodes of contacts away from their obstacles, or all towards them, and none along them.
 fn held_on_one_side(moves: &BTreeMap<u32, [f64; 2]>, contacts: &[ContactModel]) -> bool {
     let (mut away, mut towards, mut tangential) = (0.0f64, 0.0f64, 0.0f64);
     for contact in contacts {
@@ -181,7 +181,7 @@ fn works(moves: &BTreeMap<u32, [f64; 2]>, loads: &[[f64; 2]]) -> bool {
     power.abs() > ALIGNED * most
 }
 
-/// The support that ends a translation.
+/// The support that prevents a translation.
 fn towards(words: &str) -> &'static str {
     match words {
         "along x" => "`ux`",
@@ -190,7 +190,8 @@ fn towards(words: &str) -> &'static str {
     }
 }
 
-/// A rigid motion of a part of the body that neither the supports nor the given nodes and directions prevent.
+/// A rigid motion of a part of the body that neither the supports nor the given holds prevent, in words, and a node
+/// that moves.
 pub(super) fn motion_left(
     mesh: &Mesh,
     section: &Section,
@@ -213,15 +214,17 @@ pub(super) fn motion_left(
 /// A rigid motion of a part of the body, or of several hinged parts as one.
 #[derive(Clone, Debug)]
 pub struct RigidMotion {
-    /// In words, after "free to move".
+    /// The motion in words, after "free to move".
     pub words: String,
-    /// The nodes that move, and how: by 1 in a translation; in a rotation the farthest from the centre of the part by 1.
+    /// The nodes that move, and how: by 1 in a translation; in a rotation the node farthest from the centre of the part
+    /// by 1.
     pub moves: Vec<(u32, [f64; 2])>,
-    /// In a rotation, the distance of that node (length): times the power of a force it is the moment.
+    /// In a rotation, the distance of that node from the centre (length): multiplied by the power of a force it is the
+    /// moment.
     pub arm: Option<f64>,
 }
 
-/// All rigid motions that neither the supports nor the given nodes and directions prevent, but those that bend hinges.
+/// All rigid motions that neither the supports nor the given holds prevent, except those that bend hinges.
 pub(super) fn free_motions(
     mesh: &Mesh,
     section: &Section,
@@ -263,7 +266,7 @@ pub(super) fn free_motions(
     found
 }
 
-/// Nodes and the directions they are held along.
+/// The nodes that supports hold, with the directions.
 fn directions(fixed: &BTreeMap<u32, Held>) -> Vec<Hold> {
     let mut held = Vec::new();
     for (&node, what) in fixed {
@@ -285,7 +288,7 @@ fn directions(fixed: &BTreeMap<u32, Held>) -> Vec<Hold> {
     held
 }
 
-/// The motions of its nodes that a contact prevents while it touches.
+/// The motions of a contact's nodes that it prevents while it touches.
 fn hindered(contact: &ContactModel) -> Vec<Hold> {
     let holds = |law: &FrictionLaw<Average>| law.bound.holds();
     let normal = contact.condition != Condition::None;

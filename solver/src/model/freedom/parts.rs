@@ -14,29 +14,29 @@ use super::super::checks::ALIGNED;
 use crate::contact::ContactBoundary;
 use crate::mesh::Mesh;
 
-/// Parts in one mechanism that are examined: the elimination is cubic in them.
+/// The largest number of parts in one mechanism that are examined: the elimination is cubic in them.
 pub(super) const MOST_HINGED: usize = 64;
 
-/// Parts in all mechanisms together.
+/// The largest number of parts in all mechanisms together.
 pub(super) const MOST_IN_MECHANISMS: usize = 10 * MOST_HINGED;
 
-/// Rows for each part of a mechanism. Parts that do not overlap share nodes in at most 3 k pairs, and a pair gives
-/// four rows at most; each part has two of its own.
+/// The number of rows for each part of a mechanism. Parts that do not overlap share nodes in at most 3 k pairs, and a
+/// pair gives four rows at most; each part has two of its own.
 const MOST_ROWS: usize = 14;
 
-/// A node and a direction that it is held along.
+/// A node, and a direction along which it is held.
 #[derive(Clone, Copy, Debug)]
 pub struct Hold {
     /// The node.
     pub node: u32,
-    /// Unit vector.
+    /// The direction (unit vector).
     pub direction: [f64; 2],
-    /// How far the direction may be off, where it is that of a curved surface (angle).
+    /// The error of the direction, where it is that of a curved surface (angle).
     pub error: f64,
 }
 
 impl Hold {
-    /// A contact node, held along the normal.
+    /// A contact node that is held along the normal.
     pub fn along_normal(boundary: &ContactBoundary, i: usize) -> Hold {
         Hold {
             node: boundary.nodes[i],
@@ -45,7 +45,7 @@ impl Hold {
         }
     }
 
-    /// The same along the tangent.
+    /// A contact node that is held along the tangent.
     pub fn along_tangent(boundary: &ContactBoundary, i: usize) -> Hold {
         Hold {
             direction: boundary.tangent(i),
@@ -54,23 +54,23 @@ impl Hold {
     }
 }
 
-/// What is found of parts that nothing holds.
+/// What is known about parts that nothing holds.
 pub(super) enum Unheld {
     Free(Free),
-    /// This many hinged parts, more than are examined; and one of their nodes.
+    /// Too many hinged parts to be examined: their number, and one of their nodes.
     TooMany(usize, u32),
 }
 
 /// Rigid motions that nothing prevents.
 pub(super) struct Free {
-    /// What they move as one: a part, or several.
+    /// The part that moves, or several that move as one.
     pub(super) moved: Part,
     pub(super) motions: Vec<Motion>,
-    /// The number of the part, or of the first.
+    /// The number of the part, or of the first one.
     pub(super) number: usize,
-    /// Parts that move as one.
+    /// The number of parts that move as one.
     pub(super) together: usize,
-    /// Further motions of parts hinged to these.
+    /// The number of further motions of parts hinged to these.
     pub(super) more: usize,
 }
 
@@ -85,18 +85,18 @@ pub(super) struct Parts<'a> {
     first: Vec<u32>,
     /// All parts of the nodes that belong to several.
     pub(super) shared: BTreeMap<u32, Vec<u32>>,
-    /// Motions that no part has: in axisymmetry the first and the last.
+    /// Motions that no part can have: in axisymmetry the first and the last.
     pub(super) never: &'static [Motion],
 }
 
-/// Elements that hold each other, as one rigid body.
+/// A part of the body: elements that hold each other, as one rigid body.
 #[derive(Clone)]
 pub(super) struct Part {
     pub(super) nodes: Vec<u32>,
     pub(super) centre: [f64; 2],
-    /// Distance of the farthest node from the centre (length).
+    /// The distance of the farthest node from the centre (length).
     pub(super) size: f64,
-    /// A row whose remainder is below this adds nothing: coordinates are known to rounding only.
+    /// A row whose remainder is below this adds nothing, since coordinates are known only up to rounding.
     pub(super) tolerance: f64,
 }
 
@@ -119,7 +119,7 @@ impl Part {
         }
     }
 
-    /// The displacement of a place along a direction, by each motion.
+    /// A row of coefficients: the displacement of a place along a direction, for each motion.
     fn row(&self, place: [f64; 2], [a, b]: [f64; 2]) -> Motion {
         let [x, y] = [0, 1].map(|i| (place[i] - self.centre[i]) / self.size);
         [a, b, b * x - a * y]
@@ -135,7 +135,7 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// What others, which are orthonormal, leave of a row.
+/// The remainder of a row orthogonal to others, which are orthonormal.
 fn rest(rows: &[Motion], mut row: Motion) -> Motion {
     // twice is enough
     for _ in 0..2 {
@@ -199,7 +199,7 @@ impl<'a> Parts<'a> {
         }
     }
 
-    /// The free motions that are left where these nodes are held.
+    /// The free motions that remain if these nodes are held.
     pub(super) fn unheld(&self, held: &[Hold]) -> Vec<Unheld> {
         let rows = self.rows(held);
         let mut found = Vec::new();
@@ -228,7 +228,7 @@ impl<'a> Parts<'a> {
         found
     }
 
-    /// What holds each part: by itself, or by parts that are held.
+    /// The rows that hold each part, directly or through parts that are held.
     pub(super) fn rows(&self, held: &[Hold]) -> Vec<Vec<Motion>> {
         let mut rows: Vec<Vec<Motion>> = vec![self.never.to_vec(); self.parts.len()];
         let hold = |rows: &mut Vec<Vec<Motion>>, part: u32, node: u32, direction: [f64; 2]| {
@@ -279,8 +279,8 @@ impl<'a> Parts<'a> {
         rows
     }
 
-    /// The two rows of a part that are all that holds it, where the third is nothing but errors of directions: as those of a ring
-    /// that turns in a sleeve, whose sides are no circle.
+    /// The two rows of a part that are all that holds it, where a third row is only an error of directions: as for a
+    /// ring that can turn in a sleeve, whose mesh is not an exact circle.
     fn firm(&self, part: &Part, exact: &[&Hold], inexact: &[&Hold]) -> Option<Vec<Motion>> {
         let at = |one: &Hold| self.mesh.nodes[one.node as usize];
         let row = |one: &Hold| part.row(at(one), one.direction);
@@ -310,7 +310,7 @@ impl<'a> Parts<'a> {
         inexact.iter().all(in_error).then_some(rows)
     }
 
-    /// Parts that are not held, those hinged to one another together.
+    /// Groups of parts that are not held and are hinged to one another.
     pub(super) fn mechanisms(&self, rows: &[Vec<Motion>]) -> Vec<Vec<u32>> {
         let free = |part: u32| rows[part as usize].len() < 3;
         let mut seen = vec![false; self.parts.len()];
@@ -337,7 +337,7 @@ impl<'a> Parts<'a> {
         found
     }
 
-    /// The free motion of hinged parts, if there is one.
+    /// The free motion of a group of hinged parts, if there is one.
     fn of_mechanism(&self, parts: &[u32], rows: &[Vec<Motion>]) -> Option<Unheld> {
         let place: BTreeMap<u32, usize> = parts.iter().copied().zip(0..).collect();
         let columns = 3 * parts.len();
@@ -404,7 +404,7 @@ impl<'a> Parts<'a> {
         }))
     }
 
-    /// Nodes that two unheld parts share, as (part, part, node): for each pair at most two, as far apart as possible,
+    /// Nodes that two unheld parts share, as (part, part, node): at most two for each pair, as far apart as possible,
     /// since two hinges join them rigidly.
     fn hinges(&self, place: &BTreeMap<u32, usize>) -> Vec<[u32; 3]> {
         let mut pairs: BTreeMap<[u32; 2], Vec<u32>> = BTreeMap::new();

@@ -1,9 +1,9 @@
-//! Rigid motions in words.
+//! Describes rigid motions in words.
 
 use super::parts::{Motion, Part, Parts, add, dot};
 
 impl Parts<'_> {
-    /// One to three motions in words, one of them, and whether they are a rotation alone.
+    /// One to three motions in words, one of them, and whether they are only a rotation.
     pub(super) fn words(&self, part: &Part, motions: &[Motion]) -> (String, Motion, bool) {
         if !self.never.is_empty() {
             return ("along the axis".to_owned(), [0.0, 1.0, 0.0], false);
@@ -61,7 +61,7 @@ impl Parts<'_> {
         (words, first, turns)
     }
 
-    /// Where a rotation (by 1) leaves a part in place: a node that it shares, or a position.
+    /// The centre of a rotation (by 1) of a part, in words: a node that it shares, or a position.
     fn centre(&self, part: &Part, rotation: &Motion) -> String {
         let centre = [
             part.centre[0] - rotation[1] * part.size,
@@ -95,7 +95,7 @@ fn along([x, y, _]: Motion) -> String {
     }
 }
 
-/// A coordinate to six digits of the size of its part.
+/// A coordinate rounded to six digits of the size of its part.
 fn rounded(value: f64, size: f64) -> f64 {
     let digit = 10f64.powf((size.log10() - 5.0).floor());
     let rounded = (value / digit).round() * digit;

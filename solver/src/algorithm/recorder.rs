@@ -10,14 +10,14 @@ use crate::solution::{
     ContactCount, ForcePair, FrictionCount, Iteration, Observer, Progress, Residuals, Stage,
 };
 
-/// Where the iterations stand in the load history.
+/// The place of the iterations in the load history.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Place {
     /// Load step, from 0.
     pub step: u32,
     /// Increment within the step, from 0.
     pub increment: u32,
-    /// Rows reported before.
+    /// The number of rows of the history before.
     pub rows: u32,
 }
 
@@ -25,17 +25,17 @@ pub struct Place {
 #[derive(Clone)]
 pub(super) struct Measured {
     pub(super) state: State,
-    /// τ at every friction point.
+    /// The friction bound τ at every friction point.
     pub(super) bound: Vec<f64>,
-    /// τ that the state's own pressure implies.
+    /// The friction bound τ that the state's own pressure implies.
     pub(super) implied_bound: Vec<f64>,
-    /// Ŝ v − f̂.
+    /// The elastic force Ŝ v − f̂.
     pub(super) elastic_force: Vec<f64>,
     pub(super) reactions: Vec<f64>,
     pub(super) pressures: Vec<f64>,
-    /// kkt, friction and monolithic; equilibrium is computed from the body.
+    /// The residuals kkt, friction and monolithic; equilibrium is computed from the body later.
     pub(super) residuals: Residuals,
-    /// max|τ − implied τ| (stress).
+    /// The largest |τ − implied τ| (stress).
     pub(super) bound_change: f64,
 }
 
@@ -45,7 +45,7 @@ impl Measured {
         Measured::with_force(system, state, elastic_force, bound)
     }
 
-    /// The same where Ŝ v − f̂ is known.
+    /// Measures a state whose elastic force Ŝ v − f̂ is known.
     pub(super) fn with_force(
         system: &System<'_>,
         state: State,
@@ -83,7 +83,7 @@ impl Measured {
         }
     }
 
-    /// Every residual at or below the tolerance.
+    /// Whether every residual is at or below the tolerance.
     pub(super) fn within(&self, tolerance: f64) -> bool {
         self.residuals.within(tolerance)
     }
@@ -92,21 +92,21 @@ impl Measured {
 /// Relative difference up to which residuals count as equal: a cycle repeats them, an approach does not.
 const SAME: f64 = 0.01;
 
-/// What a row of the history has beside its state.
+/// The parts of a row of the history that do not follow from its state.
 pub(super) struct Row {
     pub(super) stage: Stage,
-    /// The residual that the stage itself reduces.
+    /// The residual that the method of this stage reduces.
     pub(super) residual: f64,
     pub(super) contraction: Option<f64>,
-    /// Newton steps inside.
+    /// The number of Newton steps inside the iteration.
     pub(super) inner: u32,
-    /// σ_t at every friction point.
+    /// The tangential stress σ_t at every friction point.
     pub(super) tractions: Vec<f64>,
-    /// R_F of the stage, if it has its own; else that of the nodal pressures.
+    /// R_F as the stage computes it; none: it is computed from the nodal pressures.
     pub(super) own_r_f: Option<f64>,
 }
 
-/// States that repeat.
+/// A cycle: states that repeat.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cycle {
     /// Iterations from one occurrence to the next.
@@ -117,7 +117,7 @@ pub struct Cycle {
 }
 
 /// The history of one increment.
-pub(super) struct Track<'s, 'a> {
+pub(super) struct Recorder<'s, 'a> {
     pub(super) system: &'s System<'a>,
     pub(super) controls: &'s SolverControls,
     pub(super) place: Place,
@@ -125,16 +125,16 @@ pub(super) struct Track<'s, 'a> {
     before: Option<(Vec<bool>, Vec<f64>)>,
     /// Whether the last row's contact set differs from that of the row before.
     pub(super) contact_changed: bool,
-    /// Previous states, with their number and their residual.
+    /// The states so far, with their number and their residual.
     met: HashMap<Vec<u8>, (usize, f64)>,
     states: Vec<Vec<u8>>,
-    /// What the convex problems of the sweeps share.
+    /// Factors that the convex problems of the sweeps share.
     pub(super) factors: Factors,
 }
 
-impl<'s, 'a> Track<'s, 'a> {
+impl<'s, 'a> Recorder<'s, 'a> {
     pub(super) fn new(system: &'s System<'a>, controls: &'s SolverControls, place: Place) -> Self {
-        Track {
+        Recorder {
             system,
             controls,
             place,
@@ -207,8 +207,8 @@ impl<'s, 'a> Track<'s, 'a> {
         answer
     }
 
-    /// Notes contact and slip of a state. A cycle is a previous state that returns after others, with the same
-    /// residual.
+    /// Records contact and slip of a state. Returns a cycle if the same state occurred before, with others since then
+    /// and the same residual.
     pub(super) fn note(&mut self, state: &State, residual: f64) -> Option<Cycle> {
         let code = code(self.system, state);
         let now = self.states.len();
@@ -238,14 +238,14 @@ impl<'s, 'a> Track<'s, 'a> {
         cycle
     }
 
-    /// Clears the previous states: another method begins.
+    /// Clears the states so far, when another method begins.
     pub(super) fn forget(&mut self) {
         self.met.clear();
         self.states.clear();
     }
 }
 
-/// Contact of every node and slip of every friction point: backward, stick or forward.
+/// A code for the contact of every node and the slip of every friction point: backward, stick or forward.
 fn code(system: &System<'_>, state: &State) -> Vec<u8> {
     let contact = state.active.iter().map(|active| u8::from(*active));
     let slip = system.points.iter().map(|point| {
@@ -259,7 +259,7 @@ fn code(system: &System<'_>, state: &State) -> Vec<u8> {
     contact.chain(slip).collect()
 }
 
-/// Friction points with a bound that slip, and that stick.
+/// The numbers of friction points with a bound that slip, and that stick.
 fn slipping(system: &System<'_>, state: &State, bound: &[f64]) -> (u32, u32) {
     let (mut slip, mut stick) = (0, 0);
     let points = system.points.iter().zip(bound);
@@ -270,7 +270,7 @@ fn slipping(system: &System<'_>, state: &State, bound: &[f64]) -> (u32, u32) {
     (slip, stick)
 }
 
-/// R_F of thesis 3.5: ‖σ_n − σ_n′‖ / ‖σ_n′‖, safe where nothing touched before.
+/// The relative change R_F of thesis 3.5, ‖σ_n − σ_n′‖ / ‖σ_n′‖, also defined where nothing touched before.
 pub(super) fn relative_change(now: &[f64], before: &[f64]) -> f64 {
     let change: f64 = now.iter().zip(before).map(|(a, b)| (a - b) * (a - b)).sum();
     let scale: f64 = before.iter().map(|b| b * b).sum();

@@ -1,4 +1,4 @@
-//! Places for connections: when all are taken, the one that has been idle for the longest time is closed.
+//! The limit on connections: when it is reached, the connection that has been idle for the longest time is closed.
 
 use std::{
     collections::HashMap,
@@ -8,12 +8,12 @@ use std::{
 use super::activity::Activity;
 use crate::metrics::METRICS;
 
-/// Places beyond the limit, when all others are busy: for the probes, and for telling others to come back.
+/// The number of additional connections when all others are busy: for the probes, and for refusing further ones.
 const RESERVED: usize = 16;
 
-/// The open connections.
+/// The open connections, and their limit.
 #[derive(Debug)]
-pub(super) struct Places {
+pub(super) struct Slots {
     most: usize,
     open: Mutex<Open>,
 }
@@ -24,24 +24,24 @@ struct Open {
     connections: HashMap<u64, Arc<Activity>>,
 }
 
-/// The place of one connection, free again when it is dropped.
+/// The slot of one connection, which is free again when it is dropped.
 #[derive(Debug)]
-pub(super) struct Place {
-    places: Arc<Places>,
+pub(super) struct Slot {
+    slots: Arc<Slots>,
     number: u64,
     activity: Arc<Activity>,
     reserved: bool,
 }
 
-impl Places {
-    /// For so many connections.
-    pub(super) fn new(most: usize) -> Arc<Places> {
+impl Slots {
+    /// A limit of `most` connections.
+    pub(super) fn new(most: usize) -> Arc<Slots> {
         let open = Mutex::default();
-        Arc::new(Places { most, open })
+        Arc::new(Slots { most, open })
     }
 
-    /// A place for a new connection; `None`: all are taken, the reserved ones, too.
-    pub(super) fn take(self: &Arc<Self>) -> Option<Place> {
+    /// A slot for a new connection; `None` if all are taken, including the reserved ones.
+    pub(super) fn take(self: &Arc<Self>) -> Option<Slot> {
         let mut open = self.open();
         let full = open.connections.len() >= self.most;
         let reserved = full && !open.close_longest_idle();
@@ -53,8 +53,8 @@ impl Places {
         open.connections.insert(number, activity.clone());
         METRICS.connections.inc();
         METRICS.accepted_connections.inc();
-        Some(Place {
-            places: self.clone(),
+        Some(Slot {
+            slots: self.clone(),
             number,
             activity,
             reserved,
@@ -85,21 +85,21 @@ impl Open {
     }
 }
 
-impl Place {
-    /// What happens on the connection.
+impl Slot {
+    /// The activity of the connection.
     pub(super) fn activity(&self) -> &Arc<Activity> {
         &self.activity
     }
 
-    /// Whether this place is one of the few for the probes.
+    /// Whether this slot is one of the few for the probes.
     pub(super) fn is_reserved(&self) -> bool {
         self.reserved
     }
 }
 
-impl Drop for Place {
+impl Drop for Slot {
     fn drop(&mut self) {
-        self.places.open().connections.remove(&self.number);
+        self.slots.open().connections.remove(&self.number);
         METRICS.connections.dec();
     }
 }
@@ -111,27 +111,27 @@ mod tests {
 
     #[tokio::test]
     async fn a_new_connection_takes_the_place_of_the_longest_idle_one() {
-        let places = Places::new(2);
-        let first = places.take().unwrap();
+        let slots = Slots::new(2);
+        let first = slots.take().unwrap();
         let busy = first.activity().begin();
-        let second = places.take().unwrap();
-        assert!(!places.take().unwrap().is_reserved());
+        let second = slots.take().unwrap();
+        assert!(!slots.take().unwrap().is_reserved());
         second.activity().is_cut().await;
         drop((second, busy));
     }
 
     #[test]
     fn busy_connections_keep_their_places_and_the_reserved_ones_are_few() {
-        let places = Places::new(1);
-        let first = places.take().unwrap();
+        let slots = Slots::new(1);
+        let first = slots.take().unwrap();
         let _busy = first.activity().begin();
         let mut reserved = vec![];
-        while let Some(place) = places.take() {
-            assert!(place.is_reserved());
-            reserved.push((place.activity().begin(), place));
+        while let Some(slot) = slots.take() {
+            assert!(slot.is_reserved());
+            reserved.push((slot.activity().begin(), slot));
         }
         assert_eq!(reserved.len(), RESERVED);
         drop((_busy, first));
-        assert!(places.take().is_some());
+        assert!(slots.take().is_some());
     }
 }

@@ -1,45 +1,46 @@
-//! Two halves of a part of a mesh, improved: elements go from one to the other as long as fewer nodes lie in both
-//! (Fiduccia and Mattheyses, 1982).
+//! Improves the two halves of a part of a mesh: elements move to the other half as long as fewer nodes then belong to
+//! both (Fiduccia and Mattheyses, 1982).
 //!
-//! Of all elements with a node in both halves the one goes first that leaves the fewest such nodes, even if these become
-//! more; each goes once. Then those are taken back that came after the best state. This is repeated until it helps no
-//! more.
+//! In each round, of all elements with a node in both halves the one that leaves the fewest such nodes moves first,
+//! even if their number increases; each element moves once. Then all moves after the best state are undone. Rounds are
+//! repeated until one brings no improvement.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::Deref;
 
-/// Each half keeps this share of the elements, if it has it.
+/// Each half keeps at least this share of the elements, if it has that many.
 const SMALLEST_SHARE: f64 = 0.4;
 
-/// How often all elements may go.
+/// The largest number of rounds.
 const ROUNDS: usize = 4;
 
-/// How many may go without a better state.
+/// The number of moves without a better state after which a round ends.
 const PATIENCE: usize = 60;
 
-/// A mesh, and what is known of its elements while a part of it is improved.
-pub(super) struct Halves<'a, E> {
+/// A mesh, and the data of its elements while a part of it is improved.
+pub(super) struct Bisection<'a, E> {
     elements: &'a [E],
-    /// Elements of nodes: those of node n are `around[starts[n]..starts[n + 1]]`.
+    /// The elements of nodes: those of node n are `around[starts[n]..starts[n + 1]]`.
     starts: Vec<u32>,
     around: Vec<u32>,
     /// By element: a number for the part and the half that it was last in.
     half: Vec<u32>,
-    /// By element: a number for the round in which it went last, in which its gain was known last, and for the move.
+    /// By element: numbers for the round of its last move, for the round in which its gain was last known, and for the
+    /// move.
     went: Vec<u32>,
     known: Vec<u32>,
     seen: Vec<u32>,
     stamp: u32,
-    /// By how many the nodes in both halves become fewer if the element goes.
+    /// By element: by how much the number of nodes in both halves decreases if it moves.
     gains: Vec<i32>,
-    /// By node: how many elements of each half it has.
+    /// By node: the number of its elements in each half.
     counts: Vec<[u32; 2]>,
     waiting: BinaryHeap<(i32, Reverse<u32>)>,
     gone: Vec<u32>,
 }
 
-impl<'a, E: Deref<Target = [u32]>> Halves<'a, E> {
+impl<'a, E: Deref<Target = [u32]>> Bisection<'a, E> {
     pub(super) fn new(elements: &'a [E], nodes: usize) -> Self {
         let mut starts = vec![0u32; nodes + 1];
         let all = || elements.iter().enumerate();
@@ -61,7 +62,7 @@ impl<'a, E: Deref<Target = [u32]>> Halves<'a, E> {
             }
         }
         let count = elements.len();
-        Halves {
+        Bisection {
             elements,
             starts,
             around,
@@ -77,8 +78,8 @@ impl<'a, E: Deref<Target = [u32]>> Halves<'a, E> {
         }
     }
 
-    /// Improves the halves of a part, the first of which has the first `middle` of these elements, and says how many it
-    /// has then. Only nodes that are `free` count.
+    /// Improves the halves of a part, given as the first `middle` of these elements and the others; returns the new
+    /// size of the first half. Only nodes that are `free` count.
     pub(super) fn improve(&mut self, part: &mut [u32], middle: usize, free: &[bool]) -> usize {
         let all = self.elements;
         let low = self.next_stamp();
@@ -113,7 +114,7 @@ impl<'a, E: Deref<Target = [u32]>> Halves<'a, E> {
         first
     }
 
-    /// Lets each element go once; whether there are fewer nodes in both halves afterwards.
+    /// Lets each element move once; returns whether fewer nodes are in both halves afterwards.
     fn round(
         &mut self,
         part: &[u32],
@@ -180,7 +181,7 @@ impl<'a, E: Deref<Target = [u32]>> Halves<'a, E> {
         best.0 > 0
     }
 
-    /// Puts an element among those that may go, unless it is there already with its gain.
+    /// Adds an element to those that may move, unless it is there already with its gain.
     fn wait(&mut self, e: u32, round: u32, halves: [u32; 2], free: &[bool]) {
         let place = e as usize;
         let half = usize::from(self.half[place] == halves[1]);
@@ -200,7 +201,7 @@ impl<'a, E: Deref<Target = [u32]>> Halves<'a, E> {
         }
     }
 
-    /// Puts an element into the other half.
+    /// Moves an element to the other half.
     fn go(&mut self, e: u32, halves: [u32; 2], sizes: &mut [usize; 2]) {
         let half = usize::from(self.half[e as usize] == halves[1]);
         self.half[e as usize] = halves[1 - half];
@@ -224,7 +225,7 @@ mod tests {
     use super::*;
     use crate::linear::dissection::tests::{grid, lines};
 
-    /// Nodes of both halves.
+    /// The number of nodes in both halves.
     fn shared(elements: &[Vec<u32>], low: &[u32], high: &[u32], free: &[bool]) -> usize {
         let has =
             |part: &[u32], node: u32| part.iter().any(|e| elements[*e as usize].contains(&node));
@@ -233,8 +234,9 @@ mod tests {
         nodes.filter(in_both).count()
     }
 
-    /// Nodes that two halves of a grid of 20 × 20 cells share before and after, and the elements of each then; `first`:
-    /// whether the cell in a column and a row is in the first half before.
+    /// The numbers of nodes that two halves of a grid of 20 × 20 cells share before and after the improvement, and the
+    /// number of elements of each half after it; `first`: whether the cell in a column and a row is in the first half
+    /// before.
     fn improved(free: &[bool], first: impl Fn(usize, usize) -> bool) -> (usize, usize, [usize; 2]) {
         let (elements, positions) = grid(&lines(20), &lines(20));
         let (mut part, high): (Vec<u32>, Vec<u32>) =
@@ -242,7 +244,7 @@ mod tests {
         let before = shared(&elements, &part, &high, free);
         let middle = part.len();
         part.extend(high);
-        let mut halves = Halves::new(&elements, positions.len());
+        let mut halves = Bisection::new(&elements, positions.len());
         let middle = halves.improve(&mut part, middle, free);
         let (low, high) = part.split_at(middle);
         let after = shared(&elements, low, high, free);
@@ -261,7 +263,8 @@ mod tests {
         assert!(sizes.iter().all(|size| *size >= 160), "{sizes:?}");
     }
 
-    /// The diagonal of a square is longer than its side, but no small step from it is shorter.
+    /// Bisection stay within their share and do not get worse: the diagonal of a square is longer than its side, but no
+    /// small step from it is shorter.
     #[test]
     fn halves_stay_within_their_share_and_become_no_worse() {
         let (before, after, sizes) = improved(&[true; 441], |x, y| x < y || (x == y && x < 10));
@@ -289,12 +292,12 @@ mod tests {
         assert_eq!((before, after, sizes), (21, 21, [200; 2]));
     }
 
-    /// As in a fan of triangles: more than a number of 16 bits holds.
+    /// One node may have more elements than a number of 16 bits holds, as in a fan of triangles.
     #[test]
     fn one_node_may_have_very_many_elements() {
         let elements: Vec<Vec<u32>> = (0..140_000).map(|e| vec![e, 140_000]).collect();
         let mut part: Vec<u32> = (0..140_000).collect();
-        let mut halves = Halves::new(&elements, 140_001);
+        let mut halves = Bisection::new(&elements, 140_001);
         assert_eq!(halves.improve(&mut part, 70_000, &[true; 140_001]), 70_000);
     }
 }

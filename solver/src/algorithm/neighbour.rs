@@ -1,8 +1,8 @@
-//! From the solution of a neighbour, whose numbers differ a little, to that of a system.
+//! Steps from the solution of a neighbour, a problem with slightly different numbers, to that of a system.
 //!
-//! Each step takes the friction bound that the present pressure implies, and one step of the convex problem with the last
-//! factor that serves: sweeps with one inner step each. The residual shrinks by a constant factor, as far as rounding allows; where it
-//! does not, the neighbour is too far, and the usual methods begin anew.
+//! Each step takes the friction bound that the present pressure implies, and one step of the convex problem with the
+//! last factor while that is accurate enough: sweeps with one inner step each. The residual shrinks by a constant
+//! factor, down to rounding. Where it does not, the neighbour is too different, and the usual methods start anew.
 
 use crate::algorithm::convex::{close, least_along, update_active};
 use crate::algorithm::factors::{Factors, free_dofs};
@@ -11,23 +11,23 @@ use crate::algorithm::system::{State, System};
 use crate::problem::SolverControls;
 use crate::solution::{Observer, Outcome, Progress, Residuals, Stage};
 
-/// Steps; eight to twelve are usual.
+/// The largest number of steps; eight to twelve are usual.
 const MOST_STEPS: u32 = 40;
 
-/// A part of the tolerance, so that it hardly matters where the steps began.
+/// The part of the tolerance to reach, so that the start has hardly any influence on the result.
 const AIM: f64 = 0.1;
 
-/// A step that leaves more than this part of the residual asks for a new factor.
+/// A step that leaves more than this part of the residual requires a new factor.
 const SERVES: f64 = 0.2;
 
-/// So many steps may leave more than [`SLOW`] of the residual: contact sets change at first.
+/// The number of steps that may leave more than [`SLOW`] of the residual: contact sets change at first.
 const PATIENCE: u32 = 6;
 
-/// A solution that steps approach more slowly may not be the only one.
+/// If steps leave more than this part of the residual, the solution may not be the only one.
 const SLOW: f64 = 0.7;
 
-/// The solution and the number of steps; None if the steps do not lead to it quickly.
-pub(super) fn settle(
+/// The solution and the number of steps. None if the steps do not converge to it quickly.
+pub(super) fn follow(
     system: &System<'_>,
     controls: &SolverControls,
     start: &State,
@@ -107,8 +107,8 @@ pub(super) fn settle(
     None
 }
 
-/// Anderson's acceleration with one step remembered (formulation 4.9): from two steps d₁, d₂ and the places x₁, x₂ where
-/// they began, −γ (x₂ − x₁ + d₂ − d₁) with the γ that makes d₂ − γ (d₂ − d₁) smallest. Empty unless |γ| < 1.
+/// Anderson's acceleration with one step remembered (formulation 4.9): from two steps d₁, d₂ and the places x₁, x₂
+/// where they began, −γ (x₂ − x₁ + d₂ − d₁) with the γ that makes d₂ − γ (d₂ − d₁) smallest. Empty unless |γ| < 1.
 fn further(
     (place_before, step_before): &(Vec<f64>, Vec<f64>),
     (place, step): (&[f64], &[f64]),

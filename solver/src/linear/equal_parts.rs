@@ -1,20 +1,20 @@
-//! Parts of a dissection that are alike: of elements of the same kinds, joined in the same way. What one of them leaves to
-//! the rest, and its columns of the factor, are those of all. A grid between equidistant lines has few that are not.
+//! Equal parts of a dissection: those with elements of the same kinds, connected in the same way. They have the same
+//! Schur complement and the same columns of the factor. A grid between equidistant lines has few different parts.
 
 use std::collections::HashMap;
 use std::ops::Deref;
 
 use super::dissection::Dissection;
 
-/// No node of the first half.
+/// Marks a node that is not in the first half.
 const NEW: u32 = u32::MAX;
 
-/// Of each part the number of the first one that is like it. Their own nodes have the same order already; the boundaries
-/// of the later ones are brought into the order of the first one's.
+/// For each part, the number of the first one that equals it. The parts' own nodes are in the same order already; the
+/// boundaries of later parts are put into the order of the first one.
 ///
-/// `kinds`: numbers that are equal for elements with the same matrix on their nodes, of which the same have unknowns; an
-/// element without one is like no other.
-pub(super) fn find_alike<E: Deref<Target = [u32]>>(
+/// `kinds`: numbers that are equal for elements with the same matrix and the same unknown nodes; an element without a
+/// number equals no other.
+pub(super) fn find_equal_parts<E: Deref<Target = [u32]>>(
     dissection: &mut Dissection,
     elements: &[E],
     kinds: &[Option<u32>],
@@ -88,21 +88,21 @@ pub(super) fn find_alike<E: Deref<Target = [u32]>>(
     firsts.into_iter().map(|(first, _)| first).collect()
 }
 
-/// Describes parts by numbers.
+/// The search for equal parts, which are described by keys of numbers.
 struct Search {
-    /// Places of nodes.
+    /// The place of each node.
     place: Vec<Option<u32>>,
     /// By place: when it was last numbered, and its number then.
     numbers: Vec<(u32, u32)>,
     stamp: u32,
-    /// The places of the part's nodes, in the order of their numbers.
+    /// The places of the present part's nodes, in the order of their numbers.
     places: Vec<u32>,
-    /// Equal for parts that are alike up to the order of their own nodes.
+    /// A key that is equal for parts that are equal up to the order of their own nodes.
     key: Vec<u32>,
 }
 
 impl Search {
-    /// A part that is not divided; whether others may be like it.
+    /// Describes a part that is not divided; returns whether others may equal it.
     fn describe_elements<E: Deref<Target = [u32]>>(
         &mut self,
         part: &[u32],
@@ -128,7 +128,7 @@ impl Search {
         true
     }
 
-    /// A part of two halves, by the first ones that are like them, and their boundaries.
+    /// Describes a part of two halves by the first parts that equal these, and by their boundaries.
     fn describe_halves(&mut self, firsts: [usize; 2], boundaries: [&[u32]; 2]) {
         self.start();
         // the key of a part that is not divided begins with the number of its elements, which is not 0
@@ -149,7 +149,7 @@ impl Search {
         self.key.clear();
     }
 
-    /// The number of a place; none if it is new, and has the next one from now on.
+    /// The number of a place; none if the place is new, in which case it gets the next number.
     fn number(&mut self, place: u32) -> Option<u32> {
         let (stamp, number) = &mut self.numbers[place as usize];
         if *stamp == self.stamp {

@@ -1,4 +1,4 @@
-//! Whether a damaged database can still take a job: by writing one, which is rolled back.
+//! Checks whether a damaged database can still store a job, by writing one that is rolled back.
 
 use super::{
     database::Store,
@@ -13,20 +13,20 @@ use super::{
 };
 use crate::job::{Cache, JobId, Limits, Reason, ResultAvailable};
 
-/// It is about the database, not about how many jobs wait.
+/// Without limits, since the check concerns the database, not the number of waiting jobs.
 const UNLIMITED: QueueLimits = QueueLimits {
     queued: u32::MAX,
     queued_of_owner: None,
 };
 
 impl Store {
-    /// Writes all that belongs to a small job, from its submission to its end, and rolls it back.
+    /// Writes all data of a small job, from its submission to its end, and rolls them back.
     pub(super) async fn write_and_roll_back(&self) -> Result<()> {
         let id = JobId::default();
         let job = NewJob {
             id: Some(id),
             name: None,
-            labels: [("trial".to_owned(), id.to_string())].into(),
+            labels: [("write_check".to_owned(), id.to_string())].into(),
             priority: 0,
             limits: Limits::default(),
             cache: Cache::Off,

@@ -1,34 +1,34 @@
-//! The row of a mesh: its results, and how much they changed.
+//! The row of one mesh in the sequence of refinements: its results, and how much they changed.
 
 use crate::solution::{ErrorMethod, EstimatedQuantity, QuantityName, Refinement, Solution};
 
-/// A force below this part of the largest one is not compared.
+/// A force below this part of the largest one is not compared between meshes.
 const SMALL_FORCE: f64 = 1e-3;
 
-/// Results compared from mesh to mesh.
-pub(super) struct WatchedResults<'a> {
+/// The results that are compared from mesh to mesh.
+pub(super) struct MeshResults<'a> {
     solution: &'a Solution,
-    /// The peak of σ_n has a limit.
+    /// Whether the peak of σ_n has a limit.
     normal_peak: bool,
-    /// The peak of σ_t has one.
+    /// Whether the peak of σ_t has a limit.
     tangential_peak: bool,
 }
 
-impl<'a> WatchedResults<'a> {
+impl<'a> MeshResults<'a> {
     pub(super) fn new(solution: &'a Solution) -> Self {
         let has_limit = |name: QuantityName| {
             let accuracy = solution.summary.accuracy.iter();
             let mut quantities = accuracy.flat_map(|accuracy| &accuracy.quantities);
             !quantities.any(|q| q.quantity == name && q.method == ErrorMethod::NoLimit)
         };
-        WatchedResults {
+        MeshResults {
             solution,
             normal_peak: has_limit(QuantityName::PeakNormalStress),
             tangential_peak: has_limit(QuantityName::PeakTangentialStress),
         }
     }
 
-    /// Largest |σ_t| and |σ_n| of all contacts.
+    /// The largest |σ_t| and |σ_n| of all contacts.
     fn peaks(&self) -> (f64, f64) {
         let contacts = self.solution.summary.contacts.values();
         contacts.fold((0.0, 0.0), |(tangential, normal): (f64, f64), contact| {
@@ -88,15 +88,15 @@ impl<'a> WatchedResults<'a> {
     }
 }
 
-/// The largest relative error of the quantities that have a limit and are followed; infinite if one is not known.
+/// The largest relative error of the quantities that have a limit and a stated error; infinite if one is unknown.
 pub(super) fn largest_error(solution: &Solution) -> f64 {
     let accuracy = solution.summary.accuracy.iter();
     let quantities = accuracy.flat_map(|accuracy| &accuracy.quantities);
     quantities.map(relative_error).fold(0.0, f64::max)
 }
 
-/// The relative error of a quantity that the mesh causes: 0 if it has no limit or is one of too many, infinite if nothing
-/// is known.
+/// The relative error of a quantity due to the mesh: 0 if it has no limit or is one of too many, infinite if it is
+/// unknown.
 pub(super) fn relative_error(quantity: &EstimatedQuantity) -> f64 {
     match (quantity.method, quantity.error, quantity.relative) {
         (ErrorMethod::NoLimit | ErrorMethod::TooMany, ..) | (_, Some(0.0), _) => 0.0,

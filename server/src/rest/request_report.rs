@@ -1,4 +1,4 @@
-//! What is told of every request of either protocol when its answer has ended: a line of the log, metrics, and a span.
+//! Reports every request of either protocol when its answer has ended: a line of the log, metrics, and a span.
 
 use std::{
     pin::Pin,
@@ -31,17 +31,17 @@ use crate::{
     trace::Trace,
 };
 
-/// Where a client names its request, and is told the name.
+/// The header in which a client names its request, and receives the name.
 pub(super) const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
-/// The version of the service, in every answer to a caller who is identified: a client of another version can tell why it
-/// does not understand what it gets.
+/// The header with the version of the service, in every answer to an identified caller, so that a client of another
+/// version can explain why it does not understand an answer.
 pub(super) const VERSION: HeaderName = HeaderName::from_static("signorini-version");
-/// Longest name that is taken from a client.
+/// The longest name that is accepted from a client.
 const LONGEST_ID: usize = 64;
-/// Requests in the log, for its filter.
+/// The log target of requests, for filters.
 const TARGET: &str = "service::request";
 
-/// Tells of a request, and answers with its id.
+/// Runs a request and reports it; the answer has its id.
 pub(super) async fn observe(mut request: Request, next: Next) -> Response {
     let mut observed = Observed::new(&request);
     request.extensions_mut().insert(observed.trace.clone());
@@ -60,13 +60,13 @@ pub(super) async fn observe(mut request: Request, next: Next) -> Response {
     response.map(|body| Body::new(ObservedBody { body, observed }))
 }
 
-/// Lines for requests of callers who are not identified: anyone who reaches the service could fill its disk with them. All of
-/// them are counted in metrics, and those that are refused by kind (`refused`).
+/// The limit of lines for requests of callers who are not identified, since anyone who reaches the service could fill
+/// its disk with them. Metrics count all of them, and `refused` logs the refused ones by kind.
 static BUDGET: Budget = Budget(Mutex::new(None));
-/// So many in each second.
+/// The number of such lines in each second.
 const LINES: u32 = 20;
 
-/// The second that is counted, and its lines.
+/// The present second, and the number of its lines.
 struct Budget(Mutex<Option<(Instant, u32)>>);
 
 impl Budget {
@@ -90,7 +90,7 @@ struct Observed {
     id: String,
     begun: Time,
     start: Instant,
-    /// Of the answer; none if the client has gone before.
+    /// The status of the answer; none if the client has gone before.
     status: Option<u16>,
     code: Option<Code>,
     owner: String,
@@ -126,7 +126,7 @@ impl Observed {
         self.read_code(response.headers());
     }
 
-    /// The status of a call: in the head of an answer without messages, else behind them.
+    /// Reads the status of a call: in the head of an answer without messages, else after them.
     fn read_code(&mut self, headers: &HeaderMap) {
         if let Some(code) = headers.get(tonic::Status::GRPC_STATUS) {
             self.code = Some(Code::from_bytes(code.as_bytes()));
@@ -191,7 +191,7 @@ impl Observed {
             RequestTarget::NoRoute(method) => (method, UNKNOWN),
         };
         let status = self.status;
-        let gone = || "no answer, the client has gone".to_owned();
+        let gone = || "no answer, the client has disconnected".to_owned();
         let answer = status.map_or_else(gone, |status| status.to_string());
         tell!(
             method,
@@ -244,7 +244,7 @@ impl Observed {
                 let error = match self.status {
                     Some(status) if status < 500 => None,
                     Some(status) => Some(status.to_string()),
-                    None => Some("the client has gone".to_owned()),
+                    None => Some("the client has disconnected".to_owned()),
                 };
                 (format!("{method} {route}").into(), error)
             }
@@ -262,14 +262,14 @@ impl Observed {
 }
 
 impl Drop for Observed {
-    /// Also of a request whose client does not wait for the answer, or for its end.
+    /// Reports the request, also if its client does not wait for the answer, or for its end.
     fn drop(&mut self) {
         METRICS.in_progress.dec();
         self.tell();
     }
 }
 
-/// The name that a client gives its request, if others can read it.
+/// The name that a client gives its request, if it is readable.
 fn given_id(headers: &HeaderMap) -> Option<String> {
     let id = headers.get(REQUEST_ID)?.to_str().ok()?;
     let allowed = |byte: u8| byte.is_ascii_alphanumeric() || b"._-".contains(&byte);
@@ -279,7 +279,7 @@ fn given_id(headers: &HeaderMap) -> Option<String> {
     good.then(|| id.to_owned())
 }
 
-/// The body of an answer, counted; with its end, or when it is dropped, the request has ended.
+/// The body of an answer, whose bytes are counted; the request ends with it, or when it is dropped.
 struct ObservedBody {
     body: Body,
     observed: Observed,
@@ -325,7 +325,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn strangers_have_some_lines_in_each_second() {
+    fn unidentified_callers_have_a_limited_number_of_lines() {
         let (budget, start) = (Budget(Mutex::new(None)), Instant::now());
         let lines = |millis| {
             let now = start + Duration::from_millis(millis);

@@ -1,10 +1,10 @@
-//! Errors that hyper answers by itself, since the request cannot be read: they get the document that every error has.
+//! Adds the usual error document to errors that hyper answers by itself because the request cannot be read.
 
 use axum::body::Bytes;
 
 use crate::error::ApiError;
 
-/// The answer with a document, if `head` is one of the answers that hyper gives by itself: an error without content.
+/// The answer with a document, if `head` is one of hyper's own answers: an error without content.
 pub(super) fn with_document(head: &[u8]) -> Option<Bytes> {
     let status = head.strip_prefix(b"HTTP/1.1 ")?.get(..3)?;
     let head = std::str::from_utf8(head).ok()?.to_ascii_lowercase();

@@ -1,21 +1,21 @@
 //! The iterations on the nodes that may touch.
 //!
-//! Most of a contact boundary is often far from the obstacle: where no node touches and no friction acts, the unknowns follow the
-//! others by a linear system. They are eliminated once, by a part of a Cholesky factorisation of Ŝ; every method then
-//! works on what is left as it would on the whole, and its matrices are as large as the part of the boundary that may
-//! touch. What is found is checked on the whole: where another node would pass the obstacle, or another point rub, that part is
-//! made larger, and the iterations go on.
+//! Often most of a contact boundary is far from the obstacle. Where no node touches and no friction acts, the unknowns
+//! follow from the others by a linear system. They are eliminated once, by a partial Cholesky factorisation of Ŝ. Every
+//! method then works on the remaining system, whose matrices are as large as the part of the boundary that may touch.
+//! The result is checked on the whole boundary: where another node would pass the obstacle, or friction would act at
+//! another point, the part is enlarged and the iterations continue.
 
 use std::sync::Arc;
 
 use crate::algorithm::convex::minimise;
 use crate::algorithm::factors::{Factors, dense};
 use crate::algorithm::finished::Finished;
-use crate::algorithm::fixed_point::stuck;
+use crate::algorithm::fixed_point::all_sticking;
+use crate::algorithm::neighbour::follow;
+use crate::algorithm::recorder::{Measured, Place};
 use crate::algorithm::rounding;
-use crate::algorithm::settle::settle;
 use crate::algorithm::system::{ContactNode, Follows, Oblique, Patch, State, System};
-use crate::algorithm::track::{Measured, Place};
 use crate::elasticity::Dof;
 use crate::friction::{BoundLaw, FrictionLaw, Source};
 use crate::linear::{Dense, Eliminated};
@@ -25,60 +25,61 @@ use crate::solution::{Iteration, Observer, Outcome};
 /// Below this number of unknowns the whole system costs next to nothing.
 const LEAST: usize = 64;
 
-/// Elimination is worth its cost if it leaves at most this part of the unknowns.
+/// Elimination is worth its cost if at most this part of the unknowns remains.
 const WORTH: f64 = 0.7;
 
 /// Parts of the boundary that may touch are widened on each side by this part of their length, and by a few nodes.
 const MARGIN: f64 = 0.1;
 const MARGIN_NODES: usize = 4;
 
-/// Parts that turned out too small are widened by this part of their length.
+/// Parts that turned out to be too small are widened by this part of their length.
 const GROWTH: f64 = 0.5;
 
-/// Parts of the boundary are kept, for problems that come back to them, while they take no more than this.
+/// Parts of the boundary are cached, for problems that return to them, up to this size in total.
 const KEPT_BYTES: u64 = 16 << 20;
 
 /// The part of the boundary that may touch, from one load level to the next.
 #[derive(Default)]
 pub struct Region {
-    near: Option<Arc<Near>>,
+    near: Option<Arc<MayTouch>>,
     extent: Extent,
-    /// What neighbours share.
+    /// Factors that neighbouring problems share.
     factors: Factors,
-    /// Parts that were made before, small ones.
-    made: Vec<Arc<Near>>,
+    /// Small parts of the boundary that were eliminated before.
+    made: Vec<Arc<MayTouch>>,
 }
 
-/// How far a region reaches.
+/// How far a region extends.
 #[derive(Clone, Default, PartialEq)]
 pub struct Extent {
-    /// By contact node: it may touch. Empty where nothing is known of it.
+    /// By contact node: whether it may touch. Empty while this is unknown.
     touches: Vec<bool>,
-    /// By contact node: its unknowns are kept, since it may touch or be rubbed. None until that is decided.
+    /// By contact node: whether its unknowns remain, since it may touch or friction may act there. None until that is
+    /// decided.
     wanted: Option<Vec<bool>>,
     /// Elimination is not worth its cost for this system.
     whole: bool,
 }
 
-/// The unknowns of nodes that may touch, or may be rubbed; the others are eliminated.
-struct Near {
-    /// The nodes that it was made for.
+/// The unknowns of nodes that may touch, or where friction may act; the others are eliminated.
+struct MayTouch {
+    /// By contact node: whether it was requested.
     wanted: Vec<bool>,
-    /// By contact node: kept.
+    /// By contact node: whether its unknowns remain.
     kept: Vec<bool>,
-    /// The eliminated unknowns, then the others.
+    /// All unknowns in order: first those that are eliminated, then the others.
     order: Vec<usize>,
     eliminated: Eliminated,
     stiffness: Dense,
-    /// The friction points all of whose nodes are kept.
+    /// The friction points all of whose nodes remain.
     points: Vec<usize>,
-    /// The contacts with friction, which the friction points depend on.
+    /// By contact: the friction that acts, which determines the friction points.
     acting: Vec<Option<FrictionPoints>>,
 }
 
-/// As [`run`](super::run), on the part of the boundary that may touch if that is worth it. `region`: that of the last level,
-/// for the same body and the same contact boundaries.
-pub fn run_near(
+/// As [`run`](super::run), on the part of the boundary that may touch if that is worth it. `region`: the region of the
+/// last load level, for the same body and the same contact boundaries.
+pub fn run_reduced(
     system: &System<'_>,
     controls: &SolverControls,
     place: Place,
@@ -128,10 +129,10 @@ pub fn run_near(
     }
 }
 
-/// The solution near that of a neighbour: with the same body and the same contact boundaries, and numbers that differ a
-/// little; and the number of steps to it. None if it is not near. With v of the neighbour before it the steps begin as far
-/// from it on the other side.
-pub fn settle_near(
+/// The solution close to that of a neighbour, a problem with the same body and contact boundaries and slightly
+/// different numbers, and the number of steps to it. None if it is not close. With v of the neighbour before it, the
+/// steps begin at the extrapolation of both.
+pub fn follow_neighbour(
     system: &System<'_>,
     controls: &SolverControls,
     (neighbour, before): (&Finished, Option<&[f64]>),
@@ -149,11 +150,11 @@ pub fn settle_near(
         pairs.for_each(|(v, before)| *v += *v - before);
     }
     let Some(near) = near else {
-        return settle_as_alone(system, controls, &start, factors, observe);
+        return follow_as_alone(system, controls, &start, factors, observe);
     };
     let (part, load) = near.part(system);
     let start = near.state_on_part(&start);
-    let (found, steps) = settle_as_alone(&part, controls, &start, factors, observe)?;
+    let (found, steps) = follow_as_alone(&part, controls, &start, factors, observe)?;
     let (finished, outside) = near.on_whole(system, controls, load, found);
     let settled = outside.is_empty()
         && finished.rounding.is_none()
@@ -161,18 +162,18 @@ pub fn settle_near(
     settled.then_some((finished, steps))
 }
 
-/// The solution near a start, if it is that which the problem has on its own: steps from its own frictionless state lead there
-/// too. Beyond a fold friction and pressure may hold each other in a state that nothing leads to but a neighbour.
-fn settle_as_alone(
+/// The solution close to a start, if steps from the problem's own frictionless state lead to it too. Beyond a fold,
+/// friction and pressure may support each other in a state that can only be reached from a neighbour.
+fn follow_as_alone(
     system: &System<'_>,
     controls: &SolverControls,
     start: &State,
     factors: &mut Factors,
     observe: &mut Observer<'_>,
 ) -> Option<(Finished, u32)> {
-    /// Friction bounds of one solution agree to this part, far above what the tolerance leaves of them.
+    /// Friction bounds of one solution agree to this part, far above the error that the tolerance permits.
     const AGREES: f64 = 1e-5;
-    let (found, steps) = settle(system, controls, start, factors, observe)?;
+    let (found, steps) = follow(system, controls, start, factors, observe)?;
     let given = |source: &Source| matches!(source, Source::Given(_));
     // a convex problem has one solution
     if system.points.iter().all(|point| given(&point.source)) {
@@ -186,8 +187,8 @@ fn settle_as_alone(
     let own = match implied.iter().all(|tau| *tau == 0.0) {
         true => implied,
         false => {
-            let start = stuck(system, &free.state);
-            let own = settle(system, controls, &start, &mut Factors::default(), observe)?;
+            let start = all_sticking(system, &free.state);
+            let own = follow(system, controls, &start, &mut Factors::default(), observe)?;
             own.0.bound
         }
     };
@@ -201,12 +202,12 @@ fn settle_as_alone(
 }
 
 impl Region {
-    /// How far it reaches now.
+    /// The present extent of the region.
     pub fn extent(&self) -> Extent {
         self.extent.clone()
     }
 
-    /// Reaches as far as it did for a neighbour, whose factors serve if they are the last ones.
+    /// Extends the region as far as for a neighbour. Its last factors are used if `with_last_factors`.
     pub fn reach(&mut self, extent: &Extent, with_last_factors: bool) {
         let same = self.extent == *extent;
         if !same {
@@ -218,7 +219,7 @@ impl Region {
         }
     }
 
-    /// Takes the whole of the boundary.
+    /// Extends the region to the whole boundary.
     fn take_whole(&mut self) {
         self.near = None;
         self.extent = Extent {
@@ -228,7 +229,7 @@ impl Region {
         self.factors.renew();
     }
 
-    /// Eliminates what may not touch, unless that is done or not worth it.
+    /// Eliminates the unknowns that may not touch, unless that is done already or not worth it.
     fn prepare(
         &mut self,
         system: &System<'_>,
@@ -260,12 +261,12 @@ impl Region {
         } = &mut self.extent;
         let wanted = wanted.get_or_insert_with(|| rubbed(system, touches));
         self.factors.renew();
-        let serves = |near: &&Arc<Near>| near.wanted == *wanted && near.acting == acting;
+        let serves = |near: &&Arc<MayTouch>| near.wanted == *wanted && near.acting == acting;
         self.near = self.made.iter().find(serves).cloned();
         if self.near.is_some() {
             return;
         }
-        match Near::new(system, wanted.clone(), observe) {
+        match MayTouch::new(system, wanted.clone(), observe) {
             Some(near) => {
                 let near = Arc::new(near);
                 let bytes = near.bytes() + self.made.iter().map(|near| near.bytes()).sum::<u64>();
@@ -278,7 +279,7 @@ impl Region {
         }
     }
 
-    /// Takes more of the boundary, to be eliminated anew.
+    /// Enlarges the part of the boundary, which is then eliminated anew.
     fn grow(&mut self, outside: &[usize]) {
         let touches = &mut self.extent.touches;
         for &node in outside {
@@ -296,8 +297,8 @@ impl Region {
 }
 
 /// By contact node, whether it may touch: where the obstacle overlaps the body before it deforms, and where nodes
-/// touched at the last level, with a margin. All nodes of a contact without an obstacle, or with a friction bound that does not
-/// follow from its pressure.
+/// touched at the last level, with a margin. This includes all nodes of a contact without an obstacle, or with a
+/// friction bound that does not depend on its pressure.
 fn may_touch(system: &System<'_>, last: Option<&Finished>) -> Vec<bool> {
     let steps = system.model.steps.iter().map(|step| step.indentation);
     let deepest = steps.fold(system.level.indentation, f64::max);
@@ -336,7 +337,7 @@ fn widened(nodes: &[bool], part: f64) -> Vec<bool> {
     wide
 }
 
-/// The nodes that may touch, those that friction may act on then, and those whose unknowns belong to one of them.
+/// The nodes that may touch, those where friction may act then, and those that share unknowns with one of them.
 fn rubbed(system: &System<'_>, touches: &[bool]) -> Vec<bool> {
     let mut kept = touches.to_vec();
     for point in &system.points {
@@ -360,8 +361,8 @@ fn rubbed(system: &System<'_>, touches: &[bool]) -> Vec<bool> {
     kept
 }
 
-impl Near {
-    /// Eliminates the unknowns of other nodes than `kept`. None if that is not worth it, or the observer stops.
+impl MayTouch {
+    /// Eliminates the unknowns of all nodes but `kept`. None if that is not worth it, or the observer stops.
     fn new(system: &System<'_>, kept: Vec<bool>, observe: &mut Observer<'_>) -> Option<Self> {
         let size = system.load.len();
         let mut keeps = vec![false; size];
@@ -378,14 +379,14 @@ impl Near {
         let count = order.len();
         order.extend(rest);
         let entry = |i: usize, j: usize| system.stiffness.at(order[i], order[j]);
-        let (eliminated, stiffness) = dense(size, observe, |breaks| {
-            Eliminated::new(size, count, entry, breaks)
+        let (eliminated, stiffness) = dense(size, observe, |interrupt| {
+            Eliminated::new(size, count, entry, interrupt)
         })?;
         // a node of two contacts is kept with either of them
         let has_all = |node| unknowns(node).all(|dof| keeps[dof]);
         let kept: Vec<bool> = system.nodes.iter().map(has_all).collect();
         let on_kept = |&g: &usize| system.points[g].nodes.iter().all(|&node| kept[node]);
-        Some(Near {
+        Some(MayTouch {
             points: (0..system.points.len()).filter(on_kept).collect(),
             acting: acting(system),
             wanted,
@@ -396,18 +397,18 @@ impl Near {
         })
     }
 
-    /// What it takes.
+    /// The memory that this part takes (bytes).
     fn bytes(&self) -> u64 {
         let (all, kept) = (self.order.len() as u64, self.stiffness.size() as u64);
         8 * (all * (all - kept) + kept * kept)
     }
 
-    /// Number of eliminated unknowns.
+    /// The number of eliminated unknowns.
     fn count(&self) -> usize {
         self.order.len() - self.stiffness.size()
     }
 
-    /// The system of this part, and f̂ in this order, reduced: [`Near::on_whole`] needs it again.
+    /// The system of this part, and f̂ reduced and in the order of this part, which [`MayTouch::on_whole`] needs again.
     fn part<'a>(&'a self, system: &System<'a>) -> (System<'a>, Vec<f64>) {
         let mut load: Vec<f64> = self.order.iter().map(|&dof| system.load[dof]).collect();
         self.eliminated.reduce(&mut load);
@@ -450,7 +451,7 @@ impl Near {
         (part, load)
     }
 
-    /// A state on the whole as one on this part.
+    /// Restricts a state of the whole system to this part.
     fn state_on_part(&self, whole: &State) -> State {
         let kept = self.order[self.count()..].iter();
         State {
@@ -459,7 +460,7 @@ impl Near {
         }
     }
 
-    /// An end on the whole as a start on this part.
+    /// Restricts the end of the iterations on the whole system to a start on this part.
     fn on_part(&self, whole: &Finished) -> Finished {
         Finished {
             state: self.state_on_part(&whole.state),
@@ -470,7 +471,8 @@ impl Near {
         }
     }
 
-    /// What was found on this part, measured on the whole; and the eliminated nodes that are needed too.
+    /// Extends the result on this part to the whole system and measures it there; also the eliminated nodes that are
+    /// needed.
     fn on_whole(
         &self,
         system: &System<'_>,
@@ -529,7 +531,7 @@ impl Near {
     }
 }
 
-/// By contact, where friction acts if it does.
+/// By contact, the friction that acts, if any.
 fn acting(system: &System<'_>) -> Vec<Option<FrictionPoints>> {
     let points = |patch: &Patch<'_>| patch.law.as_ref().map(|law| law.points);
     system.patches.iter().map(points).collect()
