@@ -119,7 +119,7 @@ impl JobId {
         JobId(Uuid::now_v7())
     }
 
-    /// Reads the canonical form and no other: a job has one spelling.
+    /// Reads the id of a job in its canonical form only, so that each job has one spelling.
     pub fn parse(text: &str) -> Option<Self> {
         let id = JobId(Uuid::try_parse(text.strip_prefix("job_")?).ok()?);
         (id.to_string() == text).then_some(id)
@@ -175,7 +175,7 @@ impl SweepId {
         SweepId(Uuid::now_v7())
     }
 
-    /// Reads the canonical form and no other: a sweep has one spelling.
+    /// Reads the id of a sweep in its canonical form only, so that each sweep has one spelling.
     pub fn parse(text: &str) -> Option<Self> {
         let id = SweepId(Uuid::try_parse(text.strip_prefix("sweep_")?).ok()?);
         (id.to_string() == text).then_some(id)

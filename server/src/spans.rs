@@ -53,9 +53,9 @@ pub struct Span {
     pub begun: Time,
     /// The time when it ended.
     pub ended: Time,
-    /// Further facts.
+    /// Further attributes of the span.
     pub attributes: Vec<KeyValue>,
-    /// Why it has failed; absent if it has not.
+    /// Why the work of the span failed; absent if it succeeded.
     pub error: Option<String>,
 }
 

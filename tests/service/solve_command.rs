@@ -209,7 +209,7 @@ fn the_help_lists_every_exit_code() {
         .output()
         .unwrap();
     let told = String::from_utf8_lossy(&sweep.stderr);
-    assert!(told.contains("solve it by `signorini sweep`"), "{told}");
+    assert!(told.contains("solve it with `signorini sweep`"), "{told}");
     assert_eq!(sweep.status.code(), Some(2));
     let unknown = Command::new(SIGNORINI)
         .args(["explain", "nonsense"])

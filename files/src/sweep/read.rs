@@ -153,7 +153,7 @@ fn mode(raw: Option<&RawValue>, found: &mut Findings) -> Option<Mode> {
             Reason::UnknownAlternative,
             quoted(raw.get()),
             "\"grid\", \"zip\" or \"list\"",
-            hint.unwrap_or_else(|| "Remove it for grid.".to_owned()),
+            hint.unwrap_or_else(|| "Without `mode` the sweep is a grid.".to_owned()),
         ));
     }
     mode

@@ -26,8 +26,8 @@ pub struct StepResult {
 #[derive(Debug, Serialize, JsonSchema)]
 #[schemars(rename = "Result")]
 pub struct JobResult {
-    /// As in the job: `partial` if the job has not ended or has not converged, even if the summary of the last finished
-    /// load step is that of a converged solution.
+    /// How much of the result is available, as in the job: `partial` if the job has not ended or has not converged, even
+    /// if the last finished load step converged.
     pub result_available: ResultAvailable,
     /// The summary of the last finished load step.
     pub summary: Summary,
