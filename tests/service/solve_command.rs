@@ -305,7 +305,7 @@ fn a_mesh_that_is_named_by_its_hash_is_read_from_its_file() {
     let drawn = solve(&problem, &["-o", &figure, "--mesh", &file("quad.json")]);
     assert_eq!(drawn.status.code(), Some(0), "{drawn:?}");
     for (arguments, said) in [
-        (vec![], "give its file by --mesh"),
+        (vec![], "give its file with --mesh"),
         (
             vec!["--mesh".to_owned(), file("other.json")],
             "this file has the hash",
