@@ -6,7 +6,7 @@ use super::check::Group;
 use super::plan::{Plan, Values};
 
 /// The number of consecutive members of a line that start from each other; the next one starts from the first of them
-/// again. Solving one member anew requires those before it.
+/// again. Solving one member again requires those before it.
 const CHAIN: usize = 64;
 
 /// The member that another one starts from.
