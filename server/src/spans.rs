@@ -47,7 +47,7 @@ pub struct Span {
     pub trace: Trace,
     /// The kind of work: one of a few names.
     pub name: Cow<'static, str>,
-    /// Whether it answers a request, rather than being internal work.
+    /// Whether the span is the answer to a request rather than internal work.
     pub answers: bool,
     /// The time when it began.
     pub begun: Time,

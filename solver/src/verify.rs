@@ -166,9 +166,9 @@ struct QuietObserver<'a, 'b> {
 
 /// A refusal of the observer.
 enum Stop {
-    /// It refused this many more bytes.
+    /// The caller refused this many more bytes.
     Memory(u64),
-    /// It refused to continue.
+    /// The caller refused to continue.
     Going,
 }
 

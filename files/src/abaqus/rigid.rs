@@ -35,7 +35,7 @@ pub(super) struct Body {
     pub(super) reference: Option<u32>,
     /// The node whose displacements are the rotations of the rigid body; `None` if the deck does not name a single node.
     pub(super) rotation: Option<u32>,
-    /// Whether it shares nodes with the elastic body.
+    /// Whether the rigid body shares nodes with the elastic body.
     pub(super) attached: bool,
 }
 

@@ -17,7 +17,7 @@ pub struct Neighbour {
     /// The number of the line that both are on, along an axis of the grid: once its last member is known, those before
     /// it on the line are not needed again.
     pub line: usize,
-    /// Whether it is the previous member in the group.
+    /// Whether the neighbour is the previous member in the group.
     pub adjacent: bool,
 }
 

@@ -24,7 +24,7 @@ use crate::{
 pub struct Sweep {
     /// The base problem, from which members differ, with its mesh.
     pub base: Problem,
-    /// Its members.
+    /// The members of the sweep.
     pub plan: Plan,
 }
 

@@ -42,7 +42,7 @@ pub struct Found<T> {
     pub available: ResultAvailable,
     /// The requested part.
     pub content: T,
-    /// Its share of the memory for answers, if it is large.
+    /// The part of the memory for answers that a large result takes.
     pub share: Option<Share>,
 }
 
