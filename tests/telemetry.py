@@ -275,7 +275,7 @@ def test_no_collector():
                 began = time.monotonic()
                 server.stop()
                 check(time.monotonic() - began < 5, "it stops without waiting for the collector")
-                told = [line for line in server.log.read_text().splitlines() if "does not take them" in line]
+                told = [line for line in server.log.read_text().splitlines() if "does not receive them" in line]
                 # of one that does not answer it is known after 5 s
                 check(len(told) == 1 or (url == silent and not told), "the log tells it once: %r" % told)
     check(max(longest) < 0.5, "requests took %r s" % longest)

@@ -174,7 +174,7 @@ pub(crate) fn check(fields: &Fields) -> Result<(), String> {
         if found == expected {
             Ok(())
         } else {
-            Err(format!("{what}: {found} values, where {expected} belong"))
+            Err(format!("{what}: {found} values instead of {expected}"))
         }
     };
     let nodal = [

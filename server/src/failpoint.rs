@@ -15,7 +15,7 @@ pub(crate) use points::{Failing, set, was_missed};
 pub(crate) enum Point {
     /// The job is accepted, but that is not committed.
     Accepted,
-    /// Its acceptance is committed, but not answered.
+    /// The acceptance of a job is committed, but not answered.
     Answered,
     /// The job is claimed, but that is not committed.
     Claimed,

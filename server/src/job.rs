@@ -38,9 +38,9 @@ pub struct Job {
     pub cache: Cache,
     /// The public id.
     pub id: JobId,
-    /// Its status.
+    /// The status of the job.
     pub status: Status,
-    /// Why it failed or was canceled.
+    /// Why the job failed or was canceled.
     pub reason: Option<Reason>,
     /// Whether a client asked it to stop while it was running.
     pub cancel_requested: bool,
@@ -69,7 +69,7 @@ pub struct Job {
     /// The sweep whose members it solves; its own problem and result are those of the first of these members.
     #[serde(default)]
     pub sweep: Option<SweepId>,
-    /// Whether it is never deleted because of its age.
+    /// Whether the job is pinned: never deleted because of its age or size.
     #[serde(default)]
     pub pinned: bool,
     /// The time when it was accepted.
@@ -82,11 +82,11 @@ pub struct Job {
     pub queue_wait_s: Option<f64>,
     /// Seconds from the start of the last attempt to the end.
     pub run_s: Option<f64>,
-    /// Its position in the queue, while it waits.
+    /// The position of the job in the queue, while it waits.
     pub queue: Option<QueuePosition>,
-    /// Its progress, once it was started.
+    /// The progress of the job, once it has started.
     pub progress: Option<Progress>,
-    /// Its time limits.
+    /// The time limits of the job.
     #[serde(default)]
     pub limits: Limits,
     /// What went wrong.
@@ -106,7 +106,7 @@ pub struct Job {
 }
 
 impl Job {
-    /// Whether it waits for a worker, and is not coalesced into another job.
+    /// Whether the job waits for a worker and is not coalesced into another job.
     pub fn waits_for_a_worker(&self) -> bool {
         self.status == Status::Queued && self.coalesced_into.is_none()
     }
@@ -122,7 +122,7 @@ impl JobId {
         JobId(Uuid::now_v7())
     }
 
-    /// Reads the canonical form and no other: a job has one spelling.
+    /// Reads the id of a job in its canonical form only, so that each job has one spelling.
     pub fn parse(text: &str) -> Option<Self> {
         let id = JobId(Uuid::try_parse(text.strip_prefix("job_")?).ok()?);
         (id.to_string() == text).then_some(id)
@@ -178,7 +178,7 @@ impl SweepId {
         SweepId(Uuid::now_v7())
     }
 
-    /// Reads the canonical form and no other: a sweep has one spelling.
+    /// Reads the id of a sweep in its canonical form only, so that each sweep has one spelling.
     pub fn parse(text: &str) -> Option<Self> {
         let id = SweepId(Uuid::try_parse(text.strip_prefix("sweep_")?).ok()?);
         (id.to_string() == text).then_some(id)
@@ -475,9 +475,9 @@ pub enum Waiting {
     Paused,
     /// The disk has no room for results; jobs start again when there is some.
     LowDisk,
-    /// Its owner has reached the limit of running jobs.
+    /// The owner of the job has reached the limit of running jobs.
     OwnerLimit,
-    /// It is coalesced into a queued or running job with the same input, and will end with that job's result.
+    /// The job is coalesced into a queued or running job with the same input, and will end with that job's result.
     Coalesced,
 }
 

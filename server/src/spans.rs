@@ -47,15 +47,15 @@ pub struct Span {
     pub trace: Trace,
     /// The kind of work: one of a few names.
     pub name: Cow<'static, str>,
-    /// Whether it answers a request, rather than being internal work.
+    /// Whether the span is the answer to a request rather than internal work.
     pub answers: bool,
     /// The time when it began.
     pub begun: Time,
     /// The time when it ended.
     pub ended: Time,
-    /// Further facts.
+    /// Further attributes of the span.
     pub attributes: Vec<KeyValue>,
-    /// Why it has failed; absent if it has not.
+    /// Why the work of the span failed; absent if it succeeded.
     pub error: Option<String>,
 }
 

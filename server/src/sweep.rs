@@ -78,7 +78,7 @@ pub struct MemberRow {
     pub parameters: BTreeMap<String, ParameterValue>,
     /// The member's status.
     pub status: Status,
-    /// Why it failed or was canceled.
+    /// Why the member failed or was canceled.
     pub reason: Option<Reason>,
     /// A description of the failure in words, if it failed.
     #[serde(default, skip_serializing_if = "Option::is_none")]

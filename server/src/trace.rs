@@ -53,7 +53,7 @@ impl Trace {
         }
     }
 
-    /// A new piece of work that is part of this one.
+    /// The trace context of a new part of this piece of work.
     pub fn part(&self) -> Trace {
         Trace::part_of(&self.own)
     }

@@ -27,7 +27,7 @@ pub struct Family {
 /// The numerical results of one problem of a family.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Member {
-    /// How it ended.
+    /// How the solution ended.
     pub outcome: Outcome,
     /// The normal force ∫p ≥ 0 over all contacts (force).
     pub normal_force: f64,

@@ -16,9 +16,9 @@ use crate::steps;
 
 /// The data that verifying a solution needs in addition to its problem and its mesh.
 pub struct Verification {
-    /// The problem's own mesh, if it is not in the problem.
+    /// The problem's mesh, if the problem refers to it instead of containing it.
     external: Option<External>,
-    /// The most elements of the refined mesh; none where the caller chooses the size.
+    /// The largest number of elements of the refined mesh; `None` if the caller chooses the size.
     most: Option<MostElements>,
 }
 
@@ -166,9 +166,9 @@ struct QuietObserver<'a, 'b> {
 
 /// A refusal of the observer.
 enum Stop {
-    /// It refused this many more bytes.
+    /// The caller refused this many more bytes.
     Memory(u64),
-    /// It refused to continue.
+    /// The caller refused to continue.
     Going,
 }
 

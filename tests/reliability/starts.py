@@ -193,7 +193,7 @@ def taken_away():
             told = max(told, time.monotonic() - began)
             equal(server.call("GET", "/livez").status, 200, "livez")
             time.sleep(2.2)
-            lines = [line for line in server.log.read_text().splitlines() if "nothing is stored until" in line]
+            lines = [line for line in server.log.read_text().splitlines() if "no data are stored until" in line]
             equal(len(lines), 1, "%s: lines in the log" % what)
             server.kill()
     return told
@@ -224,7 +224,7 @@ def damaged_table(server, folder):
         equal(server.call("GET", "/v1/jobs/" + job).status, 200, "reading")
         time.sleep(1.2)
         lines = server.log.read_text().splitlines()
-        equal(len([line for line in lines if "ERROR" in line and "signorini doctor" in line and "nothing more of" not in line]), 2,
+        equal(len([line for line in lines if "ERROR" in line and "signorini doctor" in line and "cannot be stored any more" not in line]), 2,
               "lines that tell of the damage, and that nothing is stored")
         check(any("job %s cannot be stored any more" % job in line for line in lines), "its job is named: %r" % lines)
         time.sleep(2.2)

@@ -209,7 +209,7 @@ fn the_help_lists_every_exit_code() {
         .output()
         .unwrap();
     let told = String::from_utf8_lossy(&sweep.stderr);
-    assert!(told.contains("solve it by `signorini sweep`"), "{told}");
+    assert!(told.contains("solve it with `signorini sweep`"), "{told}");
     assert_eq!(sweep.status.code(), Some(2));
     let unknown = Command::new(SIGNORINI)
         .args(["explain", "nonsense"])
@@ -305,7 +305,7 @@ fn a_mesh_that_is_named_by_its_hash_is_read_from_its_file() {
     let drawn = solve(&problem, &["-o", &figure, "--mesh", &file("quad.json")]);
     assert_eq!(drawn.status.code(), Some(0), "{drawn:?}");
     for (arguments, said) in [
-        (vec![], "give its file by --mesh"),
+        (vec![], "give its file with --mesh"),
         (
             vec!["--mesh".to_owned(), file("other.json")],
             "this file has the hash",

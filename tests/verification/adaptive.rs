@@ -151,7 +151,7 @@ fn a_kink_of_the_obstacle_stands_in_the_way_and_is_named() {
         message.starts_with("`peak_normal_stress` of contact `top` has no limit"),
         "{message}"
     );
-    assert!(message.ends_with("Forces have a limit, and so has the averaged pressure."));
+    assert!(message.ends_with("Forces converge, and so does the averaged pressure."));
 }
 
 /// The observer learns which mesh is being solved.

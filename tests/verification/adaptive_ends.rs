@@ -239,7 +239,7 @@ fn load_steps_are_those_of_the_last_mesh() {
     assert_eq!(lifted.solution.summary.refinements.len(), 1);
     let message = reason(&lifted.solution);
     assert!(
-        message.starts_with("At the end of the last load step nothing touches"),
+        message.starts_with("Nothing is in contact at the end of the last load step"),
         "{message}"
     );
 }

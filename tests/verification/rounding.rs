@@ -217,7 +217,7 @@ const LIMITED: Dragged = Dragged {
 #[test]
 fn the_elastic_slip_that_the_warning_names_is_large_enough() {
     let limited = summary(&LIMITED.problem(UNITS[0]));
-    let named = number(rounding(&limited).unwrap(), "elastic_slip, to ");
+    let named = number(rounding(&limited).unwrap(), "elastic_slip to ");
     assert!(
         named > LIMITED.elastic_slip && named < 1e-4 * LIMITED.drag,
         "{named:e}"

@@ -71,7 +71,7 @@ fn too_many_ends_of_stick_have_no_error_and_say_so_once() {
             .filter(|reason| reason.contains("`stick_end`"));
         let told: Vec<&String> = told.collect();
         assert!(
-            told.len() == 1 && told[0].contains("more ends of stick"),
+            told.len() == 1 && told[0].contains("too many ends of stick"),
             "{told:?}"
         );
         assert_ne!(accuracy.verdict, Verdict::Good);

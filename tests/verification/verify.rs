@@ -332,7 +332,7 @@ fn a_finer_mesh_that_cannot_be_solved_leaves_the_solution_and_says_why() {
         accuracy(solution).reasons[0].clone()
     };
     assert!(
-        reason(&own).contains("stopped before its end"),
+        reason(&own).contains("was stopped (canceled, or"),
         "{}",
         reason(&own)
     );

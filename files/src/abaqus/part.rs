@@ -69,7 +69,7 @@ pub(super) struct Part {
     pub(super) held: Vec<Held>,
     /// Which of its data are incomplete because a line could not be read.
     pub(super) incomplete: Incomplete,
-    /// Its unknown keywords.
+    /// The unknown keywords of the part.
     pub(super) unknown_keywords: Vec<UnknownKeyword>,
     /// The violations of its mesh.
     pub(super) faults: Found,

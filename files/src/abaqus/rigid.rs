@@ -31,10 +31,11 @@ pub(super) struct Tools {
 /// A rigid body.
 pub(super) struct Body {
     pub(super) line: u64,
-    /// The node that moves it, and the one whose displacements are its rotations; none: not a single node.
+    /// The reference node, which moves the rigid body; `None` if the deck does not name a single node.
     pub(super) reference: Option<u32>,
+    /// The node whose displacements are the rotations of the rigid body; `None` if the deck does not name a single node.
     pub(super) rotation: Option<u32>,
-    /// Whether it shares nodes with the elastic body.
+    /// Whether the rigid body shares nodes with the elastic body.
     pub(super) attached: bool,
 }
 

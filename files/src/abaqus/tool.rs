@@ -32,7 +32,7 @@ const DIGITS: f64 = 1e-4;
 /// A rigid surface in the form of an obstacle.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Outline {
-    /// Its points, in its direction.
+    /// The points of the outline, in its direction.
     pub(super) points: Vec<Point>,
     /// How the points are joined.
     pub(super) joined: Joined,

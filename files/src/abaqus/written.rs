@@ -72,7 +72,7 @@ pub(super) struct Orientation {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Amplitude {
     pub(super) line: u64,
-    /// Whether it is something other than a table of factors.
+    /// Whether the amplitude is something other than a table of factors.
     pub(super) other: bool,
     pub(super) values: Vec<f64>,
 }

@@ -126,7 +126,7 @@ impl Shape {
         !self.branches().is_empty() || self.condition.is_some()
     }
 
-    /// Whether it consists of alternatives and nothing else.
+    /// Whether the schema consists of alternatives and nothing else.
     pub(super) fn only_alternatives(&self) -> bool {
         self.types().is_empty() && self.properties.is_empty() && self.required.is_empty()
     }

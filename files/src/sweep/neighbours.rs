@@ -6,7 +6,7 @@ use super::check::Group;
 use super::plan::{Plan, Values};
 
 /// The number of consecutive members of a line that start from each other; the next one starts from the first of them
-/// again. Solving one member anew requires those before it.
+/// again. Solving one member again requires those before it.
 const CHAIN: usize = 64;
 
 /// The member that another one starts from.
@@ -17,7 +17,7 @@ pub struct Neighbour {
     /// The number of the line that both are on, along an axis of the grid: once its last member is known, those before
     /// it on the line are not needed again.
     pub line: usize,
-    /// Whether it is the previous member in the group.
+    /// Whether the neighbour is the previous member in the group.
     pub adjacent: bool,
 }
 

@@ -29,7 +29,7 @@ enum Known<'a> {
 pub struct Read<'a> {
     /// The problem, as [`Plan::problem`] gives it.
     pub problem: &'a Problem,
-    /// Whether it differs from the one before only in numbers of laws and motions, so that its body is the same.
+    /// Whether the member differs from the previous one only in numbers of laws and motions: both have the same body.
     pub same_body: bool,
 }
 

@@ -24,7 +24,7 @@ use crate::{
 pub struct Sweep {
     /// The base problem, from which members differ, with its mesh.
     pub base: Problem,
-    /// Its members.
+    /// The members of the sweep.
     pub plan: Plan,
 }
 
@@ -153,7 +153,7 @@ fn mode(raw: Option<&RawValue>, found: &mut Findings) -> Option<Mode> {
             Reason::UnknownAlternative,
             quoted(raw.get()),
             "\"grid\", \"zip\" or \"list\"",
-            hint.unwrap_or_else(|| "Remove it for grid.".to_owned()),
+            hint.unwrap_or_else(|| "Without `mode` the sweep is a grid.".to_owned()),
         ));
     }
     mode

@@ -472,7 +472,7 @@ mod tests {
              retain_days = true\n[tls]\nkey = 1\n",
         );
         let expected = [
-            "a.toml:1: \"wokers\": there is no such setting; did you mean workers?",
+            "a.toml:1: \"wokers\" is not a setting; did you mean workers?",
             "a.toml:2: workers: found \"many\", expected an integer",
             "a.toml:4: isolation: found \"proces\", expected thread or process",
             "a.toml:5: max_queued: found -1, expected an integer (-1 is not in 0..=4294967295)",
@@ -483,7 +483,7 @@ mod tests {
             "a.toml:9: allow_unauthenticated: found 1, expected true or false",
             "a.toml:10: listen: found 80, expected a text in quotation marks",
             "a.toml:11: retain_days: found true, expected a number",
-            "a.toml:12: \"tls\": there is no such setting; did you mean tls_key?",
+            "a.toml:12: \"tls\" is not a setting; did you mean tls_key?",
         ];
         assert_eq!(wrong, expected);
     }
@@ -494,7 +494,7 @@ mod tests {
         assert!(values.is_empty());
         assert!(wrong.len() >= 2, "{wrong:?}");
         assert!(
-            wrong[0].starts_with("a.toml:1: this is no TOML: "),
+            wrong[0].starts_with("a.toml:1: not valid TOML: "),
             "{wrong:?}"
         );
         assert!(wrong[1].starts_with("a.toml:2: "), "{wrong:?}");

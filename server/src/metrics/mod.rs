@@ -199,7 +199,7 @@ impl Metrics {
     }
 }
 
-/// The present figures that other parts of the service know.
+/// Metrics that other parts of the service measure at the moment of a request for them.
 #[derive(Debug, Default)]
 pub struct Snapshot(Registry);
 

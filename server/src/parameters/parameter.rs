@@ -131,6 +131,6 @@ pub struct Description {
     pub schema: serde_json::Value,
     /// The meaning.
     pub meaning: &'static str,
-    /// Whether it may be given several times.
+    /// Whether the parameter may be given several times.
     pub repeatable: bool,
 }

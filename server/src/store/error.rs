@@ -41,7 +41,7 @@ pub enum StoreError {
     #[error("the mesh is not stored")]
     UnknownMesh,
     /// Too many lists are requested at once.
-    #[error("too many lists at once")]
+    #[error("too many lists are being read at the same time")]
     Busy,
     /// The disk is full, or cannot be written: SQLite reports a quota and a limit on file sizes as errors of the disk.
     #[error("the disk is full, or cannot be written")]

@@ -24,7 +24,7 @@ use crate::{
 /// Version and limits of a service.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Info {
-    /// Its name.
+    /// The name of the service.
     pub name: String,
     /// The version of the program, which is also that of the solver.
     pub version: String,

@@ -89,9 +89,9 @@ pub const STRESS: Parameter<Words<Stress>> = Parameter {
 pub struct Figure {
     /// The kind of figure.
     pub plot: Plot,
-    /// The file format.
+    /// The file format of the figure.
     pub format: Format,
-    /// The style.
+    /// The style of the figure.
     pub style: Style,
     /// The load step at whose end the figure is drawn, by its name or its number from 0; absent: the last one.
     pub step: Option<String>,

@@ -22,15 +22,15 @@ use crate::{
 /// The result of checking a problem.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Validation {
-    /// Whether it would be accepted as a job, with a time limit that is not far below the estimate.
+    /// Whether the problem would be accepted as a job with a time limit not far below the estimate.
     pub valid: bool,
     /// All violations of the problem.
     pub violations: Vec<Violation>,
     /// The warnings to consider before relying on its result.
     pub warnings: Vec<Warning>,
-    /// Its estimated cost, also for an invalid problem; absent if it, or the stored mesh that it names, cannot be read.
+    /// The estimated cost of the problem, also of an invalid one; absent if the problem or its stored mesh cannot be read.
     pub estimate: Option<Estimate>,
-    /// Its fingerprint; absent if `estimate` is.
+    /// The fingerprint of the problem; absent if `estimate` is absent.
     pub input_hash: Option<String>,
 }
 

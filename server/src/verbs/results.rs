@@ -26,8 +26,8 @@ pub struct StepResult {
 #[derive(Debug, Serialize, JsonSchema)]
 #[schemars(rename = "Result")]
 pub struct JobResult {
-    /// As in the job: `partial` if the job has not ended or has not converged, even if the summary of the last finished
-    /// load step is that of a converged solution.
+    /// How much of the result is available, as in the job: `partial` if the job has not ended or has not converged, even
+    /// if the last finished load step converged.
     pub result_available: ResultAvailable,
     /// The summary of the last finished load step.
     pub summary: Summary,
@@ -42,7 +42,7 @@ pub struct Found<T> {
     pub available: ResultAvailable,
     /// The requested part.
     pub content: T,
-    /// Its share of the memory for answers, if it is large.
+    /// The part of the memory for answers that a large result takes.
     pub share: Option<Share>,
 }
 

@@ -331,7 +331,7 @@ pub async fn get(service: &Service, caller: &Caller, id: SweepId) -> Result<Swee
     }
 }
 
-/// The sweep when it has ended, or in its state after this many seconds or when the service stops.
+/// Waits until the sweep has ended, for at most this many seconds or until the service stops, and returns the sweep.
 pub async fn wait(
     service: &Service,
     caller: &Caller,

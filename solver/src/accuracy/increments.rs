@@ -20,9 +20,9 @@ const MARGIN: f64 = 1.25;
 /// The quantities at the end of the same load path, solved in more increments.
 #[derive(Default)]
 pub struct Increments {
-    /// None if that solution did not converge.
+    /// The quantities of the solution in more increments; empty if it did not converge.
     quantities: Vec<Quantity>,
-    /// Multiplies a difference to give an error.
+    /// The error of a quantity is this factor times its difference between both solutions.
     factor: f64,
 }
 

@@ -20,7 +20,7 @@ pub struct Finished {
     pub tractions: Vec<f64>,
     /// Whether the tractions are those of the thesis's own iteration, instead of those of the law in this state.
     pub own_tractions: bool,
-    /// How it ended.
+    /// How the iteration ended.
     pub outcome: Outcome,
     /// The stage that produced the final state.
     pub stage: Stage,

@@ -279,7 +279,7 @@ impl Region {
         }
     }
 
-    /// Enlarges the part of the boundary, which is then eliminated anew.
+    /// Enlarges the part of the boundary, which is then eliminated again.
     fn grow(&mut self, outside: &[usize]) {
         let touches = &mut self.extent.touches;
         for &node in outside {

@@ -18,9 +18,9 @@ pub(super) struct Corner {
 
 /// An obstacle, with its splines.
 pub(super) enum Shape<'a> {
-    /// A formula, or a table with straight lines.
+    /// A formula, or a table interpolated by straight lines.
     Of(&'a Obstacle),
-    /// A smooth table.
+    /// A table interpolated by a spline.
     Smooth(Spline),
     /// A curve, which has no coordinate c.
     InSpace(Curve<'a>),

@@ -27,8 +27,8 @@ pub enum Dof {
 pub struct Axes {
     /// The unit vectors along which the displacement is measured.
     pub along: [[f64; 2]; 2],
-    /// How the node moves where one component is 1 and the other 0: the same vectors if they are perpendicular, else
-    /// the dual basis. Components of a force are taken along these.
+    /// The displacement vectors for which one component is 1 and the other 0: equal to `along` if those vectors are
+    /// perpendicular, otherwise their dual basis. Components of a force are taken along these.
     pub moves: [[f64; 2]; 2],
 }
 

@@ -98,7 +98,7 @@ pub struct Averaging {
 /// The distance of a place from the axis as a function of its position, a r + b z + c.
 type Distance = [f64; 3];
 
-/// The distance of the place itself from the axis.
+/// The distance from the axis of the position itself, which is its coordinate r.
 const OWN: Distance = [1.0, 0.0, 0.0];
 
 /// A mirror image of the chain that continues it evenly beyond an end.

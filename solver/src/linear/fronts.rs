@@ -406,7 +406,7 @@ impl Fronts {
         *stacks
     }
 
-    /// Removes the Schur complements of its halves from their stack.
+    /// Removes the Schur complements of both halves of a front from their stacks.
     fn take_halves(&self, front: &Front, stacks: &mut [usize; 2]) {
         for half in front.halves.into_iter().flatten() {
             let half = &self.fronts[half];

@@ -39,7 +39,7 @@ impl Mesh {
         self.lineage.first_nodes.is_some() || self.added_midsides.is_some()
     }
 
-    /// All sides of the first mesh by their midsides, with their parts in this one.
+    /// All sides of the first mesh by their midsides, with their parts in this mesh.
     pub fn first_sides(&self) -> BTreeMap<u32, FirstSide> {
         let mut sides: BTreeMap<u32, FirstSide> = BTreeMap::new();
         for edge in self.elements.iter().flat_map(Element::sides) {

@@ -4,7 +4,7 @@
 //! to follow its neighbour at a short side by one level, it gets another level ahead at a long one. Where triangles,
 //! whose sides are all split equally, lead from there back to the short side, divisions would never end.
 //!
-//! So halvings are limited in advance, such that the elements of the first mesh have *levels* at which none must be
+//! Halvings are therefore limited in advance, such that the elements of the first mesh have *levels* at which none must be
 //! divided because of its neighbours. Adding the same number to all levels keeps this property. No division can then
 //! lead beyond the lowest such levels that contain the requested ones, so divisions end.
 

@@ -73,7 +73,7 @@ macro_rules! obstacles {
                 /// Where the obstacle begins; absent: at the start of the boundary.
                 #[serde(default, skip_serializing_if = "Option::is_none")]
                 from: Option<f64>,
-                /// Where it ends; absent: at the end of the boundary.
+                /// Where the obstacle ends; absent: at the end of the boundary.
                 #[serde(default, skip_serializing_if = "Option::is_none")]
                 to: Option<f64>,
                 /// The coordinate c along the boundary.

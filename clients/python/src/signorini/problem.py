@@ -478,7 +478,7 @@ class Flat(Part):
 
     along: The coordinate c along the boundary.
     from_: Where the obstacle begins; absent: at the start of the boundary.
-    to: Where it ends; absent: at the end of the boundary.
+    to: Where the obstacle ends; absent: at the end of the boundary.
     """
 
     kind: Literal["flat"] = "flat"
@@ -506,7 +506,7 @@ class Circle(Part):
     along: The coordinate c along the boundary.
     center: Coordinate where the profile is zero.
     from_: Where the obstacle begins; absent: at the start of the boundary.
-    to: Where it ends; absent: at the end of the boundary.
+    to: Where the obstacle ends; absent: at the end of the boundary.
     """
 
     kind: Literal["circle"] = "circle"
@@ -538,7 +538,7 @@ class Parabola(Part):
     along: The coordinate c along the boundary.
     center: Coordinate where the profile is zero.
     from_: Where the obstacle begins; absent: at the start of the boundary.
-    to: Where it ends; absent: at the end of the boundary.
+    to: Where the obstacle ends; absent: at the end of the boundary.
     """
 
     kind: Literal["parabola"] = "parabola"
@@ -570,7 +570,7 @@ class Wedge(Part):
     along: The coordinate c along the boundary.
     center: Coordinate where the profile is zero.
     from_: Where the obstacle begins; absent: at the start of the boundary.
-    to: Where it ends; absent: at the end of the boundary.
+    to: Where the obstacle ends; absent: at the end of the boundary.
     """
 
     kind: Literal["wedge"] = "wedge"
@@ -602,7 +602,7 @@ class Cone(Part):
     along: The coordinate c along the boundary.
     center: Coordinate where the profile is zero.
     from_: Where the obstacle begins; absent: at the start of the boundary.
-    to: Where it ends; absent: at the end of the boundary.
+    to: Where the obstacle ends; absent: at the end of the boundary.
     """
 
     kind: Literal["cone"] = "cone"
@@ -634,7 +634,7 @@ class Tilted(Part):
     along: The coordinate c along the boundary.
     center: Coordinate where the profile is zero.
     from_: Where the obstacle begins; absent: at the start of the boundary.
-    to: Where it ends; absent: at the end of the boundary.
+    to: Where the obstacle ends; absent: at the end of the boundary.
     """
 
     kind: Literal["tilted"] = "tilted"
@@ -667,7 +667,7 @@ class Power(Part):
     along: The coordinate c along the boundary.
     center: Coordinate where the profile is zero.
     from_: Where the obstacle begins; absent: at the start of the boundary.
-    to: Where it ends; absent: at the end of the boundary.
+    to: Where the obstacle ends; absent: at the end of the boundary.
     """
 
     kind: Literal["power"] = "power"
@@ -703,7 +703,7 @@ class RoundedFlat(Part):
     along: The coordinate c along the boundary.
     center: Coordinate of the middle of the flat part.
     from_: Where the obstacle begins; absent: at the start of the boundary.
-    to: Where it ends; absent: at the end of the boundary.
+    to: Where the obstacle ends; absent: at the end of the boundary.
     """
 
     kind: Literal["rounded_flat"] = "rounded_flat"
@@ -768,7 +768,7 @@ class Table(Part):
     interpolation: The shape between the points.
     smoothing: For a measured profile: the curve passes near the points instead of through them. Requires the
         interpolation `cubic`.
-    to: Where it ends; absent: at the end of the boundary.
+    to: Where the obstacle ends; absent: at the end of the boundary.
     """
 
     kind: Literal["table"] = "table"
@@ -804,7 +804,7 @@ class Polyline(Part):
     along: The coordinate c along the boundary.
     from_: Where the obstacle begins; absent: at the start of the boundary.
     interpolation: The shape between the points.
-    to: Where it ends; absent: at the end of the boundary.
+    to: Where the obstacle ends; absent: at the end of the boundary.
     """
 
     kind: Literal["polyline"] = "polyline"
@@ -836,7 +836,7 @@ class Line(Part):
     point: A point `[x, y]` of the line.
     along: The coordinate c along the boundary.
     from_: Where the obstacle begins; absent: at the start of the boundary.
-    to: Where it ends; absent: at the end of the boundary.
+    to: Where the obstacle ends; absent: at the end of the boundary.
     """
 
     kind: Literal["line"] = "line"

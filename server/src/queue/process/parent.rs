@@ -137,9 +137,9 @@ struct Process {
 
 /// Why a process cannot be used any more.
 enum Unusable {
-    /// It did not stop when asked.
+    /// The worker process did not stop when asked.
     Unwilling,
-    /// It died, with this error on the socket.
+    /// The worker process died, with this error on the socket.
     Dead(io::Error),
 }
 

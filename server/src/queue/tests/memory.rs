@@ -90,7 +90,7 @@ async fn a_job_that_outgrows_its_share_fails_with_figures_and_its_worker_goes_on
             detail.contains("1.0 TiB more") || detail.contains("1024.0 GiB more"),
             "{detail}"
         );
-        assert!(detail.contains("a share of 74.0 MiB"), "{detail}");
+        assert!(detail.contains("its share is 74.0 MiB"), "{detail}");
     }
 }
 

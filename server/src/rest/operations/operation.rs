@@ -49,7 +49,7 @@ pub(in crate::rest) struct Operation {
     pub(in crate::rest) example: Option<Value>,
     /// The successful answers.
     pub(in crate::rest) answers: Vec<Answer>,
-    /// Whether it refuses unknown parameters.
+    /// Whether the operation refuses unknown parameters.
     strict: bool,
     errors: Vec<Code>,
 }
