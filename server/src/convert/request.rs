@@ -10,15 +10,14 @@ use solver::{error::Reason, problem::Problem};
 use super::{Reader, read};
 use crate::{
     error::ApiError,
-    job::Cache,
+    job::{Cache, Status, SweepId},
+    parameters::Values,
     pb,
-    store::{Edit, Filter},
+    store::{Edit, Filter, SweepIds, job_filters},
     time::Time,
     verbs::{
         envelope::{Envelope, JobRequest},
-        filters::{
-            self, CREATED_AFTER, CREATED_BEFORE, FINISHED_AFTER, FINISHED_BEFORE, STATUS, SWEEP,
-        },
+        filters,
         sweeps::SweepRequest,
     },
 };
@@ -190,37 +189,55 @@ fn json_text(text: String, read: &mut Reader) -> Option<Box<RawValue>> {
     }
 }
 
-/// Which jobs.
-pub fn filter(message: Option<pb::JobFilter>) -> Result<Filter, ApiError> {
-    let pb::JobFilter {
-        status: numbers,
-        owner,
-        labels,
-        name,
-        input_hash,
-        created_after,
-        created_before,
-        finished_after,
-        finished_before,
-        sweep,
-    } = message.unwrap_or_default();
-    let status = |number| {
-        read(number)
-            .map_err(|_| invalid_field(STATUS.name, number, "a value of the enum other than 0"))
-    };
-    filters::checked(Filter {
-        statuses: numbers.into_iter().map(status).collect::<Result<_, _>>()?,
-        owner,
-        labels: labels.into_iter().collect(),
-        name,
-        input_hash,
-        sweep: sweep.map(|id| SWEEP.read(&id)).transpose()?,
-        created_after: time(CREATED_AFTER.name, created_after)?,
-        created_before: time(CREATED_BEFORE.name, created_before)?,
-        finished_after: time(FINISHED_AFTER.name, finished_after)?,
-        finished_before: time(FINISHED_BEFORE.name, finished_before)?,
-    })
+/// A field of the message of filters.
+trait Criterion<T> {
+    fn read(self, name: &'static str) -> Result<T, ApiError>;
 }
+
+impl Criterion<Vec<Status>> for Vec<i32> {
+    fn read(self, name: &'static str) -> Result<Vec<Status>, ApiError> {
+        let status = |number| {
+            read(number)
+                .map_err(|_| invalid_field(name, number, "a value of the enum other than 0"))
+        };
+        self.into_iter().map(status).collect()
+    }
+}
+
+impl Criterion<Option<String>> for Option<String> {
+    fn read(self, _name: &'static str) -> Result<Option<String>, ApiError> {
+        Ok(self)
+    }
+}
+
+impl Criterion<Option<SweepId>> for Option<String> {
+    fn read(self, name: &'static str) -> Result<Option<SweepId>, ApiError> {
+        let sweep = |id: String| {
+            SweepId::parse(&id).ok_or_else(|| invalid_field(name, id, &SweepIds.expected()))
+        };
+        self.map(sweep).transpose()
+    }
+}
+
+impl Criterion<Option<Time>> for Option<Timestamp> {
+    fn read(self, name: &'static str) -> Result<Option<Time>, ApiError> {
+        time(name, self)
+    }
+}
+
+macro_rules! reader {
+    ($($field:ident: $type:ty, $name:ident, $column:literal $comparison:literal, $index:expr, $meaning:literal;)*) => {
+        /// Which jobs.
+        pub fn filter(message: Option<pb::JobFilter>) -> Result<Filter, ApiError> {
+            let pb::JobFilter { labels, $($name,)* } = message.unwrap_or_default();
+            filters::checked(Filter {
+                labels: labels.into_iter().collect(),
+                $($field: Criterion::<$type>::read($name, stringify!($name))?,)*
+            })
+        }
+    };
+}
+job_filters!(reader);
 
 fn time(name: &'static str, stamp: Option<Timestamp>) -> Result<Option<Time>, ApiError> {
     let Some(stamp) = stamp else { return Ok(None) };

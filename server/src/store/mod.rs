@@ -148,6 +148,7 @@ use std::{path::Path, sync::Arc};
 
 use self::database::Rebuild;
 
+pub(crate) use self::filter::job_filters;
 pub use self::{
     backup::{Backup, Manifest, back_up},
     complaint::Complaint,
@@ -160,9 +161,10 @@ pub use self::{
     entries::Entries,
     error::{Damage, Record, Result, StoreError},
     events::FinalBatch,
-    filter::{Cursor, Filter, GroupBy, Order, OrderBy},
+    filter::{Cursor, FILTERS, Field, Filter, GroupBy, Order, OrderBy, SweepIds},
     health::Health,
     inspect::{Report, inspect},
+    list::Keys,
     meshes::{Removal, StoredMesh},
     parts::{PIECE_BYTES, PIECES_PER_COMMIT, Part, Parts, ProfilePoints},
     progress::accept,
