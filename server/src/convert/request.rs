@@ -213,7 +213,7 @@ impl Criterion<Option<String>> for Option<String> {
 impl Criterion<Option<SweepId>> for Option<String> {
     fn read(self, name: &'static str) -> Result<Option<SweepId>, ApiError> {
         let sweep = |id: String| {
-            SweepId::parse(&id).ok_or_else(|| invalid_field(name, id, &SweepIds.expected()))
+            SweepId::parse(&id).ok_or_else(|| invalid_field(name, id, SweepIds.expected()))
         };
         self.map(sweep).transpose()
     }
