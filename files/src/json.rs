@@ -7,7 +7,7 @@
 use std::fmt;
 use std::io::Read;
 
-use serde::de::{Deserializer, Error, MapAccess, SeqAccess, Visitor};
+use serde::de::{DeserializeOwned, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 
 use crate::inline::{Extract, Places};
 use crate::schema::violations;
@@ -94,8 +94,14 @@ pub(crate) fn check(text: &str, places: &Places) -> Result<Problem, Vec<Violatio
             )]);
         }
     }
-    serde_json::from_str(text)
-        .map_err(|first| vec![beyond_the_schema(text, places.message(&first))])
+    serde_json::from_str(text).map_err(|first| {
+        let hint = "See /v1/schema/problem.json.";
+        vec![beyond_the_schema::<Problem>(
+            text,
+            places.message(&first),
+            hint,
+        )]
+    })
 }
 
 /// The place of the first bracket that nests a text too deeply, in words.
@@ -132,8 +138,8 @@ fn deepest(text: &str) -> Option<(usize, usize)> {
     None
 }
 
-/// The first syntax error, or number or string without a value, with its line and column.
-fn syntax_error(text: &str) -> Option<serde_json::Error> {
+/// The first error of the syntax, or of a number or string that has no value, with its line and column.
+pub(crate) fn syntax_error(text: &str) -> Option<serde_json::Error> {
     let mut reader = serde_json::Deserializer::from_str(text);
     let read = reader.deserialize_any(Anything);
     read.and_then(|()| reader.end()).err()
@@ -195,15 +201,19 @@ impl<'de> serde::de::DeserializeSeed<'de> for Anything {
 }
 
 /// A fault that the schema cannot express, such as a repeated name or a number outside its type.
-fn beyond_the_schema(text: &str, first: String) -> Violation {
+pub(crate) fn beyond_the_schema<T: DeserializeOwned>(
+    text: &str,
+    first: String,
+    hint: &str,
+) -> Violation {
     let mut reader = serde_json::Deserializer::from_str(text);
-    let path = serde_path_to_error::deserialize::<_, Problem>(&mut reader).err();
+    let path = serde_path_to_error::deserialize::<_, T>(&mut reader).err();
     Violation::new(
         path.map_or_else(String::new, |error| pointer_of(error.path())),
         Reason::Malformed,
         first,
         "a value as the schema describes it",
-        "See /v1/schema/problem.json.",
+        hint,
     )
 }
 
@@ -518,7 +528,7 @@ mod tests {
         let support = r#""supports": [{"boundary": "top", "ux": [0, 1, 2]}], "materials""#;
         assert_eq!(expected(r#""materials""#, support), "2 items");
         let support = r#""supports": [{"boundary": "top", "ux": "5"}], "materials""#;
-        assert_eq!(expected(r#""materials""#, support), "number or array");
+        assert_eq!(expected(r#""materials""#, support), "a number or a list");
     }
 
     #[test]

@@ -30,7 +30,8 @@
 //! | subject | where |
 //! |---|---|
 //! | a problem from JSON | `json.rs` |
-//! | the JSON Schema of a problem, and all violations of it | `schema` |
+//! | JSON Schemas, and all violations of them | `schema` |
+//! | bodies of requests | `body.rs` |
 //! | large inline meshes | `inline.rs` |
 //! | a mesh file of any format | `file.rs` |
 //! | Gmsh | `gmsh.rs` |
@@ -51,6 +52,7 @@
 
 // In: problems as JSON, and sweeps of them; meshes as Gmsh files and as decks of Abaqus or CalculiX.
 pub mod abaqus;
+pub mod body;
 pub mod gmsh;
 pub mod json;
 

@@ -174,7 +174,7 @@ async fn a_batch_is_accepted_completely_or_not_at_all() {
         .collect();
     assert_eq!(
         pointers,
-        ["/jobs/2/problem", "/jobs/2/name"],
+        ["/jobs/2/name", "/jobs/2/problem"],
         "structure first"
     );
     let jobs = json!({ "jobs": [body("a"), { "problem": broken, "priority": 99 }] });

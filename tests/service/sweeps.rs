@@ -482,7 +482,12 @@ async fn everything_invalid_is_reported_before_anything_is_stored() {
     assert_eq!(found, expected.into());
     let found = refused(json!({ "axis": [], "limits": { "timeout_s": "x" } })).await;
     let found: BTreeSet<&str> = violations(&found).into_iter().map(|(at, _)| at).collect();
-    assert_eq!(found, ["/axes", "/axis", "/base", "/limits"].into());
+    assert_eq!(found, ["/axis", "/base", "/limits/timeout_s"].into());
+    // what is of the right structure is checked for what it means
+    let found = refused(json!({ "base": punch()["base"], "points": [] })).await;
+    assert_eq!(violations(&found), [("/points", "not_used")]);
+    let found = refused(json!({ "base": punch()["base"] })).await;
+    assert_eq!(violations(&found), [("/axes", "missing")]);
 
     // limits: members, values, depth
     let many = json!({ "start": 0.1, "stop": 0.2, "count": 101 });

@@ -291,3 +291,15 @@ def test_a_service_that_is_not_there() -> None:
             client.info()
         with pytest.raises(ConnectionError):
             list(sg.Job(client, JOB).events())
+
+
+def test_a_list_goes_on_over_short_and_empty_pages(monkeypatch: pytest.MonkeyPatch) -> None:
+    pages = [([], "a"), ([JOB, JOB], "b"), ([], "c"), ([JOB], None)]
+    answers = [httpx.Response(200, json={"jobs": jobs, "next_page_token": token}) for jobs, token in pages]
+    service = Service(*answers)
+    client = client_of(service, monkeypatch)
+    assert len(list(client.jobs(labels={"study": 7}))) == 3
+    tokens = [request.url.params.get("page_token") for request in service.requests]
+    assert tokens == [None, "a", "b", "c"]
+    with pytest.raises(TypeError, match="no such filter: lables; there are created_after"):
+        client.count(lables={"study": 7})  # type: ignore[call-arg]

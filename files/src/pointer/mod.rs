@@ -10,7 +10,7 @@ use serde::{
 };
 use serde_json::value::RawValue;
 
-pub(crate) use parts::{List, Named, list, members};
+pub(crate) use parts::members;
 
 /// The place that a pointer names in a text.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -149,7 +149,7 @@ fn offers(shape: &'static Shape) -> Vec<String> {
         Some(only) => vec![format!("{only:?}")],
         None => {
             let types = shape.types().iter().filter(|own| **own != Type::Null);
-            let names = types.map(|own| <&str>::from(own).to_owned());
+            let names = types.map(|own| own.words().to_owned());
             let further = shape.branches().iter().flat_map(offers);
             iter::chain(names, further).collect()
         }

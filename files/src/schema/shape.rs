@@ -1,7 +1,8 @@
-//! The JSON Schema of a problem in the form used for checking values: references resolved, once per process.
+//! A JSON Schema in the form that values are checked with: references resolved, once per process.
 
-use std::{collections::BTreeMap, sync::LazyLock};
+use std::{borrow::Cow, collections::BTreeMap, sync::LazyLock};
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
@@ -19,17 +20,25 @@ pub(super) static PROBLEM: LazyLock<Shape> = LazyLock::new(|| {
     shape(&schema, &schema).unwrap_or_default()
 });
 
-/// The shape that a schema describes; `whole` contains the definitions.
+/// The shape of the body of a request. How long its parts and how large its numbers may be is left to the operation,
+/// which checks the same for requests over gRPC; only the lengths of lists are bounded here, before they are read.
+pub(super) fn of_body<T: JsonSchema>() -> serde_json::Result<Shape> {
+    let schema = schemars::schema_for!(T).to_value();
+    let mut shape: Shape = serde_json::from_value(Plain::OfBody.schema(&schema, &schema))?;
+    shape.find_forms();
+    Ok(shape)
+}
+
+/// The shape that a schema describes; `whole` has the definitions.
 pub(super) fn shape(schema: &Value, whole: &Value) -> serde_json::Result<Shape> {
-    let mut shape: Shape = serde_json::from_value(plain(schema, whole))?;
+    let mut shape: Shape = serde_json::from_value(Plain::OfProblem.schema(schema, whole))?;
     shape.find_forms();
     Ok(shape)
 }
 
 /// A type of JSON values.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, strum::IntoStaticStr)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
 pub(super) enum Type {
     Null,
     Boolean,
@@ -40,13 +49,32 @@ pub(super) enum Type {
     Object,
 }
 
-/// The values that are allowed. The fields are the keywords of draft 2020-12 that the schema of our types has; any
-/// other keyword is an error of [`shape`].
+impl Type {
+    /// A value of the type in words.
+    pub(super) fn words(self) -> &'static str {
+        match self {
+            Type::Null => "null",
+            Type::Boolean => "true or false",
+            Type::Integer => "an integer",
+            Type::Number => "a number",
+            Type::String => "a string",
+            Type::Array => "a list",
+            Type::Object => "an object",
+        }
+    }
+}
+
+/// What a value may be. The fields are the keywords of draft 2020-12 that the schema of our types has; any other
+/// keyword is an error of [`shape`].
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "camelCase")]
-pub(super) struct Shape {
+pub(crate) struct Shape {
     /// `false` instead of a schema: the value must be absent.
     pub(super) never: bool,
+    /// A problem in the body of a request: it is checked by itself.
+    pub(super) problem: bool,
+    /// Most entries of a list in the body of a request.
+    pub(super) at_most: Option<usize>,
     #[serde(rename = "type")]
     types: Types,
     #[serde(rename = "const")]
@@ -101,7 +129,27 @@ impl Shape {
         types.is_empty() || types.iter().any(same)
     }
 
-    /// Whether the shape is a list of any length of numbers, or of short lists of them.
+    /// Whether it says nothing of the value.
+    pub(super) fn is_anything(&self) -> bool {
+        !self.never
+            && self.only.is_none()
+            && self.minimum.is_none()
+            && self.items.is_none()
+            && self.additional_properties.is_none()
+            && !self.has_alternatives()
+            && self.only_alternatives()
+    }
+
+    /// Whether an object that lacks the member `name` is what that member should be, judged by its unknown names.
+    pub(super) fn lacks_only(&self, name: &str, unknown: &[Cow<'_, str>]) -> bool {
+        let member = self.properties.get(name);
+        member.is_some_and(|member| {
+            let own = |name: &Cow<'_, str>| member.required.iter().any(|own| own == name);
+            unknown.iter().any(own)
+        })
+    }
+
+    /// Whether it is a list of any length of numbers, or of short lists of them.
     pub(super) fn is_long_list_of_numbers(&self) -> bool {
         let number = |shape: &Shape| matches!(shape.types(), [Type::Number | Type::Integer]);
         // the lengths of inner lists are not compared with the limits of a walk
@@ -133,9 +181,13 @@ impl Shape {
 
     /// Whether serde keeps the whole value in memory until it knows the alternative. It does not for a value or null.
     pub(super) fn is_kept(&self) -> bool {
-        let null = |branch: &Shape| branch.types() == [Type::Null];
         let by_kind = self.one_of.iter().any(|branch| branch.kind().is_some());
-        by_kind || !self.any_of.is_empty() && !self.any_of.iter().any(null)
+        by_kind || !self.any_of.is_empty() && !self.any_of.iter().any(Shape::is_null)
+    }
+
+    /// Whether it is null and nothing else.
+    pub(super) fn is_null(&self) -> bool {
+        self.types() == [Type::Null]
     }
 
     /// The value of `kind` that an object of this shape must have.
@@ -204,36 +256,75 @@ fn all_required(form: &Shape) -> Vec<&str> {
     own.chain(further).collect()
 }
 
-/// The schema with references replaced by their definitions, and without descriptions for readers. Our types do not
-/// contain themselves.
-fn plain(schema: &Value, whole: &Value) -> Value {
-    let Value::Object(words) = schema else {
-        return json!({ "never": *schema == Value::Bool(false) });
-    };
-    let place = words.get("$ref").and_then(Value::as_str);
-    if let Some(named) = place.and_then(|place| whole.pointer(place.strip_prefix('#')?)) {
-        return plain(named, whole);
-    }
-    let each = |named: &Map<String, Value>| -> Value {
-        let each = named
+/// How a schema is made plain: its references are replaced by what they name, and what is only for readers is left
+/// out. Our types do not contain themselves.
+#[derive(Clone, Copy)]
+enum Plain {
+    OfProblem,
+    OfBody,
+}
+
+impl Plain {
+    fn schema(self, schema: &Value, whole: &Value) -> Value {
+        let Value::Object(words) = schema else {
+            return json!({ "never": *schema == Value::Bool(false) });
+        };
+        let place = words.get("$ref").and_then(Value::as_str);
+        if let Some(place) = place
+            && let Some(named) = whole.pointer(place.trim_start_matches('#'))
+        {
+            let problem = matches!(self, Plain::OfBody) && place.ends_with("/Problem");
+            if !problem {
+                return self.schema(named, whole);
+            }
+            let mut problem = Plain::OfProblem.schema(named, whole);
+            problem["problem"] = true.into();
+            return problem;
+        }
+        let kept = words
             .iter()
-            .map(|(name, one)| (name.clone(), plain(one, whole)));
-        Value::Object(each.collect())
-    };
-    let mut kept = Map::new();
-    for (word, value) in words {
-        let value = match (word.as_str(), value) {
-            ("description" | "default" | "format" | "title" | "$schema" | "$defs", _) => continue,
+            .filter_map(|(word, value)| self.keyword(word, value, whole));
+        Value::Object(kept.collect())
+    }
+
+    fn keyword(self, word: &str, value: &Value, whole: &Value) -> Option<(String, Value)> {
+        let each = |named: &Map<String, Value>| -> Value {
+            let each = named
+                .iter()
+                .map(|(name, one)| (name.clone(), self.schema(one, whole)));
+            Value::Object(each.collect())
+        };
+        let plain = match (word, value) {
+            ("description" | "default" | "format" | "title" | "$schema" | "$defs", _) => {
+                return None;
+            }
             ("const" | "required" | "type", _) => value.clone(),
             ("properties", Value::Object(named)) => each(named),
-            (_, Value::Array(list)) => list.iter().map(|one| plain(one, whole)).collect(),
-            (_, Value::Object(_) | Value::Bool(_)) => plain(value, whole),
+            (_, Value::Array(list)) => list.iter().map(|one| self.schema(one, whole)).collect(),
+            (_, Value::Object(_) | Value::Bool(_)) if !LEFT_TO_OPERATIONS.contains(&word) => {
+                self.schema(value, whole)
+            }
             _ => value.clone(),
         };
-        kept.insert(word.clone(), value);
+        match (self, word) {
+            (Plain::OfBody, "maxItems") => Some(("atMost".to_owned(), plain)),
+            (Plain::OfBody, word) if LEFT_TO_OPERATIONS.contains(&word) => None,
+            _ => Some((word.to_owned(), plain)),
+        }
     }
-    Value::Object(kept)
 }
+
+/// Keywords of bodies that are not checked here.
+const LEFT_TO_OPERATIONS: &[&str] = &[
+    "maxLength",
+    "maxProperties",
+    "maximum",
+    "minItems",
+    "minLength",
+    "minimum",
+    "pattern",
+    "uniqueItems",
+];
 
 #[cfg(test)]
 mod tests {

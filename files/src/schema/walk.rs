@@ -1,4 +1,4 @@
-//! Checks a JSON text against the shape of a problem in one pass.
+//! A walk through a JSON text and the shape that it should have at once.
 //!
 //! The text is checked while it is read, without a tree of its values: a tree takes 32 bytes and more for a value of
 //! two. Only where alternatives must be distinguished, the text of one value is read again. The check ends at the
@@ -14,7 +14,7 @@ use super::alternatives::Outline;
 use super::numbers;
 use super::shape::{Shape, Type};
 use super::words;
-use solver::error::{Findings, Reason, Violation, escape};
+use solver::error::{Findings, MOST_LISTED, Reason, Violation, escape};
 
 /// The largest number of entries of a list of objects, and of names of an object whose names are free: an entry of
 /// three bytes takes a hundred and more in memory. No problem that can be solved comes close.
@@ -29,11 +29,13 @@ const MOST_NUMBERS: usize = 1 << 20;
 const MOST_KEPT_NUMBERS: usize = 1 << 17;
 const MOST_KEPT_LISTS: usize = 1 << 16;
 
-/// The violations found so far, and the present place.
-pub(super) struct Walk<'a> {
-    /// The list of violations; `None` if only their existence matters.
-    found: Option<&'a mut Findings>,
-    /// The names and numbers from the problem to the current value.
+/// The violations of a walk, and where it is.
+pub(super) struct Walk<'f, 'de> {
+    /// The list of violations; `None` if the question is only whether there is one.
+    found: Option<&'f mut Findings>,
+    /// The problems in the text, which are checked apart from it, with their places.
+    pub(super) problems: Vec<(String, &'de str)>,
+    /// Names and numbers from the outermost value to the current one.
     place: Vec<Token>,
     /// The number of values around the current one that serde keeps in memory.
     kept: usize,
@@ -47,10 +49,11 @@ enum Token {
     Index(usize),
 }
 
-impl<'a> Walk<'a> {
-    pub(super) fn new(found: Option<&'a mut Findings>) -> Self {
+impl<'f, 'de> Walk<'f, 'de> {
+    pub(super) fn new(found: Option<&'f mut Findings>) -> Self {
         Walk {
             found,
+            problems: Vec::new(),
             place: Vec::new(),
             kept: 0,
             stopped: false,
@@ -58,15 +61,23 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Checks a text. The error is one of its syntax, unless the check was stopped.
-    pub(super) fn check(&mut self, shape: &'static Shape, text: &str) -> serde_json::Result<()> {
+    /// Checks a text. An error is one of its syntax, unless the walk has stopped.
+    pub(super) fn check(
+        &mut self,
+        shape: &'static Shape,
+        text: &'de str,
+    ) -> serde_json::Result<()> {
         let mut reader = serde_json::Deserializer::from_str(text);
         self.at(shape).deserialize(&mut reader)?;
         reader.end()
     }
 
     /// Checks a value as if its shape had no alternatives.
-    fn check_base(&mut self, shape: &'static Shape, value: &RawValue) -> serde_json::Result<()> {
+    fn check_base(
+        &mut self,
+        shape: &'static Shape,
+        value: &'de RawValue,
+    ) -> serde_json::Result<()> {
         let mut reader = serde_json::Deserializer::from_str(value.get());
         reader.deserialize_any(self.at(shape))
     }
@@ -80,7 +91,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    fn at(&mut self, shape: &'static Shape) -> Value<'_, 'a> {
+    fn at(&mut self, shape: &'static Shape) -> Value<'_, 'f, 'de> {
         Value { shape, walk: self }
     }
 
@@ -94,11 +105,7 @@ impl<'a> Walk<'a> {
             None => true,
             Some(found) if found.is_full() => true,
             Some(found) => {
-                let token = |token: &Token| match token {
-                    Token::Name(name) => format!("/{}", escape(&words::beginning(name))),
-                    Token::Index(index) => format!("/{index}"),
-                };
-                found.add(violation(self.place.iter().map(token).collect()));
+                found.add(violation(pointer(&self.place)));
                 false
             }
         };
@@ -126,7 +133,7 @@ impl<'a> Walk<'a> {
     fn check_alternatives(
         &mut self,
         shape: &'static Shape,
-        value: &RawValue,
+        value: &'de RawValue,
     ) -> serde_json::Result<()> {
         let outline = Outline::of(shape, value)?;
         if !shape.only_alternatives() {
@@ -152,6 +159,12 @@ impl<'a> Walk<'a> {
             };
         }
         let branches = shape.branches();
+        let meant = branches.iter().filter(|branch| !branch.is_null());
+        if let [only] = meant.collect::<Vec<_>>()[..]
+            && outline.found != Type::Null
+        {
+            return self.check(only, value.get());
+        }
         let mut alike = branches.iter().filter(|branch| outline.resembles(branch));
         match (alike.next(), alike.next()) {
             (Some(only), None) => self.check(only, value.get()),
@@ -186,22 +199,29 @@ impl<'a> Walk<'a> {
     fn too_many<E: Error>(&mut self, count: usize, most: usize, what: &str) -> Result<(), E> {
         let got = format!("{count} {what}");
         let expected = format!("at most {most} {what}");
-        let hint =
-            "No problem of this size can be solved; a large mesh is written `inline` or uploaded.";
+        let hint = "Give fewer; a large mesh is written `inline` or uploaded.";
         self.report(|at| Violation::new(at, Reason::TooMany, got, expected, hint))
     }
 }
 
-/// One value of the text, checked while it is read.
-struct Value<'w, 'a> {
-    shape: &'static Shape,
-    walk: &'w mut Walk<'a>,
+fn pointer(place: &[Token]) -> String {
+    let token = |token: &Token| match token {
+        Token::Name(name) => format!("/{}", escape(&words::beginning(name))),
+        Token::Index(index) => format!("/{index}"),
+    };
+    place.iter().map(token).collect()
 }
 
-impl Value<'_, '_> {
+/// One value of the text, which is checked as it is read.
+struct Value<'w, 'f, 'de> {
+    shape: &'static Shape,
+    walk: &'w mut Walk<'f, 'de>,
+}
+
+impl Value<'_, '_, '_> {
     fn wrong_type<E: Error>(self, got: impl FnOnce() -> String) -> Result<(), E> {
         let names = self.shape.types().iter().filter(|own| **own != Type::Null);
-        let names: Vec<&str> = names.map(|own| own.into()).collect();
+        let names: Vec<&str> = names.map(|own| own.words()).collect();
         let (expected, hint) = (names.join(" or "), "Write the value in that form.");
         self.walk
             .report(|at| Violation::new(at, Reason::WrongType, got(), expected, hint))
@@ -224,10 +244,15 @@ impl Value<'_, '_> {
         Ok(())
     }
 
-    fn number<E: Error>(self, number: f64, got: impl Fn() -> String) -> Result<(), E> {
+    /// `integral`: written as an integer. Serde takes no 1.0 for one.
+    fn number<E: Error>(
+        self,
+        number: f64,
+        integral: bool,
+        got: impl Fn() -> String,
+    ) -> Result<(), E> {
         let types = self.shape.types();
-        let integral = number.fract() == 0.0 && types.contains(&Type::Integer);
-        let found = if integral {
+        let found = if integral && types.contains(&Type::Integer) {
             Type::Integer
         } else {
             Type::Number
@@ -244,7 +269,7 @@ impl Value<'_, '_> {
     }
 }
 
-impl<'de> DeserializeSeed<'de> for Value<'_, '_> {
+impl<'de> DeserializeSeed<'de> for Value<'_, '_, 'de> {
     type Value = ();
 
     fn deserialize<D: Deserializer<'de>>(self, reader: D) -> Result<(), D::Error> {
@@ -255,6 +280,16 @@ impl<'de> DeserializeSeed<'de> for Value<'_, '_> {
             let got = || words::value(value.get());
             let not_used = |at| Violation::new(at, Reason::NotUsed, got(), expected, hint);
             return self.walk.report(not_used);
+        }
+        if self.shape.problem {
+            let value = <&RawValue>::deserialize(reader)?;
+            let place = pointer(&self.walk.place);
+            self.walk.problems.push((place, value.get()));
+            return Ok(());
+        }
+        if self.shape.is_anything() {
+            <&RawValue>::deserialize(reader)?;
+            return Ok(());
         }
         if let Some(items) = &self.shape.items
             && self.shape.is_long_list_of_numbers()
@@ -279,7 +314,7 @@ impl<'de> DeserializeSeed<'de> for Value<'_, '_> {
     }
 }
 
-impl<'de> Visitor<'de> for Value<'_, '_> {
+impl<'de> Visitor<'de> for Value<'_, '_, 'de> {
     type Value = ();
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -295,15 +330,15 @@ impl<'de> Visitor<'de> for Value<'_, '_> {
     }
 
     fn visit_i64<E: Error>(self, value: i64) -> Result<(), E> {
-        self.number(value as f64, || value.to_string())
+        self.number(value as f64, true, || value.to_string())
     }
 
     fn visit_u64<E: Error>(self, value: u64) -> Result<(), E> {
-        self.number(value as f64, || value.to_string())
+        self.number(value as f64, true, || value.to_string())
     }
 
     fn visit_f64<E: Error>(self, value: f64) -> Result<(), E> {
-        self.number(value, || value.to_string())
+        self.number(value, false, || value.to_string())
     }
 
     fn visit_str<E: Error>(self, text: &str) -> Result<(), E> {
@@ -323,6 +358,7 @@ impl<'de> Visitor<'de> for Value<'_, '_> {
         let Value { shape, walk } = self;
         let items = shape.items.as_deref().filter(|_| shape.allows(Type::Array));
         let most = items.map_or(0, |items| walk.most_items(items));
+        let most = shape.at_most.map_or(most, |own| own.min(most));
         let mut count = 0;
         while let Some(items) = items
             && count < most.min(shape.most_items().unwrap_or(most))
@@ -366,6 +402,7 @@ impl<'de> Visitor<'de> for Value<'_, '_> {
         // whether other names are refused; if not, this shape is one alternative and another reports these
         let free = shape.additional_properties.as_deref();
         let mut seen: BTreeSet<Cow<'de, str>> = BTreeSet::new();
+        let mut unknown: Vec<Cow<'de, str>> = Vec::new();
         let mut count = 0;
         while let Some(Name(name)) = members.next_key()? {
             let own = shape.properties.get_key_value(&*name);
@@ -374,9 +411,10 @@ impl<'de> Visitor<'de> for Value<'_, '_> {
                 (Some((known, own)), _) => (Cow::Borrowed(known.as_str()), own),
                 (None, Some(free)) if free.never => {
                     members.next_value::<IgnoredAny>()?;
-                    let known = || shape.properties.keys();
-                    let place = words::beginning(&name).into_owned();
-                    walk.report_inside(place, |at| words::unknown_name(at, &name, known()))?;
+                    // one more than is listed, so that the walk ends
+                    if unknown.len() <= MOST_LISTED {
+                        unknown.push(name);
+                    }
                     continue;
                 }
                 (None, Some(free)) if count < MOST_OBJECTS => {
@@ -405,14 +443,21 @@ impl<'de> Visitor<'de> for Value<'_, '_> {
                 walk.report_inside(known, |at| Violation::new(at, reason, got, expected, hint))?;
             }
         }
-        for name in &shape.required {
-            if !seen.contains(name.as_str()) {
-                let expected = format!("a value for `{name}`");
-                let (reason, hint) = (Reason::Missing, "It has no default.");
-                walk.report_inside(name.as_str(), |at| {
-                    Violation::new(at, reason, "nothing", expected, hint)
-                })?;
+        let missing = |name: &&String| !seen.contains(name.as_str());
+        for name in shape.required.iter().filter(missing) {
+            if shape.lacks_only(name, &unknown) {
+                return walk.report_inside(name.as_str(), |at| words::bare(at, name));
             }
+            let expected = format!("a value for `{name}`");
+            let (reason, hint) = (Reason::Missing, "It has no default.");
+            walk.report_inside(name.as_str(), |at| {
+                Violation::new(at, reason, "nothing", expected, hint)
+            })?;
+        }
+        for name in unknown {
+            let place = words::beginning(&name).into_owned();
+            let known = || shape.properties.keys();
+            walk.report_inside(place, |at| words::unknown_name(at, &name, known()))?;
         }
         if count > MOST_OBJECTS {
             walk.too_many(count, MOST_OBJECTS, "names")

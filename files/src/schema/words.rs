@@ -72,7 +72,18 @@ pub(super) fn unknown_name<'a>(
     Violation::new(at, Reason::UnknownName, got, expected, hint)
 }
 
-/// The hint “Did you mean …” with the known name that differs from `name` by the fewest letters, if by few.
+/// The violation for an object that is the member `name` itself instead of having it.
+pub(super) fn bare(at: String, name: &str) -> Violation {
+    Violation::new(
+        at,
+        Reason::Missing,
+        format!("the bare {name}"),
+        format!("an object with the field {name}"),
+        format!("Wrap it as {{\"{name}\": …}}."),
+    )
+}
+
+/// “Did you mean …”: the known name that differs from `name` by the fewest letters, if by few.
 pub fn meant<S: AsRef<str>>(name: &str, known: impl IntoIterator<Item = S>) -> Option<String> {
     /// The longest name that is compared: a longer one is not just misspelt, and the comparison takes the square of its
     /// length.

@@ -31,8 +31,8 @@ pub use neighbours::Neighbour;
 pub use numbers::{Problems, Read};
 pub use path::{MOST_POINTER_BYTES, MOST_POINTER_TOKENS};
 pub use plan::{MOST_BYTES, MOST_MEMBERS, MOST_PATHS, MOST_VALUE_BYTES, Mode, Plan};
-pub use read::{Sweep, read};
-pub use values::Fields;
+pub use read::{Sweep, of_body, read};
+pub use values::{Axis, Points, Spaced, Variation};
 
 #[cfg(test)]
 mod tests;

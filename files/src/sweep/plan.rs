@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 use solver::error::{Reason, Violation, escape};
@@ -22,7 +23,11 @@ pub const MOST_BYTES: u64 = 64 << 20;
 pub const MOST_VALUE_BYTES: u64 = 8 << 20;
 
 /// How the values of several axes are combined.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::IntoStaticStr, strum::VariantArray)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema, strum::IntoStaticStr,
+)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "SweepMode")]
 #[strum(serialize_all = "snake_case")]
 pub enum Mode {
     /// Every value of each axis with every value of the others; the last axis changes fastest.
@@ -30,7 +35,7 @@ pub enum Mode {
     Grid,
     /// The first values of all axes, then the second ones, and so on.
     Zip,
-    /// The members as listed in `points`, without axes.
+    /// As listed in `points`.
     List,
 }
 

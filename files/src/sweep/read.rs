@@ -2,18 +2,17 @@
 
 use std::borrow::Cow;
 
-use serde_json::value::RawValue;
 use solver::error::{Findings, Reason, Violation};
 use solver::problem::Problem;
-use strum::VariantArray;
 
 use super::{
     path::Path,
     plan::{MOST_BYTES, MOST_MEMBERS, MOST_VALUE_BYTES, Mode, Plan},
     template::Template,
-    values::{Fields, axes, points},
+    values::{Variation, axes, points},
 };
 use crate::{
+    body::Content,
     json::parse,
     pointer::{Nowhere, Place, locate},
     schema::{meant, quoted},
@@ -31,24 +30,23 @@ pub struct Sweep {
 /// A placeholder for the mesh that all members share: a file that is not read.
 const NO_MESH: &str = r#"{"gmsh":""}"#;
 
-/// Reads the definition of a sweep. Its members are not checked yet, see [`groups`](super::groups).
+/// Reads a sweep from the text of its base and what its members differ in. Its members are not checked yet, see
+/// [`groups`](super::groups).
 ///
 /// # Errors
 ///
 /// All violations of the definition, with pointers relative to it.
-pub fn read(fields: &Fields<'_>) -> Result<Sweep, Vec<Violation>> {
+pub fn read(text: &str, variation: Variation) -> Result<Sweep, Vec<Violation>> {
     let mut found = Findings::default();
-    let base = base(fields.base, &mut found);
-    let mode = mode(fields.mode, &mut found);
+    let base = base(text, &mut found);
+    let mode = variation.mode.unwrap_or_default();
     let listed = match mode {
-        Some(Mode::List) => points(fields, &mut found),
-        Some(mode) => axes(fields, mode, &mut found),
-        None => None,
+        Mode::List => points(&variation, &mut found),
+        _ => axes(variation, &mut found),
     };
     let (Some(base), Some((paths, values))) = (base, listed) else {
         return Err(found.into_violations());
     };
-    let text = fields.base.map_or("", RawValue::get);
     let with_mesh = paths.iter().any(|path| path.tokens[0] == "mesh");
     let text = match locate(text, &["mesh".to_owned()]) {
         Ok(Place::Value(range)) if !with_mesh => Cow::Owned(format!(
@@ -76,7 +74,7 @@ pub fn read(fields: &Fields<'_>) -> Result<Sweep, Vec<Violation>> {
     };
     let (count, bytes) = (plan.count(), plan.bytes());
     let (at, list) = match mode {
-        Some(Mode::List) => ("/points", true),
+        Mode::List => ("/points", true),
         _ => ("/axes", false),
     };
     if count > MOST_MEMBERS {
@@ -118,48 +116,33 @@ pub fn read(fields: &Fields<'_>) -> Result<Sweep, Vec<Violation>> {
     found.into_result(Sweep { base, plan })
 }
 
-fn base(raw: Option<&RawValue>, found: &mut Findings) -> Option<Problem> {
-    let Some(raw) = raw else {
-        found.add(Violation::new(
-            "/base",
-            Reason::Missing,
-            "nothing",
-            "the base problem, from which members differ",
-            "Send {\"base\": {…}, \"axes\": […]}.",
-        ));
-        return None;
-    };
-    let read = parse(raw.get());
+/// Reads a sweep from a body with its base as the only problem.
+///
+/// # Errors
+///
+/// All violations of the body: of its structure, or else of what it means.
+pub fn of_body(mut content: Content<'_, Variation>) -> Result<Sweep, Vec<Violation>> {
+    let sound = content.violations.is_empty();
+    match (content.fields.take(), &content.problems[..]) {
+        (Some(variation), [(_, base)]) if sound => read(base, variation),
+        _ => {
+            content.parse_problems();
+            Err(content.into_violations())
+        }
+    }
+}
+
+fn base(text: &str, found: &mut Findings) -> Option<Problem> {
     let inside = |v: Violation| Violation {
         pointer: format!("/base{}", v.pointer),
         ..v
     };
-    read.map_err(|list| found.extend(list.into_iter().map(inside)))
+    parse(text)
+        .map_err(|list| found.extend(list.into_iter().map(inside)))
         .ok()
 }
 
-fn mode(raw: Option<&RawValue>, found: &mut Findings) -> Option<Mode> {
-    let Some(raw) = raw.filter(|raw| raw.get() != "null") else {
-        return Some(Mode::default());
-    };
-    let word: Option<Cow<'_, str>> = serde_json::from_str(raw.get()).ok();
-    let named = |mode: &&Mode| word.as_deref() == Some(<&str>::from(**mode));
-    let mode = Mode::VARIANTS.iter().find(named).copied();
-    if mode.is_none() {
-        let names = Mode::VARIANTS.iter().map(|mode| <&str>::from(*mode));
-        let hint = meant(word.as_deref().unwrap_or_default(), names);
-        found.add(Violation::new(
-            "/mode",
-            Reason::UnknownAlternative,
-            quoted(raw.get()),
-            "\"grid\", \"zip\" or \"list\"",
-            hint.unwrap_or_else(|| "Without `mode` the sweep is a grid.".to_owned()),
-        ));
-    }
-    mode
-}
-
-/// The violation of a pointer that names no value of the problem.
+/// The violation of a pointer that leads nowhere in the problem.
 fn leads_nowhere(path: &Path, nowhere: &Nowhere) -> Violation {
     let Nowhere {
         parent,

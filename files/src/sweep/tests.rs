@@ -1,10 +1,13 @@
 #![allow(clippy::unwrap_used)]
 
+use schemars::JsonSchema;
+use serde::Deserialize;
 use serde_json::{Value, json, value::RawValue};
 use solver::error::{Reason, Violation};
 use solver::problem::MeshSource;
 
 use super::*;
+use crate::body::{Body, Embedded};
 
 fn base() -> Value {
     json!({
@@ -23,18 +26,33 @@ fn base() -> Value {
 const MU: &str = "/contacts/0/friction/coefficient";
 const RHO: &str = "/contacts/0/friction/nonlocal_radius";
 
+#[derive(Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+struct Definition {
+    #[serde(rename = "base")]
+    _base: Embedded,
+    #[serde(default)]
+    mode: Option<Mode>,
+    #[serde(default)]
+    axes: Option<Vec<Axis>>,
+    #[serde(default)]
+    #[schemars(with = "Option<Points>")]
+    points: Option<Vec<Box<RawValue>>>,
+}
+
+static DEFINITION: Body<Definition> = Body::new();
+
 fn reading(definition: &Value) -> Result<Sweep, Vec<Violation>> {
-    let text = |name: &str| {
-        let value = definition.get(name)?;
-        Some(RawValue::from_string(value.to_string()).unwrap())
-    };
-    let (base, axes, mode, points) = (text("base"), text("axes"), text("mode"), text("points"));
-    read(&Fields {
-        base: base.as_deref(),
-        axes: axes.as_deref(),
-        mode: mode.as_deref(),
-        points: points.as_deref(),
-    })
+    reading_text(&definition.to_string())
+}
+
+fn reading_text(text: &str) -> Result<Sweep, Vec<Violation>> {
+    let members = |Definition {
+                       mode, axes, points, ..
+                   }| Variation { mode, axes, points };
+    let mut content = DEFINITION.read(text).unwrap();
+    let members = content.fields.take().map(members);
+    of_body(content.with(members))
 }
 
 fn refused(definition: &Value) -> Vec<(String, Reason)> {
@@ -227,33 +245,51 @@ fn members_that_share_a_body_are_one_group() {
 fn all_violations_are_reported_at_once_with_their_places() {
     let mut broken = base();
     broken["materials"][0]["poisons_ratio"] = json!(0.3);
-    let found = refused(&json!({"base": broken, "mode": "grit", "axes": 7}));
-    let expected = [
-        ("/base/materials/0/poisons_ratio", Reason::UnknownName),
-        ("/mode", Reason::UnknownAlternative),
-    ];
-    assert_eq!(found, expected.map(|(at, reason)| (at.to_owned(), reason)));
-    let found = refused(&json!({"base": base(), "points": [], "axes": [
-        {"path": "contacts", "values": []},
-        {"path": MU, "values": [1], "linspace": {"start": 0, "stop": 1, "count": 2}, "step": 2},
-        {"path": "/contacts/1/indentation", "logspace": {"start": 0, "stop": 1, "count": 0}},
+    let places = |found: Vec<(String, Reason)>, expected: &[(&str, Reason)]| {
+        let found: Vec<_> = found
+            .iter()
+            .map(|(at, reason)| (&at[..], *reason))
+            .collect();
+        assert_eq!(found, expected);
+    };
+    // first all of the structure …
+    let found = refused(&json!({"base": broken, "mode": "grit", "axes": [
+        {"path": MU, "values": [1], "step": 2},
         {"values": [1]},
         7,
         {"path": RHO, "linspace": [0, 1, 2]},
+        {"path": RHO, "logspace": {"start": "a", "stop": 2}},
+    ], "points": [7]}));
+    let expected = [
+        ("/axes/0/step", Reason::UnknownName),
+        ("/axes/1/path", Reason::Missing),
+        ("/axes/2", Reason::WrongType),
+        ("/axes/3/linspace", Reason::WrongType),
+        ("/axes/4/logspace/start", Reason::WrongType),
+        ("/axes/4/logspace/count", Reason::Missing),
+        ("/mode", Reason::UnknownAlternative),
+        ("/points/0", Reason::WrongType),
+        ("/base/materials/0/poisons_ratio", Reason::UnknownName),
+    ];
+    places(found, &expected);
+    // … then all of what it means
+    let mut broken = base();
+    broken["materials"][0]["poisons_ratio"] = json!(0.3);
+    let found = refused(&json!({"base": broken, "points": [], "axes": [
+        {"path": "contacts", "values": []},
+        {"path": MU, "values": [1], "linspace": {"start": 0, "stop": 1, "count": 2}},
+        {"path": "/contacts/1/indentation", "logspace": {"start": 0, "stop": 1, "count": 0}},
     ]}));
     let expected = [
+        ("/base/materials/0/poisons_ratio", Reason::UnknownName),
         ("/points", Reason::NotUsed),
         ("/axes/0/path", Reason::Malformed),
         ("/axes/0/values", Reason::TooFew),
-        ("/axes/1/step", Reason::UnknownName),
         ("/axes/1", Reason::WrongCount),
         ("/axes/2/logspace/count", Reason::OutOfRange),
         ("/axes/2/logspace/start", Reason::OutOfRange),
-        ("/axes/3/path", Reason::Missing),
-        ("/axes/4", Reason::WrongType),
-        ("/axes/5/linspace", Reason::WrongType),
     ];
-    assert_eq!(found, expected.map(|(at, reason)| (at.to_owned(), reason)));
+    places(found, &expected);
 }
 
 #[test]
@@ -318,15 +354,10 @@ fn a_violation_of_a_member_names_the_value_that_causes_it() {
         refused(&list),
         at("/points/1/~1contacts~10~1obstacle/radius", Reason::Missing)
     );
-    let huge: Box<RawValue> =
-        RawValue::from_string("[{\"path\":\"/quadrature\",\"values\":[1e999]}]".into()).unwrap();
-    let text = RawValue::from_string(base().to_string()).unwrap();
-    let fields = Fields {
-        base: Some(&text),
-        axes: Some(&huge),
-        ..Fields::default()
-    };
-    assert_eq!(read(&fields).unwrap_err()[0].reason, Reason::NotFinite);
+    let text = json!({"base": base(), "axes": [{"path": "/quadrature", "values": ["huge"]}]});
+    let text = text.to_string().replace("\"huge\"", "1e999");
+    let found = reading_text(&text).unwrap_err();
+    assert_eq!(found[0].reason, Reason::NotFinite);
 }
 
 #[test]
@@ -379,7 +410,13 @@ fn a_sweep_has_limits() {
     // a deep value is refused as a deep problem is
     let deep = format!("{}1{}", "[".repeat(62), "]".repeat(62));
     let deep: Value = serde_json::from_str(&deep).unwrap();
-    let found = grid(json!([{"path": "/contacts/0/obstacle/radius", "values": [deep]}]));
+    let axes = json!([{"path": "/contacts/0/obstacle/radius", "values": [deep]}]);
+    let text = base().to_string();
+    let variation = Variation {
+        axes: serde_json::from_value(axes).unwrap(),
+        ..Variation::default()
+    };
+    let found = groups(&read(&text, variation).unwrap()).unwrap_err();
     assert_eq!(found.len(), 1, "{found:?}");
 }
 

@@ -1,36 +1,68 @@
 //! The values of all members of a sweep: by axes, or by points.
 
-use std::{borrow::Cow, collections::BTreeSet};
+use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
-use serde_json::value::RawValue;
-use solver::error::{Findings, Reason, Violation, escape, shortened};
+use serde_json::{Value, value::RawValue};
+use solver::error::{Findings, Reason, Violation, either, escape, shortened};
 
 use super::{
     path::{Path, are_apart, path},
     plan::{MOST_MEMBERS, MOST_PATHS, Mode, Values},
 };
-use crate::{
-    pointer::{List, Named, list, members},
-    schema::{meant, quoted},
-};
+use crate::{pointer::members, schema::quoted};
 
-/// The given fields of a definition, as text.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Fields<'a> {
-    /// The base problem.
-    pub base: Option<&'a RawValue>,
-    /// The axes: a list of objects with a `path` and its values.
-    pub axes: Option<&'a RawValue>,
-    /// How the axes are combined.
-    pub mode: Option<&'a RawValue>,
-    /// The points, for the mode `list`: a list of objects from pointer to value.
-    pub points: Option<&'a RawValue>,
+/// What the members of a sweep differ in.
+#[derive(Clone, Debug, Default)]
+pub struct Variation {
+    /// How the values of several axes are combined; absent: grid.
+    pub mode: Option<Mode>,
+    /// With the modes grid and zip.
+    pub axes: Option<Vec<Axis>>,
+    /// With the mode list: objects from JSON Pointer to value, as they are written.
+    pub points: Option<Vec<Box<RawValue>>>,
 }
 
-/// Reports a field that a mode does not use.
-fn not_used(name: &str, raw: Option<&RawValue>, mode: &str, hint: &str, found: &mut Findings) {
-    if raw.is_some_and(|raw| raw.get() != "null") {
+/// A value of the problem that members differ in, and its values in one form.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct Axis {
+    /// JSON Pointer (RFC 6901) into the problem, such as /contacts/0/friction/coefficient. The object around it must be in
+    /// the base.
+    pub path: String,
+    /// Any values of the schema of a problem there: numbers, or a whole obstacle or list of steps.
+    #[serde(default)]
+    #[schemars(with = "Option<Vec<Value>>", length(min = 1, max = MOST_MEMBERS))]
+    pub values: Option<Vec<Box<RawValue>>>,
+    /// Numbers at equal distances.
+    #[serde(default)]
+    pub linspace: Option<Spaced>,
+    /// Numbers at equal ratios, both ends above 0.
+    #[serde(default)]
+    pub logspace: Option<Spaced>,
+}
+
+/// Numbers from start to stop, both among them.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct Spaced {
+    /// The first.
+    pub start: f64,
+    /// The last.
+    pub stop: f64,
+    /// How many.
+    #[schemars(range(min = 1, max = MOST_MEMBERS))]
+    pub count: u64,
+}
+
+/// The points of a sweep, for schemas: objects from JSON Pointer to value.
+pub type Points = Vec<BTreeMap<String, Value>>;
+
+/// A field that a mode does not use.
+fn not_used(name: &str, given: bool, mode: Mode, hint: &str, found: &mut Findings) {
+    if given {
+        let mode: &str = mode.into();
         found.add(Violation::new(
             format!("/{name}"),
             Reason::NotUsed,
@@ -41,39 +73,25 @@ fn not_used(name: &str, raw: Option<&RawValue>, mode: &str, hint: &str, found: &
     }
 }
 
-fn wrong_type(at: impl Into<String>, raw: &RawValue, expected: &str) -> Violation {
-    Violation::new(
-        at,
-        Reason::WrongType,
-        quoted(raw.get()),
-        expected,
-        "Write the value in that form.",
-    )
-}
-
-/// The largest number of members of an axis or a point that are read: more than they may have.
+/// Most members of a point that are looked at: more than it may have.
 const MOST_NAMES: usize = 64;
 
 const AXES_HINT: &str = "Change several values together by the mode zip or list.";
 const VALUES_HINT: &str = "An axis has at least one value, and a sweep at most that many members.";
 
-/// The items of a list that must have 1 … `most` of `what`.
-fn counted<'a>(
+/// Whether a list has 1 … `most` of `what`.
+fn are_few(
     at: &str,
-    raw: &'a RawValue,
+    count: usize,
     most: usize,
     what: &str,
     hint: &str,
     found: &mut Findings,
-) -> Option<Vec<&'a RawValue>> {
-    let Some(List { items, count }) = list(raw.get(), most) else {
-        found.add(wrong_type(at, raw, &format!("a list of {what}")));
-        return None;
-    };
+) -> bool {
     let (reason, hint) = match count {
         0 => (Reason::TooFew, "Give at least one."),
         _ if count > most => (Reason::TooMany, hint),
-        _ => return Some(items),
+        _ => return true,
     };
     found.add(Violation::new(
         at,
@@ -82,46 +100,36 @@ fn counted<'a>(
         format!("1 … {most} {what}"),
         hint,
     ));
-    None
+    false
 }
 
 /// The axes of a grid or zip.
-pub(super) fn axes(
-    fields: &Fields<'_>,
-    mode: Mode,
-    found: &mut Findings,
-) -> Option<(Vec<Path>, Values)> {
+pub(super) fn axes(given: Variation, found: &mut Findings) -> Option<(Vec<Path>, Values)> {
+    let mode = given.mode.unwrap_or_default();
     let hint = "Set `mode` to \"list\" for points, or leave them out.";
-    not_used("points", fields.points, mode.into(), hint, found);
-    let some = format!("1 … {MOST_PATHS} axes");
-    let Some(raw) = fields.axes else {
+    not_used("points", given.points.is_some(), mode, hint, found);
+    let Some(axes) = given.axes else {
         // points without their mode: that is told already
-        if fields.points.is_some() {
-            return None;
+        if given.points.is_none() {
+            found.add(Violation::new(
+                "/axes",
+                Reason::Missing,
+                "nothing",
+                format!("1 … {MOST_PATHS} axes"),
+                "Send {\"axes\": [{\"path\": \"/contacts/0/indentation\", \"values\": [0.1, 0.2]}]}.",
+            ));
         }
-        let hint =
-            "Send {\"axes\": [{\"path\": \"/contacts/0/indentation\", \"values\": [0.1, 0.2]}]}.";
-        found.add(Violation::new(
-            "/axes",
-            Reason::Missing,
-            "nothing",
-            some,
-            hint,
-        ));
         return None;
     };
-    let items = counted("/axes", raw, MOST_PATHS, "axes", AXES_HINT, found)?;
-    let count = items.len();
+    let count = axes.len();
+    if !are_few("/axes", count, MOST_PATHS, "axes", AXES_HINT, found) {
+        return None;
+    }
     let (mut paths, mut values) = (vec![], vec![]);
-    for (k, raw) in items.into_iter().enumerate() {
+    for (k, given) in axes.into_iter().enumerate() {
         let at = format!("/axes/{k}");
-        let Some(members) = members(raw.get(), MOST_NAMES) else {
-            found.add(wrong_type(at, raw, "an object with a path and its values"));
-            continue;
-        };
-        let (path, list) = axis(&at, members, found);
-        paths.extend(path);
-        values.extend(list);
+        paths.extend(path(format!("{at}/path"), &given.path, found));
+        values.extend(axis(&at, given, found));
     }
     if !are_apart(&paths, found) || paths.len() < count || values.len() < count {
         return None;
@@ -148,93 +156,60 @@ pub(super) fn axes(
     Some((paths, Values::Grid(values)))
 }
 
-/// One axis: its path, and its values as JSON.
-fn axis(at: &str, members: Named<'_>, found: &mut Findings) -> (Option<Path>, Option<Vec<String>>) {
-    const KNOWN: [&str; 4] = ["path", "values", "linspace", "logspace"];
-    let mut seen = BTreeSet::new();
-    for (name, _) in &members {
-        if !KNOWN.contains(&&**name) {
-            let hint = meant(name, KNOWN);
-            found.add(Violation::new(
-                format!("{at}/{}", escape(&shortened(name, 80))),
-                Reason::UnknownName,
-                format!("{:?}", quoted(name)),
-                "one of path, values, linspace, logspace",
-                hint.unwrap_or_else(|| "Check the spelling, or leave it out.".to_owned()),
-            ));
-        } else if !seen.insert(name.clone()) {
-            found.add(Violation::new(
-                format!("{at}/{name}"),
-                Reason::DuplicateName,
-                "the name twice",
-                "each name once",
-                "Remove one of them; one would be ignored.",
-            ));
-        }
-    }
-    let member = |wanted: &str| {
-        let named = members.iter().find(|(name, _)| name == wanted);
-        named.map(|(_, raw)| *raw)
-    };
-    let place = format!("{at}/path");
-    let path = match member("path") {
-        Some(raw) => match serde_json::from_str::<Cow<'_, str>>(raw.get()) {
-            Ok(text) => path(place, &text, found),
-            Err(_) => {
-                found.add(wrong_type(place, raw, "a JSON Pointer as a string"));
-                None
-            }
-        },
-        None => {
-            let hint = "Say what the axis changes, such as /contacts/0/friction/coefficient.";
-            let expected = "a JSON Pointer into the problem";
-            found.add(Violation::new(
-                place,
-                Reason::Missing,
-                "nothing",
-                expected,
-                hint,
-            ));
-            None
-        }
-    };
-    let given: Vec<(&str, &RawValue)> = KNOWN[1..]
-        .iter()
-        .filter_map(|name| Some((*name, member(name)?)))
-        .collect();
-    let values = match given[..] {
-        [("values", raw)] => values(&format!("{at}/values"), raw, found),
-        [(name, raw)] => spaced(&format!("{at}/{name}"), name == "logspace", raw, found),
-        _ => {
-            let named: Vec<&str> = given.iter().map(|(name, _)| *name).collect();
-            let got = if named.is_empty() {
-                "none of them".to_owned()
-            } else {
-                named.join(" and ")
-            };
+/// The values of an axis as JSON.
+fn axis(at: &str, axis: Axis, found: &mut Findings) -> Option<Vec<String>> {
+    match axis {
+        Axis {
+            values: Some(given),
+            linspace: None,
+            logspace: None,
+            ..
+        } => values(&format!("{at}/values"), &given, found),
+        Axis {
+            values: None,
+            linspace: Some(given),
+            logspace: None,
+            ..
+        } => spaced(&format!("{at}/linspace"), false, given, found),
+        Axis {
+            values: None,
+            linspace: None,
+            logspace: Some(given),
+            ..
+        } => spaced(&format!("{at}/logspace"), true, given, found),
+        Axis {
+            values,
+            linspace,
+            logspace,
+            ..
+        } => {
+            let forms = [
+                ("values", values.is_some()),
+                ("linspace", linspace.is_some()),
+                ("logspace", logspace.is_some()),
+            ];
             found.add(Violation::new(
                 at,
                 Reason::WrongCount,
-                got,
-                "exactly one of values, linspace, logspace",
+                either(&forms),
+                "exactly one of `values`, `linspace`, `logspace`",
                 "Give the values in one form.",
             ));
             None
         }
-    };
-    (path, values)
+    }
 }
 
-/// Reads a list of any values.
-fn values(at: &str, raw: &RawValue, found: &mut Findings) -> Option<Vec<String>> {
-    let items = counted(at, raw, MOST_MEMBERS, "values", VALUES_HINT, found)?;
-    let mut sound = true;
-    let mut texts = Vec::with_capacity(items.len());
-    for (k, raw) in items.into_iter().enumerate() {
-        sound &= is_finite(&format!("{at}/{k}"), raw, found);
-        texts.push(raw.get().to_owned());
+/// A list of any values.
+fn values(at: &str, given: &[Box<RawValue>], found: &mut Findings) -> Option<Vec<String>> {
+    if !are_few(at, given.len(), MOST_MEMBERS, "values", VALUES_HINT, found) {
+        return None;
     }
-    sound.then_some(texts)
+    let mut sound = true;
+    for (k, raw) in given.iter().enumerate() {
+        sound &= is_finite(&format!("{at}/{k}"), raw, found);
+    }
+    sound.then(|| given.iter().map(|raw| raw.get().to_owned()).collect())
 }
 
 /// Checks that a value is not too large a number. Numbers inside lists and objects are checked when the problem is
@@ -256,24 +231,8 @@ fn is_finite(at: &str, raw: &RawValue, found: &mut Findings) -> bool {
     finite
 }
 
-/// Numbers at equal distances or ratios, including both ends.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Spaced {
-    start: f64,
-    stop: f64,
-    count: u64,
-}
-
-fn spaced(at: &str, ratios: bool, raw: &RawValue, found: &mut Findings) -> Option<Vec<String>> {
-    // serde would also take a list
-    let object = raw.get().starts_with('{');
-    let read = serde_json::from_str::<Spaced>(raw.get());
-    let Some(Spaced { start, stop, count }) = read.ok().filter(|_| object) else {
-        let expected = "an object of start, stop (finite numbers) and count (a whole number), and nothing else";
-        found.add(wrong_type(at, raw, expected));
-        return None;
-    };
+fn spaced(at: &str, ratios: bool, given: Spaced, found: &mut Findings) -> Option<Vec<String>> {
+    let Spaced { start, stop, count } = given;
     let mut sound = true;
     if count == 0 || count > MOST_MEMBERS as u64 {
         sound = false;
@@ -327,36 +286,32 @@ fn number(value: f64) -> String {
 }
 
 /// The points of a list: each an object from pointer to value.
-pub(super) fn points(fields: &Fields<'_>, found: &mut Findings) -> Option<(Vec<Path>, Values)> {
+pub(super) fn points(given: &Variation, found: &mut Findings) -> Option<(Vec<Path>, Values)> {
     let hint = "Choose the mode grid or zip for axes, or leave them out.";
-    not_used("axes", fields.axes, "list", hint, found);
-    let some = format!("1 … {MOST_MEMBERS} points");
-    let Some(raw) = fields.points else {
-        let hint = "Send {\"points\": [{\"/contacts/0/indentation\": 0.1}, …]}.";
+    not_used("axes", given.axes.is_some(), Mode::List, hint, found);
+    let Some(items) = &given.points else {
         found.add(Violation::new(
             "/points",
             Reason::Missing,
             "nothing",
-            some,
-            hint,
+            format!("1 … {MOST_MEMBERS} points"),
+            "Send {\"points\": [{\"/contacts/0/indentation\": 0.1}, …]}.",
         ));
         return None;
     };
     let hint = "Submit several sweeps.";
-    let items = counted("/points", raw, MOST_MEMBERS, "points", hint, found)?;
+    if !are_few("/points", items.len(), MOST_MEMBERS, "points", hint, found) {
+        return None;
+    }
     let mut paths: Vec<Path> = vec![];
     let mut listed: Vec<Vec<Option<String>>> = vec![];
     let mut sound = true;
-    for (n, raw) in items.into_iter().enumerate() {
+    for (n, raw) in items.iter().enumerate() {
         if found.is_full() {
             return None;
         }
         let at = format!("/points/{n}");
-        let Some(members) = members(raw.get(), MOST_NAMES) else {
-            found.add(wrong_type(at, raw, "an object from JSON Pointer to value"));
-            sound = false;
-            continue;
-        };
+        let members = members(raw.get(), MOST_NAMES).unwrap_or_default();
         let mut point: Vec<Option<String>> = vec![None; paths.len()];
         for (name, raw) in members {
             let at = format!("{at}/{}", escape(&shortened(&name, 80)));
@@ -386,16 +341,7 @@ pub(super) fn points(fields: &Fields<'_>, found: &mut Findings) -> Option<(Vec<P
                     }
                 },
             };
-            if point[place].replace(raw.get().to_owned()).is_some() {
-                found.add(Violation::new(
-                    at,
-                    Reason::DuplicateName,
-                    "the name twice",
-                    "each name once",
-                    "Remove one of them; one would be ignored.",
-                ));
-                sound = false;
-            }
+            point[place] = Some(raw.get().to_owned());
         }
         listed.push(point);
     }

@@ -9,9 +9,13 @@ use std::{
 
 use anyhow::Context;
 use clap::Args;
-use files::sweep::{Fields, Sweep, groups};
+use files::{
+    body::{Body, Embedded},
+    sweep::{Axis, Mode, Points, Sweep, Variation, groups},
+};
+use schemars::JsonSchema;
 use serde::{Deserialize, de::IgnoredAny};
-use serde_json::value::RawValue;
+use serde_json::{Value, value::RawValue};
 use solver::{
     error::{Reason, Violation},
     solution::Progress,
@@ -52,26 +56,31 @@ pub(super) struct Arguments {
     threads: Threads,
 }
 
-/// A file with a sweep. Fields for the service only are ignored.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Definition<'a> {
-    #[serde(borrow)]
-    base: Option<&'a RawValue>,
-    #[serde(borrow)]
-    axes: Option<&'a RawValue>,
-    #[serde(borrow)]
-    mode: Option<&'a RawValue>,
-    #[serde(borrow)]
-    points: Option<&'a RawValue>,
-    #[serde(rename = "name")]
-    _name: Option<IgnoredAny>,
-    #[serde(rename = "labels")]
-    _labels: Option<IgnoredAny>,
-    #[serde(rename = "priority")]
-    _priority: Option<IgnoredAny>,
-    #[serde(rename = "limits")]
-    _limits: Option<IgnoredAny>,
+/// A file with a sweep. What is for the service only is not used.
+#[derive(Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+struct Definition {
+    #[serde(rename = "base")]
+    _base: Embedded,
+    #[serde(default)]
+    axes: Option<Vec<Axis>>,
+    #[serde(default)]
+    mode: Option<Mode>,
+    #[serde(default)]
+    #[schemars(with = "Option<Points>")]
+    points: Option<Vec<Box<RawValue>>>,
+    #[serde(default, rename = "name")]
+    #[schemars(with = "Value")]
+    _name: IgnoredAny,
+    #[serde(default, rename = "labels")]
+    #[schemars(with = "Value")]
+    _labels: IgnoredAny,
+    #[serde(default, rename = "priority")]
+    #[schemars(with = "Value")]
+    _priority: IgnoredAny,
+    #[serde(default, rename = "limits")]
+    #[schemars(with = "Value")]
+    _limits: IgnoredAny,
 }
 
 /// How often progress is printed.
@@ -210,17 +219,14 @@ pub(super) fn format_of(path: &Path) -> Result<Format, String> {
     }
 }
 
-/// The base of a sweep, read from the file that it names; `None` if it is a problem itself.
-pub(super) fn base_from_file(
-    file: &Path,
-    base: Option<&RawValue>,
-) -> anyhow::Result<Option<Box<RawValue>>> {
-    let Some(named) = base.filter(|base| base.get().starts_with('"')) else {
+/// The base of a sweep in this file, if it names a file instead of being a problem.
+pub(super) fn base_from_file(file: &Path, base: &str) -> anyhow::Result<Option<Box<RawValue>>> {
+    if !base.starts_with('"') {
         return Ok(None);
-    };
+    }
     let unread = |found: String| ApiError::InvalidProblem(malformed("/base", found));
-    let named: Cow<'_, str> = serde_json::from_str(named.get())
-        .map_err(|_| unread("a text that cannot be read".into()))?;
+    let named: Cow<'_, str> =
+        serde_json::from_str(base).map_err(|_| unread("a text that cannot be read".into()))?;
     let path = file.parent().unwrap_or(Path::new("")).join(&*named);
     let text = std::fs::read_to_string(&path)
         .with_context(|| format!("cannot read the base {}", path.display()))?;
@@ -241,14 +247,16 @@ fn malformed(pointer: &str, found: String) -> Vec<Violation> {
 
 /// Reads a sweep from a file's text; the error says why the file of its base cannot be read.
 fn read(file: &Path, text: &str) -> anyhow::Result<Result<Sweep, Vec<Violation>>> {
-    if let Some(place) = files::json::too_deep(text) {
-        return Ok(Err(malformed("", place)));
-    }
-    let definition: Definition<'_> = match serde_json::from_str(text) {
-        Ok(definition) => definition,
-        Err(error) => return Ok(Err(malformed("", error.to_string()))),
+    static BODY: Body<Definition> = Body::new();
+    let mut content = match BODY.read(text) {
+        Ok(content) => content,
+        Err(error) => return Ok(Err(malformed("", error))),
     };
-    let from_file = match base_from_file(file, definition.base) {
+    let from_file = match content.problems.first() {
+        Some((_, base)) => base_from_file(file, base),
+        None => Ok(None),
+    };
+    let from_file = match from_file {
         Ok(base) => base,
         Err(error) => match error.downcast() {
             Ok(ApiError::InvalidProblem(violations)) => return Ok(Err(violations)),
@@ -256,10 +264,14 @@ fn read(file: &Path, text: &str) -> anyhow::Result<Result<Sweep, Vec<Violation>>
             Err(other) => return Err(other),
         },
     };
-    Ok(files::sweep::read(&Fields {
-        base: from_file.as_deref().or(definition.base),
-        axes: definition.axes,
-        mode: definition.mode,
-        points: definition.points,
-    }))
+    let variation = content.fields.take().map(|fields| Variation {
+        axes: fields.axes,
+        mode: fields.mode,
+        points: fields.points,
+    });
+    let mut content = content.with(variation);
+    if let (Some(base), Some((_, text))) = (&from_file, content.problems.first_mut()) {
+        *text = base.get();
+    }
+    Ok(files::sweep::of_body(content))
 }

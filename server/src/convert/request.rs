@@ -1,22 +1,23 @@
 //! Reads the parts of requests other than a problem.
 
-use files::sweep::Fields;
+use std::collections::BTreeMap;
+
+use files::sweep::{Axis, Mode, Spaced, Variation};
 use prost_types::Timestamp;
-use serde_json::{json, value::RawValue};
+use serde_json::value::{RawValue, to_raw_value};
 use solver::{error::Reason, problem::Problem};
 
 use super::{Reader, read};
 use crate::{
     error::ApiError,
-    job::Cache,
+    job::{Cache, Status, SweepId},
+    parameters::Values,
     pb,
-    store::{Edit, Filter},
+    store::{Edit, Filter, SweepIds, job_filters},
     time::Time,
     verbs::{
         envelope::{Envelope, JobRequest},
-        filters::{
-            self, CREATED_AFTER, CREATED_BEFORE, FINISHED_AFTER, FINISHED_BEFORE, STATUS, SWEEP,
-        },
+        filters,
         sweeps::SweepRequest,
     },
 };
@@ -52,8 +53,7 @@ pub fn job_request(request: pb::CreateJobRequest) -> JobRequest {
     JobRequest { envelope, problem }
 }
 
-/// Reads the request for a sweep: its definition as JSON, which is then read as over REST. Pointers refer to the
-/// request.
+/// A sweep as it is asked for. Pointers go into the request.
 pub fn sweep_request(request: pb::CreateSweepRequest) -> SweepRequest {
     let pb::CreateSweepRequest {
         base,
@@ -73,35 +73,26 @@ pub fn sweep_request(request: pb::CreateSweepRequest) -> SweepRequest {
     };
     let base: Option<Problem> = read.field("base", base.unwrap_or_default());
     let mode = match pb::SweepMode::try_from(mode) {
-        Ok(pb::SweepMode::Unspecified | pb::SweepMode::Grid) => Some(r#""grid""#),
-        Ok(pb::SweepMode::Zip) => Some(r#""zip""#),
-        Ok(pb::SweepMode::List) => Some(r#""list""#),
+        Ok(pb::SweepMode::Unspecified | pb::SweepMode::Grid) => Some(Mode::Grid),
+        Ok(pb::SweepMode::Zip) => Some(Mode::Zip),
+        Ok(pb::SweepMode::List) => Some(Mode::List),
         Err(_) => read.unknown(mode, "SweepMode"),
     };
     let (listed, pointed) = (!axes.is_empty(), !points.is_empty());
-    let axes: Vec<Option<String>> = read_each("axes", axes, &mut read, axis);
-    let points: Vec<Option<String>> = read_each("points", points, &mut read, point);
-    let list = |items: Vec<Option<String>>| -> Option<Box<RawValue>> {
-        let items: Option<Vec<String>> = items.into_iter().collect();
-        RawValue::from_string(format!("[{}]", items?.join(","))).ok()
-    };
+    let axes = read_each("axes", axes, &mut read, axis);
+    let points = read_each("points", points, &mut read, point);
     let definition = (|| {
         let base = serde_json::to_string(&base?).ok()?;
-        let base = RawValue::from_string(base).ok()?;
-        let mode = RawValue::from_string(mode?.to_owned()).ok()?;
-        let (axes, points) = (list(axes)?, list(points)?);
-        Some((base, mode, axes, points))
+        let variation = Variation {
+            mode: Some(mode?),
+            axes: Some(axes?).filter(|_| listed),
+            points: Some(points?).filter(|_| pointed),
+        };
+        Some((base, variation))
     })();
     let definition = read
         .found(definition)
-        .and_then(|(base, mode, axes, points)| {
-            files::sweep::read(&Fields {
-                base: Some(&base),
-                axes: Some(&*axes).filter(|_| listed),
-                mode: Some(&mode),
-                points: Some(&*points).filter(|_| pointed),
-            })
-        });
+        .and_then(|(base, variation)| files::sweep::read(&base, variation));
     SweepRequest {
         envelope: Envelope {
             name,
@@ -115,107 +106,138 @@ pub fn sweep_request(request: pb::CreateSweepRequest) -> SweepRequest {
     }
 }
 
-/// Reads each item as JSON; violations are recorded at their places.
-fn read_each<M>(
+/// Each item; what cannot be read is noted at its place.
+fn read_each<M, T>(
     name: &'static str,
     messages: Vec<M>,
     read: &mut Reader,
-    item: fn(M, &mut Reader) -> Option<String>,
-) -> Vec<Option<String>> {
+    item: fn(M, &mut Reader) -> Option<T>,
+) -> Option<Vec<T>> {
     read.inside(name, |read| {
         let each = |(n, message)| read.item(n, |read| item(message, read));
-        messages.into_iter().enumerate().map(each).collect()
+        // all of them, so that all that is wrong is noted
+        let items: Vec<Option<T>> = messages.into_iter().enumerate().map(each).collect();
+        items.into_iter().collect()
     })
 }
 
-/// Reads an axis as JSON.
-fn axis(message: pb::SweepAxis, read: &mut Reader) -> Option<String> {
+fn axis(message: pb::SweepAxis, read: &mut Reader) -> Option<Axis> {
     use pb::sweep_axis::Values;
     let pb::SweepAxis { path, values } = message;
     let spaced = |name, spaced: pb::Spaced, read: &mut Reader| {
         let pb::Spaced { start, stop, count } = spaced;
         read.inside(name, |read| {
-            let (start, stop): (Option<f64>, Option<f64>) =
-                (read.field("start", start), read.field("stop", stop));
-            let spaced = json!({"start": start?, "stop": stop?, "count": count});
-            Some(json!({"path": path, name: spaced}).to_string())
+            let (start, stop) = (read.field("start", start), read.field("stop", stop));
+            let count = count.into();
+            Some(Spaced {
+                start: start?,
+                stop: stop?,
+                count,
+            })
         })
+    };
+    let mut axis = Axis {
+        path,
+        values: None,
+        linspace: None,
+        logspace: None,
     };
     match values {
         Some(Values::Numbers(pb::NumberList { numbers })) => {
             let numbers: Option<Vec<f64>> = read.field("values", numbers);
-            Some(json!({"path": path, "values": numbers?}).to_string())
+            let texts = numbers?
+                .into_iter()
+                .map(|number| to_raw_value(&number).ok());
+            axis.values = Some(texts.collect::<Option<_>>()?);
         }
-        Some(Values::Linspace(message)) => spaced("linspace", message, read),
-        Some(Values::Logspace(message)) => spaced("logspace", message, read),
+        Some(Values::Linspace(message)) => {
+            axis.linspace = Some(spaced("linspace", message, read)?);
+        }
+        Some(Values::Logspace(message)) => {
+            axis.logspace = Some(spaced("logspace", message, read)?);
+        }
         Some(Values::Json(pb::JsonList { values })) => {
-            let texts = read_each("values", values, read, json_text);
-            let texts: Option<Vec<String>> = texts.into_iter().collect();
-            let path = serde_json::Value::String(path);
-            Some(format!(
-                r#"{{"path":{path},"values":[{}]}}"#,
-                texts?.join(",")
-            ))
+            axis.values = Some(read_each("values", values, read, json_text)?);
         }
-        None => read.missing("one of numbers, linspace, logspace, json"),
+        None => return read.missing("one of numbers, linspace, logspace, json"),
     }
+    Some(axis)
 }
 
-/// Reads a point as JSON.
-fn point(message: pb::SweepPoint, read: &mut Reader) -> Option<String> {
-    let mut members = vec![];
+fn point(message: pb::SweepPoint, read: &mut Reader) -> Option<Box<RawValue>> {
+    let mut members = BTreeMap::new();
     let mut sound = true;
     for (n, (path, text)) in message.values.into_iter().enumerate() {
         match read.item(n, |read| json_text(text, read)) {
-            Some(text) => members.push(format!("{}:{text}", serde_json::Value::String(path))),
+            Some(text) => {
+                members.insert(path, text);
+            }
             None => sound = false,
         }
     }
-    sound.then(|| format!("{{{}}}", members.join(",")))
+    to_raw_value(&members).ok().filter(|_| sound)
 }
 
-/// Reads a text that is a JSON value, nested no deeper than a problem may be.
-fn json_text(text: String, read: &mut Reader) -> Option<String> {
-    let deep = files::json::too_deep(&text);
-    let read_one = || serde_json::from_str::<&RawValue>(&text).map(|_| ());
-    match (deep, read_one()) {
-        (None, Ok(())) => Some(text),
-        (Some(place), _) => read.wrong(Reason::Malformed, place, "a value as JSON"),
-        (None, Err(error)) => read.wrong(Reason::Malformed, error, "a value as JSON"),
+/// A text that is a value as JSON, and nested no deeper than a problem may be.
+fn json_text(text: String, read: &mut Reader) -> Option<Box<RawValue>> {
+    if let Some(place) = files::json::too_deep(&text) {
+        return read.wrong(Reason::Malformed, place, "a value as JSON");
+    }
+    match RawValue::from_string(text) {
+        Ok(value) => Some(value),
+        Err(error) => read.wrong(Reason::Malformed, error, "a value as JSON"),
     }
 }
 
-/// Reads the filter for jobs.
-pub fn filter(message: Option<pb::JobFilter>) -> Result<Filter, ApiError> {
-    let pb::JobFilter {
-        status: numbers,
-        owner,
-        labels,
-        name,
-        input_hash,
-        created_after,
-        created_before,
-        finished_after,
-        finished_before,
-        sweep,
-    } = message.unwrap_or_default();
-    let status = |number| {
-        read(number)
-            .map_err(|_| invalid_field(STATUS.name, number, "a value of the enum other than 0"))
-    };
-    filters::checked(Filter {
-        statuses: numbers.into_iter().map(status).collect::<Result<_, _>>()?,
-        owner,
-        labels: labels.into_iter().collect(),
-        name,
-        input_hash,
-        sweep: sweep.map(|id| SWEEP.read(&id)).transpose()?,
-        created_after: time(CREATED_AFTER.name, created_after)?,
-        created_before: time(CREATED_BEFORE.name, created_before)?,
-        finished_after: time(FINISHED_AFTER.name, finished_after)?,
-        finished_before: time(FINISHED_BEFORE.name, finished_before)?,
-    })
+/// A field of the message of filters.
+trait Criterion<T> {
+    fn read(self, name: &'static str) -> Result<T, ApiError>;
 }
+
+impl Criterion<Vec<Status>> for Vec<i32> {
+    fn read(self, name: &'static str) -> Result<Vec<Status>, ApiError> {
+        let status = |number| {
+            read(number)
+                .map_err(|_| invalid_field(name, number, "a value of the enum other than 0"))
+        };
+        self.into_iter().map(status).collect()
+    }
+}
+
+impl Criterion<Option<String>> for Option<String> {
+    fn read(self, _name: &'static str) -> Result<Option<String>, ApiError> {
+        Ok(self)
+    }
+}
+
+impl Criterion<Option<SweepId>> for Option<String> {
+    fn read(self, name: &'static str) -> Result<Option<SweepId>, ApiError> {
+        let sweep = |id: String| {
+            SweepId::parse(&id).ok_or_else(|| invalid_field(name, id, SweepIds.expected()))
+        };
+        self.map(sweep).transpose()
+    }
+}
+
+impl Criterion<Option<Time>> for Option<Timestamp> {
+    fn read(self, name: &'static str) -> Result<Option<Time>, ApiError> {
+        time(name, self)
+    }
+}
+
+macro_rules! reader {
+    ($($field:ident: $type:ty, $name:ident, $column:literal $comparison:literal, $index:expr, $meaning:literal;)*) => {
+        /// Which jobs.
+        pub fn filter(message: Option<pb::JobFilter>) -> Result<Filter, ApiError> {
+            let pb::JobFilter { labels, $($name,)* } = message.unwrap_or_default();
+            filters::checked(Filter {
+                labels: labels.into_iter().collect(),
+                $($field: Criterion::<$type>::read($name, stringify!($name))?,)*
+            })
+        }
+    };
+}
+job_filters!(reader);
 
 fn time(name: &'static str, stamp: Option<Timestamp>) -> Result<Option<Time>, ApiError> {
     let Some(stamp) = stamp else { return Ok(None) };

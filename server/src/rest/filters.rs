@@ -3,12 +3,9 @@
 use super::input::{Input, RawInput};
 use crate::{
     error::ApiError,
-    parameters::{Description, Parameter, Text},
-    store::Filter,
-    verbs::filters::{
-        self, CREATED_AFTER, CREATED_BEFORE, FINISHED_AFTER, FINISHED_BEFORE, INPUT_HASH, LABEL,
-        NAME, OWNER, STATUS, SWEEP,
-    },
+    parameters::Description,
+    store::{self, Filter},
+    verbs::filters::{self, LABEL},
 };
 
 /// All filters; without any, every job matches.
@@ -22,26 +19,24 @@ impl Input for Filters {
     type Value = Filter;
 
     fn descriptions(&self) -> Vec<Description> {
-        filters::describe().into()
+        filters::describe()
     }
 
     fn extract(&self, raw: &RawInput<'_>) -> Result<Filter, ApiError> {
-        let statuses = raw.all(STATUS.name).flat_map(|list| list.split(','));
-        let text = |filter: Parameter<Text>| raw.one(filter.name).map(str::to_owned);
-        filters::checked(Filter {
-            statuses: statuses
-                .map(|word| STATUS.read(word))
-                .collect::<Result<_, _>>()?,
-            owner: text(OWNER),
+        let mut filter = Filter {
             labels: raw.keyed(LABEL.name).collect(),
-            name: text(NAME),
-            input_hash: text(INPUT_HASH),
-            sweep: SWEEP.extract(raw)?,
-            created_after: CREATED_AFTER.extract(raw)?,
-            created_before: CREATED_BEFORE.extract(raw)?,
-            finished_after: FINISHED_AFTER.extract(raw)?,
-            finished_before: FINISHED_BEFORE.extract(raw)?,
-        })
+            ..Filter::default()
+        };
+        for field in store::FILTERS {
+            for text in raw.all(field.name) {
+                let list = field.several.then(|| text.split(','));
+                let one = (!field.several).then_some(text);
+                for text in list.into_iter().flatten().chain(one) {
+                    filters::set(&mut filter, field, text)?;
+                }
+            }
+        }
+        filters::checked(filter)
     }
 }
 

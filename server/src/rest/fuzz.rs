@@ -206,10 +206,7 @@ fn changed_bodies_are_read_or_refused() {
                 bodies::submission(&text).and_then(|job| found(job.problem)),
                 |_| String::new(),
             ),
-            kind(
-                bodies::batch(&text).and_then(|jobs| jobs.map_err(ApiError::InvalidProblem)),
-                |jobs| jobs.len().min(3).to_string(),
-            ),
+            kind(bodies::batch(&text), |jobs| jobs.len().min(3).to_string()),
             kind(bodies::bare_problem(&text).and_then(found), |_| {
                 String::new()
             }),

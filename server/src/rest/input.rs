@@ -185,7 +185,7 @@ mod tests {
 
     fn refused(query: &str) -> Option<String> {
         let headers = HeaderMap::new();
-        let described = [filters::describe().to_vec(), vec![PAGE_SIZE.describe()]].concat();
+        let described = [filters::describe(), vec![PAGE_SIZE.describe()]].concat();
         let raw = RawInput::new(vec![], Some(query), &headers);
         raw.check(&described).err().map(|error| error.to_string())
     }

@@ -12,7 +12,7 @@
 //! | the input of a request: path, query and headers | `input`, `headers` |
 //! | the input of a request: filters | `filters` |
 //! | the input of a request: formats | `accept` |
-//! | bodies as bytes, as JSON with all violations | `body`, `bodies`, `object` |
+//! | bodies as bytes, as JSON with all violations | `body`, `bodies` |
 //! | content codings | `coding`, `compressed` |
 //! | the caller and what they may do | `authenticate` |
 //! | a token that is revoked while it is used | `revocation` |
@@ -38,7 +38,6 @@ mod forwarded;
 mod headers;
 mod input;
 mod limits;
-mod object;
 mod origin;
 
 // Answers.

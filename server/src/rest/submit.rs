@@ -154,7 +154,6 @@ pub(super) async fn create_batch(mut call: Call, key: Option<Key>) -> Result<Res
     call.service.accepting()?;
     let text = call.json().await?;
     let requests = call.service.work(move || bodies::batch(&text)).await??;
-    let requests = requests.map_err(ApiError::InvalidProblem)?;
     let submitted = verbs::create_batch(&call.service, &call.caller, requests, key).await?;
     let batch = Batch {
         jobs: submitted.accepted,

@@ -222,8 +222,8 @@ pub fn row_of(number: usize, error: SolveError) -> Result<MemberRow, SolveError>
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use files::sweep::{Fields, read};
-    use serde_json::{json, value::RawValue};
+    use files::sweep::{Variation, read};
+    use serde_json::json;
 
     use super::*;
 
@@ -246,15 +246,11 @@ mod tests {
                 {"path": "/contacts/0/friction/nonlocal_radius", "values": [0.05, 0.08]},
                 {"path": "/contacts/0/indentation", "values": [0.01, 0.02, 0.03]},
             ]);
-            let [base, axes] =
-                [&base, &axes].map(|text| RawValue::from_string(text.to_string()).unwrap());
-            let sweep = read(&Fields {
-                base: Some(&base),
-                axes: Some(&axes),
-                mode: None,
-                points: None,
-            })
-            .unwrap();
+            let variation = Variation {
+                axes: serde_json::from_value(axes).unwrap(),
+                ..Default::default()
+            };
+            let sweep = read(&base.to_string(), variation).unwrap();
             let group: Group = (0..24).collect();
             let solved = |numbers: &[usize]| {
                 let none = |_: &Problem| None;

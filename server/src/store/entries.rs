@@ -2,6 +2,8 @@
 
 use std::{collections::BTreeMap, ops::ControlFlow};
 
+use super::filter::Cursor;
+
 /// Most bytes of labels of the entries of a list that are read at a time: a page of a thousand jobs might have a hundred times
 /// as many.
 const MOST_LABEL_BYTES: usize = 2 << 20;
@@ -13,6 +15,8 @@ pub struct Entries<T> {
     pub items: Vec<T>,
     /// There are more, which were not read since the labels of these are large.
     pub cut: bool,
+    /// The place up to which the list was checked, if it goes on there: it may then have more, also if there are no items.
+    pub checked_to: Option<Cursor>,
     bytes: usize,
 }
 
@@ -21,6 +25,7 @@ impl<T> Default for Entries<T> {
         Entries {
             items: vec![],
             cut: false,
+            checked_to: None,
             bytes: 0,
         }
     }

@@ -6,16 +6,13 @@ use crate::job::Job;
 /// Writes the labels of a job.
 pub(super) async fn write(change: &mut Change<'_>, job: &Job) -> Result<()> {
     for (name, value) in &job.labels {
-        sqlx::query(
-            "insert into job_label (key, value, created_at, job_id, owner) values (?, ?, ?, ?, ?)",
-        )
-        .bind(name)
-        .bind(value)
-        .bind(job.created_at.micros())
-        .bind(job.key)
-        .bind(&job.owner)
-        .execute(change.sql().await?)
-        .await?;
+        sqlx::query("insert into job_label (key, value, created_at, job_id) values (?, ?, ?, ?)")
+            .bind(name)
+            .bind(value)
+            .bind(job.created_at.micros())
+            .bind(job.key)
+            .execute(change.sql().await?)
+            .await?;
     }
     Ok(())
 }

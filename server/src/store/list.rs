@@ -1,10 +1,9 @@
 //! Lists of jobs: pages, counts, keys.
 //!
-//! A page costs as many rows as it shows, not as many as the table has. Each filter has an index in the order of
-//! the list, and those by label, status and name have another one that begins with the owner: most callers see
-//! only their own jobs, however many others have the same. One filter is chosen as the access path, and the
-//! others are checked on the rows that it finds: a filter that matches few jobs, which are then sorted if
-//! necessary, or else one whose index has the order of the list, since then a page is soon full.
+//! A filter has an index with the jobs of each value in order of arrival, and there is one of all jobs in order of
+//! arrival and one in order of their ends. A page is read along one of them, and the other filters are checked row by
+//! row, for at most [`MOST_CHECKED`] rows: then the page is short, and the next one goes on behind the last row that was
+//! checked. Of several indexes the one is taken that gets furthest in so many rows; their lengths need not be known.
 
 use futures_util::TryStreamExt;
 use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
@@ -14,53 +13,92 @@ use super::{
     database::Store,
     entries::{Entries, bytes_of},
     error::Result,
-    filter::{Cursor, Filter, GroupBy, Order, OrderBy},
+    filter::{Cursor, FILTERS, Field, Filter, GroupBy, Order, OrderBy, Stored},
     rows::from_row,
 };
-use crate::{
-    caller::Owners,
-    job::{Job, Status, SweepId},
-};
+use crate::{caller::Owners, job::Job};
 
-/// The index by which the rows of a list are found.
+/// Rows that are checked for a page; few in tests, so that pages are short.
+const MOST_CHECKED: i64 = if cfg!(test) { 8 } else { 2000 };
+/// Labels by whose index a list may be read.
+const MOST_LABEL_PATHS: usize = 4;
+
+/// A part of an index: the rows of one value.
 #[derive(Clone, Copy)]
-pub(super) enum AccessPath<'a> {
+enum Lane<'a> {
+    /// Of a label.
     Label(&'a (String, String)),
-    InputHash(&'a str),
-    Sweep(SweepId),
-    Name(&'a str),
-    Status(Status),
-    Owner(&'a str),
-    /// By the time of the end, in a list ordered by the time of arrival.
-    Ended,
+    /// Of a value of a column.
+    Value(&'static str, &'static Field, &'a Stored),
+    /// All jobs, or all that have ended.
     All,
 }
 
-/// A filter that matches no more jobs than this is the access path, whatever the order of the list: to read and sort
-/// all of them costs less than a page may.
-const FEW: i64 = 1000;
-/// Matches are counted up to so many, which takes a millisecond or two: of several filters that match more than a few, the first
-/// one within this is the access path, or one with a tenth of its matches, since a page may have to pass over all of them.
-const MANY: i64 = 20_000;
-/// The statuses of jobs that have ended.
-const ENDED: [Status; 3] = [Status::Succeeded, Status::Failed, Status::Canceled];
+/// How the rows of a list are found: the lanes of one index, merged, and the time that orders each.
+pub(super) struct Path<'a> {
+    lanes: Vec<Lane<'a>>,
+    by: OrderBy,
+}
+
+/// The part of a path that is read for a page.
+#[derive(Clone, Copy)]
+pub(super) struct Window {
+    /// Behind this row.
+    pub(super) after: Option<Cursor>,
+    /// Up to this one; none: to the end.
+    pub(super) last: Option<Cursor>,
+    pub(super) order: Order,
+}
+
+/// Keys of jobs, in order of arrival.
+#[derive(Debug)]
+pub struct Keys {
+    /// The keys.
+    pub keys: Vec<i64>,
+    /// Where the next ones begin; none after the last.
+    pub next: Option<Cursor>,
+}
+
+impl Path<'_> {
+    /// The path of all jobs.
+    fn whole(by: OrderBy) -> Self {
+        let lanes = vec![Lane::All];
+        Path { lanes, by }
+    }
+
+    /// The order in which its rows are for a list of that order.
+    pub(super) fn order(&self, list: Order) -> Order {
+        Order {
+            by: self.by,
+            ..list
+        }
+    }
+}
 
 impl Store {
-    /// At most `limit` jobs of a list, after `cursor`.
+    /// At most `limit` jobs of a list, after `cursor`, from as many pages as that takes.
     #[cfg(test)]
     pub async fn jobs(
         &self,
         owners: Owners<'_>,
         filter: &Filter,
         order: Order,
-        cursor: Option<Cursor>,
+        mut cursor: Option<Cursor>,
         limit: i64,
     ) -> Result<Vec<Job>> {
-        let found = self.some_jobs(owners, filter, order, cursor, limit).await?;
-        Ok(found.items)
+        let mut all = vec![];
+        loop {
+            let rest = limit - all.len() as i64;
+            let found = self.some_jobs(owners, filter, order, cursor, rest).await?;
+            all.extend(found.items);
+            cursor = found.checked_to;
+            if cursor.is_none() || all.len() as i64 >= limit {
+                return Ok(all);
+            }
+        }
     }
 
-    /// At most `limit` jobs of a list, after `cursor`; fewer if their labels are large.
+    /// At most `limit` jobs of a list, after `cursor`; fewer if their labels are large or many rows had to be checked.
     pub async fn some_jobs(
         &self,
         owners: Owners<'_>,
@@ -74,12 +112,11 @@ impl Store {
         };
         let read = async {
             let mut connection = self.lists.acquire().await?;
-            let paths = match selective_path(&mut connection, filter, order).await? {
-                Some(path) => vec![path],
-                None => ordered_paths(filter, order),
-            };
-            let mut query = page_of_jobs(filter, &paths, order, cursor, limit);
+            let values = values_of(filter);
+            let (path, window) = choose(&mut connection, filter, &values, order, cursor).await?;
+            let mut query = page("job.*", filter, &path, window, i64::MAX, limit);
             let mut jobs = Entries::default();
+            jobs.checked_to = window.last;
             let mut rows = query.build().fetch(&mut *connection);
             while let Some(row) = rows.try_next().await? {
                 let job = from_row(&row)?;
@@ -117,22 +154,36 @@ impl Store {
         self.damages.noting(read).await
     }
 
-    /// The keys of at most `limit` jobs, in order of arrival, after one key and up to another.
+    /// The keys of at most `limit` jobs, in order of arrival, after a place in that order and up to a key.
     pub async fn keys(
         &self,
         owners: Owners<'_>,
         filter: &Filter,
-        after: i64,
+        after: Option<Cursor>,
         up_to: i64,
         limit: i64,
-    ) -> Result<Vec<i64>> {
-        let Some(filter) = &filter.among(owners) else {
-            return Ok(vec![]);
-        };
-        let mut query = keys_of_jobs(filter, after, up_to, limit);
-        let keys = query.build_query_scalar().fetch_all(&self.lists).await?;
-        self.damages.have_all(tables_of(filter))?;
-        Ok(keys)
+    ) -> Result<Keys> {
+        let (mut keys, mut next) = (vec![], None);
+        if let Some(filter) = &filter.among(owners) {
+            let mut connection = self.lists.acquire().await?;
+            let values = values_of(filter);
+            let order = Order::OLDEST_FIRST;
+            let (path, window) = choose(&mut connection, filter, &values, order, after).await?;
+            let columns = "job.id, job.created_at";
+            let mut query = page(columns, filter, &path, window, up_to, limit);
+            let places: Vec<(i64, i64)> =
+                query.build_query_as().fetch_all(&mut *connection).await?;
+            next = match places.last() {
+                Some((key, micros)) if places.len() as i64 == limit => Some(Cursor {
+                    micros: *micros,
+                    key: *key,
+                }),
+                _ => window.last,
+            };
+            keys = places.into_iter().map(|(key, _)| key).collect();
+            self.damages.have_all(tables_of(filter))?;
+        }
+        Ok(Keys { keys, next })
     }
 }
 
@@ -144,30 +195,210 @@ fn tables_of(filter: &Filter) -> &'static [Table] {
     }
 }
 
-/// At most `limit` jobs, from the lists of all access paths merged.
-pub(super) fn page_of_jobs(
-    filter: &Filter,
-    paths: &[AccessPath<'_>],
+/// The filters that are given, each with its values.
+pub(super) fn values_of(filter: &Filter) -> Vec<(&'static Field, Vec<Stored>)> {
+    let each = FILTERS.iter().map(|field| (field, (field.values)(filter)));
+    each.filter(|(_, values)| !values.is_empty()).collect()
+}
+
+/// All ways to find the jobs of a list. The last one finds all jobs in the order of the list.
+pub(super) fn paths<'a>(
+    filter: &'a Filter,
+    values: &'a [(&'static Field, Vec<Stored>)],
     order: Order,
-    cursor: Option<Cursor>,
+) -> Vec<Path<'a>> {
+    let mut paths = vec![];
+    let mut add = |by, lanes| paths.push(Path { lanes, by });
+    for label in filter.labels.iter().take(MOST_LABEL_PATHS) {
+        add(OrderBy::CreatedAt, vec![Lane::Label(label)]);
+    }
+    for (field, values) in values {
+        if let Some(index) = field.index {
+            let lane = |value| Lane::Value(index, field, value);
+            add(OrderBy::CreatedAt, values.iter().map(lane).collect());
+        }
+    }
+    let other = match order.by {
+        OrderBy::CreatedAt => OrderBy::FinishedAt,
+        OrderBy::FinishedAt => OrderBy::CreatedAt,
+    };
+    if values
+        .iter()
+        .any(|(field, _)| field.column == <&str>::from(other))
+    {
+        paths.push(Path::whole(other));
+    }
+    paths.push(Path::whole(order.by));
+    paths
+}
+
+/// The path of a page and its part. One in the order of the list is read as far as the limit permits; one in another
+/// order only if that is to its end, since its rows are sorted.
+async fn choose<'a>(
+    connection: &mut SqliteConnection,
+    filter: &'a Filter,
+    values: &'a [(&'static Field, Vec<Stored>)],
+    order: Order,
+    after: Option<Cursor>,
+) -> Result<(Path<'a>, Window)> {
+    // each row is looked up in the index of each label
+    let most = (MOST_CHECKED / filter.labels.len().max(1) as i64).max(2);
+    let end = Window {
+        after,
+        last: None,
+        order,
+    };
+    let mut furthest = (Path::whole(order.by), end);
+    for path in paths(filter, values, order) {
+        let ordered = path.by == order.by;
+        let begin = after.filter(|_| ordered);
+        let reached = reach(filter, &path, path.order(order), begin, most)
+            .build_query_as()
+            .fetch_optional(&mut *connection)
+            .await?;
+        let Some((micros, key)) = reached else {
+            return Ok((path, end));
+        };
+        let reached = Cursor { micros, key };
+        if ordered
+            && furthest
+                .1
+                .last
+                .is_none_or(|best| order.is_before(best, reached))
+        {
+            let last = Some(reached);
+            furthest = (path, Window { last, ..end });
+        }
+    }
+    Ok(furthest)
+}
+
+/// The place of the row of a path that is `most` rows behind another place; none if it ends before.
+pub(super) fn reach(
+    filter: &Filter,
+    path: &Path<'_>,
+    order: Order,
+    after: Option<Cursor>,
+    most: i64,
+) -> QueryBuilder<Sqlite> {
+    let mut query = QueryBuilder::<Sqlite>::new("");
+    let window = Window {
+        after,
+        last: None,
+        order,
+    };
+    merged(&mut query, path, "micros", order, most, |query, lane| {
+        let place = Place::of(lane, path.by);
+        let Place { at, id } = place;
+        from(query, lane, path.by, &format!("{at} as micros, {id} as id"));
+        bounds(query, filter, place, window);
+        query.push(ordered(at, id, order));
+    });
+    query.push(" limit 1 offset ").push_bind(most - 1);
+    query
+}
+
+/// At most `limit` jobs of a path, in order, with keys up to `up_to`.
+pub(super) fn page(
+    columns: &str,
+    filter: &Filter,
+    path: &Path<'_>,
+    window: Window,
+    up_to: i64,
     limit: i64,
 ) -> QueryBuilder<Sqlite> {
     let mut query = QueryBuilder::<Sqlite>::new("");
-    for (n, path) in paths.iter().enumerate() {
+    let order = window.order;
+    let by = <&str>::from(order.by);
+    merged(&mut query, path, by, order, limit, |query, lane| {
+        // rows that are sorted are those of the table
+        let place = match path.by == order.by {
+            true => Place::of(lane, order.by),
+            false => Place::of(Lane::All, order.by),
+        };
+        from(query, lane, path.by, columns);
+        if order.by == OrderBy::FinishedAt {
+            query.push(" and job.finished_at is not null");
+        }
+        if up_to < i64::MAX {
+            query.push(" and job.id <= ").push_bind(up_to);
+        }
+        conditions(query, filter, Some(lane), order.by);
+        bounds(query, filter, place, window);
+        query.push(ordered(place.at, place.id, order));
+    });
+    query.push(" limit ").push_bind(limit);
+    query
+}
+
+/// The lanes of a path, each with at most `most` rows, merged in order.
+fn merged<'a>(
+    query: &mut QueryBuilder<Sqlite>,
+    path: &Path<'a>,
+    by: &str,
+    order: Order,
+    most: i64,
+    lane: impl Fn(&mut QueryBuilder<Sqlite>, Lane<'a>),
+) {
+    if let [only] = path.lanes[..] {
+        return lane(query, only);
+    }
+    for (n, one) in path.lanes.iter().enumerate() {
         query.push(if n == 0 {
             "select * from ("
         } else {
             " union all select * from ("
         });
-        page(&mut query, filter, *path, order, cursor);
-        query.push(" limit ").push_bind(limit).push(")");
+        lane(query, *one);
+        query.push(" limit ").push_bind(most).push(")");
     }
-    if paths.len() > 1 {
-        let (by, direction) = (<&str>::from(order.by), order.direction());
-        query.push(format!(" order by {by} {direction}, id {direction} limit "));
-        query.push_bind(limit);
+    query.push(ordered(by, "id", order));
+}
+
+fn ordered(at: &str, id: &str, order: Order) -> String {
+    let direction = order.direction();
+    format!(" order by {at} {direction}, {id} {direction}")
+}
+
+/// The rows of a lane. `indexed by`: the planner does not know how many jobs a filter matches, and would guess.
+fn from(query: &mut QueryBuilder<Sqlite>, lane: Lane<'_>, by: OrderBy, columns: &str) {
+    match lane {
+        Lane::Label((key, value)) => {
+            // a place in the index needs no job
+            let job = match columns.contains("job.") {
+                true => " cross join job on job.id = job_label.job_id",
+                false => "",
+            };
+            query.push(format!(
+                "select {columns} from job_label{job} where job_label.key = "
+            ));
+            query.push_bind(key.clone()).push(" and job_label.value = ");
+            query.push_bind(value.clone());
+        }
+        Lane::Value(index, field, value) => {
+            let column = field.column;
+            query.push(format!(
+                "select {columns} from job indexed by {index} where {column} = "
+            ));
+            push_value(query, value);
+        }
+        Lane::All => {
+            let (index, all) = match by {
+                OrderBy::CreatedAt => ("job_by_created", "true"),
+                OrderBy::FinishedAt => ("job_by_finished", "finished_at is not null"),
+            };
+            query.push(format!(
+                "select {columns} from job indexed by {index} where {all}"
+            ));
+        }
     }
-    query
+}
+
+fn push_value(query: &mut QueryBuilder<Sqlite>, value: &Stored) {
+    match value {
+        Stored::Text(text) => query.push_bind(text.clone()),
+        Stored::Micros(micros) => query.push_bind(*micros),
+    };
 }
 
 /// The number of jobs in each group.
@@ -176,314 +407,116 @@ pub(super) fn counted(filter: &Filter, group_by: Option<GroupBy>) -> QueryBuilde
     let mut query = QueryBuilder::<Sqlite>::new(format!(
         "select {group} as kind, count(*) as jobs from job where true"
     ));
-    conditions(&mut query, filter, None);
-    times(&mut query, filter, "job.created_at", None);
+    conditions(&mut query, filter, None, OrderBy::CreatedAt);
+    let window = Window {
+        after: None,
+        last: None,
+        order: Order::NEWEST_FIRST,
+    };
+    let place = Place::of(Lane::All, OrderBy::CreatedAt);
+    bounds(&mut query, filter, place, window);
     query.push(" group by kind order by kind");
     query
 }
 
-/// The keys of at most `limit` jobs, in order.
-pub(super) fn keys_of_jobs(
-    filter: &Filter,
-    after: i64,
-    up_to: i64,
-    limit: i64,
-) -> QueryBuilder<Sqlite> {
-    let mut query = QueryBuilder::<Sqlite>::new("select id from job where id > ");
-    query.push_bind(after).push(" and id <= ").push_bind(up_to);
-    conditions(&mut query, filter, None);
-    times(&mut query, filter, "job.created_at", None);
-    query.push(" order by id limit ").push_bind(limit);
-    query
-}
-
-/// The access path by a filter that matches few jobs, or the fewest, if there is such a filter and more than one path.
-async fn selective_path<'a>(
-    connection: &mut SqliteConnection,
-    filter: &'a Filter,
-    order: Order,
-) -> Result<Option<AccessPath<'a>>> {
-    let mut candidates: Vec<AccessPath<'a>> = filter.labels.iter().map(AccessPath::Label).collect();
-    candidates.extend(filter.input_hash.as_deref().map(AccessPath::InputHash));
-    candidates.extend(filter.sweep.map(AccessPath::Sweep));
-    candidates.extend(filter.name.as_deref().map(AccessPath::Name));
-    // the other indexes begin with the owner, and a sweep has one only
-    if filter.input_hash.is_some() {
-        candidates.extend(filter.owner.as_deref().map(AccessPath::Owner));
-    }
-    if let [status] = filter.statuses[..] {
-        candidates.push(AccessPath::Status(status));
-    }
-    let by_creation = order.by == OrderBy::CreatedAt;
-    if by_creation && (filter.finished_after.is_some() || filter.finished_before.is_some()) {
-        candidates.push(AccessPath::Ended);
-    }
-    if by_creation && candidates.len() == 1 && !matches!(candidates[0], AccessPath::Ended) {
-        return Ok(None);
-    }
-    let mut counted = if by_creation { MANY } else { FEW };
-    let mut fewest = None;
-    for path in candidates {
-        let mut query = QueryBuilder::<Sqlite>::new("select count(*) from (select 1 from ");
-        match path {
-            AccessPath::Label((key, value)) => {
-                query.push("job_label where key = ").push_bind(key);
-                query.push(" and value = ").push_bind(value);
-            }
-            AccessPath::InputHash(hash) => {
-                query.push("job where input_hash = ").push_bind(hash);
-            }
-            AccessPath::Sweep(sweep) => {
-                let uuid = sweep.0.to_string();
-                query.push("job where sweep = ").push_bind(uuid);
-            }
-            AccessPath::Name(name) => {
-                query.push("job where name = ").push_bind(name);
-            }
-            AccessPath::Status(status) => {
-                query
-                    .push("job where status = ")
-                    .push_bind(<&str>::from(status));
-            }
-            AccessPath::Ended => {
-                query.push("job indexed by job_by_finished where finished_at is not null");
-                times(&mut query, filter, "finished_at", None);
-            }
-            AccessPath::Owner(owner) => {
-                query.push("job where owner = ").push_bind(owner);
-            }
-            AccessPath::All => continue,
-        }
-        let owner_is_in_index = matches!(
-            path,
-            AccessPath::Label(_) | AccessPath::Name(_) | AccessPath::Status(_)
-        );
-        if owner_is_in_index && let Some(owner) = &filter.owner {
-            query.push(" and owner = ").push_bind(owner);
-        }
-        query.push(" limit ").push_bind(counted + 1).push(")");
-        let jobs: i64 = query
-            .build_query_scalar()
-            .fetch_one(&mut *connection)
-            .await?;
-        if jobs <= FEW {
-            return Ok(Some(path));
-        }
-        // the others have the order of the list
-        let ordered = by_creation && !matches!(path, AccessPath::Ended);
-        if ordered && jobs <= counted {
-            fewest = Some(path);
-            // to count costs time, too: another one only matters if it matches many times fewer
-            counted = (jobs / 10).max(FEW);
-        }
-    }
-    Ok(fewest)
-}
-
-/// The access path if every filter matches many jobs: an index in the order of the list. It is one path, or one
-/// for each status, whose lists are merged.
-pub(super) fn ordered_paths(filter: &Filter, order: Order) -> Vec<AccessPath<'_>> {
-    let mut statuses = &filter.statuses[..];
-    if statuses.is_empty() && order.by == OrderBy::FinishedAt && filter.owner.is_some() {
-        statuses = &ENDED; // an owner's jobs are in this order by status
-    }
-    let by_status: Vec<AccessPath<'_>> = statuses.iter().copied().map(AccessPath::Status).collect();
-    let owner_or_all = filter
-        .owner
-        .as_deref()
-        .map_or(AccessPath::All, AccessPath::Owner);
-    // most jobs succeed: of the other statuses there are fewer jobs than most filters match
-    let of_the_others = !by_status.is_empty() && !statuses.contains(&Status::Succeeded);
-    if order.by == OrderBy::FinishedAt || of_the_others {
-        return match by_status.is_empty() {
-            true => vec![owner_or_all],
-            false => by_status,
-        };
-    }
-    if let Some(label) = filter.labels.first() {
-        return vec![AccessPath::Label(label)];
-    }
-    if let Some(sweep) = filter.sweep {
-        return vec![AccessPath::Sweep(sweep)];
-    }
-    if let Some(hash) = &filter.input_hash {
-        return vec![AccessPath::InputHash(hash)];
-    }
-    if let Some(name) = &filter.name {
-        return vec![AccessPath::Name(name)];
-    }
-    if !by_status.is_empty() {
-        return by_status;
-    }
-    vec![owner_or_all]
-}
-
-/// The list of one access path, in order and without its limit.
-fn page(
+/// The conditions of a filter, except for that of the lane and for bounds of the time that orders the list.
+fn conditions(
     query: &mut QueryBuilder<Sqlite>,
     filter: &Filter,
-    path: AccessPath<'_>,
-    order: Order,
-    cursor: Option<Cursor>,
+    lane: Option<Lane<'_>>,
+    by: OrderBy,
 ) {
-    let by_creation = order.by == OrderBy::CreatedAt;
-    let of_one_owner = filter.owner.is_some();
-    // `indexed by`: the planner does not know how many jobs a filter matches, and would guess
-    match path {
-        AccessPath::Label((key, value)) => {
-            query.push("select job.* from job_label cross join job on job.id = job_label.job_id where job_label.key = ");
-            query.push_bind(key.clone());
-            query.push(" and job_label.value = ");
-            query.push_bind(value.clone());
-            if let Some(owner) = &filter.owner {
-                query
-                    .push(" and job_label.owner = ")
-                    .push_bind(owner.clone());
-            }
+    for (field, values) in values_of(filter) {
+        let of_lane = matches!(lane, Some(Lane::Value(_, own, _)) if own.name == field.name);
+        if of_lane || field.column == <&str>::from(by) {
+            continue;
         }
-        AccessPath::InputHash(hash) => {
-            query.push("select * from job indexed by job_by_input where input_hash = ");
-            query.push_bind(hash.to_owned());
+        if field.comparison != "=" {
+            query.push(format!(" and job.{} {} ", field.column, field.comparison));
+            values.iter().for_each(|value| push_value(query, value));
+            continue;
         }
-        AccessPath::Sweep(sweep) => {
-            query.push("select * from job indexed by job_by_sweep where sweep = ");
-            query.push_bind(sweep.0.to_string());
+        query.push(format!(" and job.{} in (", field.column));
+        for (n, value) in values.iter().enumerate() {
+            query.push(if n == 0 { "" } else { ", " });
+            push_value(query, value);
         }
-        AccessPath::Name(name) => {
-            let index = match of_one_owner {
-                true => "job_by_owner_name",
-                false => "job_by_name",
-            };
-            query.push(format!(
-                "select * from job indexed by {index} where name = "
-            ));
-            query.push_bind(name.to_owned());
-        }
-        AccessPath::Status(status) => {
-            let index = match (of_one_owner, by_creation) {
-                (true, true) => "job_by_owner_status",
-                (true, false) => "job_by_owner_status_finished",
-                (false, true) => "job_by_status",
-                (false, false) => "job_by_status_finished",
-            };
-            query.push(format!(
-                "select * from job indexed by {index} where status = "
-            ));
-            query.push_bind(<&str>::from(status));
-        }
-        AccessPath::Owner(owner) => {
-            query.push("select * from job indexed by job_by_owner where owner = ");
-            query.push_bind(owner.to_owned());
-        }
-        AccessPath::Ended => {
-            query
-                .push("select * from job indexed by job_by_finished where finished_at is not null");
-        }
-        AccessPath::All => {
-            let index = if by_creation {
-                "job_by_created"
-            } else {
-                "job_by_finished"
-            };
-            query.push(format!("select * from job indexed by {index} where true"));
-        }
-    }
-    if order.by == OrderBy::FinishedAt {
-        query.push(" and job.finished_at is not null");
-    }
-    conditions(query, filter, Some(path));
-    let (by, id) = match path {
-        AccessPath::Label(_) if by_creation => ("job_label.created_at", "job_label.job_id"),
-        _ if by_creation => ("job.created_at", "job.id"),
-        _ => ("job.finished_at", "job.id"),
-    };
-    times(query, filter, by, cursor.map(|_| order));
-    if let Some(Cursor { micros, key }) = cursor {
-        let beyond = if order.descending { "<" } else { ">" };
-        query.push(format!(" and ({by}, {id}) {beyond} ("));
-        query.push_bind(micros).push(", ").push_bind(key).push(")");
-    }
-    let direction = order.direction();
-    query.push(format!(" order by {by} {direction}, {id} {direction}"));
-}
-
-/// The conditions of a filter except for times. The condition of the access path is repeated, which costs nothing,
-/// unless it is a status, of which each has a list of its own, or a label, which is in another table.
-fn conditions(query: &mut QueryBuilder<Sqlite>, filter: &Filter, path: Option<AccessPath<'_>>) {
-    let Filter {
-        statuses,
-        owner,
-        labels,
-        name,
-        input_hash,
-        sweep,
-        ..
-    } = filter;
-    let sweep = sweep.map(|sweep| sweep.0.to_string());
-    if !statuses.is_empty() && !matches!(path, Some(AccessPath::Status(_))) {
-        query.push(" and job.status in (");
-        let mut list = query.separated(", ");
-        statuses.iter().for_each(|status| {
-            list.push_bind(<&str>::from(*status));
-        });
         query.push(")");
     }
-    for label in labels {
-        let (key, value) = label;
-        match path {
-            Some(AccessPath::Label(leading)) if leading == label => continue,
-            // one lookup for each row of the access path
+    for label in &filter.labels {
+        match lane {
+            Some(Lane::Label(own)) if own == label => continue,
+            // one lookup for each row of the lane
             Some(_) => query.push(
                 " and exists (select 1 from job_label where created_at = job.created_at and job_id = job.id and key = ",
             ),
             None => query.push(" and job.id in (select job_id from job_label where key = "),
         };
-        query.push_bind(key.clone()).push(" and value = ");
-        query.push_bind(value.clone());
-        if let (None, Some(owner)) = (path, owner) {
-            query.push(" and owner = ").push_bind(owner.clone());
-        }
-        query.push(")");
+        let (key, value) = label.clone();
+        query.push_bind(key).push(" and value = ");
+        query.push_bind(value).push(")");
     }
-    let texts = [
-        ("owner", owner),
-        ("name", name),
-        ("input_hash", input_hash),
-        ("sweep", &sweep),
-    ];
-    for (column, text) in texts {
-        if let Some(text) = text {
-            query.push(format!(" and job.{column} = "));
-            query.push_bind(text.clone());
+}
+
+/// The names of the time that orders the rows of a lane and of the key.
+#[derive(Clone, Copy)]
+struct Place {
+    at: &'static str,
+    id: &'static str,
+}
+
+impl Place {
+    fn of(lane: Lane<'_>, by: OrderBy) -> Place {
+        match (lane, by) {
+            (Lane::Label(_), OrderBy::CreatedAt) => Place {
+                at: "job_label.created_at",
+                id: "job_label.job_id",
+            },
+            (_, OrderBy::CreatedAt) => Place {
+                at: "job.created_at",
+                id: "job.id",
+            },
+            (_, OrderBy::FinishedAt) => Place {
+                at: "job.finished_at",
+                id: "job.id",
+            },
         }
     }
 }
 
-/// The bounds of both times. `by` is the column that orders the list; a bound that a cursor in this order implies is
-/// left out, since the index would start from the weaker one as well.
-fn times(query: &mut QueryBuilder<Sqlite>, filter: &Filter, by: &str, cursor: Option<Order>) {
-    let (mut created_before, mut finished_after) = (filter.created_before, filter.finished_after);
-    let by_creation = by.ends_with("created_at");
-    // No job ends before it was accepted: a bound on one time is also one on the other, by which the list is read.
-    if by_creation {
-        let bounds = [created_before, filter.finished_before];
-        created_before = bounds.into_iter().flatten().min();
-    } else {
-        finished_after = finished_after.max(filter.created_after);
-    }
-    let created = if by_creation { by } else { "job.created_at" };
-    for (column, comparison, time) in [
-        (created, ">=", filter.created_after),
-        (created, "<", created_before),
-        ("job.finished_at", ">=", finished_after),
-        ("job.finished_at", "<", filter.finished_before),
-    ] {
-        let implied = cursor.is_some_and(|order| order.descending == (comparison == "<"));
-        if let Some(time) = time
-            && !(implied && column == by)
-        {
-            query.push(format!(" and {column} {comparison} "));
+/// The bounds of the time that orders the rows, and those of the window. No job ends before it was accepted: a bound on
+/// one time is also one on the other. A bound that the window implies is left out, since the index would be read from
+/// the weaker one as well.
+fn bounds(query: &mut QueryBuilder<Sqlite>, filter: &Filter, place: Place, window: Window) {
+    let Place { at, id } = place;
+    let Window { after, last, order } = window;
+    let (least, most) = match order.by {
+        OrderBy::CreatedAt => {
+            let before = [filter.created_before, filter.finished_before];
+            (filter.created_after, before.into_iter().flatten().min())
+        }
+        OrderBy::FinishedAt => (
+            filter.finished_after.max(filter.created_after),
+            filter.finished_before,
+        ),
+    };
+    let (lower, upper) = match order.descending {
+        true => (last, after),
+        false => (after, last),
+    };
+    for (time, comparison, implied) in [(least, ">=", lower), (most, "<", upper)] {
+        if let (Some(time), None) = (time, implied) {
+            query.push(format!(" and {at} {comparison} "));
             query.push_bind(time.micros());
+        }
+    }
+    for (place, comparison) in [
+        (after, if order.descending { "<" } else { ">" }),
+        (last, if order.descending { ">=" } else { "<=" }),
+    ] {
+        if let Some(Cursor { micros, key }) = place {
+            query.push(format!(" and ({at}, {id}) {comparison} ("));
+            query.push_bind(micros).push(", ").push_bind(key).push(")");
         }
     }
 }

@@ -14,7 +14,7 @@ use super::{
 
 /// Every step, with the name of its file. They are listed here instead of found by `sqlx::migrate!`, which would
 /// compile sqlx and SQLite a second time for the compiler to run; a test compares the list with the folder.
-const STEPS: [(i64, &str, &str); 17] = [
+const STEPS: [(i64, &str, &str); 18] = [
     (1, "jobs", include_str!("../../../migrations/0001_jobs.sql")),
     (
         2,
@@ -85,6 +85,11 @@ const STEPS: [(i64, &str, &str); 17] = [
         15,
         "sealed jobs",
         include_str!("../../../migrations/0015_sealed_jobs.sql"),
+    ),
+    (
+        16,
+        "one index a filter",
+        include_str!("../../../migrations/0016_one_index_a_filter.sql"),
     ),
     (
         17,

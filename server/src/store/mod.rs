@@ -154,6 +154,7 @@ use std::{path::Path, sync::Arc};
 
 use self::database::Rebuild;
 
+pub(crate) use self::filter::job_filters;
 pub use self::{
     backup::{Backup, Manifest, back_up},
     content::{Fingerprint, PIECE_BYTES, PIECES_PER_COMMIT},
@@ -166,9 +167,10 @@ pub use self::{
     entries::Entries,
     error::{Damage, Record, Result, StoreError},
     events::FinalBatch,
-    filter::{Cursor, Filter, GroupBy, Order, OrderBy},
+    filter::{Cursor, FILTERS, Field, Filter, GroupBy, Order, OrderBy, SweepIds},
     health::Health,
     inspect::{Report, inspect},
+    list::Keys,
     meshes::{Removal, StoredMesh},
     parts::{Part, Parts, ProfilePoints},
     progress::accept,

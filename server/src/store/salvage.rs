@@ -60,13 +60,12 @@ pub(super) async fn copy_job(
     }
     for (name, value) in &job.labels {
         sqlx::query(
-            "insert or ignore into job_label (key, value, created_at, job_id, owner) values (?, ?, ?, ?, ?)",
+            "insert or ignore into job_label (key, value, created_at, job_id) values (?, ?, ?, ?)",
         )
         .bind(name)
         .bind(value)
         .bind(job.created_at.micros())
         .bind(job.key)
-        .bind(&job.owner)
         .execute(&mut **tx)
         .await?;
     }

@@ -9,7 +9,11 @@ use super::{
     filters,
     service::{Service, detached},
 };
-use crate::{caller::Caller, error::ApiError, store::Filter};
+use crate::{
+    caller::Caller,
+    error::ApiError,
+    store::{Filter, Keys},
+};
 
 /// How many jobs a bulk operation matched and changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, JsonSchema)]
@@ -60,11 +64,18 @@ async fn for_each(
     detached(async move {
         let store = &service.store;
         let last = store.last_key().await?;
-        let (mut after, mut many) = (0, BulkResult::default());
+        let (mut after, mut many) = (None, BulkResult::default());
         loop {
-            let keys = store.keys(caller.visible_owners(), &filter, after, last, AT_ONCE);
-            let keys = keys.await?;
-            let Some(end) = keys.last() else {
+            let found = store.keys(caller.visible_owners(), &filter, after, last, AT_ONCE);
+            let Keys { keys, next } = found.await?;
+            let mut rest = &keys[..];
+            while !rest.is_empty() {
+                let (seen, changed) = act(&service, &caller, rest, action).await?;
+                many.matched += seen as u64;
+                many.changed += changed as u64;
+                rest = rest.get(seen..).unwrap_or_default();
+            }
+            if next.is_none() {
                 info!(
                     many.matched,
                     many.changed,
@@ -75,15 +86,8 @@ async fn for_each(
                     many.matched
                 );
                 return Ok(many);
-            };
-            after = *end;
-            let mut rest = &keys[..];
-            while !rest.is_empty() {
-                let (seen, changed) = act(&service, &caller, rest, action).await?;
-                many.matched += seen as u64;
-                many.changed += changed as u64;
-                rest = rest.get(seen..).unwrap_or_default();
             }
+            after = next;
         }
     })
     .await

@@ -52,17 +52,33 @@ pub(super) struct Found<T> {
     items: Vec<T>,
     /// Whether there are more entries, whatever the size of the page is.
     cut: bool,
+    /// The place up to which the list was checked, if it goes on there.
+    checked_to: Option<Cursor>,
 }
 
 impl<T> From<Vec<T>> for Found<T> {
     fn from(items: Vec<T>) -> Self {
-        Found { items, cut: false }
+        Found {
+            items,
+            cut: false,
+            checked_to: None,
+        }
     }
 }
 
 impl<T> From<Entries<T>> for Found<T> {
-    fn from(Entries { items, cut, .. }: Entries<T>) -> Self {
-        Found { items, cut }
+    fn from(entries: Entries<T>) -> Self {
+        let Entries {
+            items,
+            cut,
+            checked_to,
+            ..
+        } = entries;
+        Found {
+            items,
+            cut,
+            checked_to,
+        }
     }
 }
 
@@ -90,11 +106,13 @@ impl Paging {
         let Found {
             items: mut found,
             cut,
+            checked_to,
         } = found.into();
         let more = cut || found.len() as i64 > self.size();
         found.truncate(self.size() as usize);
         let last = found.last().filter(|_| more);
-        let next = last.map(|last| token(at(last), list));
+        let next = last.map(at).or(checked_to);
+        let next = next.map(|place| token(place, list));
         Page { items: found, next }
     }
 

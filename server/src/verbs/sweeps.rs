@@ -17,7 +17,6 @@ use tokio::time::{Instant, timeout, timeout_at};
 use super::{
     admission::{admit, enqueue_sweep, has_share, prepare, replayed, time_violation},
     envelope::{Envelope, JobRequest, MAX_NAME},
-    filters::SweepIds,
     key::Key,
     page::{Page, Paging},
     problems::{expected_run_s, too_large_at},
@@ -31,7 +30,7 @@ use crate::{
     formats::{self, Format},
     job::{Cache, Job, Limits, SweepId},
     parameters::{Integers, Parameter, Seconds, Variable},
-    store::{Accepted, Cursor, Filter, MemberEvents, NewJob, NewSweep, RequestKey},
+    store::{Accepted, Cursor, Filter, MemberEvents, NewJob, NewSweep, RequestKey, SweepIds},
     sweep::{MemberRow, Sweep, SweepEvent, SweepPayload, limits_for},
     time::Time,
     transfer::with_own_share,

@@ -4,7 +4,6 @@
 use std::{path::Path, sync::Arc};
 
 use futures_util::StreamExt;
-use serde_json::value::RawValue;
 
 use super::{
     bulk,
@@ -217,18 +216,16 @@ async fn keys_and_ids_belong_to_the_owner_who_used_them() {
 }
 
 async fn create_sweep(service: &Arc<Service>, caller: &Caller, key: Option<&str>) -> Sweep {
-    let raw = |text: String| RawValue::from_string(text).unwrap();
-    let base = raw(serde_json::to_string(&fake::problem()).unwrap());
-    let axes = raw(r#"[{"path": "/contacts/0/indentation", "values": [0.1, 0.2]}]"#.into());
-    let fields = files::sweep::Fields {
-        base: Some(&base),
-        axes: Some(&axes),
+    let base = serde_json::to_string(&fake::problem()).unwrap();
+    let axes = r#"[{"path": "/contacts/0/indentation", "values": [0.1, 0.2]}]"#;
+    let variation = files::sweep::Variation {
+        axes: serde_json::from_str(axes).unwrap(),
         ..Default::default()
     };
     let request = SweepRequest {
         envelope: Envelope::default(),
         limits: None,
-        definition: files::sweep::read(&fields),
+        definition: files::sweep::read(&base, variation),
     };
     let key = key.map(|key| IDEMPOTENCY_KEY.read(key).unwrap());
     let created = sweeps::create(service, caller, request, key).await;

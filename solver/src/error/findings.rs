@@ -96,7 +96,12 @@ impl Findings {
         });
     }
 
-    /// Whether the list is full, so that further violations are only counted.
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.listed.is_empty() && self.more == 0
+    }
+
+    /// Whether further violations are only counted.
     pub fn is_full(&self) -> bool {
         self.listed.len() >= MOST_LISTED
     }

@@ -16,7 +16,7 @@ import re
 import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypedDict, TypeVar
 from urllib.parse import quote
 
 import httpx
@@ -355,12 +355,40 @@ def _job(id: str) -> str:
     return "/v1/jobs/" + quote(id, safe="")
 
 
+class Filters(TypedDict, total=False):
+    """Which jobs: those that match all that is given, by the names of the query of `GET /v1/jobs`."""
+
+    status: str | Sequence[str] | None
+    labels: Mapping[str, object] | None
+    name: str | None
+    owner: str | None
+    sweep: str | None
+    input_hash: str | None
+    created_after: datetime.date | str | None
+    created_before: datetime.date | str | None
+    finished_after: datetime.date | str | None
+    finished_before: datetime.date | str | None
+
+
+class Listing(Filters, total=False):
+    """Which jobs, and how they are listed."""
+
+    order_by: str | None
+    page_size: int | None
+
+
+NAMES = frozenset(Listing.__annotations__) | {"group_by"}
+
+
 def filters(
     status: str | Sequence[str] | None = None,
     labels: Mapping[str, object] | None = None,
     **others: str | datetime.date | int | None,
 ) -> Params:
     """The parameters of `GET /v1/jobs`."""
+    unknown = others.keys() - NAMES
+    if unknown:
+        raise TypeError(f"no such filter: {', '.join(sorted(unknown))}; there are {', '.join(sorted(NAMES))}")
     found = [("status", s) for s in ([status] if isinstance(status, str) else status or [])]
     found += [(f"label.{key}", str(value)) for key, value in (labels or {}).items()]
     for name, value in others.items():

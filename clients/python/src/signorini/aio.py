@@ -37,6 +37,7 @@ from .result import write
 if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
+    from typing_extensions import Unpack
 
 T = TypeVar("T")
 
@@ -128,7 +129,7 @@ class AsyncClient:
     async def job(self, id: str) -> AsyncJob:
         return AsyncJob(self, await self._send(calls.job(id)))
 
-    async def jobs(self, **filters: Any) -> AsyncIterator[AsyncJob]:
+    async def jobs(self, **filters: Unpack[calls.Listing]) -> AsyncIterator[AsyncJob]:
         """The jobs that match all filters, which are those of `Client.jobs`."""
         params = calls.filters(**filters)
         token: str | None = ""
@@ -138,13 +139,13 @@ class AsyncClient:
                 yield AsyncJob(self, document)
             token = page.get("next_page_token") or None
 
-    async def count(self, *, group_by: str | None = None, **filters: Any) -> Mapping[str, Any]:
+    async def count(self, *, group_by: str | None = None, **filters: Unpack[calls.Filters]) -> Mapping[str, Any]:
         return await self._send(calls.count(calls.filters(**filters, group_by=group_by)))
 
-    async def cancel_jobs(self, **filters: Any) -> Mapping[str, int]:
+    async def cancel_jobs(self, **filters: Unpack[calls.Filters]) -> Mapping[str, int]:
         return await self._send(calls.cancel_jobs(calls.filters(**filters)))
 
-    async def delete_jobs(self, **filters: Any) -> Mapping[str, int]:
+    async def delete_jobs(self, **filters: Unpack[calls.Filters]) -> Mapping[str, int]:
         before = await self._send(calls.count(calls.filters(**filters, group_by="status")))
         return await self._send(calls.delete_jobs(calls.filters(**filters), before))
 

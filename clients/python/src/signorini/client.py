@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import datetime
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import httpx
 
@@ -24,6 +23,9 @@ from .job import Job
 from .local import LocalServer
 from .problem import Problem
 from .sweep import Sweep
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 T = TypeVar("T")
 
@@ -139,52 +141,28 @@ class Client:
         """A job by its id: from another machine, or the next day."""
         return Job(self, self._send(calls.job(id)))
 
-    def jobs(
-        self,
-        *,
-        status: str | Sequence[str] | None = None,
-        name: str | None = None,
-        labels: Mapping[str, object] | None = None,
-        owner: str | None = None,
-        sweep: str | None = None,
-        input_hash: str | None = None,
-        created_after: datetime.date | str | None = None,
-        created_before: datetime.date | str | None = None,
-        finished_after: datetime.date | str | None = None,
-        finished_before: datetime.date | str | None = None,
-        order_by: str | None = None,
-        page_size: int | None = None,
-    ) -> Iterator[Job]:
-        """The jobs that match all filters, newest first; pages are fetched as they are needed."""
-        params = calls.filters(
-            status,
-            labels,
-            name=name,
-            owner=owner,
-            sweep=sweep,
-            input_hash=input_hash,
-            created_after=created_after,
-            created_before=created_before,
-            finished_after=finished_after,
-            finished_before=finished_before,
-            order_by=order_by,
-            page_size=page_size,
-        )
+    def jobs(self, **filters: Unpack[calls.Listing]) -> Iterator[Job]:
+        """The jobs that match all filters, newest first; pages are fetched as they are needed.
+
+        Filters: `status` (one or several), `labels` (a dictionary), `name`, `owner`, `sweep`, `input_hash`,
+        `created_after`, `created_before`, `finished_after`, `finished_before`; also `order_by` and `page_size`.
+        """
+        params = calls.filters(**filters)
         token: str | None = ""
         while token is not None:
             page = self._send(calls.jobs(params, token))
             yield from (Job(self, document) for document in page["jobs"])
             token = page.get("next_page_token") or None
 
-    def count(self, *, group_by: str | None = None, **filters: Any) -> Mapping[str, Any]:
+    def count(self, *, group_by: str | None = None, **filters: Unpack[calls.Filters]) -> Mapping[str, Any]:
         """How many jobs match the filters of `jobs`; by `group_by` also of each status, name, …"""
         return self._send(calls.count(calls.filters(**filters, group_by=group_by)))
 
-    def cancel_jobs(self, **filters: Any) -> Mapping[str, int]:
+    def cancel_jobs(self, **filters: Unpack[calls.Filters]) -> Mapping[str, int]:
         """Asks all jobs that match the filters of `jobs` to stop: `{"matched", "changed"}`."""
         return self._send(calls.cancel_jobs(calls.filters(**filters)))
 
-    def delete_jobs(self, **filters: Any) -> Mapping[str, int]:
+    def delete_jobs(self, **filters: Unpack[calls.Filters]) -> Mapping[str, int]:
         """Deletes all jobs that match the filters of `jobs` and have ended: `{"matched", "changed"}`."""
         before = self._send(calls.count(calls.filters(**filters, group_by="status")))
         return self._send(calls.delete_jobs(calls.filters(**filters), before))

@@ -113,7 +113,8 @@ impl Submitted {
             (Kind::Job, _) => serde_json::from_str(&text)?,
             (Kind::Sweep, _) => {
                 let mut fields: BTreeMap<String, Box<RawValue>> = serde_json::from_str(&text)?;
-                if let Some(base) = sweep::base_from_file(&path, names.base)? {
+                let base = names.base.map_or("", RawValue::get);
+                if let Some(base) = sweep::base_from_file(&path, base)? {
                     fields.insert("base".into(), base);
                 }
                 fields

@@ -1,6 +1,6 @@
 //! The command `signorini ls`.
 
-use clap::Args;
+use clap::{Arg, ArgAction, ArgGroup, ArgMatches, Args, Command, FromArgMatches};
 use form_urlencoded::Serializer;
 use serde_json::Value;
 
@@ -9,38 +9,24 @@ use super::{
     listing::{Found, Shown},
     submit::label,
 };
-use crate::job::Status;
+use crate::store::{FILTERS, Field, Filter};
 
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  signorini ls --status queued,running\n  \
     signorini ls --label study=radius -n 0 -f csv > study.csv\n  signorini rm $(signorini ls --status failed -q)")]
 pub(in crate::cli) struct Arguments {
-    /// List sweeps instead of jobs
-    #[arg(long, conflicts_with_all = ["status", "name", "owner", "labels", "sweep"])]
+    /// Sweeps instead of jobs
+    #[arg(long, conflicts_with_all = ["filters", "labels"])]
     sweeps: bool,
 
-    /// List only jobs with this status: queued, running, succeeded, failed, canceled; can be repeated, or a list with
-    /// commas
-    #[arg(long, value_delimiter = ',', value_name = "STATUS", value_parser = status)]
-    status: Vec<Status>,
-
-    /// List only jobs with this name
-    #[arg(long)]
-    name: Option<String>,
-
-    /// List only jobs of this owner
-    #[arg(long)]
-    owner: Option<String>,
+    #[command(flatten)]
+    filters: Filters,
 
     /// List only jobs with this label; can be repeated
     #[arg(long = "label", value_name = "KEY=VALUE", value_parser = label)]
     labels: Vec<(String, String)>,
 
-    /// List only the jobs of this sweep
-    #[arg(long, value_name = "ID")]
-    sweep: Option<String>,
-
-    /// List at most this many, the newest first; 0: all
+    /// At most so many, the newest first; 0: all
     #[arg(short = 'n', long, default_value_t = 20, value_name = "N")]
     limit: usize,
 
@@ -51,9 +37,63 @@ pub(in crate::cli) struct Arguments {
     service: Connection,
 }
 
-fn status(text: &str) -> Result<Status, String> {
-    text.parse()
-        .map_err(|_| "expected queued, running, succeeded, failed or canceled".into())
+/// The filters that the service has, each as an option: names and values for a query.
+#[derive(Debug)]
+struct Filters(Vec<(&'static str, String)>);
+
+impl FromArgMatches for Filters {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let of = |field: &Field| {
+            let given = matches.get_many::<String>(field.name).into_iter().flatten();
+            let name = field.name;
+            given
+                .map(move |text| (name, text.clone()))
+                .collect::<Vec<_>>()
+        };
+        Ok(Filters(FILTERS.iter().flat_map(of).collect()))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Filters::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl Args for Filters {
+    fn augment_args(command: Command) -> Command {
+        FILTERS
+            .iter()
+            .fold(command, |command, field| {
+                let checked = |text: &str| match (field.set)(&mut Filter::default(), text) {
+                    true => Ok(text.to_owned()),
+                    false => Err(format!("expected {}", (field.expected)())),
+                };
+                let (value, help) = match (field.several, field.name.rsplit_once('_')) {
+                    (true, _) => (
+                        field.name,
+                        format!("{}: {}", field.meaning, (field.expected)()),
+                    ),
+                    (_, Some((_, "after" | "before"))) => ("time", field.meaning.to_owned()),
+                    (_, Some((_, last))) => (last, field.meaning.to_owned()),
+                    (_, None) => (field.name, field.meaning.to_owned()),
+                };
+                let option = Arg::new(field.name)
+                    .long(field.name.replace('_', "-"))
+                    .help(help)
+                    .value_name(value.to_uppercase())
+                    .value_parser(checked)
+                    .group("filters");
+                command.arg(match field.several {
+                    true => option.action(ArgAction::Append).value_delimiter(','),
+                    false => option,
+                })
+            })
+            .group(ArgGroup::new("filters").multiple(true))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Filters::augment_args(command)
+    }
 }
 
 /// The largest page that the service gives.
@@ -72,16 +112,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     let (mut found, mut page): (Vec<Value>, Option<String>) = (vec![], None);
     loop {
         let mut query = Serializer::new(String::new());
-        for status in &arguments.status {
-            query.append_pair("status", (*status).into());
-        }
-        for (name, value) in [
-            ("name", &arguments.name),
-            ("owner", &arguments.owner),
-            ("sweep", &arguments.sweep),
-        ] {
-            query.extend_pairs(value.iter().map(|value| (name, value)));
-        }
+        query.extend_pairs(&arguments.filters.0);
         for (key, value) in &arguments.labels {
             query.append_pair(&format!("label.{key}"), value);
         }

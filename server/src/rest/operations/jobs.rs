@@ -59,7 +59,7 @@ pub(super) fn operations() -> Vec<Operation> {
         get(READ, "/v1/jobs", (FILTERS, PAGE_SIZE, PAGE_TOKEN, ORDER_BY), jobs::list)
             .rpcs(&["ListJobs"])
             .summary("Lists jobs, newest first")
-            .answers(200, "A page of jobs", json::<jobs::List>())
+            .answers(200, "A page of jobs. It may be short or empty before the list ends, since only so many jobs are checked for each page: the list ends where there is no next_page_token", json::<jobs::List>())
             .fails(&[Code::BadPageToken]),
         get(READ, "/v1/jobs/count", (FILTERS, GROUP_BY), jobs::count)
             .rpcs(&["CountJobs"])

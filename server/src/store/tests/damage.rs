@@ -498,7 +498,7 @@ async fn a_changed_bit_makes_no_second_job_and_hides_nothing() {
             store.close().await;
         }
     }
-    assert!(told >= 8, "{told} of {tried}");
+    assert!(tried > 6 && told + 1 >= tried, "{told} of {tried}");
 }
 
 #[tokio::test]

@@ -3,6 +3,7 @@
 
 mod backups;
 mod damage;
+mod lists;
 mod owners;
 mod plans;
 mod simulation;

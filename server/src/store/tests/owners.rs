@@ -136,8 +136,12 @@ async fn lists_counts_and_keys_contain_only_the_visible_jobs() {
                 let listed: Vec<i64> = listed.iter().map(|job| job.key).collect();
                 assert_eq!(listed, expected, "{owners:?} {filter:?} {order:?}");
             }
-            let keys = store.keys(owners, filter, 0, bob.key, 10).await.unwrap();
-            assert_eq!(keys, expected, "{owners:?} {filter:?}");
+            let found = store.keys(owners, filter, None, bob.key, 10).await.unwrap();
+            assert_eq!(
+                (found.keys, found.next),
+                (expected.clone(), None),
+                "{owners:?} {filter:?}"
+            );
             let counted = store.count(owners, filter, None).await.unwrap();
             assert_eq!(
                 counted[0].1 as usize,
@@ -163,13 +167,18 @@ async fn lists_counts_and_keys_contain_only_the_visible_jobs() {
     assert!(store.count(ADA, &bobs, None).await.unwrap().is_empty());
     assert!(
         store
-            .keys(ADA, &bobs, 0, bob.key, 10)
+            .keys(ADA, &bobs, None, bob.key, 10)
             .await
             .unwrap()
+            .keys
             .is_empty()
     );
     assert_eq!(
-        store.keys(BOB, &bobs, 0, bob.key, 10).await.unwrap(),
+        store
+            .keys(BOB, &bobs, None, bob.key, 10)
+            .await
+            .unwrap()
+            .keys,
         [bob.key]
     );
 }
