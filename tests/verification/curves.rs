@@ -221,7 +221,7 @@ fn reentrant_corners_are_reported() {
     let round = json!({"kind": "polyline", "points": pin, "interpolation": "cubic"});
     let facets = told(round.clone(), 0.05, &[]);
     assert!(
-        facets.contains("points into it") && facets.contains("-4.00°"),
+        facets.contains("has a reentrant corner in the contact") && facets.contains("-4.00°"),
         "{facets}"
     );
     let circle = json!({"inner": {"kind": "circle", "center": [0, 0], "radius": 4}});

@@ -249,7 +249,7 @@ fn a_body_pushed_beyond_its_friction_is_said_to_slide_away() {
             }
             // known from equilibrium: no iteration is made
             if part > 1.2 {
-                says(message, &["can hold at most"]);
+                says(message, &["can resist at most"]);
                 assert_eq!(slides.iterations, 1, "{friction}");
                 assert!(
                     (slides.friction_force / limit - 1.0).abs() < 0.05,
@@ -350,7 +350,7 @@ fn a_plate_that_is_turned_beyond_its_friction_is_said_to_turn() {
         message,
         &[
             "turn the body with a moment of 6.2 in rotation about (0, 0)",
-            "can hold at most 6.0:",
+            "can resist at most 6.0:",
         ],
     );
 }

@@ -448,8 +448,8 @@ fn a_contact_that_appears_is_reported() {
     assert!(force.finer.unwrap() > 0.0 && force.difference == force.finer);
     assert_eq!(verified.verdict, Verdict::Poor);
     for told in [
-        "0 of `contact_start`, and 1 with",
-        "0 of `peak_normal_stress`, and 1",
+        "0 of `contact_start` on this mesh and 1 on the refined one",
+        "0 of `peak_normal_stress` on this mesh and 1",
     ] {
         let told = |reason: &String| reason.contains(told);
         assert!(verified.reasons.iter().any(told), "{:#?}", verified.reasons);
