@@ -113,7 +113,10 @@ fn worker_process() -> Command {
 /// requeued yet are requeued by the queue later.
 async fn clean_up(store: &Store) -> store::Result<()> {
     store.requeue_interrupted().await?;
-    let pieces = store.discard_unattached().await?;
+    let pieces = match store.discard_unattached().await {
+        Err(StoreError::Damaged(_)) => 0, // the log has it; nothing was removed
+        pieces => pieces?,
+    };
     if pieces > 0 {
         info!(
             pieces,

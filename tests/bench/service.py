@@ -174,7 +174,7 @@ def submits():
 def checksum(row):
     """Of a row, as the service has it: CRC-32 of kind, place, length and bytes of each value that is not null."""
     pack = {int: lambda value: (b"i", struct.pack("<q", value)), float: lambda value: (b"r", struct.pack("<d", value)),
-            str: lambda value: (b"t", value.encode())}
+            str: lambda value: (b"t", value.encode()), bytes: lambda value: (b"b", value)}
     values = [value for column, value in row.items() if column != "checksum"]
     packed = [(place, *pack[type(value)](value)) for place, value in enumerate(values) if value is not None]
     return zlib.crc32(b"".join(struct.pack("<cIQ", kind, place, len(body)) + body for place, kind, body in packed))
@@ -190,14 +190,12 @@ def fill(server, jobs, dice):
     indexes = list(map(tuple, indexes))
     samples = {row["status"]: dict(row) for row in database.execute("select * from job")}
     equal(set(samples), {"succeeded", "queued"}, "the jobs to copy")
-    problem = dict(database.execute("select * from problem limit 1").fetchone())
+    problem, digest = database.execute(
+        "select content, hash from attachment join content on content.id = content where name = 'problem' limit 1").fetchone()
     hashes = ["sha256:%064x" % n for n in range(2000)]
     # nobody else is there, and whoever is interrupted begins anew
     for pragma in ("journal_mode = off", "synchronous = off", "cache_size = -1000000"):
         database.execute("pragma " + pragma)
-    database.executemany(
-        "insert into problem (%s) values (%s)" % (", ".join(problem), ", ".join("?" * len(problem))),
-        ([{**problem, "input_hash": name}[column] for column in problem] for name in hashes))
     for name, _ in indexes:
         database.execute('drop index "%s"' % name)
     number = database.execute("select max(id) from job").fetchone()[0]
@@ -220,6 +218,11 @@ def fill(server, jobs, dice):
             yield [checksum(row) if column == "checksum" else row[column] for column in columns]
 
     database.executemany("insert into job (%s) values (%s)" % (", ".join(columns), ", ".join("?" * len(columns))), rows())
+    # one problem for all, whatever their input hash
+    attachments = (("job", number + n, "problem") for n in range(1, jobs + 1))
+    database.executemany(
+        "insert into attachment (kind, key, name, content, checksum) values (?, ?, ?, ?, ?)",
+        ((*place, problem, checksum(dict(enumerate((*place, digest))))) for place in attachments))
     database.executemany(
         "insert into job_label (key, value, created_at, job_id) values (?, ?, ?, ?)",
         sorted((key, value, now - (jobs - n) * 1_000_000, number + n)

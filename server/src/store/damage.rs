@@ -23,6 +23,7 @@ pub(super) enum Table {
     Meshes,
     Sweeps,
     Deleted,
+    Attachments,
 }
 
 impl Table {
@@ -35,6 +36,7 @@ impl Table {
             Table::Meshes => "meshes",
             Table::Sweeps => "sweeps",
             Table::Deleted => "deleted jobs",
+            Table::Attachments => "attached content",
         };
         Record::named(format!("index of the {of}")).damaged(cause)
     }

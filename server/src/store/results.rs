@@ -11,6 +11,7 @@ use super::{
     intact::Intact,
     parts::{Entry, HEADER_BYTES, Parts, index_bytes, read_index},
     rows::is_current,
+    sizes,
 };
 use crate::job::ResultAvailable;
 
@@ -76,6 +77,9 @@ impl Store {
             let Some(found) = StoredResult::of(&mut connection, key).await? else {
                 return Ok(None);
             };
+            if part == name::FIELDS && found.fields().is_none() {
+                found.must_have_no_fields(&mut connection).await?;
+            }
             found.memory_to_read(&mut connection, part).await
         };
         self.damages.noting(read).await
@@ -189,6 +193,18 @@ impl StoredResult {
     pub(super) fn fields(&self) -> Option<(i64, &PartInfo)> {
         let (entry, _) = self.find(name::FIELDS)?;
         Some((self.fields.as_ref()?.id, &entry.info))
+    }
+
+    /// An error if there should be fields: they were not deleted, and are not attached any more.
+    pub(super) async fn must_have_no_fields(
+        &self,
+        connection: &mut SqliteConnection,
+    ) -> Result<()> {
+        let had_some = self.find(name::FIELDS).is_some();
+        match had_some && !sizes::lost_fields(connection, self.key).await? {
+            true => Err(self.record(name::FIELDS).damaged("it is missing")),
+            false => Ok(()),
+        }
     }
 
     /// A part in the index, with its place among the bytes of all parts.

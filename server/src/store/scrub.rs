@@ -35,7 +35,7 @@ const BY_JOB: &str = "index of the request keys by job";
 type Check = fn(&SqliteRow) -> Result<()>;
 
 /// Tables whose rows are few, or small, with the check of a row if it has a checksum.
-const TABLES: [(Table, &str, Option<Check>); 8] = [
+const TABLES: [(Table, &str, Option<Check>); 9] = [
     (Table::Keys, "request_key", Some(keys::check)),
     (Table::Jobs, "job", None),
     (Table::Labels, "job_label", None),
@@ -52,6 +52,7 @@ const TABLES: [(Table, &str, Option<Check>); 8] = [
     ),
     (Table::Deleted, "deleted_job", None),
     (Table::Deleted, "deleted_sweep", None),
+    (Table::Attachments, "attachment", None),
 ];
 
 impl Store {

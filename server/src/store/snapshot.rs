@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     caller::Owners,
-    job::{Job, JobId},
+    job::{Job, JobId, ResultAvailable},
 };
 
 impl Store {
@@ -46,6 +46,7 @@ impl Store {
                 return Ok(None);
             };
             let Some((content, _)) = found.fields() else {
+                found.must_have_no_fields(&mut connection).await?;
                 return Ok(None);
             };
             let Some((info, decoded)) = found.read(&mut connection, name::FIELDS).await? else {
@@ -112,7 +113,11 @@ impl Snapshot {
 
     async fn read_index(&mut self) -> Result<()> {
         if self.result.is_none() {
-            self.result = StoredResult::of(&mut self.tx, self.job.key).await?;
+            let key = self.job.key;
+            self.result = StoredResult::of(&mut self.tx, key).await?;
+            if self.result.is_none() && self.job.result_available != ResultAvailable::None {
+                return Err(Record::of_job(key, name::RESULT).damaged("it is missing"));
+            }
         }
         Ok(())
     }
