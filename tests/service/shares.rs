@@ -313,7 +313,10 @@ async fn uploads_at_once_stay_within_the_share_of_their_owner() {
         let refusal: Value = answer.json().await.unwrap();
         assert_eq!(refusal["code"], "overloaded", "{refusal}");
         let said = refusal["detail"].as_str().unwrap();
-        assert!(said.starts_with("ada uploads 8 meshes at once"), "{said}");
+        assert!(
+            said.starts_with("ada uploads 8 meshes at the same time"),
+            "{said}"
+        );
     }
     let (pieces, answer) = begin("bob");
     pieces.try_send(Ok(b"nothing".to_vec())).unwrap();

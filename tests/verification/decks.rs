@@ -637,7 +637,7 @@ fn messages_say_what_to_do() {
         .collect();
     assert_eq!(
         got,
-        ["*FOO, here and 2 more times", "*BAR, here and 1 more times"]
+        ["*FOO, here and 2 more times", "*BAR, here and once more"]
     );
     assert!(
         list[0].hint.contains("*RIGID BODY, *CONTACT PAIR") && !list[1].hint.contains("*RIGID"),

@@ -169,9 +169,9 @@ fn a_body_not_held_by_its_contacts_is_an_error_with_its_motion() {
         p.supports.remove(1);
         let refused = solver::check(&p, None).err().unwrap();
         assert!(
-            refused[0]
-                .got
-                .contains(&format!("{motion} on one side only")),
+            refused[0].got.contains(&format!(
+                "{motion} from the contact that holds it on one side only"
+            )),
             "{name}"
         );
         // a load along the motion may press or pull, as may those of some load steps: this one pulls

@@ -253,11 +253,11 @@ fn steps_press_and_drag() {
     assert_eq!(steps, [(1.0, 0.0, 1.0, 1.0, 10), (1.0, 1.0, 1.0, 1.0, 20)]);
     // the roller stands where the last step leaves it, and the deck's user is told
     let (_, warnings) = abaqus::problem_with_warnings(&deck).unwrap();
-    assert!(
-        warnings
-            .iter()
-            .any(|w| w.code == WarningCode::DeckDiffers && w.message.contains("placed where"))
-    );
+    assert!(warnings.iter().any(|w| {
+        w.code == WarningCode::DeckDiffers
+            && w.message
+                .contains("where it is at the end of the last step")
+    }));
     assert_eq!(
         serde_json::to_value(&found.obstacle).unwrap()["center"],
         0.01

@@ -158,6 +158,7 @@ pub(super) fn report_unknown(mut unknown: Vec<UnknownKeyword>, doubts: &mut Find
     for UnknownKeyword { name, line, more } in unknown {
         let got = match more {
             0 => format!("*{name:.60}"),
+            1 => format!("*{name:.60}, here and once more"),
             more => format!("*{name:.60}, here and {more} more times"),
         };
         let expected = "a keyword that is known here";

@@ -20,7 +20,7 @@ use super::{
     damage::Damages,
     database::{Store, Writing},
     error::{Result, StoreError},
-    events, results,
+    events, intact,
     rows::{self, JobRow},
     rules::{self, Ended},
     waiting::{Move, Owner},
@@ -323,7 +323,7 @@ impl Change<'_> {
         let attached = content::all(self.sql().await?, Holder::Job(job.key)).await;
         let mut reader = self.store.reader.acquire().await?;
         let checked = async {
-            results::check_stored(&mut reader, &self.store.intact, job.key, attached?).await
+            intact::check_result(&mut reader, &self.store.intact, job.key, attached?).await
         };
         let checked = checked.await;
         Ok(self.unless_damaged(checked).await?.is_some())

@@ -13,7 +13,7 @@ use super::{
     database::Store,
     end_job::end_job,
     error::{Result, StoreError},
-    results,
+    intact, results,
     rows::{JobRow, from_row},
     rules::Ending,
     sizes,
@@ -97,7 +97,7 @@ impl Store {
         };
         let mut connection = self.reader.acquire().await?;
         let attached = content::all(&mut connection, Holder::Job(job.key)).await?;
-        results::check_stored(&mut connection, &self.intact, job.key, attached).await
+        intact::check_result(&mut connection, &self.intact, job.key, attached).await
     }
 }
 

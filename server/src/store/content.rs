@@ -37,6 +37,8 @@ pub(super) mod name {
     pub(in crate::store) const RESULT: &str = "result";
     /// The fields of a job.
     pub(in crate::store) const FIELDS: &str = "fields";
+    /// What is attached to a job that has a result.
+    pub(in crate::store) const OF_RESULT: [&str; 2] = [RESULT, FIELDS];
     /// The definition of the sweep of a job: JSON.
     pub(in crate::store) const DEFINITION: &str = "definition";
     /// A mesh, parsed.

@@ -5,6 +5,13 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
+use sqlx::SqliteConnection;
+
+use super::{
+    content::{Content, name},
+    error::{Record, Result},
+};
+
 /// The numbers of such content: what answers other jobs is checked once. Numbers are never used again. The older half is
 /// forgotten when there are many.
 #[derive(Debug, Default)]
@@ -26,4 +33,25 @@ impl Intact {
         }
         halves[0].insert(content);
     }
+}
+
+/// Compares the content of a result with its hash, without decoding it, which would take a hundred times as long: what is in
+/// it is compared when it is served. What was found intact before is not read again.
+pub(super) async fn check_result(
+    connection: &mut SqliteConnection,
+    intact: &Intact,
+    key: i64,
+    attached: Vec<Content>,
+) -> Result<()> {
+    if !attached.iter().any(|content| content.name == name::RESULT) {
+        return Err(Record::of_job(key, name::RESULT).damaged("it is missing"));
+    }
+    for content in attached {
+        if name::OF_RESULT.contains(&content.name.as_str()) && !intact.contains(content.id) {
+            let checked = content.check(connection).await;
+            checked.map_err(|error| error.reading(|| content.record()))?;
+            intact.insert(content.id);
+        }
+    }
+    Ok(())
 }

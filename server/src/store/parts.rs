@@ -131,7 +131,10 @@ impl Parts {
         if !go_on() {
             return Ok(None);
         }
-        parts.push(Part::of_value("history".into(), &document.history)?);
+        // a partial result has none: its events go on after it
+        if !document.history.is_empty() {
+            parts.push(Part::of_value("history".into(), &document.history)?);
+        }
         drop(document.history);
         // the iterations of a step are part of the history; its profiles are requested one by one
         let steps = document.steps.iter();

@@ -8,15 +8,11 @@ use super::{
     database::Store,
     encoding::{self, Decoded, PartInfo, decoded},
     error::{Record, Result},
-    intact::Intact,
     parts::{Entry, HEADER_BYTES, Parts, index_bytes, read_index},
     rows::is_current,
     sizes,
 };
 use crate::job::ResultAvailable;
-
-/// What is attached to a job that has a result.
-const NAMES: [&str; 2] = [name::RESULT, name::FIELDS];
 
 /// Up to this size of its JSON a part is decoded where it is read: that takes a millisecond or two.
 const INLINE_BYTES: u64 = 256 << 10;
@@ -86,27 +82,6 @@ impl Store {
     }
 }
 
-/// Compares the content of a result with its hash, without decoding it, which would take a hundred times as long: what is in
-/// it is compared when it is served. What was found intact before is not read again.
-pub(super) async fn check_stored(
-    connection: &mut SqliteConnection,
-    intact: &Intact,
-    key: i64,
-    attached: Vec<Content>,
-) -> Result<()> {
-    if !attached.iter().any(|content| content.name == name::RESULT) {
-        return Err(Record::of_job(key, name::RESULT).damaged("it is missing"));
-    }
-    for content in attached {
-        if NAMES.contains(&content.name.as_str()) && !intact.contains(content.id) {
-            let checked = content.check(connection).await;
-            checked.map_err(|error| error.reading(|| content.record()))?;
-            intact.insert(content.id);
-        }
-    }
-    Ok(())
-}
-
 /// Attaches a result to a job in place of an earlier one.
 pub(super) async fn attach(change: &mut Change<'_>, key: i64, parts: &Parts) -> Result<()> {
     let tx = change.sql().await?;
@@ -119,12 +94,12 @@ pub(super) async fn attach(change: &mut Change<'_>, key: i64, parts: &Parts) -> 
 
 /// Gives a job the result of another one.
 pub(super) async fn share(tx: &mut SqliteConnection, from: i64, to: i64) -> Result<()> {
-    content::copy(tx, from, to, &NAMES).await
+    content::copy(tx, from, to, &name::OF_RESULT).await
 }
 
 /// Removes the result of a job.
 pub(super) async fn remove(tx: &mut SqliteConnection, key: i64) -> Result<()> {
-    content::detach(tx, Holder::Job(key), &NAMES).await
+    content::detach(tx, Holder::Job(key), &name::OF_RESULT).await
 }
 
 /// The result of a job as it is stored: its index is read, its parts are not.

@@ -254,7 +254,7 @@ async fn what_answers_a_job_is_checked_before_and_by_what_is_stored() {
     let nothing = intact::Intact::default();
     let attached = content::all(&mut connection, content::Holder::Job(job.key)).await;
     let attached = attached.unwrap();
-    let checked = results::check_stored(&mut connection, &nothing, job.key, attached).await;
+    let checked = intact::check_result(&mut connection, &nothing, job.key, attached).await;
     assert!(
         matches!(checked, Err(StoreError::Damaged(_))),
         "{checked:?}"
