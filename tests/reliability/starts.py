@@ -254,7 +254,7 @@ def doctors(server, folder):
     with (data / "signorini.db").open("r+b") as file:
         file.write(bytes(100))
     equal(len(doctor(data, DAMAGED, "no job can be read: restore the store from a backup")), 1, "findings, each once")
-    doctor(folder / "missing", FOLDER, "there is no signorini.db in it")
+    doctor(folder / "missing", FOLDER, "it contains no signorini.db")
     data = crash(server, folder)
     doctor(data, 0, "3 of 3 jobs are intact")
     if os.geteuid() == 0:

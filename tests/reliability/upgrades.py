@@ -258,6 +258,8 @@ def older(source, fields, folder, version):
         theirs = {column for _, column, *_ in store.execute("pragma new.table_info(%s)" % table)}
         pairs = [(column, OLD_NAMES.get((table, column), column)) for column in ours]
         pairs = [pair for pair in pairs if pair[1] in theirs]
+        if table == "job_label" and "owner" in ours:  # up to step 16
+            pairs.append(("owner", "(select owner from new.job where id = job_id)"))
         # before sweeps, no job was one of them
         where = " where sweep is null" if table == "job" and version < 8 else ""
         if table in ("event", "job_label") and version < 8:
