@@ -180,7 +180,7 @@ def token(server):
     missing = run("list", "--ca", "/nonexistent")
     check("cannot be read" in missing.stderr, "an authority without a file, %r" % missing)
     wrong = run("list", "--ca", "/dev/null")
-    check("there is no certificate" in wrong.stderr, "an empty authority, %r" % wrong)
+    check("found no certificate" in wrong.stderr, "an empty authority, %r" % wrong)
     print(unknown.stderr, end="")
 
 
