@@ -47,11 +47,23 @@ pub(super) async fn check_result(
         return Err(Record::of_job(key, name::RESULT).damaged("it is missing"));
     }
     for content in attached {
-        if name::OF_RESULT.contains(&content.name.as_str()) && !intact.contains(content.id) {
-            let checked = content.check(connection).await;
-            checked.map_err(|error| error.reading(|| content.record()))?;
-            intact.insert(content.id);
+        if name::OF_RESULT.contains(&content.name.as_str()) {
+            check(connection, intact, &content).await?;
         }
+    }
+    Ok(())
+}
+
+/// Compares content with its hash, unless it was found intact before.
+pub(super) async fn check(
+    connection: &mut SqliteConnection,
+    intact: &Intact,
+    content: &Content,
+) -> Result<()> {
+    if !intact.contains(content.id) {
+        let checked = content.check(connection).await;
+        checked.map_err(|error| error.reading(|| content.record()))?;
+        intact.insert(content.id);
     }
     Ok(())
 }

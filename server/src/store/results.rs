@@ -8,6 +8,7 @@ use super::{
     database::Store,
     encoding::{self, Decoded, PartInfo, decoded},
     error::{Record, Result},
+    intact::{self, Intact},
     parts::{Entry, HEADER_BYTES, Parts, index_bytes, read_index},
     rows::is_current,
     sizes,
@@ -76,7 +77,9 @@ impl Store {
             if part == name::FIELDS && found.fields().is_none() {
                 found.must_have_no_fields(&mut connection).await?;
             }
-            found.memory_to_read(&mut connection, part).await
+            found
+                .memory_to_read(&mut connection, &self.intact, part)
+                .await
         };
         self.damages.noting(read).await
     }
@@ -263,6 +266,7 @@ impl StoredResult {
     async fn memory_to_read(
         &self,
         connection: &mut SqliteConnection,
+        intact: &Intact,
         part: &str,
     ) -> Result<Option<usize>> {
         let Some((entry, _)) = self.find(part) else {
@@ -271,6 +275,8 @@ impl StoredResult {
         let (first, stored) = match (part, &self.fields) {
             (name::FIELDS, None) => return Ok(None),
             (name::FIELDS, Some(fields)) => {
+                // how much they take is told by their first bytes
+                intact::check(connection, intact, fields).await?;
                 (fields.piece(connection, 0).await?, fields.fingerprint.bytes)
             }
             _ => (vec![], entry.bytes),

@@ -84,8 +84,11 @@ impl Store {
 
     /// Whether the fields of this job were deleted by themselves.
     pub async fn lost_fields(&self, key: i64) -> Result<bool> {
-        let mut connection = self.reader.acquire().await?;
-        lost_fields(&mut connection, key).await
+        let read = async {
+            let mut connection = self.reader.acquire().await?;
+            lost_fields(&mut connection, key).await
+        };
+        self.damages.noting(read).await
     }
 }
 

@@ -3,6 +3,8 @@
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use tokio::{sync::Semaphore, time::timeout};
+use tracing::error;
+use uuid::Uuid;
 
 use super::{
     fields_in_memory::FieldsInMemory,
@@ -247,14 +249,18 @@ impl From<StoreError> for ApiError {
             StoreError::IdConflict(id) => ApiError::IdConflict(id),
             StoreError::Deleted(id) => ApiError::Deleted(id),
             StoreError::Replaced(_) | StoreError::Broken(_) => ApiError::StorageLost,
-            // it is logged already, once
-            StoreError::Damaged(damage) => match damage.incident {
-                Some(incident) => ApiError::CorruptData {
+            StoreError::Damaged(damage) => {
+                // most of it was logged by the store, once
+                let incident = damage.incident.unwrap_or_else(|| {
+                    let incident = Uuid::now_v7();
+                    error!(%incident, cause = damage.cause, "incident {incident}: {damage}: {}", damage.cause);
+                    incident
+                });
+                ApiError::CorruptData {
                     what: damage.to_string(),
                     incident,
-                },
-                None => ApiError::internal(StoreError::Damaged(damage)),
-            },
+                }
+            }
             other => ApiError::internal(other),
         }
     }

@@ -334,6 +334,22 @@ async fn a_damaged_result_answers_no_other_job() {
     assert_eq!(accepted.jobs[0].input_hash, "sha256:2");
 }
 
+/// The first bytes of fields tell how much memory it takes to read them: noise there may ask for more than there is.
+#[tokio::test]
+async fn the_memory_for_fields_is_told_by_intact_ones_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let job = solved(&store, new("1")).await;
+    assert!(store.fields_memory(job.key).await.unwrap().is_some());
+    store.close().await;
+    let store = Store::open(folder.path()).await.unwrap();
+    let noise = "update content_piece set body = x'ffffffff' || substr(body, 5)
+                 where content = (select content from attachment where name = 'fields')";
+    sqlx::query(noise).execute(&store.writer).await.unwrap();
+    let told = store.fields_memory(job.key).await;
+    assert!(told.is_err_and(|told| told.is_damage_of(job.key)));
+}
+
 async fn submit_three(store: &Store) {
     for input in ["1", "2", "3"] {
         let job = NewJob {
