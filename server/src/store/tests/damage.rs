@@ -343,7 +343,7 @@ async fn the_memory_for_fields_is_told_by_intact_ones_only() {
     assert!(store.fields_memory(job.key).await.unwrap().is_some());
     store.close().await;
     let store = Store::open(folder.path()).await.unwrap();
-    let noise = "update content_piece set body = x'ffffffff' || substr(body, 5)
+    let noise = "update content_piece set body = zeroblob(length(body))
                  where content = (select content from attachment where name = 'fields')";
     sqlx::query(noise).execute(&store.writer).await.unwrap();
     let told = store.fields_memory(job.key).await;
