@@ -63,7 +63,7 @@ impl Holder {
 }
 
 /// The hash of content, and how long it is.
-#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fingerprint {
     /// SHA-256.
     pub hash: Vec<u8>,
@@ -180,7 +180,8 @@ async fn insert(tx: &mut SqliteConnection, content: &Fingerprint) -> Result<i64>
         .await?)
 }
 
-/// Attaches content under a name that has none, and writes those pieces of it that are not there.
+/// Writes content, and attaches it under a name that has none. What is there already is compared: what a disk has changed since
+/// is mended so.
 pub(super) async fn attach(
     tx: &mut SqliteConnection,
     holder: Holder,
@@ -191,13 +192,9 @@ pub(super) async fn attach(
     if fingerprint.pieces() == 1 {
         return attach_small(tx, holder, name, content).await;
     }
-    if attach_written(tx, holder, name, fingerprint).await? {
-        return Ok(());
-    }
     write_pieces(tx, fingerprint, 0, &content.pieces()).await?;
-    attach_written(tx, holder, name, fingerprint)
-        .await
-        .map(drop)
+    let id = insert(tx, fingerprint).await?;
+    attach_stored(tx, holder, name, id, &fingerprint.hash).await
 }
 
 /// Writes and attaches content of one piece. Statements are sent together: to hand one to the thread of the connection costs as
@@ -231,7 +228,7 @@ async fn attach_small(
     Ok(())
 }
 
-/// Attaches content that was written; false if some of it is not there.
+/// Attaches content that was written a moment ago; false if some of it is not there.
 pub(super) async fn attach_written(
     tx: &mut SqliteConnection,
     holder: Holder,

@@ -90,7 +90,13 @@ pub(super) async fn attach(change: &mut Change<'_>, key: i64, parts: &Parts) -> 
     let tx = change.sql().await?;
     remove(tx, key).await?;
     for (name, content) in parts.contents() {
-        content::attach(tx, Holder::Job(key), name, &content).await?;
+        let job = Holder::Job(key);
+        // large content was written before the end of the job; that of a partial result was not
+        let written = content.fingerprint.pieces() > 1
+            && content::attach_written(tx, job, name, &content.fingerprint).await?;
+        if !written {
+            content::attach(tx, job, name, &content).await?;
+        }
     }
     Ok(())
 }

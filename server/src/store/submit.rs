@@ -129,7 +129,8 @@ async fn accept(
         if let (Some((sweep, definition)), Some(members)) = (&sweep_key, groups.next()) {
             let tx = change.sql().await?;
             sweeps::insert_members(tx, *sweep, key, members).await?;
-            sweeps::attach_definition(tx, key, definition).await?;
+            let is_first = inserted.is_empty();
+            sweeps::attach_definition(tx, key, definition, is_first).await?;
         }
         inserted.push(key);
     }

@@ -395,13 +395,18 @@ pub(super) async fn insert(change: &mut Change<'_>, owner: &str, new: &NewSweep)
     Ok(key)
 }
 
-/// Attaches the definition of its sweep to a job, so that it is kept as long as one of its jobs.
+/// Attaches the definition of its sweep to a job, so that it is kept as long as one of its jobs. With the first of them it is written.
 pub(super) async fn attach_definition(
     tx: &mut SqliteConnection,
     job: i64,
     definition: &NewContent<'_>,
+    is_first: bool,
 ) -> Result<()> {
-    content::attach(tx, Holder::Job(job), name::DEFINITION, definition).await
+    let (job, what) = (Holder::Job(job), name::DEFINITION);
+    if !is_first && content::attach_written(tx, job, what, &definition.fingerprint).await? {
+        return Ok(());
+    }
+    content::attach(tx, job, what, definition).await
 }
 
 /// Inserts members of a sweep that a job is to solve.

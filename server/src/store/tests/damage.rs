@@ -706,4 +706,15 @@ async fn a_damaged_problem_that_is_submitted_again_is_mended_before_it_is_claime
     set(&store, "content_piece", 1, "body", "x'5b5d'").await;
     let again = store.submit(by("ada", vec![new("1")], None), true).await;
     assert_eq!(again.unwrap().claim.unwrap().problem, new("1").problem);
+    // also a large one, of which a single piece was changed
+    let large = || NewJob {
+        problem: format!("\"{}\"", "p".repeat(2 * PIECE_BYTES)),
+        ..new("2")
+    };
+    let first = store.submit(by("ada", vec![large()], None), true).await;
+    first.unwrap().claim.unwrap();
+    let harm = "update content_piece set body = zeroblob(length(body)) where piece = 1";
+    sqlx::query(harm).execute(&store.writer).await.unwrap();
+    let again = store.submit(by("ada", vec![large()], None), true).await;
+    assert_eq!(again.unwrap().claim.unwrap().problem, large().problem);
 }
