@@ -168,6 +168,21 @@ async fn a_merge_patch_changes_single_labels() {
         .header(header::IF_MATCH, "\"1\"")
         .body(r#"{"labels": {"b": null}}"#);
     assert_eq!(answer(stale).await.0, StatusCode::PRECONDITION_FAILED);
+    // a condition is judged only if the request is valid
+    let too_many = |count: u32, value: Value| -> Value {
+        let labels: serde_json::Map<_, _> =
+            (0..count).map(|n| (n.to_string(), value.clone())).collect();
+        json!({ "labels": labels })
+    };
+    for labels in [too_many(65, json!("x")), too_many(129, json!(null))] {
+        let invalid = server
+            .request(Method::PATCH, &format!("/v1/jobs/{id}"))
+            .header(header::CONTENT_TYPE, "application/merge-patch+json")
+            .header(header::IF_MATCH, "\"1\"")
+            .body(labels.to_string());
+        let (status, refused) = answer(invalid).await;
+        assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY, "{refused:#}");
+    }
     let nulls = r#"{"name": null, "labels": null, "priority": null, "pinned": null}"#;
     let (_, job) = patch(&server, id, nulls).await;
     assert_eq!(

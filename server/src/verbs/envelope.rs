@@ -102,6 +102,17 @@ pub(super) fn priority_violation(priority: i32) -> Option<Violation> {
     })
 }
 
+/// The violation of a change of more labels than a job could lose and get.
+pub(super) fn label_changes_violation(changes: usize) -> Option<Violation> {
+    (changes > 2 * MAX_LABELS).then(|| Violation {
+        pointer: "/labels".into(),
+        reason: Reason::OutOfRange,
+        got: changes.to_string(),
+        expected: format!("changes of at most {} labels", 2 * MAX_LABELS),
+        hint: "Change some at a time, or set null for all labels.".into(),
+    })
+}
+
 /// The violations of invalid labels.
 pub(super) fn label_violations(labels: &BTreeMap<String, String>) -> Vec<Violation> {
     let violation = |pointer: String, got: String, expected: String, hint: &str| Violation {

@@ -102,6 +102,18 @@ pub async fn update(
     if labels.is_empty() {
         return replace(service, caller, id, edit, versions).await;
     }
+    // before the job is looked at: a condition is judged only if the request is valid (RFC 9110, 13.2.1)
+    let set = labels.iter();
+    let set = set.filter_map(|(name, value)| Some((name.clone(), value.clone()?)));
+    let labels_alone = Edit {
+        labels: Some(set.collect()),
+        ..edit.clone()
+    };
+    let mut violations = edit_violations(&labels_alone);
+    violations.extend(envelope::label_changes_violation(labels.len()));
+    violations
+        .into_result(())
+        .map_err(ApiError::InvalidProblem)?;
     // Changed on what there is, which must not change meanwhile; a job changes its version a few times in its life.
     const MOST_TRIES: u32 = 10;
     let mut tries = 0;
@@ -135,6 +147,15 @@ pub async fn update(
 /// Labels to be set, or removed if they are `None`.
 pub type LabelChanges = BTreeMap<String, Option<String>>;
 
+fn edit_violations(edit: &Edit) -> Findings {
+    let mut violations = Findings::default();
+    let name = edit.name.iter().flatten().next();
+    violations.extend(name.and_then(|name| envelope::name_violation(name)));
+    violations.extend(edit.priority.and_then(envelope::priority_violation));
+    violations.extend(edit.labels.iter().flat_map(envelope::label_violations));
+    violations
+}
+
 async fn replace(
     service: &Arc<Service>,
     caller: &Caller,
@@ -142,12 +163,7 @@ async fn replace(
     edit: Edit,
     versions: Option<Vec<i64>>,
 ) -> Result<Job, ApiError> {
-    let mut violations = Findings::default();
-    let name = edit.name.iter().flatten().next();
-    violations.extend(name.and_then(|name| envelope::name_violation(name)));
-    violations.extend(edit.priority.and_then(envelope::priority_violation));
-    violations.extend(edit.labels.iter().flat_map(envelope::label_violations));
-    violations
+    edit_violations(&edit)
         .into_result(())
         .map_err(ApiError::InvalidProblem)?;
     if let Some(priority) = edit.priority.filter(|priority| *priority > 0)

@@ -44,7 +44,7 @@ pub(super) fn operations() -> Vec<Operation> {
         )
         .rpcs(&["ListIterations"])
         .summary("Returns the iterations of a job's last attempt, one row each")
-        .file("The rows", data::<Vec<TimedIteration>>(Format::OF_TABLES)),
+        .file_of_result("The rows", data::<Vec<TimedIteration>>(Format::OF_TABLES)),
         get(
             READ,
             "/v1/jobs/{id}/profiles/{boundary}",
@@ -53,7 +53,7 @@ pub(super) fn operations() -> Vec<Operation> {
         )
         .rpcs(&["GetProfile"])
         .summary("Returns columns along a contact boundary, by arc length")
-        .file("The columns", data::<ContactProfile>(Format::OF_TABLES))
+        .file_of_result("The columns", data::<ContactProfile>(Format::OF_TABLES))
         .fails(NO_RESULT),
         get(
             READ,
@@ -63,7 +63,7 @@ pub(super) fn operations() -> Vec<Operation> {
         )
         .rpcs(&["StreamResult"])
         .summary("Returns mesh, displacements and stresses")
-        .file("The fields", data::<Fields>(Format::OF_FIELDS))
+        .file_of_result("The fields", data::<Fields>(Format::OF_FIELDS))
         .fails(NO_RESULT),
         delete(CANCEL, "/v1/jobs/{id}/fields", (ID,), results::delete_fields)
             .rpcs(&["DeleteFields"])
@@ -78,7 +78,7 @@ pub(super) fn operations() -> Vec<Operation> {
         )
         .rest_only("GetPlot")
         .summary("Draws a figure: mesh, deformed body, stresses along the contact, convergence")
-        .file("The figure", figures())
+        .file_of_result("The figure", figures())
         .fails(NO_RESULT),
     ]
 }
@@ -96,7 +96,11 @@ impl Operation {
     pub(super) fn file(self, meaning: &'static str, content: Content) -> Self {
         let tag = || header("ETag", text(), "The file's SHA-256");
         let name = || header("Content-Disposition", text(), "A name for the file");
-        let whole_file = header("Content-Digest", text(), "Its SHA-256 (RFC 9530)");
+        let whole_file = header(
+            "Content-Digest",
+            text(),
+            "Its SHA-256 (RFC 9530); absent from a compressed answer",
+        );
         let parts = content.iter().flat_map(|(media, _)| bytes(media)).collect();
         let part = header(
             "Content-Range",
@@ -104,11 +108,22 @@ impl Operation {
             "The part, and the size of the file",
         );
         self.answers(200, meaning, content)
-            .with([tag(), name(), whole_file, result_available()])
+            .with([tag(), name()])
+            .sometimes_with(whole_file)
             .answers(206, "The requested part", parts)
-            .with([tag(), name(), part, result_available()])
+            .with([tag(), name(), part])
             .answers(304, "The file has not changed", nothing())
-            .with([tag(), result_available()])
+            .with([tag()])
             .fails(&[Code::NotAcceptable, Code::RangeNotSatisfiable])
+    }
+
+    /// As `file`, of a job: the answers say whether its result is partial or final.
+    fn file_of_result(mut self, meaning: &'static str, content: Content) -> Self {
+        let others = self.answers.len();
+        self = self.file(meaning, content);
+        for answer in &mut self.answers[others..] {
+            answer.headers.push((result_available(), true));
+        }
+        self
     }
 }
