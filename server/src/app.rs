@@ -111,7 +111,7 @@ fn worker_process() -> Command {
 
 /// Requeues the jobs, and removes the uploads, that were interrupted when the service last ended. Jobs that cannot be
 /// requeued yet are requeued by the queue later.
-async fn clean_up(store: &Store) -> store::Result<()> {
+async fn clean_up(store: &Arc<Store>) -> store::Result<()> {
     store.requeue_interrupted().await?;
     let pieces = match store.discard_unattached().await {
         Err(StoreError::Damaged(_)) => 0, // the log has it; nothing was removed

@@ -1,6 +1,6 @@
 //! The caller of a request: its owner name, its scopes, and the owners whose jobs it can see.
 
-use std::{collections::BTreeSet, net::IpAddr};
+use std::{collections::BTreeSet, net::IpAddr, sync::Arc};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -141,10 +141,10 @@ impl Caller {
     }
 
     /// The owners whose jobs this caller sees.
-    pub fn visible_owners(&self) -> Owners<'_> {
+    pub fn visible_owners(&self) -> Owners {
         match self.is_admin() {
             true => Owners::All,
-            false => Owners::Only(&self.owner),
+            false => Owners::Only(self.owner.as_str().into()),
         }
     }
 }
@@ -162,20 +162,20 @@ pub fn is_owner(name: &str) -> bool {
 }
 
 /// The owners whose jobs a query to the store is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Owners<'a> {
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Owners {
     /// Every owner.
     All,
     /// This owner.
-    Only(&'a str),
+    Only(Arc<str>),
 }
 
-impl Owners<'_> {
+impl Owners {
     /// Whether `owner` is among them.
-    pub fn include(self, owner: &str) -> bool {
+    pub fn include(&self, owner: &str) -> bool {
         match self {
             Owners::All => true,
-            Owners::Only(only) => only == owner,
+            Owners::Only(only) => **only == *owner,
         }
     }
 }
@@ -189,7 +189,7 @@ mod tests {
         let local = Caller::local();
         assert_eq!(local.visible_owners(), Owners::All);
         let ada = Caller::new("ada", [Scope::Read, Scope::Submit]);
-        assert_eq!(ada.visible_owners(), Owners::Only("ada"));
+        assert_eq!(ada.visible_owners(), Owners::Only("ada".into()));
         assert!(ada.visible_owners().include("ada") && !ada.visible_owners().include("bob"));
         assert!(local.visible_owners().include("bob"));
     }

@@ -38,6 +38,16 @@ impl Time {
         SIMULATED.set(Some(self.0));
     }
 
+    /// Work for another thread that sees the simulated time of this one.
+    #[cfg(test)]
+    pub(crate) fn simulated_for<T>(work: impl FnOnce() -> T) -> impl FnOnce() -> T {
+        let simulated = SIMULATED.get();
+        move || {
+            SIMULATED.set(simulated);
+            work()
+        }
+    }
+
     /// The present time of the machine's clock, also if it was set since the start: for tokens, which expire at a time
     /// that others know.
     pub fn of_the_machine() -> Self {

@@ -40,7 +40,7 @@ fn broken(changes: &[(&str, &str)]) -> Vec<String> {
         ),
         (
             "server/src/store/rows.rs",
-            "use solver::top::Top; use sqlx::Row;",
+            "use solver::top::Top; use rusqlite::Row;",
         ),
         (
             "server/src/store/list.rs",
@@ -165,8 +165,8 @@ fn names_of_one_owner_are_not_visible_to_others() {
         ),
         (
             "server/src/high.rs",
-            "fn f() { sqlx::query() }",
-            "`sqlx` is for server/src/store/ alone",
+            "fn f() { rusqlite::params() }",
+            "`rusqlite` is for server/src/store/ alone",
         ),
         (
             "solver/src/low.rs",

@@ -20,7 +20,7 @@ struct Reserved {
 #[rustfmt::skip]
 const RESERVED: &[Reserved] = &[
     Reserved { path: "faer",        within: "",       only: &["solver/src/linear/"] },
-    Reserved { path: "sqlx",        within: "",       only: &["server/src/store/"] },
+    Reserved { path: "rusqlite",    within: "",       only: &["server/src/store/"] },
     Reserved { path: "std::time",   within: "solver/", only: &[] },
     Reserved { path: "std::thread", within: "solver/", only: &["solver/src/linear/parallel.rs"] },
     Reserved { path: "std::fs",     within: "solver/", only: &[] },

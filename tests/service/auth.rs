@@ -6,9 +6,9 @@ use std::{
 };
 
 use reqwest::{Method, StatusCode};
+use rusqlite::Connection;
 use serde_json::{Value, json};
 use service::pb::{self, job_service_client::JobServiceClient};
-use sqlx::{ConnectOptions, Connection, sqlite::SqliteConnectOptions};
 use suite::{example_json, harness::Server};
 use tonic::{Code, Request, client::Grpc, codegen::http::uri::PathAndQuery, transport::Channel};
 use tonic_prost::ProstCodec;
@@ -127,15 +127,10 @@ async fn with_tokens() -> (Server, String, Cases) {
     short["expires_in_s"] = json!(60);
     let (id, expired) = create(&server, Some(&admin), short).await;
     server.terminate().await;
-    let database = SqliteConnectOptions::new().filename(server.data().join("signorini.db"));
-    let mut database = database.connect().await.unwrap();
+    let database = Connection::open(server.data().join("signorini.db")).unwrap();
     let over = "update token set expires_at = created_at, checksum = null where id = ?";
-    sqlx::query(over)
-        .bind(&id)
-        .execute(&mut database)
-        .await
-        .unwrap();
-    database.close().await.unwrap();
+    database.execute(over, [&id]).unwrap();
+    drop(database);
     server.restart().await;
     let mut cases: Vec<Case> = vec![
         ("none".into(), None, None),

@@ -46,7 +46,7 @@ impl Feed {
     /// whether events are kept for other watchers.
     pub(super) async fn news(
         &self,
-        store: &Store,
+        store: &Arc<Store>,
         key: i64,
         announced: u64,
         after: i64,
@@ -72,7 +72,7 @@ impl Feed {
 }
 
 /// Reads the end before the events: if the job had ended then, all its events are there.
-async fn read(store: &Store, key: i64, after: i64) -> store::Result<News> {
+async fn read(store: &Arc<Store>, key: i64, after: i64) -> store::Result<News> {
     let ended = store.has_ended(key).await?;
     let events = store.events_after(key, after, MOST).await?;
     Ok(News {

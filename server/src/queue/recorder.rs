@@ -1,6 +1,6 @@
 //! Records the reports of a running solver: commits its events in batches, then announces them.
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use tokio::{
     sync::mpsc,
@@ -38,7 +38,7 @@ struct Batch {
     /// Members of a sweep.
     members: Vec<(Time, MemberRow)>,
     /// A partial result that was reported after the events.
-    partial: Option<Box<Parts>>,
+    partial: Option<Arc<Parts>>,
     one_level: bool,
     /// Whether the solver has ended, so that this is the last batch.
     last: bool,
@@ -126,7 +126,10 @@ async fn store_batch(
     let (store, key, attempt) = (&queue.store, job.key, running.attempt);
     // first: to store them again changes nothing, as a retry does after what comes below has failed
     if !batch.members.is_empty() {
-        match store.record_members(key, attempt, &batch.members).await? {
+        match store
+            .record_members(key, attempt, batch.members.clone())
+            .await?
+        {
             Some(sweep) => queue.announce_sweep(sweep),
             None => return Ok(false),
         }
@@ -135,7 +138,7 @@ async fn store_batch(
         if failpoint::fails(Point::EventsReported, job.id) {
             return Err(StoreError::Full);
         }
-        let stored = store.append_events(key, attempt, &batch.events, progress);
+        let stored = store.append_events(key, attempt, batch.events.clone(), progress);
         match stored.await? {
             true => {
                 failpoint::pass(Point::EventsStored, job.id);
@@ -180,7 +183,7 @@ impl Batch {
         match report {
             Report::Event(time, payload) => self.events.push((time, payload)),
             Report::Member(time, row) => self.members.push((time, *row)),
-            Report::Partial(parts) => self.partial = Some(parts),
+            Report::Partial(parts) => self.partial = Some(Arc::new(*parts)),
             Report::OneLevel => self.one_level = true,
         }
     }

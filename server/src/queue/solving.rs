@@ -1,6 +1,10 @@
 //! Solves a problem on a blocking thread, and reports the progress.
 
-use std::{ops::ControlFlow, time::Duration, time::Instant};
+use std::{
+    ops::ControlFlow,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use files::sweep::Plan;
 use solver::{
@@ -31,7 +35,7 @@ use crate::{
 };
 
 /// Reads the stored form of a mesh, which existed when the job was accepted. Call this on a blocking thread.
-pub(super) fn stored_mesh(store: &Store, hash: &str) -> Result<Vec<u8>, NoSolution> {
+pub(super) fn stored_mesh(store: &Arc<Store>, hash: &str) -> Result<Vec<u8>, NoSolution> {
     let failed =
         |cause: &dyn std::fmt::Display| NoSolution::Internal(format!("mesh {hash}: {cause}"));
     let body = tokio::runtime::Handle::current().block_on(store.mesh_body(hash));
@@ -46,7 +50,7 @@ pub(super) fn read_mesh(body: &[u8]) -> Result<Mesh, NoSolution> {
 }
 
 /// Reads the members of a sweep that a job still has to solve. Call this on a blocking thread.
-pub(super) fn members_of(store: &Store, key: i64) -> Result<MembersTask, NoSolution> {
+pub(super) fn members_of(store: &Arc<Store>, key: i64) -> Result<MembersTask, NoSolution> {
     let failed = |cause: String| NoSolution::Internal(format!("the members of the job: {cause}"));
     let task = tokio::runtime::Handle::current().block_on(store.members_task(key));
     let task = task.map_err(|error| failed(error.to_string()))?;

@@ -205,6 +205,7 @@ async fn end_with_retries(
     last: FinalBatch,
     parts: Option<Parts>,
 ) {
+    let parts = parts.map(Arc::new);
     let mut backoff = Backoff::default();
     let stored = loop {
         let cause = match try_to_end(queue, job, &ending, &last, parts.as_ref()).await {
@@ -234,7 +235,7 @@ async fn try_to_end(
     job: &Job,
     ending: &Ending,
     last: &FinalBatch,
-    parts: Option<&Parts>,
+    parts: Option<&Arc<Parts>>,
 ) -> crate::store::Result<bool> {
     let (key, attempt) = (job.key, job.attempt);
     if failpoint::fails(Point::Solved, job.id) {

@@ -18,9 +18,9 @@ use std::{
 use rustix::fs::{CWD, RenameFlags, renameat_with, statvfs};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use sqlx::{ConnectOptions, Connection, SqliteConnection, sqlite::SqliteConnectOptions};
 
 use super::{
+    connections::{Mode, blocking, open},
     database::{compare_with_the_past, with_advice},
     error::{Result, StoreError},
     folder::{DATABASE, JOURNAL, unusable},
@@ -28,6 +28,7 @@ use super::{
     migrations,
     pages::Pages,
     progress::{self, Progress},
+    sql::Sql,
 };
 use crate::{error::size, time::Time};
 
@@ -77,11 +78,16 @@ pub struct Backup {
 /// Writes a backup of the store in this folder, whether or not a server is using it, to a new folder. With `check`, reads
 /// everything in it as the service does.
 pub async fn back_up(data: &Path, target: &Path, check: bool) -> Result<Backup> {
+    let (data, target) = (data.to_owned(), target.to_owned());
+    blocking(move || write_backup(&data, &target, check)).await
+}
+
+fn write_backup(data: &Path, target: &Path, check: bool) -> Result<Backup> {
     if !progress::has_content(&data.join(DATABASE)) {
         return Err(unusable(data, absent(data)));
     }
     let partial = Partial::create(data, target)?;
-    let made = fill(data, &partial, check).await;
+    let made = fill(data, &partial, check);
     let made = made.and_then(|backup| partial.complete(&backup.manifest).map(|()| backup));
     made.map_err(|error| {
         partial.remove();
@@ -92,60 +98,47 @@ pub async fn back_up(data: &Path, target: &Path, check: bool) -> Result<Backup> 
     })
 }
 
-async fn fill(data: &Path, partial: &Partial, check: bool) -> Result<Backup> {
+fn fill(data: &Path, partial: &Partial, check: bool) -> Result<Backup> {
     // before the database: later, it would tell of transactions that the copy does not have
     let known = progress::read(data)?;
     let created_at = Time::now();
-    let options = SqliteConnectOptions::new().filename(data.join(DATABASE));
-    let mut source = options.read_only(true).connect().await?;
-    migrations::check(&mut source).await?;
-    let pages = Pages::of(&mut source).await?;
+    let source = open(&data.join(DATABASE), Mode::Read)?;
+    migrations::check(&source)?;
+    let pages = Pages::of(&source)?;
     partial.require_space(pages.bytes_of(pages.count - pages.free))?;
     let database = partial.path.join(DATABASE);
     // SQLite takes an empty file, which is for its owner alone
     partial.named(new_file(&database))?;
     let name = database.to_str();
     let name = name.ok_or_else(|| partial.unwritable("its name must be UTF-8"))?;
-    sqlx::query("vacuum into ?")
-        .bind(name)
-        .execute(&mut source)
-        .await?;
-    source.close().await?;
+    source.run("vacuum into ?", [name])?;
+    drop(source);
 
-    let options = SqliteConnectOptions::new().filename(&database);
-    let doubt = compare_with_the_past(&partial.path, &known, options.clone()).await?;
-    let mut copy = options.read_only(true).connect().await?;
-    let count = async |copy: &mut SqliteConnection, statement: &'static str| {
-        sqlx::query_scalar::<_, i64>(statement)
-            .fetch_one(copy)
-            .await
-    };
+    let doubt = compare_with_the_past(&partial.path, &known, &database)?;
+    let copy = open(&database, Mode::Read)?;
+    let count = |statement: &str| copy.value::<i64>(statement, ());
     let mut manifest = Manifest {
         format: FORMAT,
         version: env!("CARGO_PKG_VERSION").into(),
-        tables: count(&mut copy, "select max(version) from _sqlx_migrations").await?,
+        tables: count("select max(version) from _sqlx_migrations")?,
         created_at,
-        jobs: count(&mut copy, "select count(*) from job").await?,
-        unfinished: count(
-            &mut copy,
-            "select count(*) from job where status in ('queued', 'running')",
-        )
-        .await?,
+        jobs: count("select count(*) from job")?,
+        unfinished: count("select count(*) from job where status in ('queued', 'running')")?,
         meshes: 0,
         bytes: 0,
         digest: String::new(),
         damaged: None,
     };
     if manifest.tables >= 2 {
-        manifest.meshes = count(&mut copy, "select count(*) from mesh").await?;
+        manifest.meshes = count("select count(*) from mesh")?;
     }
-    if let Some(last) = progress::in_database(&mut copy).await? {
+    if let Some(last) = progress::in_database(&copy)? {
         partial.named(Progress::start(&partial.path, last).map(drop))?;
     }
-    copy.close().await?;
+    drop(copy);
     let mut findings: Vec<String> = doubt.into_iter().collect();
     if check {
-        findings.extend(check_copy(&partial.path).await?);
+        findings.extend(check_copy(&partial.path)?);
         manifest.damaged = Some(findings.len());
     }
     let (digest, bytes) = partial.named(digest(&database))?;

@@ -1,10 +1,13 @@
 //! Changes of many jobs, some in one transaction: each commit waits for the disk, and so would each job.
 
-use std::time::{Duration, Instant};
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use super::{
     change::Change,
-    database::Store,
+    database::{Store, Writer},
     delete::{Deletion, delete, remove},
     end::end,
     error::Result,
@@ -39,10 +42,10 @@ pub struct Batch {
 }
 
 /// Which jobs are discarded that have ended, and what of them.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Discard<'a> {
+#[derive(Clone, Debug)]
+pub(super) enum Discard {
     /// Those of these owners.
-    Jobs(Owners<'a>),
+    Jobs(Owners),
     /// Those that ended before, unless they are pinned.
     OldJobs(Time),
     /// The fields of those.
@@ -51,83 +54,96 @@ pub(super) enum Discard<'a> {
 
 impl Store {
     /// Cancels the first of these jobs, if they wait.
-    pub async fn cancel_queued(&self, keys: &[i64]) -> Result<Batch> {
-        self.control(|| self.try_to_cancel_queued(keys)).await
-    }
-
-    async fn try_to_cancel_queued(&self, keys: &[i64]) -> Result<Batch> {
-        let mut change = self.control_change().await?;
-        let (mut batch, start) = (Batch::default(), Instant::now());
-        for key in keys {
-            let found = change.find(*key).await;
-            // a damaged one stays as it is
-            match change.unless_damage_of(*key, found).await?.flatten() {
-                Some(job) if job.status == Status::Queued => {
-                    end(&mut change, job.key, &Ending::canceled()).await?;
-                    batch.done += 1;
-                }
-                Some(job) if job.status == Status::Running => batch.running.push(*key),
-                _ => {} // it has ended, or was deleted
-            }
-            batch.seen += 1;
-            if start.elapsed() >= LONGEST {
-                break;
-            }
-        }
-        batch.changed = change.commit().await?;
-        Ok(batch)
-    }
-
-    /// Deletes the first of these jobs, if they have ended.
-    pub async fn delete_ended(&self, owners: Owners<'_>, keys: &[i64]) -> Result<Batch> {
-        self.control(|| self.try_to_delete_ended(owners, keys))
+    pub async fn cancel_queued(self: &Arc<Self>, keys: &[i64]) -> Result<Batch> {
+        let keys = keys.to_vec();
+        self.control(move |writer| cancel_queued(writer, &keys))
             .await
     }
 
-    async fn try_to_delete_ended(&self, owners: Owners<'_>, keys: &[i64]) -> Result<Batch> {
+    /// Deletes the first of these jobs, if they have ended.
+    pub async fn delete_ended(self: &Arc<Self>, owners: Owners, keys: &[i64]) -> Result<Batch> {
         self.try_to_discard(Discard::Jobs(owners), keys).await
     }
 
     /// Discards the first of these jobs.
-    pub(super) async fn try_to_discard(&self, what: Discard<'_>, keys: &[i64]) -> Result<Batch> {
-        let asked = Instant::now();
-        let mut change = self.control_change().await?;
-        let longest = asked.elapsed().clamp(LONGEST, LONGEST_LATE);
-        let (mut batch, start) = (Batch::default(), Instant::now());
-        for key in keys {
-            let discarded = discard(&mut change, what, *key).await;
-            match change.unless_damage_of(*key, discarded).await? {
-                Some(true) => batch.done += 1,
-                Some(false) | None => batch.left.push(*key),
-            }
-            batch.seen += 1;
-            if start.elapsed() >= longest {
-                break;
-            }
-        }
-        batch.changed = change.commit().await?;
-        Ok(batch)
+    pub(super) async fn try_to_discard(
+        self: &Arc<Self>,
+        what: Discard,
+        keys: &[i64],
+    ) -> Result<Batch> {
+        let (asked, keys) = (Instant::now(), keys.to_vec());
+        self.control(move |writer| {
+            let longest = asked.elapsed().clamp(LONGEST, LONGEST_LATE);
+            discard_first(writer, &what, &keys, longest)
+        })
+        .await
     }
 }
 
+fn cancel_queued(writer: &Writer<'_>, keys: &[i64]) -> Result<Batch> {
+    let mut change = writer.control_change()?;
+    let (mut batch, start) = (Batch::default(), Instant::now());
+    for key in keys {
+        let found = change.find(*key);
+        // a damaged one stays as it is
+        match change.unless_damage_of(*key, found)?.flatten() {
+            Some(job) if job.status == Status::Queued => {
+                end(&mut change, job.key, &Ending::canceled())?;
+                batch.done += 1;
+            }
+            Some(job) if job.status == Status::Running => batch.running.push(*key),
+            _ => {} // it has ended, or was deleted
+        }
+        batch.seen += 1;
+        if start.elapsed() >= LONGEST {
+            break;
+        }
+    }
+    batch.changed = change.commit()?;
+    Ok(batch)
+}
+
+fn discard_first(
+    writer: &Writer<'_>,
+    what: &Discard,
+    keys: &[i64],
+    longest: Duration,
+) -> Result<Batch> {
+    let mut change = writer.control_change()?;
+    let (mut batch, start) = (Batch::default(), Instant::now());
+    for key in keys {
+        let discarded = discard(&mut change, what, *key);
+        match change.unless_damage_of(*key, discarded)? {
+            Some(true) => batch.done += 1,
+            Some(false) | None => batch.left.push(*key),
+        }
+        batch.seen += 1;
+        if start.elapsed() >= longest {
+            break;
+        }
+    }
+    batch.changed = change.commit()?;
+    Ok(batch)
+}
+
 /// Discards a job; false if it is not one of those.
-async fn discard(change: &mut Change<'_>, what: Discard<'_>, key: i64) -> Result<bool> {
+fn discard(change: &mut Change<'_>, what: &Discard, key: i64) -> Result<bool> {
     let (before, fields_alone) = match what {
         Discard::Jobs(owners) => {
-            return Ok(delete(change, owners, key).await? == Deletion::Deleted);
+            return Ok(delete(change, owners, key)? == Deletion::Deleted);
         }
-        Discard::OldJobs(before) => (before, false),
-        Discard::OldFields(before) => (before, true),
+        Discard::OldJobs(before) => (*before, false),
+        Discard::OldFields(before) => (*before, true),
     };
     // as it is now, and by its own record, which has a checksum: it may have been pinned
-    let job = change.find(key).await?;
+    let job = change.find(key)?;
     let old = |job: &Job| !job.pinned && job.finished_at.is_some_and(|at| at < before);
     let Some(job) = job.filter(old) else {
         return Ok(false);
     };
     match fields_alone {
-        true => remove_fields(change, &job).await?,
-        false => remove(change, &job).await?,
+        true => remove_fields(change, &job)?,
+        false => remove(change, &job)?,
     }
     Ok(true)
 }

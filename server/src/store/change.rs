@@ -10,19 +10,19 @@ use std::{
     sync::Arc,
 };
 
-use sqlx::SqliteConnection;
-use tokio::sync::MutexGuard;
+use rusqlite::Connection;
 use tracing::info;
 
 use super::{
     checksum::Value,
     content::{self, Holder, name},
     damage::Damages,
-    database::{Store, Writing},
+    database::{Store, Writer, Writing},
     error::{Result, StoreError},
     events, intact,
     rows::{self, JobRow},
     rules::{self, Ended},
+    sql::Sql,
     waiting::{Move, Owner},
 };
 use crate::{
@@ -38,8 +38,9 @@ const MOST_ROWS: usize = 256;
 
 /// An open transaction.
 pub(super) struct Change<'a> {
+    writer: &'a Writer<'a>,
     store: &'a Store,
-    tx: Writing,
+    tx: Writing<'a>,
     /// Rows of jobs as this transaction has changed them, by their keys.
     rows: BTreeMap<i64, Cached>,
     /// Those of them that are not written yet.
@@ -53,9 +54,6 @@ pub(super) struct Change<'a> {
     changed: Vec<i64>,
     /// What the log will tell of jobs that end or are deleted.
     log_lines: Vec<(JobId, LogLine)>,
-    /// Held until the moves are applied: no other change begins before, so that moves are applied in the order of
-    /// commits.
-    _lock: MutexGuard<'a, ()>,
 }
 
 /// A row of a job.
@@ -79,20 +77,20 @@ pub(super) struct Savepoint {
     log_lines: usize,
 }
 
-impl Store {
-    /// Begins a transaction that may change jobs.
-    pub(super) async fn change(&self) -> Result<Change<'_>> {
-        self.reserve.has_room()?;
-        self.control_change().await
+impl Writer<'_> {
+    /// Begins a transaction that may change jobs. No other one begins before its moves are applied, so that moves are applied
+    /// in the order of commits.
+    pub(super) fn change(&self) -> Result<Change<'_>> {
+        self.store.reserve.has_room()?;
+        self.control_change()
     }
 
     /// The same for what must work even if the disk is full.
-    pub(super) async fn control_change(&self) -> Result<Change<'_>> {
-        let lock = self.change_lock.lock().await;
+    pub(super) fn control_change(&self) -> Result<Change<'_>> {
         Ok(Change {
-            _lock: lock,
-            store: self,
-            tx: self.begin_control().await?,
+            writer: self,
+            store: self.store,
+            tx: self.begin_control()?,
             rows: BTreeMap::new(),
             unwritten: BTreeSet::new(),
             next_key: None,
@@ -107,49 +105,49 @@ impl Store {
 /// Jobs, read and changed.
 impl Change<'_> {
     /// The job with this key, as this transaction has left it, if it exists.
-    pub(super) async fn find(&mut self, key: i64) -> Result<Option<Job>> {
-        let found = self.cached(key).await?;
+    pub(super) fn find(&mut self, key: i64) -> Result<Option<Job>> {
+        let found = self.cached(key)?;
         Ok(found.map(|cached| cached.row.job.clone()))
     }
 
     /// The same of a job that must exist.
-    pub(super) async fn read(&mut self, key: i64) -> Result<Job> {
-        self.find(key).await?.ok_or_else(|| rows::missing(key))
+    pub(super) fn read(&mut self, key: i64) -> Result<Job> {
+        self.find(key)?.ok_or_else(|| rows::missing(key))
     }
 
     /// Whether this attempt of the job is the current one, and running.
-    pub(super) async fn is_current(&mut self, key: i64, attempt: i32) -> Result<bool> {
-        let found = self.cached(key).await?.map(|cached| &cached.row.job);
+    pub(super) fn is_current(&mut self, key: i64, attempt: i32) -> Result<bool> {
+        let found = self.cached(key)?.map(|cached| &cached.row.job);
         Ok(found.is_some_and(|job| job.status == Status::Running && job.attempt == attempt))
     }
 
     /// Accepts a job; `new` makes its row from its key, which is returned.
-    pub(super) async fn insert(&mut self, new: impl FnOnce(i64) -> JobRow) -> Result<i64> {
+    pub(super) fn insert(&mut self, new: impl FnOnce(i64) -> JobRow) -> Result<i64> {
         let key = match self.next_key {
             Some(key) => key,
-            None => rows::next_key(&mut self.tx).await?,
+            None => rows::next_key(&self.tx)?,
         };
         self.next_key = Some(key + 1);
         let mut row = new(key);
         let event = rules::event(None, &row.job, self.now());
         row.last_seq = event.iter().len() as i64;
         self.move_job(rules::moves(None, &row.job));
-        let stored = rows::insert(&mut self.tx, &row).await?;
+        let stored = rows::insert(&self.tx, &row)?;
         let (first, attempt) = (1, row.job.attempt);
-        events::insert(&mut self.tx, key, first, attempt, event.as_slice()).await?;
-        self.keep(key, Cached { row, stored }).await?;
+        events::insert(&self.tx, key, first, attempt, event.as_slice())?;
+        self.keep(key, Cached { row, stored })?;
         Ok(key)
     }
 
     /// Changes a job, which must exist, by this step. All that follows from the change follows here. Returns the job as it
     /// is now.
-    pub(super) async fn update(
+    pub(super) fn update(
         &mut self,
         key: i64,
         step: impl FnOnce(&mut JobRow) -> Result<()>,
     ) -> Result<Job> {
         let now = self.now();
-        let cached = self.cached(key).await?;
+        let cached = self.cached(key)?;
         let cached = cached.ok_or_else(|| rows::missing(key))?;
         let mut new = cached.row.clone();
         step(&mut new)?;
@@ -169,48 +167,48 @@ impl Change<'_> {
             self.log_lines.push((job.id, LogLine::Ended(ended)));
         }
         if let Some(event) = rules::event(Some(&old), &job, now) {
-            self.append(key, &[event]).await?;
+            self.append(key, &[event])?;
         }
         Ok(job)
     }
 
     /// The same by a step that no status forbids.
-    pub(super) async fn set(&mut self, key: i64, step: impl FnOnce(&mut JobRow)) -> Result<Job> {
+    pub(super) fn set(&mut self, key: i64, step: impl FnOnce(&mut JobRow)) -> Result<Job> {
         let step = |row: &mut JobRow| {
             step(row);
             Ok(())
         };
-        self.update(key, step).await
+        self.update(key, step)
     }
 
     /// Appends events to those of a job, which must exist.
-    pub(super) async fn append(&mut self, key: i64, events: &[(Time, Payload)]) -> Result<()> {
-        let cached = self.cached(key).await?;
+    pub(super) fn append(&mut self, key: i64, events: &[(Time, Payload)]) -> Result<()> {
+        let cached = self.cached(key)?;
         let row = &mut cached.ok_or_else(|| rows::missing(key))?.row;
         let (first, attempt) = (row.last_seq + 1, row.job.attempt);
         row.last_seq += events.len() as i64;
         self.unwritten.insert(key);
-        events::insert(&mut self.tx, key, first, attempt, events).await
+        events::insert(&self.tx, key, first, attempt, events)
     }
 
     /// Appends events of the current attempt, with the progress after them.
-    pub(super) async fn append_with_progress(
+    pub(super) fn append_with_progress(
         &mut self,
         key: i64,
         events: &[(Time, Payload)],
         progress: &Progress,
     ) -> Result<()> {
         let events = self.store.events_by_our_clock(events);
-        self.append(key, &events).await?;
+        self.append(key, &events)?;
         let progress = Some(progress.clone());
-        self.set(key, |row| row.job.progress = progress).await?;
+        self.set(key, |row| row.job.progress = progress)?;
         Ok(())
     }
 
     /// Deletes a job that has ended, with what only this job has.
-    pub(super) async fn delete(&mut self, job: &Job) -> Result<()> {
+    pub(super) fn delete(&mut self, job: &Job) -> Result<()> {
         let now = self.now();
-        rows::delete(self.sql().await?, job, now).await?;
+        rows::delete(self.sql()?, job, now)?;
         self.rows.remove(&job.key);
         self.changed.push(job.key);
         self.log_lines.push((job.id, LogLine::Deleted));
@@ -218,19 +216,19 @@ impl Change<'_> {
     }
 
     /// The row with this key, if it exists.
-    async fn cached(&mut self, key: i64) -> Result<Option<&mut Cached>> {
+    fn cached(&mut self, key: i64) -> Result<Option<&mut Cached>> {
         if !self.rows.contains_key(&key) {
-            let Some((row, stored)) = rows::find_row(&mut self.tx, key).await? else {
+            let Some((row, stored)) = rows::find_row(&self.tx, key)? else {
                 return Ok(None);
             };
-            self.keep(key, Cached { row, stored }).await?;
+            self.keep(key, Cached { row, stored })?;
         }
         Ok(self.rows.get_mut(&key))
     }
 
-    async fn keep(&mut self, key: i64, cached: Cached) -> Result<()> {
+    fn keep(&mut self, key: i64, cached: Cached) -> Result<()> {
         if self.rows.len() >= MOST_ROWS {
-            self.write_rows().await?;
+            self.write_rows()?;
             self.rows.clear();
         }
         self.rows.insert(key, cached);
@@ -238,10 +236,10 @@ impl Change<'_> {
     }
 
     /// Writes the rows that have changed.
-    async fn write_rows(&mut self) -> Result<()> {
+    fn write_rows(&mut self) -> Result<()> {
         for key in mem::take(&mut self.unwritten) {
             if let Some(Cached { row, stored }) = self.rows.get_mut(&key) {
-                *stored = rows::update(&mut self.tx, stored, row).await?;
+                *stored = rows::update(&self.tx, stored, row)?;
             }
         }
         Ok(())
@@ -250,9 +248,9 @@ impl Change<'_> {
 
 impl Change<'_> {
     /// The connection, for statements: they find all jobs as they are now.
-    pub(super) async fn sql(&mut self) -> Result<&mut SqliteConnection> {
-        self.write_rows().await?;
-        Ok(&mut self.tx)
+    pub(super) fn sql(&mut self) -> Result<&Connection> {
+        self.write_rows()?;
+        Ok(&self.tx)
     }
 
     /// What was found damaged.
@@ -288,8 +286,8 @@ impl Change<'_> {
     }
 
     /// What was read, unless it is damaged, which is noted.
-    pub(super) async fn unless_damaged<T>(&self, read: Result<T>) -> Result<Option<T>> {
-        match self.store.damages.noting(async { read }).await {
+    pub(super) fn unless_damaged<T>(&self, read: Result<T>) -> Result<Option<T>> {
+        match self.store.damages.noting(read) {
             Ok(read) => Ok(Some(read)),
             Err(StoreError::Damaged(_)) => Ok(None),
             Err(error) => Err(error),
@@ -298,35 +296,34 @@ impl Change<'_> {
 
     /// What was read of this job, unless a record of it is damaged, which is noted. If it is the database, it is an error:
     /// the change may be half done.
-    pub(super) async fn unless_damage_of<T>(&self, key: i64, read: Result<T>) -> Result<Option<T>> {
+    pub(super) fn unless_damage_of<T>(&self, key: i64, read: Result<T>) -> Result<Option<T>> {
         match read {
             Err(error) if !error.is_damage_of(key) => Err(error),
-            read => self.unless_damaged(read).await,
+            read => self.unless_damaged(read),
         }
     }
 
     /// The problem of a job. It is read beside the transaction first: a page that cannot be read would end that.
-    pub(super) async fn problem(&mut self, job: &Job) -> Result<String> {
-        let (holder, mut reader) = (Holder::Job(job.key), self.store.reader.acquire().await?);
-        match content::try_to_read_text(&mut reader, holder, name::PROBLEM).await {
+    pub(super) fn problem(&mut self, job: &Job) -> Result<String> {
+        let holder = Holder::Job(job.key);
+        match content::try_to_read_text(self.writer.beside(), holder, name::PROBLEM) {
             // this transaction may have written it, or mended it
             Err(error) if error.is_damage_of(job.key) => {
-                content::read_text(&mut self.tx, holder, name::PROBLEM).await
+                content::read_text(&self.tx, holder, name::PROBLEM)
             }
             read => read.map_err(|error| error.reading(|| holder.record(name::PROBLEM))),
         }
     }
 
     /// Whether the result of a job that has ended is as it was written; checked once, and beside the transaction, as above.
-    pub(super) async fn has_intact_result(&mut self, job: &Job) -> Result<bool> {
+    pub(super) fn has_intact_result(&mut self, job: &Job) -> Result<bool> {
         // this transaction may have attached it
-        let attached = content::all(self.sql().await?, Holder::Job(job.key)).await;
-        let mut reader = self.store.reader.acquire().await?;
-        let checked = async {
-            intact::check_result(&mut reader, &self.store.intact, job.key, attached?).await
-        };
-        let checked = checked.await;
-        Ok(self.unless_damaged(checked).await?.is_some())
+        let attached = content::all(self.sql()?, Holder::Job(job.key));
+        let checked = attached.and_then(|attached| {
+            let beside = self.writer.beside();
+            intact::check_result(beside, &self.store.intact, job.key, attached)
+        });
+        Ok(self.unless_damaged(checked)?.is_some())
     }
 
     /// This moment, by the clock of the store.
@@ -363,10 +360,8 @@ impl Change<'_> {
     }
 
     /// Sets a point to roll back to. There is one at a time: it is released or rolled back to before the next is set.
-    pub(super) async fn savepoint(&mut self) -> Result<Savepoint> {
-        sqlx::query("savepoint submission")
-            .execute(self.sql().await?)
-            .await?;
+    pub(super) fn savepoint(&mut self) -> Result<Savepoint> {
+        self.sql()?.run("savepoint submission", ())?;
         Ok(Savepoint {
             moves: self.moves.len(),
             changed: self.changed.len(),
@@ -375,22 +370,18 @@ impl Change<'_> {
     }
 
     /// Keeps the changes since the savepoint.
-    pub(super) async fn release(&mut self) -> Result<()> {
-        sqlx::query("release submission")
-            .execute(self.sql().await?)
-            .await?;
+    pub(super) fn release(&mut self) -> Result<()> {
+        self.sql()?.run("release submission", ())?;
         Ok(())
     }
 
     /// Undoes the changes since this savepoint.
-    pub(super) async fn roll_back_to(&mut self, savepoint: Savepoint) -> Result<()> {
+    pub(super) fn roll_back_to(&mut self, savepoint: Savepoint) -> Result<()> {
         self.rows.clear();
         self.unwritten.clear();
         self.next_key = None;
-        sqlx::query("rollback to submission")
-            .execute(self.sql().await?)
-            .await?;
-        self.release().await?;
+        self.sql()?.run("rollback to submission", ())?;
+        self.release()?;
         for change in self.moves.split_off(savepoint.moves) {
             self.count(&change, -1);
         }
@@ -401,9 +392,9 @@ impl Change<'_> {
 
     /// Commits: the changes are on the disk when this returns, and only then applied to the jobs in memory. Returns the
     /// jobs that have changed.
-    pub(super) async fn commit(mut self) -> Result<Vec<i64>> {
-        self.write_rows().await?;
-        self.tx.commit().await?;
+    pub(super) fn commit(mut self) -> Result<Vec<i64>> {
+        self.write_rows()?;
+        self.tx.commit()?;
         let mut waiting = self.store.waiting_jobs();
         for change in self.moves {
             waiting.apply(change);

@@ -4,13 +4,13 @@
 //! checksum beside their data. It finds every change of up to 32 neighbouring bits and misses one in 4 · 10⁹ of the
 //! others, costs 4 bytes in each of many millions of events instead of 32, and is in the dependencies anyway, of `zip`.
 
-use sqlx::{
-    AssertSqlSafe, Column, Decode, Row, Sqlite, SqliteConnection, TypeInfo, ValueRef,
-    query::Query,
-    sqlite::{SqliteArguments, SqliteRow},
-};
+pub(super) use rusqlite::types::Value;
+use rusqlite::{Connection, Row, params};
 
-use super::error::{Record, Result, StoreError};
+use super::{
+    error::{Record, Result},
+    sql::Sql,
+};
 
 /// The column that holds it.
 const COLUMN: &str = "checksum";
@@ -87,74 +87,12 @@ impl Checksum {
     }
 }
 
-/// A value of a row, as SQLite keeps it.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Value {
-    Null,
-    Int(i64),
-    Real(f64),
-    Text(String),
-    Bytes(Vec<u8>),
-}
-
-impl From<i64> for Value {
-    fn from(value: i64) -> Value {
-        Value::Int(value)
-    }
-}
-
-impl From<&str> for Value {
-    fn from(text: &str) -> Value {
-        Value::Text(text.to_owned())
-    }
-}
-
-impl From<String> for Value {
-    fn from(text: String) -> Value {
-        Value::Text(text)
-    }
-}
-
-impl<T: Into<Value>> From<Option<T>> for Value {
-    fn from(some: Option<T>) -> Value {
-        some.map_or(Value::Null, T::into)
-    }
-}
-
-/// Gives values to a statement.
-pub(super) fn bind<'q, 'v>(
-    query: Query<'q, Sqlite, SqliteArguments>,
-    values: impl Iterator<Item = &'v Value>,
-) -> Query<'q, Sqlite, SqliteArguments> {
-    values.fold(query, |query, value| match value.clone() {
-        Value::Null => query.bind(None::<i64>),
-        Value::Int(value) => query.bind(value),
-        Value::Real(value) => query.bind(value),
-        Value::Text(value) => query.bind(value),
-        Value::Bytes(value) => query.bind(value),
-    })
-}
-
 /// The values of a row that was read with `select *`, but for its checksum.
-pub(super) fn values(row: &SqliteRow) -> Result<Vec<Value>> {
-    let columns = row.columns().iter();
-    let columns = columns.filter(|column| column.name() != COLUMN);
-    columns.map(|column| value(row, column.ordinal())).collect()
-}
-
-/// The value in one place of a row.
-pub(super) fn value(row: &SqliteRow, place: usize) -> Result<Value> {
-    let value = row.try_get_raw(place)?;
-    if value.is_null() {
-        return Ok(Value::Null);
-    }
-    let kind = value.type_info().name().to_owned();
-    Ok(match kind.as_str() {
-        "INTEGER" => Value::Int(decode(value)?),
-        "REAL" => Value::Real(decode(value)?),
-        "TEXT" => Value::Text(decode(value)?),
-        _ => Value::Bytes(decode(value)?),
-    })
+pub(super) fn values(row: &Row<'_>) -> Result<Vec<Value>> {
+    let statement: &rusqlite::Statement<'_> = row.as_ref();
+    let places = 0..statement.column_count();
+    let places = places.filter(|place| statement.column_name(*place) != Ok(COLUMN));
+    places.map(|place| Ok(row.get(place)?)).collect()
 }
 
 /// The checksum of all values of a row.
@@ -163,45 +101,39 @@ pub(super) fn of_values(values: &[Value]) -> i64 {
         .iter()
         .fold(Checksum::new(), |sum, value| match value {
             Value::Null => sum.null(),
-            Value::Int(value) => sum.int(*value),
+            Value::Integer(value) => sum.int(*value),
             Value::Real(value) => sum.real(*value),
             Value::Text(value) => sum.text(value),
-            Value::Bytes(value) => sum.bytes(value),
+            Value::Blob(value) => sum.bytes(value),
         });
     sum.stored()
 }
 
 /// The checksum of a whole row, as it was read with `select *`.
-pub(super) fn of_row(row: &SqliteRow) -> Result<i64> {
+pub(super) fn of_row(row: &Row<'_>) -> Result<i64> {
     Ok(of_values(&values(row)?))
 }
 
 /// Whether a whole row is as it was written.
-pub(super) fn row_is_intact(row: &SqliteRow) -> Result<bool> {
-    let stored: Option<i64> = row.try_get(COLUMN)?;
+pub(super) fn row_is_intact(row: &Row<'_>) -> Result<bool> {
+    let stored: Option<i64> = row.get(COLUMN)?;
     Ok(stored == Some(of_row(row)?))
 }
 
 /// Gives the row of a table with this key its checksum, once its other columns are written.
-pub(super) async fn seal(
-    tx: &mut SqliteConnection,
+pub(super) fn seal(
+    tx: &Connection,
     table: &str,
     key_column: &str,
     key: impl Into<Value>,
 ) -> Result<()> {
-    let key = [key.into()];
+    let key = key.into();
     let statement = format!("select * from {table} where {key_column} = ?");
-    let row = bind(sqlx::query(AssertSqlSafe(statement)), key.iter());
-    let sum = of_row(&row.fetch_one(&mut *tx).await?)?;
+    let sum = tx.row(&statement, [&key], of_row)?;
+    let sum = sum.ok_or(rusqlite::Error::QueryReturnedNoRows)?;
     let statement = format!("update {table} set {COLUMN} = ? where {key_column} = ?");
-    let update = sqlx::query(AssertSqlSafe(statement)).bind(sum);
-    bind(update, key.iter()).execute(tx).await?;
+    tx.run(&statement, params![sum, key])?;
     Ok(())
-}
-
-fn decode<'r, T: Decode<'r, Sqlite>>(value: <Sqlite as sqlx::Database>::ValueRef<'r>) -> Result<T> {
-    let decoded = <T as Decode<'r, Sqlite>>::decode(value);
-    decoded.map_err(|error| StoreError::from(sqlx::Error::Decode(error)))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The next job of the queue, claimed for a worker.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, sync::Arc};
 
 use super::{
     change::Change,
@@ -18,27 +18,26 @@ use crate::{
 };
 
 impl Store {
-    /// Starts an attempt of the next job of the queue, in the order of `waiting`. Jobs before it for which there is a result by now are answered. Also returns all jobs that have changed.
-    pub async fn claim_next(&self) -> Result<(Option<Claim>, Vec<i64>)> {
+    /// Starts an attempt of the next job of the queue, in the order of `waiting`. Jobs before it for which there is a
+    /// result by now are answered. Also returns all jobs that have changed.
+    pub async fn claim_next(self: &Arc<Self>) -> Result<(Option<Claim>, Vec<i64>)> {
         self.check_result_for_next().await;
-        self.writing(self.try_to_claim_next()).await
-    }
-
-    async fn try_to_claim_next(&self) -> Result<(Option<Claim>, Vec<i64>)> {
-        let mut change = self.change().await?;
-        let claim = claim(&mut change).await?;
-        let changed = change.commit().await?;
-        Ok((claim, changed))
+        self.write(|writer| {
+            let mut change = writer.change()?;
+            let claim = claim(&mut change)?;
+            Ok((claim, change.commit()?))
+        })
+        .await
     }
 }
 
 /// The next job of the queue and its owner's turn, but for damaged ones, of which nothing can be trusted: they wait until
 /// the operator removes them, and the others go on.
-async fn next(change: &mut Change<'_>) -> Result<Option<(Job, Move)>> {
+fn next(change: &mut Change<'_>) -> Result<Option<(Job, Move)>> {
     let mut damaged = BTreeSet::new();
     while let Some((key, turn)) = change.next(&damaged) {
-        let found = change.read(key).await;
-        match change.unless_damaged(found).await? {
+        let found = change.read(key);
+        match change.unless_damaged(found)? {
             Some(job) => return Ok(Some((job, turn))),
             None => damaged.insert(key),
         };
@@ -49,27 +48,25 @@ async fn next(change: &mut Change<'_>) -> Result<Option<(Job, Move)>> {
 /// Claims within a transaction. The next job waits until it fits into the memory budget, and those after it wait with
 /// it, also if they would fit: the order is strict, so that no large job is overtaken for ever. Running jobs end within
 /// their time limits, and each of them alone fits.
-pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
+pub(super) fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
     /// With more jobs than this, one transaction would take too long.
     const MOST_ANSWERED: usize = 100;
     for _ in 0..MOST_ANSWERED {
-        let Some((waiting, turn)) = next(change).await? else {
+        let Some((waiting, turn)) = next(change)? else {
             return Ok(None);
         };
         // there may be a result by now
         if waiting.cache == Cache::Use
-            && let Some(source) = coalescing::earlier_result(change, &waiting.input_hash).await?
+            && let Some(source) = coalescing::earlier_result(change, &waiting.input_hash)?
         {
-            coalescing::answer(change, waiting.key, &source).await?;
-            coalescing::end_coalesced(change, waiting.key).await?;
+            coalescing::answer(change, waiting.key, &source)?;
+            coalescing::end_coalesced(change, waiting.key)?;
             continue;
         }
-        if waiting.cache == Cache::Use
-            && coalescing::coalesce_into_running(change, &waiting).await?
-        {
+        if waiting.cache == Cache::Use && coalescing::coalesce_into_running(change, &waiting)? {
             continue;
         }
-        let problem = change.problem(&waiting).await;
+        let problem = change.problem(&waiting);
         let needed = match &problem {
             Ok(_) => waiting.memory_bytes,
             // it is not going to be solved
@@ -80,13 +77,13 @@ pub(super) async fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
             return Ok(None);
         };
         let now = change.now();
-        let job = change.update(waiting.key, |row| row.start(now)).await?;
+        let job = change.update(waiting.key, |row| row.start(now))?;
         change.take_turn(turn);
         let problem = match problem {
             Ok(problem) => problem,
             // it fails alone, and does not stop the queue
             Err(StoreError::Damaged(damage)) => {
-                end::end(change, job.key, &Ending::damaged(&damage)).await?;
+                end::end(change, job.key, &Ending::damaged(&damage))?;
                 continue;
             }
             Err(error) => return Err(error),

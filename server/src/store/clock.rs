@@ -1,13 +1,19 @@
 //! The clock of the store, which is never behind the times that are in it; and the time that it has seen pass.
 
-use std::{borrow::Cow, sync::atomic::Ordering};
+use std::{
+    borrow::Cow,
+    sync::{Arc, atomic::Ordering},
+};
+
+use rusqlite::{Connection, params};
 
 use super::{
-    database::Store,
+    database::{Store, Writer},
     error::{Result, StoreError},
     events,
     pauses::Pause,
     rows::from_row,
+    sql::Sql,
 };
 use crate::{event::Payload, time::Time};
 
@@ -29,8 +35,8 @@ impl Store {
     /// Compares the clock of the machine with the times in the store, when it is opened: it may have been set back since
     /// then. Jobs are listed in the order of their times, so new ones must not be earlier than those that are there; and
     /// the next event of a job that has not ended must not be earlier than its last one.
-    pub(super) async fn read_clock(&self) -> Result<()> {
-        let latest = self.latest_time().await?;
+    pub(super) async fn read_clock(self: &Arc<Self>) -> Result<()> {
+        let latest = self.read(|_, connection| latest_time(connection)).await?;
         let ahead = latest.map_or(0, |latest| latest - Time::now().micros());
         if ahead > 0 {
             tracing::warn!(
@@ -67,17 +73,22 @@ impl Store {
 
 impl Store {
     /// Compares the clock with the last moment that the store has seen, when it is opened; after `read_clock`.
-    pub(super) async fn read_pauses(&self) -> Result<()> {
+    pub(super) async fn read_pauses(self: &Arc<Self>) -> Result<()> {
         let now = self.now().micros();
-        let mut pauses: Vec<Pause> = match self.sealed_setting(PAUSES).await? {
+        let read = self.read(|_, connection| {
+            let pauses = sealed_setting(connection, PAUSES)?;
+            let latest = latest_time(connection)?;
+            Ok((pauses, latest, sealed_setting(connection, SEEN)?))
+        });
+        let (pauses, latest, seen) = read.await?;
+        let mut pauses: Vec<Pause> = match pauses {
             Sealed::Absent => vec![],
             Sealed::Intact(text) => serde_json::from_str(&text).unwrap_or_default(),
             // nothing is known of the time before
             Sealed::Damaged => vec![Pause(i64::MIN, now)],
         };
         let before = pauses.clone();
-        let latest = self.latest_time().await?;
-        let seen = match self.sealed_setting(SEEN).await? {
+        let seen = match seen {
             // jobs may have been stored since it was noted, but none long after
             Sealed::Intact(text) => text.parse().ok().map(|seen: i64| {
                 let since = latest.unwrap_or(seen).saturating_sub(seen);
@@ -106,24 +117,25 @@ impl Store {
         }
         if changed {
             // an error is told when the queue is first written: a full disk does not prevent a start
-            let noted = self.control(|| self.write_sealed(PAUSES, &text)).await;
-            noted.or_else(unless_damaged)?;
+            let noted = self.control(move |writer| write_sealed(writer, PAUSES, &text));
+            noted.await.or_else(unless_damaged)?;
         }
         if pause >= NOTABLE_MICROS {
-            let extended = self.control(|| self.extend_waits(pause)).await;
-            extended.or_else(unless_damaged)?;
+            let extended = self.control(move |writer| extend_waits(writer, pause));
+            extended.await.or_else(unless_damaged)?;
         }
         self.note_alive().await;
         Ok(())
     }
 
     /// The store has seen this moment. On a full disk it is not noted: the space that is reserved there is for what users ask.
-    pub(super) async fn note_alive(&self) {
+    pub(super) async fn note_alive(self: &Arc<Self>) {
         if self.reserve.was_disk_full() {
             return;
         }
         let now = self.now().micros().to_string();
-        if let Err(cause) = self.writing(self.write_sealed(SEEN, &now)).await {
+        let noted = self.write(move |writer| write_sealed(writer, SEEN, &now));
+        if let Err(cause) = noted.await {
             tracing::debug!(%cause, "the time could not be stored: {cause}");
         }
     }
@@ -132,73 +144,66 @@ impl Store {
     pub(super) fn cutoff(&self, now: Time, age_s: f64) -> Time {
         Time::from_micros(self.pauses.cutoff(now.micros(), (age_s * 1e6) as i64))
     }
+}
 
-    /// The latest time in the store, of records that are intact: a changed bit in a row or an index would set the clock.
-    pub(super) async fn latest_time(&self) -> Result<Option<i64>> {
-        // the first of each, and some more for those that are damaged
-        const CREATED: &str = "select * from job order by created_at desc limit 10";
-        const FINISHED: &str =
-            "select * from job where finished_at is not null order by finished_at desc limit 10";
-        const OF_ACTIVE: &str =
-            "select event.* from job join event on event.job_id = job.id and event.seq = job.last_seq
-             where job.status in ('queued', 'running') order by event.t desc limit 10";
-        let mut times = vec![];
-        for query in [CREATED, FINISHED] {
-            for row in sqlx::query(query).fetch_all(&self.reader).await? {
-                if let Ok(job) = from_row(&row) {
-                    times.push(job.created_at.micros());
-                    times.extend(job.finished_at.map(Time::micros));
-                }
-            }
+/// The latest time in the store, of records that are intact: a changed bit in a row or an index would set the clock.
+fn latest_time(connection: &Connection) -> Result<Option<i64>> {
+    // the first of each, and some more for those that are damaged
+    const CREATED: &str = "select * from job order by created_at desc limit 10";
+    const FINISHED: &str =
+        "select * from job where finished_at is not null order by finished_at desc limit 10";
+    const OF_ACTIVE: &str =
+        "select event.* from job join event on event.job_id = job.id and event.seq = job.last_seq
+         where job.status in ('queued', 'running') order by event.t desc limit 10";
+    let mut times = vec![];
+    for query in [CREATED, FINISHED] {
+        let jobs = connection.rows(query, (), |row| Ok(from_row(row)))?;
+        for job in jobs.into_iter().flatten() {
+            times.push(job.created_at.micros());
+            times.extend(job.finished_at.map(Time::micros));
         }
-        for row in sqlx::query(OF_ACTIVE).fetch_all(&self.reader).await? {
-            times.extend(events::intact_time(&row));
-        }
-        Ok(times.into_iter().max())
     }
+    let of_active = connection.rows(OF_ACTIVE, (), |row| Ok(events::intact_time(row)))?;
+    times.extend(of_active.into_iter().flatten());
+    Ok(times.into_iter().max())
+}
 
-    /// Jobs that would expire within as much time as was not seen may wait for that much longer.
-    async fn extend_waits(&self, pause: i64) -> Result<()> {
-        let mut change = self.control_change().await?;
-        let short: Vec<i64> = sqlx::query_scalar(
-            "select id from job indexed by job_expiry where status = 'queued' and expires_at < ?",
-        )
-        .bind(change.now().micros().saturating_add(pause))
-        .fetch_all(change.sql().await?)
-        .await?;
-        for key in short {
-            let later = |at: Time| Time::from_micros(at.micros().saturating_add(pause));
-            let extended = change.set(key, |row| row.expires_at = row.expires_at.map(later));
-            let extended = extended.await;
-            // a damaged one stays as it is
-            change.unless_damage_of(key, extended).await?;
-        }
-        change.commit().await.map(drop)
+/// Jobs that would expire within as much time as was not seen may wait for that much longer.
+fn extend_waits(writer: &Writer<'_>, pause: i64) -> Result<()> {
+    let mut change = writer.control_change()?;
+    let until = change.now().micros().saturating_add(pause);
+    let short =
+        "select id from job indexed by job_expiry where status = 'queued' and expires_at < ?";
+    let short: Vec<i64> = change.sql()?.values(short, [until])?;
+    for key in short {
+        let later = |at: Time| Time::from_micros(at.micros().saturating_add(pause));
+        let extended = change.set(key, |row| row.expires_at = row.expires_at.map(later));
+        // a damaged one stays as it is
+        change.unless_damage_of(key, extended)?;
     }
+    change.commit().map(drop)
+}
 
-    async fn sealed_setting(&self, name: &str) -> Result<Sealed> {
-        let value: Option<String> = sqlx::query_scalar("select value from setting where name = ?")
-            .bind(name)
-            .fetch_optional(&self.reader)
-            .await?;
-        Ok(match value {
-            None => Sealed::Absent,
-            Some(value) => match value.split_once(' ') {
-                Some((sum, text)) if sum == checksum(text) => Sealed::Intact(text.to_owned()),
-                _ => Sealed::Damaged,
-            },
-        })
-    }
+fn sealed_setting(connection: &Connection, name: &str) -> Result<Sealed> {
+    let value = "select value from setting where name = ?";
+    let value: Option<String> = connection.optional_value(value, [name])?;
+    Ok(match value {
+        None => Sealed::Absent,
+        Some(value) => match value.split_once(' ') {
+            Some((sum, text)) if sum == checksum(text) => Sealed::Intact(text.to_owned()),
+            _ => Sealed::Damaged,
+        },
+    })
+}
 
-    async fn write_sealed(&self, name: &str, text: &str) -> Result<()> {
-        let mut tx = self.begin_control().await?;
-        sqlx::query("insert or replace into setting (name, value) values (?, ?)")
-            .bind(name)
-            .bind(format!("{} {text}", checksum(text)))
-            .execute(&mut *tx)
-            .await?;
-        tx.commit().await
-    }
+fn write_sealed(writer: &Writer<'_>, name: &str, text: &str) -> Result<()> {
+    let tx = writer.begin_control()?;
+    let value = format!("{} {text}", checksum(text));
+    tx.run(
+        "insert or replace into setting (name, value) values (?, ?)",
+        params![name, value],
+    )?;
+    tx.commit()
 }
 
 /// A setting that has a checksum.

@@ -5,18 +5,24 @@
 //! the end concerns the primary alone (if it was canceled, for example), the first of the jobs coalesced into it
 //! takes its place.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
+
+use rusqlite::Connection;
 
 use super::{
     change::Change,
     content::{self, Holder},
     database::Store,
     end_job::end_job,
-    error::{Result, StoreError},
+    error::Result,
     intact, results,
     rows::{JobRow, from_row},
     rules::Ending,
     sizes,
+    sql::Sql,
     submission::NewJob,
 };
 use crate::job::{Job, Reason, Status};
@@ -39,21 +45,19 @@ pub(super) const PRIMARY: &str = "select id from job indexed by job_under_way
 const ONLY_RUNNING: i32 = i32::MAX;
 
 /// The newest job of this input whose final result, found by this version of the program, may answer others.
-pub(super) async fn earlier_result(
-    change: &mut Change<'_>,
-    input_hash: &str,
-) -> Result<Option<Job>> {
-    let rows = sqlx::query(EARLIER_RESULT)
-        .bind(input_hash)
-        .bind(env!("CARGO_PKG_VERSION"))
-        .fetch_all(change.sql().await?)
-        .await?;
-    for row in &rows {
+pub(super) fn earlier_result(change: &mut Change<'_>, input_hash: &str) -> Result<Option<Job>> {
+    let version = env!("CARGO_PKG_VERSION");
+    let found = change
+        .sql()?
+        .rows(EARLIER_RESULT, [input_hash, version], |row| {
+            Ok(from_row(row))
+        })?;
+    for job in found {
         // a damaged one answers nobody
-        if let Some(job) = change.unless_damaged(from_row(row)).await?
+        if let Some(job) = change.unless_damaged(job)?
             // what has lost its fields answers nobody
-            && !sizes::lost_fields(change.sql().await?, job.key).await?
-            && change.has_intact_result(&job).await?
+            && !sizes::lost_fields(change.sql()?, job.key)?
+            && change.has_intact_result(&job)?
         {
             return Ok(Some(job));
         }
@@ -64,148 +68,137 @@ pub(super) async fn earlier_result(
 impl Store {
     /// Checks the result that may answer a job of this input, before the transaction that needs it, which would occupy the
     /// single writer meanwhile. What is not found intact answers nobody.
-    pub(super) async fn check_earlier_result(&self, input_hash: &str) {
-        let checked = self.try_to_check_earlier_result(input_hash);
-        let _ = self.damages.noting(checked).await;
+    pub(super) async fn check_earlier_result(self: &Arc<Self>, input_hash: &str) {
+        let hash = input_hash.to_owned();
+        let _ = self
+            .read(move |store, connection| check_earlier_result(store, connection, &hash))
+            .await;
     }
 
     /// The same for the job that is probably claimed next.
-    pub(super) async fn check_result_for_next(&self) {
-        let read = async {
-            let most_running = self.most_running_of_owner();
-            let next = self.waiting_jobs().next(&BTreeSet::new(), most_running);
-            let Some((key, _)) = next else {
-                return Ok(None);
-            };
-            let hash = "select input_hash from job where id = ? and cache = 'use'";
-            let hash = sqlx::query_scalar(hash).bind(key);
-            Ok::<Option<String>, StoreError>(hash.fetch_optional(&self.reader).await?)
-        };
-        if let Ok(Some(input_hash)) = read.await {
-            self.check_earlier_result(&input_hash).await;
-        }
+    pub(super) async fn check_result_for_next(self: &Arc<Self>) {
+        let most_running = self.most_running_of_owner();
+        let next = self.waiting_jobs().next(&BTreeSet::new(), most_running);
+        let Some((key, _)) = next else { return };
+        let _ = self
+            .read(move |store, connection| {
+                let hash = "select input_hash from job where id = ? and cache = 'use'";
+                match connection.optional_value::<String>(hash, [key]) {
+                    Ok(Some(hash)) => check_earlier_result(store, connection, &hash),
+                    Ok(None) | Err(_) => Ok(()),
+                }
+            })
+            .await;
     }
+}
 
-    async fn try_to_check_earlier_result(&self, input_hash: &str) -> Result<()> {
-        let row = sqlx::query(EARLIER_RESULT)
-            .bind(input_hash)
-            .bind(env!("CARGO_PKG_VERSION"))
-            .fetch_optional(&self.reader)
-            .await?;
-        let Some(Ok(job)) = row.as_ref().map(from_row) else {
-            return Ok(());
-        };
-        let mut connection = self.reader.acquire().await?;
-        let attached = content::all(&mut connection, Holder::Job(job.key)).await?;
-        intact::check_result(&mut connection, &self.intact, job.key, attached).await
-    }
+fn check_earlier_result(store: &Store, connection: &Connection, input_hash: &str) -> Result<()> {
+    let version = env!("CARGO_PKG_VERSION");
+    let newest = connection.row(EARLIER_RESULT, [input_hash, version], |row| {
+        Ok(from_row(row))
+    })?;
+    let Some(Ok(job)) = newest else {
+        return Ok(());
+    };
+    let attached = content::all(connection, Holder::Job(job.key))?;
+    intact::check_result(connection, &store.intact, job.key, attached)
 }
 
 /// The job that a new one of this owner may be coalesced into. One that waits with a lower priority or for another owner's
 /// turn, or that is about to be canceled, would delay the new one.
-pub(super) async fn primary_for(
+pub(super) fn primary_for(
     change: &mut Change<'_>,
     owner: &str,
     new: &NewJob,
 ) -> Result<Option<i64>> {
-    let primary: Option<i64> = sqlx::query_scalar(PRIMARY)
-        .bind(&new.input_hash)
-        .bind(new.priority)
-        .bind(owner)
-        .fetch_optional(change.sql().await?)
-        .await?;
+    let same = (&new.input_hash, new.priority, owner);
+    let primary = change.sql()?.optional_value(PRIMARY, same)?;
     Ok(match primary {
-        Some(primary) if count_coalesced(change, primary).await? < MOST_COALESCED => Some(primary),
+        Some(primary) if count_coalesced(change, primary)? < MOST_COALESCED => Some(primary),
         _ => None,
     })
 }
 
-async fn count_coalesced(change: &mut Change<'_>, primary: i64) -> Result<i64> {
-    let count = sqlx::query_scalar("select count(*) from job where coalesced_into = ?")
-        .bind(primary)
-        .fetch_one(change.sql().await?);
-    Ok(count.await?)
+fn count_coalesced(change: &mut Change<'_>, primary: i64) -> Result<i64> {
+    let count = "select count(*) from job where coalesced_into = ?";
+    change.sql()?.value(count, [primary])
 }
 
 /// Coalesces a job whose turn it is into one that runs on the same input, and with it those coalesced into it;
 /// false if there is none, or if they were too many. Two such jobs arise where the later one had a higher priority.
-pub(super) async fn coalesce_into_running(change: &mut Change<'_>, job: &Job) -> Result<bool> {
-    let primary: Option<i64> = sqlx::query_scalar(PRIMARY)
-        .bind(&job.input_hash)
-        .bind(ONLY_RUNNING)
-        .bind(&job.owner)
-        .fetch_optional(change.sql().await?)
-        .await?;
+pub(super) fn coalesce_into_running(change: &mut Change<'_>, job: &Job) -> Result<bool> {
+    let same = (&job.input_hash, ONLY_RUNNING, &job.owner);
+    let primary = change.sql()?.optional_value(PRIMARY, same)?;
     let Some(primary) = primary else {
         return Ok(false);
     };
     let (there, more) = (
-        count_coalesced(change, primary).await?,
-        count_coalesced(change, job.key).await?,
+        count_coalesced(change, primary)?,
+        count_coalesced(change, job.key)?,
     );
     if there + more >= MOST_COALESCED {
         return Ok(false);
     }
-    let coalesced = coalesced_jobs(change, job.key).await?;
+    let coalesced = coalesced_jobs(change, job.key)?;
     for job in coalesced.iter().chain([job]) {
-        coalesce(change, job.key, primary).await?;
+        coalesce(change, job.key, primary)?;
     }
     Ok(true)
 }
 
 /// The jobs coalesced into this one, in the order in which they would be started, but for damaged ones.
-pub(super) async fn coalesced_jobs(change: &mut Change<'_>, primary: i64) -> Result<Vec<Job>> {
-    let rows = sqlx::query("select * from job where coalesced_into = ? order by priority desc, id")
-        .bind(primary)
-        .fetch_all(change.sql().await?)
-        .await?;
+pub(super) fn coalesced_jobs(change: &mut Change<'_>, primary: i64) -> Result<Vec<Job>> {
+    let coalesced = "select * from job where coalesced_into = ? order by priority desc, id";
+    let found = change
+        .sql()?
+        .rows(coalesced, [primary], |row| Ok(from_row(row)))?;
     let mut jobs = vec![];
-    for row in &rows {
-        jobs.extend(change.unless_damaged(from_row(row)).await?);
+    for job in found {
+        jobs.extend(change.unless_damaged(job)?);
     }
     Ok(jobs)
 }
 
 /// Ends the jobs coalesced into one that has ended in the same way, or puts the first of them in its place.
-pub(super) async fn end_coalesced(change: &mut Change<'_>, primary: i64) -> Result<()> {
-    let coalesced = coalesced_jobs(change, primary).await?;
+pub(super) fn end_coalesced(change: &mut Change<'_>, primary: i64) -> Result<()> {
+    let coalesced = coalesced_jobs(change, primary)?;
     let Some(first) = coalesced.first() else {
         return Ok(());
     };
-    let primary = change.read(primary).await?;
+    let primary = change.read(primary)?;
     if !is_shared(primary.status, primary.reason) {
-        return replace_primary(change, first, primary.key).await;
+        return replace_primary(change, first, primary.key);
     }
     for job in &coalesced {
-        answer(change, job.key, &primary).await?;
+        answer(change, job.key, &primary)?;
     }
     Ok(())
 }
 
 /// A primary waits: if a job coalesced into it has a higher priority, that job takes its place.
-pub(super) async fn replace_if_outranked(change: &mut Change<'_>, primary: i64) -> Result<()> {
-    let coalesced = coalesced_jobs(change, primary).await?;
+pub(super) fn replace_if_outranked(change: &mut Change<'_>, primary: i64) -> Result<()> {
+    let coalesced = coalesced_jobs(change, primary)?;
     let Some(first) = coalesced.first() else {
         return Ok(());
     };
-    match first.priority > change.read(primary).await?.priority {
-        true => replace_primary(change, first, primary).await,
+    match first.priority > change.read(primary)?.priority {
+        true => replace_primary(change, first, primary),
         false => Ok(()),
     }
 }
 
 /// Lets a job wait for a worker in place of its primary, and the first of every other owner in their own turn, each with the
 /// other jobs of that primary and of the same owner coalesced into it.
-async fn replace_primary(change: &mut Change<'_>, job: &Job, primary: i64) -> Result<()> {
-    change.set(job.key, JobRow::waits_by_itself).await?;
-    let others = coalesced_jobs(change, primary).await?;
+fn replace_primary(change: &mut Change<'_>, job: &Job, primary: i64) -> Result<()> {
+    change.set(job.key, JobRow::waits_by_itself)?;
+    let others = coalesced_jobs(change, primary)?;
     let mut first_of = BTreeMap::from([(job.owner.clone(), job.key)]);
     for other in &others {
         match first_of.get(&other.owner) {
-            Some(first) => coalesce(change, other.key, *first).await?,
+            Some(first) => coalesce(change, other.key, *first)?,
             None => {
                 first_of.insert(other.owner.clone(), other.key);
-                change.set(other.key, JobRow::waits_by_itself).await?;
+                change.set(other.key, JobRow::waits_by_itself)?;
             }
         }
     }
@@ -213,20 +206,16 @@ async fn replace_primary(change: &mut Change<'_>, job: &Job, primary: i64) -> Re
 }
 
 /// Coalesces a job into this primary.
-async fn coalesce(change: &mut Change<'_>, key: i64, primary: i64) -> Result<()> {
+fn coalesce(change: &mut Change<'_>, key: i64, primary: i64) -> Result<()> {
     let set = change.set(key, |row| row.job.coalesced_into = Some(primary));
-    set.await.map(drop)
+    set.map(drop)
 }
 
 /// The priority of a coalesced job may have changed: if its primary waits with a lower one, it waits by itself.
-pub(super) async fn detach_if_ahead(
-    change: &mut Change<'_>,
-    job: &Job,
-    primary: i64,
-) -> Result<()> {
-    let primary = change.read(primary).await?;
+pub(super) fn detach_if_ahead(change: &mut Change<'_>, job: &Job, primary: i64) -> Result<()> {
+    let primary = change.read(primary)?;
     if primary.status == Status::Queued && primary.priority < job.priority {
-        change.set(job.key, JobRow::waits_by_itself).await?;
+        change.set(job.key, JobRow::waits_by_itself)?;
     }
     Ok(())
 }
@@ -243,16 +232,14 @@ fn is_shared(status: Status, reason: Option<Reason>) -> bool {
 }
 
 /// Starts a queued job and ends it at once, with the result of another one of the same input.
-pub(super) async fn answer(change: &mut Change<'_>, key: i64, source: &Job) -> Result<()> {
+pub(super) fn answer(change: &mut Change<'_>, key: i64, source: &Job) -> Result<()> {
     let now = change.now();
-    let job = change
-        .update(key, |row| row.start_with_answer(source, now))
-        .await?;
-    let tx = change.sql().await?;
+    let job = change.update(key, |row| row.start_with_answer(source, now))?;
+    let tx = change.sql()?;
     if job.attempt > 1 {
         // that of finished load steps of an earlier attempt
-        results::remove(tx, key).await?;
+        results::remove(tx, key)?;
     }
-    results::share(tx, source.key, key).await?;
-    end_job(change, key, &Ending::like(source)).await
+    results::share(tx, source.key, key)?;
+    end_job(change, key, &Ending::like(source))
 }

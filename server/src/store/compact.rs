@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use sqlx::SqliteConnection;
+use rusqlite::Connection;
 
 use super::{
     error::{Result, StoreError},
@@ -16,14 +16,11 @@ const REBUILT_BYTES: u64 = 256 << 20;
 /// Rebuilds a database of an earlier version, which cannot give space back, unless that takes long or there is no room. What
 /// `doctor --compact` does for large ones. It works without that as well: what stands in the way of it is told in the log,
 /// and it is tried again at the next start.
-pub(super) async fn enable_giving_back(
-    connection: &mut SqliteConnection,
-    folder: &Path,
-) -> Result<()> {
-    if gives_back(connection).await? {
+pub(super) fn enable_giving_back(connection: &Connection, folder: &Path) -> Result<()> {
+    if gives_back(connection)? {
         return Ok(());
     }
-    let pages = Pages::of(&mut *connection).await?;
+    let pages = Pages::of(connection)?;
     let bytes = pages.bytes_of(pages.count);
     if bytes > REBUILT_BYTES {
         tracing::warn!(
@@ -33,7 +30,7 @@ pub(super) async fn enable_giving_back(
         return Ok(());
     }
     let rebuilt = match has_room(folder, bytes) {
-        true => compact(connection).await,
+        true => compact(connection),
         false => Err(StoreError::Full),
     };
     if let Err(cause) = rebuilt {
@@ -48,10 +45,9 @@ pub(super) async fn enable_giving_back(
 }
 
 /// Whether a database can give back to the file system what is free in it.
-pub(super) async fn gives_back(connection: &mut SqliteConnection) -> Result<bool> {
-    let mode: i64 = sqlx::query_scalar("pragma auto_vacuum")
-        .fetch_one(connection)
-        .await?;
+pub(super) fn gives_back(connection: &Connection) -> Result<bool> {
+    // not prepared once: it is evaluated when it is prepared
+    let mode: i64 = connection.pragma_query_value(None, "auto_vacuum", |row| row.get(0))?;
     Ok(mode != 0)
 }
 
@@ -62,23 +58,12 @@ fn has_room(folder: &Path, bytes: u64) -> bool {
 }
 
 /// Rebuilds a database without free pages, and so that it can give space back later.
-pub(super) async fn compact(connection: &mut SqliteConnection) -> Result<()> {
+pub(super) fn compact(connection: &Connection) -> Result<()> {
     // the mode of an existing database changes when it is rebuilt, and not in a write-ahead log
-    let rebuilt = async {
-        for statement in [
-            "pragma journal_mode = delete",
-            "pragma auto_vacuum = incremental",
-            "vacuum",
-        ] {
-            sqlx::query(statement).fetch_all(&mut *connection).await?;
-        }
-        Ok(())
-    };
-    let rebuilt: Result<()> = rebuilt.await;
-    sqlx::query("pragma journal_mode = wal")
-        .fetch_all(connection)
-        .await?;
-    rebuilt
+    let rebuilt = connection
+        .execute_batch("pragma journal_mode = delete; pragma auto_vacuum = incremental; vacuum");
+    connection.execute_batch("pragma journal_mode = wal")?;
+    Ok(rebuilt?)
 }
 
 #[cfg(test)]
@@ -86,42 +71,37 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use std::time::Duration;
 
-    use sqlx::{ConnectOptions, Connection, sqlite::SqliteConnectOptions};
+    use super::{
+        super::{
+            connections::{Mode, open},
+            sql::Sql,
+        },
+        *,
+    };
 
-    use super::*;
-
-    #[tokio::test]
-    async fn a_database_that_cannot_be_rebuilt_now_works_and_is_rebuilt_later() {
+    #[test]
+    fn a_database_that_cannot_be_rebuilt_now_works_and_is_rebuilt_later() {
         let folder = tempfile::tempdir().unwrap();
-        let options = SqliteConnectOptions::new()
-            .filename(folder.path().join("old.db"))
-            .create_if_missing(true)
-            .busy_timeout(Duration::ZERO);
-        let mut writer = options.connect().await.unwrap();
-        for statement in ["pragma journal_mode = wal", "create table a (b)"] {
-            sqlx::query(statement).execute(&mut writer).await.unwrap();
-        }
-        let mut other = options.connect().await.unwrap();
-        let mut reading = other.begin().await.unwrap();
-        let read = sqlx::query("select * from a").fetch_all(&mut *reading);
-        read.await.unwrap();
-        enable_giving_back(&mut writer, folder.path())
-            .await
-            .unwrap();
-        assert!(!gives_back(&mut writer).await.unwrap());
-        let mode = sqlx::query_scalar("pragma journal_mode");
-        let mode: String = mode.fetch_one(&mut writer).await.unwrap();
+        let connect = || {
+            let connection = open(&folder.path().join("old.db"), Mode::Create).unwrap();
+            connection.busy_timeout(Duration::ZERO).unwrap();
+            connection
+        };
+        let writer = connect();
+        let tables = "pragma journal_mode = wal; create table a (b)";
+        writer.execute_batch(tables).unwrap();
+        let other = connect();
+        let reading = other.unchecked_transaction().unwrap();
+        reading.values::<i64>("select b from a", ()).unwrap();
+        enable_giving_back(&writer, folder.path()).unwrap();
+        assert!(!gives_back(&writer).unwrap());
+        let mode: String = writer.value("pragma journal_mode", ()).unwrap();
         assert_eq!(mode, "wal");
-        sqlx::query("insert into a values (1)")
-            .execute(&mut writer)
-            .await
-            .unwrap();
+        writer.run("insert into a values (1)", ()).unwrap();
         drop(reading);
-        other.close().await.unwrap();
-        enable_giving_back(&mut writer, folder.path())
-            .await
-            .unwrap();
-        assert!(gives_back(&mut writer).await.unwrap());
+        drop(other);
+        enable_giving_back(&writer, folder.path()).unwrap();
+        assert!(gives_back(&writer).unwrap());
     }
 
     #[test]

@@ -8,12 +8,13 @@
 
 use std::borrow::Cow;
 
+use rusqlite::{Connection, Row, ToSql, params, params_from_iter};
 use sha2::{Digest, Sha256};
-use sqlx::{AssertSqlSafe, Row, SqliteConnection, sqlite::SqliteRow};
 
 use super::{
     checksum::Checksum,
     error::{Record, Result},
+    sql::{Sql, text},
 };
 
 /// Bytes of one piece: larger rows make SQLite chain pages, and readers need more memory.
@@ -127,148 +128,84 @@ impl<'a> NewContent<'a> {
 }
 
 /// Removes content that is not attached; how many pieces it had.
-pub(super) async fn remove(tx: &mut SqliteConnection, ids: &[i64]) -> Result<u64> {
+pub(super) fn remove(tx: &Connection, ids: &[i64]) -> Result<usize> {
     let mut pieces = 0;
     for id in ids {
-        let removed = sqlx::query("delete from content_piece where content = ?")
-            .bind(id)
-            .execute(&mut *tx)
-            .await?;
-        pieces += removed.rows_affected();
-        sqlx::query("delete from content where id = ?")
-            .bind(id)
-            .execute(&mut *tx)
-            .await?;
+        pieces += tx.run("delete from content_piece where content = ?", [id])?;
+        tx.run("delete from content where id = ?", [id])?;
     }
     Ok(pieces)
 }
 
-/// Writes pieces of content, numbered from `first`. What a disk has changed since it was written before is mended so.
-pub(super) async fn write_pieces(
-    tx: &mut SqliteConnection,
+/// Writes pieces of content, numbered from `first`; its number. What a disk has changed since it was written before is mended so.
+pub(super) fn write_pieces(
+    tx: &Connection,
     content: &Fingerprint,
     first: usize,
     pieces: &[impl AsRef<[u8]>],
-) -> Result<()> {
-    let id = insert(tx, content).await?;
+) -> Result<i64> {
+    let id = insert(tx, content)?;
     for (number, piece) in (first as i64..).zip(pieces) {
-        sqlx::query(
+        tx.run(
             "insert into content_piece (content, piece, body) values (?, ?, ?)
              on conflict do update set body = excluded.body where body <> excluded.body",
-        )
-        .bind(id)
-        .bind(number)
-        .bind(piece.as_ref())
-        .execute(&mut *tx)
-        .await?;
+            params![id, number, piece.as_ref()],
+        )?;
     }
-    Ok(())
+    Ok(id)
 }
 
 /// The number of content with this hash, which is new if there was none.
-async fn insert(tx: &mut SqliteConnection, content: &Fingerprint) -> Result<i64> {
-    let id = sqlx::query_scalar(
+fn insert(tx: &Connection, content: &Fingerprint) -> Result<i64> {
+    tx.value(
         "insert into content (hash, bytes, checksum) values (?, ?, ?)
          on conflict (hash) do update set bytes = excluded.bytes, checksum = excluded.checksum
          returning id",
-    );
-    Ok(id
-        .bind(&content.hash)
-        .bind(content.bytes as i64)
-        .bind(content.checksum())
-        .fetch_one(tx)
-        .await?)
+        params![content.hash, content.bytes as i64, content.checksum()],
+    )
 }
 
 /// Writes content, and attaches it under a name that has none. What is there already is compared: what a disk has changed since
 /// is mended so.
-pub(super) async fn attach(
-    tx: &mut SqliteConnection,
+pub(super) fn attach(
+    tx: &Connection,
     holder: Holder,
     name: &str,
     content: &NewContent<'_>,
 ) -> Result<()> {
     let fingerprint = &*content.fingerprint;
-    if fingerprint.pieces() == 1 {
-        return attach_small(tx, holder, name, content).await;
-    }
-    write_pieces(tx, fingerprint, 0, &content.pieces()).await?;
-    let id = insert(tx, fingerprint).await?;
-    attach_stored(tx, holder, name, id, &fingerprint.hash).await
-}
-
-/// Writes and attaches content of one piece. Statements are sent together: to hand one to the thread of the connection costs as
-/// much as to run it, and each job has two of these.
-async fn attach_small(
-    tx: &mut SqliteConnection,
-    holder: Holder,
-    name: &str,
-    content: &NewContent<'_>,
-) -> Result<()> {
-    let fingerprint = &*content.fingerprint;
-    let (kind, key) = holder.kind_and_key();
-    sqlx::query(
-        "insert into content (hash, bytes, checksum) values (?1, ?2, ?3)
-             on conflict (hash) do update set bytes = excluded.bytes, checksum = excluded.checksum
-             where checksum <> excluded.checksum;
-         insert into content_piece (content, piece, body) select id, 0, ?4 from content where hash = ?1
-             on conflict do update set body = excluded.body where body <> excluded.body;
-         insert into attachment (kind, key, name, content, checksum) select ?5, ?6, ?7, id, ?8 from content where hash = ?1;",
-    )
-    .bind(&fingerprint.hash)
-    .bind(fingerprint.bytes as i64)
-    .bind(fingerprint.checksum())
-    .bind(content.chunks.concat())
-    .bind(kind)
-    .bind(key)
-    .bind(name)
-    .bind(attachment_checksum(kind, key, name, &fingerprint.hash))
-    .execute(tx)
-    .await?;
-    Ok(())
+    let id = write_pieces(tx, fingerprint, 0, &content.pieces())?;
+    attach_stored(tx, holder, name, id, &fingerprint.hash)
 }
 
 /// Attaches content that was written a moment ago; false if some of it is not there.
-pub(super) async fn attach_written(
-    tx: &mut SqliteConnection,
+pub(super) fn attach_written(
+    tx: &Connection,
     holder: Holder,
     name: &str,
     content: &Fingerprint,
 ) -> Result<bool> {
-    let id = insert(tx, content).await?;
-    if !has_all_pieces(tx, id, content).await? {
+    let id = insert(tx, content)?;
+    if !has_all_pieces(tx, id, content)? {
         return Ok(false);
     }
-    attach_stored(tx, holder, name, id, &content.hash).await?;
+    attach_stored(tx, holder, name, id, &content.hash)?;
     Ok(true)
 }
 
-async fn has_all_pieces(tx: &mut SqliteConnection, id: i64, content: &Fingerprint) -> Result<bool> {
-    let there: i64 = sqlx::query_scalar("select count(*) from content_piece where content = ?")
-        .bind(id)
-        .fetch_one(tx)
-        .await?;
+fn has_all_pieces(tx: &Connection, id: i64, content: &Fingerprint) -> Result<bool> {
+    let there = "select count(*) from content_piece where content = ?";
+    let there: i64 = tx.value(there, [id])?;
     Ok(there == content.pieces() as i64)
 }
 
-async fn attach_stored(
-    tx: &mut SqliteConnection,
-    holder: Holder,
-    name: &str,
-    id: i64,
-    hash: &[u8],
-) -> Result<()> {
+fn attach_stored(tx: &Connection, holder: Holder, name: &str, id: i64, hash: &[u8]) -> Result<()> {
     let (kind, key) = holder.kind_and_key();
-    sqlx::query(
+    let checksum = attachment_checksum(kind, key, name, hash);
+    tx.run(
         "insert into attachment (kind, key, name, content, checksum) values (?, ?, ?, ?, ?)",
-    )
-    .bind(kind)
-    .bind(key)
-    .bind(name)
-    .bind(id)
-    .bind(attachment_checksum(kind, key, name, hash))
-    .execute(tx)
-    .await?;
+        params![kind, key, name, id, checksum],
+    )?;
     Ok(())
 }
 
@@ -278,13 +215,8 @@ fn attachment_checksum(kind: &str, key: i64, name: &str, hash: &[u8]) -> i64 {
 }
 
 /// Attaches what a job has under these names to another one, too.
-pub(super) async fn copy(
-    tx: &mut SqliteConnection,
-    from: i64,
-    to: i64,
-    names: &[&str],
-) -> Result<()> {
-    let attached = all(tx, Holder::Job(from)).await?;
+pub(super) fn copy(tx: &Connection, from: i64, to: i64, names: &[&str]) -> Result<()> {
+    let attached = all(tx, Holder::Job(from))?;
     let copied = attached
         .iter()
         .filter(|content| names.contains(&content.name.as_str()));
@@ -295,25 +227,20 @@ pub(super) async fn copy(
             &content.name,
             content.id,
             &content.fingerprint.hash,
-        )
-        .await?;
+        )?;
     }
     Ok(())
 }
 
 /// Takes what is attached under these names away.
-pub(super) async fn detach(
-    tx: &mut SqliteConnection,
-    holder: Holder,
-    names: &[&str],
-) -> Result<()> {
+pub(super) fn detach(tx: &Connection, holder: Holder, names: &[&str]) -> Result<()> {
     let (kind, key) = holder.kind_and_key();
     let places = vec!["?"; names.len()].join(", ");
     let statement =
         format!("delete from attachment where kind = ? and key = ? and name in ({places})");
-    let query = sqlx::query(AssertSqlSafe(statement)).bind(kind).bind(key);
-    let query = names.iter().fold(query, |query, name| query.bind(*name));
-    query.execute(tx).await?;
+    let names = names.iter().map(|name| name as &dyn ToSql);
+    let params = [&kind as &dyn ToSql, &key].into_iter().chain(names);
+    tx.run(&statement, params_from_iter(params))?;
     Ok(())
 }
 
@@ -333,49 +260,36 @@ const ATTACHED: &str =
      from attachment left join content on content.id = content where kind = ? and key = ?";
 
 /// What is attached under a name, if there is something.
-pub(super) async fn find(
-    connection: &mut SqliteConnection,
-    holder: Holder,
-    name: &str,
-) -> Result<Option<Content>> {
+pub(super) fn find(connection: &Connection, holder: Holder, name: &str) -> Result<Option<Content>> {
     let (kind, key) = holder.kind_and_key();
     let statement = format!("{ATTACHED} and name = ?");
-    let found = sqlx::query(AssertSqlSafe(statement))
-        .bind(kind)
-        .bind(key)
-        .bind(name)
-        .fetch_optional(connection)
-        .await?;
-    found.map(|row| attached(&row, holder)).transpose()
+    connection.row(&statement, params![kind, key, name], |row| {
+        attached(row, holder)
+    })
 }
 
 /// All that is attached, in the order of its names.
-pub(super) async fn all(connection: &mut SqliteConnection, holder: Holder) -> Result<Vec<Content>> {
+pub(super) fn all(connection: &Connection, holder: Holder) -> Result<Vec<Content>> {
     let (kind, key) = holder.kind_and_key();
     let statement = format!("{ATTACHED} order by name");
-    let found = sqlx::query(AssertSqlSafe(statement))
-        .bind(kind)
-        .bind(key)
-        .fetch_all(connection)
-        .await?;
-    found.iter().map(|row| attached(row, holder)).collect()
+    connection.rows(&statement, (kind, key), |row| attached(row, holder))
 }
 
 /// A row of attached content, if it is as it was written.
-fn attached(row: &SqliteRow, holder: Holder) -> Result<Content> {
-    let name: String = row.try_get("name")?;
+fn attached(row: &Row<'_>, holder: Holder) -> Result<Content> {
+    let name = text(row, "name")?.to_owned();
     let record = holder.record(&name);
-    let hash: Option<Vec<u8>> = row.try_get("hash")?;
+    let hash: Option<Vec<u8>> = row.get("hash")?;
     let Some(hash) = hash else {
         return Err(record.damaged("it is missing"));
     };
-    let bytes: i64 = row.try_get("bytes")?;
+    let bytes: i64 = row.get("bytes")?;
     let fingerprint = Fingerprint {
         hash,
         bytes: usize::try_from(bytes).unwrap_or(usize::MAX),
     };
     let (kind, key) = holder.kind_and_key();
-    let sums: (i64, i64) = (row.try_get("attached")?, row.try_get("stored")?);
+    let sums: (i64, i64) = (row.get("attached")?, row.get("stored")?);
     let expected = (
         attachment_checksum(kind, key, &name, &fingerprint.hash),
         fingerprint.checksum(),
@@ -384,7 +298,7 @@ fn attached(row: &SqliteRow, holder: Holder) -> Result<Content> {
         return Err(record.damaged("its checksum does not match its content"));
     }
     Ok(Content {
-        id: row.try_get("content")?,
+        id: row.get("content")?,
         name,
         fingerprint,
         record,
@@ -392,24 +306,20 @@ fn attached(row: &SqliteRow, holder: Holder) -> Result<Content> {
 }
 
 /// The text that is attached under a name, where there must be one.
-pub(super) async fn read_text(
-    connection: &mut SqliteConnection,
-    holder: Holder,
-    name: &str,
-) -> Result<String> {
-    let read = try_to_read_text(connection, holder, name).await;
+pub(super) fn read_text(connection: &Connection, holder: Holder, name: &str) -> Result<String> {
+    let read = try_to_read_text(connection, holder, name);
     read.map_err(|error| error.reading(|| holder.record(name)))
 }
 
 /// As [`read_text`], but a page that cannot be read is an error of the database, not of the holder.
-pub(super) async fn try_to_read_text(
-    connection: &mut SqliteConnection,
+pub(super) fn try_to_read_text(
+    connection: &Connection,
     holder: Holder,
     name: &str,
 ) -> Result<String> {
-    let found = find(connection, holder, name).await?;
+    let found = find(connection, holder, name)?;
     let found = found.ok_or_else(|| holder.record(name).damaged("it is missing"))?;
-    let bytes = found.read(connection).await?;
+    let bytes = found.read(connection)?;
     String::from_utf8(bytes).map_err(|error| holder.record(name).damaged(error))
 }
 
@@ -420,20 +330,20 @@ impl Content {
     }
 
     /// All of it, compared with its hash. What differs is an error of the holder, a page that cannot be read one of the database.
-    pub(super) async fn read(&self, connection: &mut SqliteConnection) -> Result<Vec<u8>> {
+    pub(super) fn read(&self, connection: &Connection) -> Result<Vec<u8>> {
         let mut whole = Vec::with_capacity(self.fingerprint.bytes.min(MOST_RESERVED));
         for number in 0..self.fingerprint.pieces() {
-            whole.extend(self.piece(connection, number).await?);
+            whole.extend(self.piece(connection, number)?);
         }
         self.compare(&Fingerprint::of([&*whole]))?;
         Ok(whole)
     }
 
     /// Compares it with its hash, one piece after the other.
-    pub(super) async fn check(&self, connection: &mut SqliteConnection) -> Result<()> {
+    pub(super) fn check(&self, connection: &Connection) -> Result<()> {
         let (mut hash, mut bytes) = (Sha256::new(), 0);
         for number in 0..self.fingerprint.pieces() {
-            let piece = self.piece(connection, number).await?;
+            let piece = self.piece(connection, number)?;
             hash.update(&piece);
             bytes += piece.len();
         }
@@ -452,18 +362,9 @@ impl Content {
     }
 
     /// One of its pieces, from 0; not compared with anything.
-    pub(super) async fn piece(
-        &self,
-        connection: &mut SqliteConnection,
-        number: usize,
-    ) -> Result<Vec<u8>> {
-        let body =
-            sqlx::query_scalar("select body from content_piece where content = ? and piece = ?")
-                .bind(self.id)
-                .bind(number as i64)
-                .fetch_optional(connection)
-                .await;
-        let body: Option<Vec<u8>> = body?;
+    pub(super) fn piece(&self, connection: &Connection, number: usize) -> Result<Vec<u8>> {
+        let body = "select body from content_piece where content = ? and piece = ?";
+        let body = connection.optional_value(body, (self.id, number as i64))?;
         body.ok_or_else(|| self.record.clone().damaged("a piece is missing"))
     }
 }

@@ -2,13 +2,16 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    sync::{Mutex, OnceLock, PoisonError},
+    sync::{Arc, Mutex, OnceLock, PoisonError},
 };
 
-use sqlx::SqlitePool;
 use uuid::Uuid;
 
-use super::error::{Damage, Record, Result, StoreError};
+use super::{
+    connections::Connections,
+    error::{Damage, Record, Result, StoreError},
+    sql::Sql,
+};
 use crate::job::JobId;
 
 /// Most parts that are remembered; the log has all of them.
@@ -53,11 +56,11 @@ pub(super) struct Damages {
     /// Why nothing is written any more.
     broken: OnceLock<String>,
     /// Finds the public id of a job.
-    reader: SqlitePool,
+    reader: Arc<Connections>,
 }
 
 impl Damages {
-    pub(super) fn new(reader: SqlitePool) -> Self {
+    pub(super) fn new(reader: Arc<Connections>) -> Self {
         Damages {
             found: Mutex::default(),
             tables: Mutex::default(),
@@ -67,11 +70,11 @@ impl Damages {
         }
     }
 
-    /// Runs a query, and takes note of damage that it finds.
-    pub(super) async fn noting<T>(&self, query: impl Future<Output = Result<T>>) -> Result<T> {
-        match query.await {
+    /// Takes note of damage that a query has found.
+    pub(super) fn noting<T>(&self, found: Result<T>) -> Result<T> {
+        match found {
             Err(StoreError::Damaged(damage)) => {
-                Err(StoreError::Damaged(Box::new(self.note(*damage).await)))
+                Err(StoreError::Damaged(Box::new(self.note(*damage))))
             }
             other => other,
         }
@@ -99,7 +102,7 @@ impl Damages {
     }
 
     /// Takes note of damage: the first time it is logged, under an incident number that stays the same.
-    pub(super) async fn note(&self, mut damage: Damage) -> Damage {
+    pub(super) fn note(&self, mut damage: Damage) -> Damage {
         if damage.incident.is_some() {
             return damage;
         }
@@ -109,7 +112,7 @@ impl Damages {
             return damage;
         }
         if damage.job.is_none() {
-            damage.job = self.public_id(damage.record.job).await;
+            damage.job = self.public_id(damage.record.job);
         }
         let incident = Uuid::now_v7();
         damage.incident = Some(incident);
@@ -125,11 +128,12 @@ impl Damages {
         damage
     }
 
-    async fn public_id(&self, key: Option<i64>) -> Option<JobId> {
+    fn public_id(&self, key: Option<i64>) -> Option<JobId> {
         // whoever asks may hold the last connection
-        let mut connection = self.reader.try_acquire()?;
-        let query = sqlx::query_scalar("select uuid from job where id = ?").bind(key?);
-        let uuid: Option<String> = query.fetch_optional(&mut *connection).await.ok()?;
+        let mut connection = self.reader.free()?;
+        let connection = connection.get().ok()?;
+        let uuid = "select uuid from job where id = ?";
+        let uuid: Option<String> = connection.optional_value(uuid, [key?]).ok()?;
         Some(JobId(Uuid::try_parse(&uuid?).ok()?))
     }
 
@@ -142,13 +146,13 @@ impl Damages {
     }
 
     /// A table was found damaged, or differs from its indexes.
-    pub(super) async fn note_table(&self, table: Table, cause: &str) {
+    pub(super) fn note_table(&self, table: Table, cause: &str) {
         {
             let mut tables = self.tables.lock().unwrap_or_else(PoisonError::into_inner);
             tables.insert(table);
         }
         if let StoreError::Damaged(damage) = table.damaged(cause) {
-            self.note(*damage).await;
+            self.note(*damage);
         }
     }
 

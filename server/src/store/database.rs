@@ -1,27 +1,23 @@
 //! The one SQLite file: its connections, and the data that is also kept in memory.
 
 use std::{
+    cell::Cell,
     collections::HashSet,
-    ops::{Deref, DerefMut},
+    ops::Deref,
     path::Path,
     sync::{
         Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock,
-        atomic::{AtomicBool, AtomicI64, Ordering::Relaxed},
+        atomic::{AtomicBool, AtomicI64},
     },
     time::{Duration, Instant},
 };
 
-use sqlx::{
-    ConnectOptions, Connection, Sqlite, SqliteConnection, SqlitePool, Transaction,
-    sqlite::{
-        SqliteAutoVacuum, SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions,
-        SqliteSynchronous,
-    },
-};
+use rusqlite::{Connection, Transaction, TransactionBehavior};
 use tokio::sync::{mpsc, watch};
 
 use super::{
     compact,
+    connections::{Connections, Lease, Mode, blocking, closed, open},
     damage::Damages,
     error::{Result, StoreError},
     folder::{Folder, Identity, JOURNAL, LOG, LOG_BYTES},
@@ -31,23 +27,27 @@ use super::{
     pauses::Pauses,
     progress::{self, Known, LastCommit, Progress},
     reserve::Reserve,
+    sql::Sql,
     submission::{Inbox, Pending},
     waiting::WaitingJobs,
 };
 use crate::{memory::Budget, metrics::METRICS, token::Tokens};
 
-/// How long a list waits for a connection.
+/// How long a query or a change waits for a connection.
+const PATIENCE: Duration = Duration::from_secs(30);
+/// The same of a list.
 const LIST_PATIENCE: Duration = Duration::from_secs(5);
 
 /// The database of one server.
 #[derive(Debug)]
 pub struct Store {
-    pub(super) writer: SqlitePool,
-    /// The connection of the writer could not begin a transaction: it is to be replaced.
-    cannot_begin: Arc<AtomicBool>,
-    pub(super) reader: SqlitePool,
+    /// The only one that writes: one transaction at a time changes the jobs that wait.
+    writer: Arc<Connections>,
+    /// What the writer reads with beside its transaction, which a page that cannot be read would end.
+    beside: Arc<Connections>,
+    pub(super) reader: Arc<Connections>,
     /// For lists and counts, which may be slow, so that they do not delay other reads.
-    pub(super) lists: SqlitePool,
+    lists: Arc<Connections>,
     /// The jobs that wait, as they are on the disk after every commit.
     pub(super) waiting: Mutex<WaitingJobs>,
     /// Whether the queue is paused, as it is on the disk after every commit.
@@ -60,8 +60,6 @@ pub struct Store {
     pub(super) most_running: OnceLock<usize>,
     /// The memory that running jobs share; without limit until it is set.
     pub(super) budget: OnceLock<Arc<Budget>>,
-    /// One transaction at a time changes the jobs that wait.
-    pub(super) change_lock: tokio::sync::Mutex<()>,
     /// Where submissions wait for the next commit.
     pub(super) inbox: Inbox,
     /// Running jobs that a client has canceled, even if that could not be stored yet.
@@ -99,48 +97,84 @@ pub(super) enum Rebuild {
     Never,
 }
 
-/// A transaction of the single writer; unless it is committed it is rolled back.
-pub(super) struct Writing {
-    tx: Transaction<'static, Sqlite>,
-    progress: Progress,
-    number: i64,
-    #[cfg(test)]
-    full_commits: Arc<std::sync::atomic::AtomicU32>,
+/// The connection that writes, in use.
+pub(super) struct Writer<'a> {
+    pub(super) store: &'a Store,
+    connection: &'a Connection,
+    beside: &'a Connection,
+    /// SQLite opens a file that it cannot write for reading only, which would last: such a connection is replaced.
+    cannot_begin: Cell<bool>,
 }
 
-impl Deref for Writing {
-    type Target = SqliteConnection;
+/// A transaction of the single writer; unless it is committed it is rolled back.
+pub(super) struct Writing<'a> {
+    tx: Transaction<'a>,
+    store: &'a Store,
+    number: i64,
+}
 
-    fn deref(&self) -> &SqliteConnection {
+impl Deref for Writing<'_> {
+    type Target = Connection;
+
+    fn deref(&self) -> &Connection {
         &self.tx
     }
 }
 
-impl DerefMut for Writing {
-    fn deref_mut(&mut self) -> &mut SqliteConnection {
-        &mut self.tx
-    }
-}
-
-impl Writing {
+impl Writing<'_> {
     /// Commits: the changes are on the disk when this returns.
-    pub(super) async fn commit(self) -> Result<()> {
+    pub(super) fn commit(self) -> Result<()> {
         #[cfg(test)]
-        if is_full(&self.full_commits) {
+        if is_full(&self.store.full_commits) {
             return Err(StoreError::Full);
         }
         let start = Instant::now();
-        self.tx.commit().await?;
+        self.tx.commit()?;
         METRICS.committed(start.elapsed());
-        self.progress.reached(self.number);
+        self.store.progress.reached(self.number);
         Ok(())
+    }
+}
+
+impl Writer<'_> {
+    /// Begins a transaction.
+    pub(super) fn begin(&self) -> Result<Writing<'_>> {
+        self.store.reserve.has_room()?;
+        self.begin_control()
+    }
+
+    /// The same for what must work even if the disk is full.
+    pub(super) fn begin_control(&self) -> Result<Writing<'_>> {
+        self.store.damages.can_write()?;
+        self.store.identity.check()?;
+        let begun = Transaction::new_unchecked(self.connection, TransactionBehavior::Immediate);
+        let tx = begun.inspect_err(|_| self.cannot_begin.set(true))?;
+        let number = tx.value(
+            "update progress set commits = commits + 1 returning commits",
+            (),
+        )?;
+        Ok(Writing {
+            tx,
+            store: self.store,
+            number,
+        })
+    }
+
+    /// The connection, for what is not part of a transaction.
+    pub(super) fn connection(&self) -> &Connection {
+        self.connection
+    }
+
+    /// A connection that reads what is committed.
+    pub(super) fn beside(&self) -> &Connection {
+        self.beside
     }
 }
 
 impl Store {
     /// Connects to the database in `folder`, created if necessary, and brings its tables up to date. Also
     /// returns the receiver of submissions. The data kept in memory is not read yet.
-    pub(super) async fn connect(
+    pub(super) fn connect(
         path: &Path,
         rebuild: Rebuild,
     ) -> Result<(Store, mpsc::Receiver<Pending>)> {
@@ -150,60 +184,33 @@ impl Store {
         let reserve = Reserve::new(path);
         let known = progress::read(path)?;
         let database = folder.database();
-        let options = SqliteConnectOptions::new()
-            .filename(&database)
-            .foreign_keys(true)
-            .busy_timeout(Duration::from_secs(5));
-        if let Some(doubt) = compare_with_the_past(path, &known, options.clone()).await? {
+        if let Some(doubt) = compare_with_the_past(path, &known, &database)? {
             tracing::warn!("{}: {doubt}", path.display());
         }
         folder.prepare()?;
         folder.tighten();
         let identity = Identity::of(&folder)?;
-        let writing = options
-            .clone()
-            .auto_vacuum(SqliteAutoVacuum::Incremental)
-            .journal_mode(SqliteJournalMode::Wal)
-            .pragma("journal_size_limit", LOG_BYTES.to_string())
-            .synchronous(SqliteSynchronous::Full);
-        // Two kinds of connections are replaced by new ones. A full disk makes SQLite end a transaction by itself, which
-        // leaves the driver's count of open ones wrong permanently. And SQLite opens a file that it cannot write for
-        // reading only, which would last: the first transaction of such a connection fails.
-        let cannot_begin = Arc::new(AtomicBool::default());
-        let failed = cannot_begin.clone();
-        let writer = pool(1)
-            .before_acquire(move |connection, _| {
-                let whole = !connection.is_in_transaction() && !failed.swap(false, Relaxed);
-                Box::pin(async move { Ok(whole) })
-            })
-            .connect_with(writing)
-            .await?;
-        migrations::run(&writer, path).await?;
-        if rebuild == Rebuild::IfItCannotGiveBack {
-            // before there are connections that read
-            compact::enable_giving_back(&mut *writer.acquire().await?, path).await?;
-        }
-        // the service may have died between giving space back and copying the log into the file
-        let pages = Pages::of(&mut *writer.acquire().await?).await?;
-        identity.may_shrink_to(pages.bytes_of(pages.count));
-        let record = progress::in_database(&mut *writer.acquire().await?).await?;
-        let record = record.ok_or_else(|| StoreError::Unexpected("no progress".into()))?;
-        let progress = Progress::start(path, record).map_err(|error| {
-            let file = path.join(progress::FILE);
-            StoreError::Folder(format!("cannot write {}: {error}", file.display()))
+        let file = database.clone();
+        let writer = Connections::new(1, PATIENCE, move || {
+            let connection = open(&file, Mode::ReadWrite)?;
+            connection.execute_batch(&format!(
+                "pragma auto_vacuum = incremental; pragma journal_mode = wal;
+                 pragma journal_size_limit = {LOG_BYTES}; pragma synchronous = full"
+            ))?;
+            Ok(connection)
         })?;
-        let reading = options.read_only(true);
-        let reader = pool(4).connect_with(reading.clone()).await?;
-        let lists = pool(2)
-            .acquire_timeout(LIST_PATIENCE)
-            .connect_with(reading)
-            .await?;
+        let progress = prepare(&writer, path, rebuild, &identity)?;
+        let file = database.clone();
+        let reading = move || open(&file, Mode::Read);
+        let beside = Connections::new(1, PATIENCE, reading.clone())?;
+        let reader = Connections::new(4, PATIENCE, reading.clone())?;
+        let lists = Connections::new(2, LIST_PATIENCE, reading)?;
         let (inbox, submissions) = Inbox::new();
         let store = Store {
             damages: Arc::new(Damages::new(reader.clone())),
             keys_read: watch::Sender::new(true),
             writer,
-            cannot_begin,
+            beside,
             reader,
             lists,
             waiting: Mutex::default(),
@@ -212,7 +219,6 @@ impl Store {
             any_tokens: AtomicBool::default(),
             most_running: OnceLock::new(),
             budget: OnceLock::new(),
-            change_lock: tokio::sync::Mutex::default(),
             inbox,
             cancels: Mutex::default(),
             intact: Arc::default(),
@@ -236,26 +242,41 @@ impl Store {
     }
 
     /// Closes every connection, and with the last one the write-ahead log. Another server may use the folder then.
-    pub async fn close(&self) {
+    pub async fn close(self: &Arc<Self>) {
         self.close_as(true).await;
     }
 
     /// The same by a command that is not the service: whether the service has stopped or died, its next start still knows.
-    pub async fn close_as_found(&self) {
+    pub async fn close_as_found(self: &Arc<Self>) {
         self.close_as(self.was_stopped).await;
     }
 
-    async fn close_as(&self, stopped: bool) {
-        self.note_alive().await;
+    /// Whether it was closed.
+    pub(super) fn is_closed(&self) -> bool {
+        self.writer.is_closed()
+    }
+
+    /// Closes the connections that read.
+    pub(super) async fn close_readers(&self) {
         self.lists.close().await;
         self.reader.close().await;
-        // SQLite does this with the last connection only, which may be one for reading whose thread ends late, or of another
-        // program that makes a backup: what cannot be copied soon, stays for the next start
-        let checkpoint =
-            sqlx::raw_sql("pragma busy_timeout = 100; pragma wal_checkpoint(truncate)");
-        if let Err(error) = checkpoint.execute(&self.writer).await {
+    }
+
+    async fn close_as(self: &Arc<Self>, stopped: bool) {
+        self.note_alive().await;
+        self.close_readers().await;
+        let merged = self
+            .write(|writer| {
+                // SQLite does this with the last connection only, which may be one of another program that makes a backup:
+                // what cannot be copied soon, stays for the next start
+                let checkpoint = "pragma busy_timeout = 100; pragma wal_checkpoint(truncate)";
+                Ok(writer.connection.execute_batch(checkpoint)?)
+            })
+            .await;
+        if let Err(error) = merged {
             tracing::warn!(%error, "the write-ahead log could not be merged; the next start will read it: {error}");
         }
+        self.beside.close().await;
         self.writer.close().await;
         self.reserve.keep_for_a_start();
         if stopped && let Err(error) = self.progress.stop() {
@@ -264,54 +285,97 @@ impl Store {
         self.folder.unlock();
     }
 
-    /// Begins a transaction of the single writer.
-    pub(super) async fn begin(&self) -> Result<Writing> {
-        self.reserve.has_room()?;
-        self.begin_control().await
-    }
-
-    /// The same for what must work even if the disk is full.
-    pub(super) async fn begin_control(&self) -> Result<Writing> {
-        self.damages.can_write()?;
-        self.identity.check()?;
-        let begun = self.writer.begin_with("begin immediate").await;
-        let mut tx = begun.inspect_err(|_| self.cannot_begin.store(true, Relaxed))?;
-        let count = "update progress set commits = commits + 1 returning commits";
-        let number = sqlx::query_scalar(count).fetch_one(&mut *tx).await?;
-        let progress = self.progress.clone();
-        Ok(Writing {
-            tx,
-            progress,
-            number,
-            #[cfg(test)]
-            full_commits: self.full_commits.clone(),
-        })
-    }
-
-    /// Does something that must work even if the disk is full: then once more, with the space that is reserved for it.
-    pub(super) async fn control<T, F: Future<Output = Result<T>>>(
-        &self,
-        work: impl Fn() -> F,
+    /// Runs a query, on a thread that may block, and takes note of damage that it finds.
+    pub(super) async fn read<T: Send + 'static>(
+        self: &Arc<Self>,
+        query: impl FnOnce(&Store, &Connection) -> Result<T> + Send + 'static,
     ) -> Result<T> {
-        let done = match work().await {
-            Err(StoreError::Full) => {
-                // it may have been released a moment ago, for another
-                self.reserve.release();
-                work().await
-            }
-            other => other,
-        };
-        self.writing(async { done }).await
+        let lease = self.reader.turn().await?;
+        self.query(lease, query).await
     }
 
-    /// Runs what writes, and takes note of damage that it finds. Damage of the database may be that of a single page, of data
-    /// that this alone has met, or a disk may have failed to read once: only if nothing else can be written either, all
-    /// writing ends.
-    pub(super) async fn writing<T>(&self, work: impl Future<Output = Result<T>>) -> Result<T> {
-        match self.damages.noting(work).await {
+    /// The same for lists and counts.
+    pub(super) async fn read_list<T: Send + 'static>(
+        self: &Arc<Self>,
+        query: impl FnOnce(&Store, &Connection) -> Result<T> + Send + 'static,
+    ) -> Result<T> {
+        let lease = self.lists.turn().await?;
+        self.query(lease, query).await
+    }
+
+    async fn query<T: Send + 'static>(
+        self: &Arc<Self>,
+        mut lease: Lease,
+        query: impl FnOnce(&Store, &Connection) -> Result<T> + Send + 'static,
+    ) -> Result<T> {
+        let store = self.clone();
+        blocking(move || {
+            let found = query(&store, lease.get()?);
+            drop(lease);
+            store.damages.noting(found)
+        })
+        .await
+    }
+
+    /// Runs what writes, on a thread that may block, and takes note of damage that it finds. It runs to its end even if
+    /// nobody waits for that any more.
+    pub(super) async fn write<T: Send + 'static>(
+        self: &Arc<Self>,
+        work: impl FnOnce(&Writer<'_>) -> Result<T> + Send + 'static,
+    ) -> Result<T> {
+        let (mut lease, store) = (self.writer.turn().await?, self.clone());
+        blocking(move || {
+            let done = store.attempt(&mut lease, work);
+            store.noting_what_cannot_be_written(&mut lease, done)
+        })
+        .await
+    }
+
+    /// The same for what must work even if the disk is full: then once more, with the space that is reserved for it.
+    pub(super) async fn control<T: Send + 'static>(
+        self: &Arc<Self>,
+        work: impl Fn(&Writer<'_>) -> Result<T> + Send + 'static,
+    ) -> Result<T> {
+        let (mut lease, store) = (self.writer.turn().await?, self.clone());
+        blocking(move || {
+            let mut done = store.attempt(&mut lease, &work);
+            if let Err(StoreError::Full) = done {
+                // it may have been released a moment ago, for another
+                store.reserve.release();
+                done = store.attempt(&mut lease, &work);
+            }
+            store.noting_what_cannot_be_written(&mut lease, done)
+        })
+        .await
+    }
+
+    fn attempt<T>(
+        &self,
+        lease: &mut Lease,
+        work: impl FnOnce(&Writer<'_>) -> Result<T>,
+    ) -> Result<T> {
+        let mut beside = self.beside.free().ok_or_else(closed)?; // only who writes has it
+        let writer = Writer {
+            store: self,
+            connection: lease.get()?,
+            beside: beside.get()?,
+            cannot_begin: Cell::new(false),
+        };
+        let done = work(&writer);
+        // and one that has met a full disk begins anew, too
+        if writer.cannot_begin.get() || matches!(done, Err(StoreError::Full)) {
+            lease.discard();
+        }
+        done
+    }
+
+    /// Damage of the database may be that of a single page, of data that this alone has met, or a disk may have failed to
+    /// read once: only if nothing else can be written either, all writing ends.
+    fn noting_what_cannot_be_written<T>(&self, lease: &mut Lease, done: Result<T>) -> Result<T> {
+        match self.damages.noting(done) {
             Err(StoreError::Damaged(damage)) if damage.record.is_database() => {
-                self.cannot_begin.store(true, Relaxed); // a new connection has read nothing yet
-                match self.write_and_roll_back().await {
+                lease.discard(); // a new connection has read nothing yet
+                match self.attempt(lease, |writer| writer.write_and_roll_back()) {
                     Err(StoreError::Damaged(_)) => Err(self.damages.stop_writing(&damage)),
                     Ok(()) | Err(_) => Err(StoreError::Damaged(damage)),
                 }
@@ -321,13 +385,37 @@ impl Store {
     }
 }
 
+/// Brings the tables up to date, before there are connections that read; how far the store has come.
+fn prepare(
+    writer: &Arc<Connections>,
+    path: &Path,
+    rebuild: Rebuild,
+    identity: &Identity,
+) -> Result<Progress> {
+    let mut lease = writer.free().ok_or_else(closed)?;
+    let writer = lease.get()?;
+    migrations::run(writer, path)?;
+    if rebuild == Rebuild::IfItCannotGiveBack {
+        compact::enable_giving_back(writer, path)?;
+    }
+    // the service may have died between giving space back and copying the log into the file
+    let pages = Pages::of(writer)?;
+    identity.may_shrink_to(pages.bytes_of(pages.count));
+    let record = progress::in_database(writer)?;
+    let record = record.ok_or_else(|| StoreError::Unexpected("no progress".into()))?;
+    Progress::start(path, record).map_err(|error| {
+        let file = path.join(progress::FILE);
+        StoreError::Folder(format!("cannot write {}: {error}", file.display()))
+    })
+}
+
 /// Compares the database with what is known of it before anything is written to it. If too little is known, why.
-pub(super) async fn compare_with_the_past(
+pub(super) fn compare_with_the_past(
     path: &Path,
     known: &Known,
-    options: SqliteConnectOptions,
+    database: &Path,
 ) -> Result<Option<String>> {
-    if !progress::has_content(&path.join(super::folder::DATABASE)) {
+    if !progress::has_content(database) {
         return match known {
             Known::Last(_) => Err(StoreError::Lost("it is missing or empty".into())),
             _ if progress::has_content(&path.join(LOG)) => Err(StoreError::Lost(
@@ -338,15 +426,15 @@ pub(super) async fn compare_with_the_past(
     }
     // the disk failed when the database was created: what was half done is undone first
     let half_created = progress::has_content(&path.join(JOURNAL));
-    let mut connection = options.read_only(!half_created).connect().await?;
-    let compared = async {
-        migrations::check(&mut connection).await?;
-        let found = progress::in_database(&mut connection).await?;
-        progress::compare(known, found.as_ref())
+    let mode = if half_created {
+        Mode::ReadWrite
+    } else {
+        Mode::Read
     };
-    let compared = compared.await;
-    connection.close().await?;
-    compared
+    let connection = open(database, mode)?;
+    migrations::check(&connection)?;
+    let found = progress::in_database(&connection)?;
+    progress::compare(known, found.as_ref())
 }
 
 /// What the operator can do.
@@ -370,21 +458,12 @@ pub fn with_advice(error: StoreError, path: &Path) -> StoreError {
         )),
         StoreError::Broken(_) => damaged("is damaged where jobs are stored"),
         StoreError::Damaged(damage) => damaged(&format!("cannot be read: {}", damage.cause)),
-        StoreError::Full | StoreError::Database(_) | StoreError::Migrate(_) => StoreError::Folder(
-            format!("the store in {} cannot be opened: {error}", path.display()),
-        ),
+        StoreError::Full | StoreError::Database(_) => StoreError::Folder(format!(
+            "the store in {} cannot be opened: {error}",
+            path.display()
+        )),
         other => other,
     }
-}
-
-/// Connections to a local file neither age nor need a test before use.
-fn pool(connections: u32) -> SqlitePoolOptions {
-    SqlitePoolOptions::new()
-        .max_connections(connections)
-        .min_connections(connections)
-        .idle_timeout(None)
-        .max_lifetime(None)
-        .test_before_acquire(false)
 }
 
 /// Whether a commit is to find the disk full, as it does where the write-ahead log cannot grow.

@@ -1,10 +1,10 @@
 //! Deleting jobs.
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
-use sqlx::SqliteConnection;
+use rusqlite::Connection;
 
-use super::{change::Change, damage::Table, database::Store, error::Result, sweeps};
+use super::{change::Change, damage::Table, database::Store, error::Result, sql::Sql, sweeps};
 use crate::{
     caller::Owners,
     job::{Job, JobId},
@@ -26,82 +26,64 @@ pub enum Deletion {
 
 impl Store {
     /// Deletes a job that has ended, with its events and its result. Others that were answered with it keep it.
-    pub async fn delete(&self, owners: Owners<'_>, key: i64) -> Result<Deletion> {
-        self.control(|| self.try_to_delete(owners, key)).await
-    }
-
-    async fn try_to_delete(&self, owners: Owners<'_>, key: i64) -> Result<Deletion> {
-        let mut change = self.control_change().await?;
-        let deletion = delete(&mut change, owners, key).await?;
-        if deletion == Deletion::Deleted {
-            change.commit().await?;
-        }
-        Ok(deletion)
+    pub async fn delete(self: &Arc<Self>, owners: Owners, key: i64) -> Result<Deletion> {
+        self.control(move |writer| {
+            let mut change = writer.control_change()?;
+            let deletion = delete(&mut change, &owners, key)?;
+            if deletion == Deletion::Deleted {
+                change.commit()?;
+            }
+            Ok(deletion)
+        })
+        .await
     }
 
     /// Whether a job of these owners with this public id was deleted recently.
-    pub async fn was_deleted(&self, owners: Owners<'_>, id: JobId) -> Result<bool> {
-        let read = async {
-            let mut connection = self.reader.acquire().await?;
-            let owner = owner_of_deleted(&mut connection, id).await?;
+    pub async fn was_deleted(self: &Arc<Self>, owners: Owners, id: JobId) -> Result<bool> {
+        self.read(move |store, connection| {
+            let owner = owner_of_deleted(connection, id)?;
             if owner.is_none() {
-                self.damages.have_all(&[Table::Deleted])?;
+                store.damages.have_all(&[Table::Deleted])?;
             }
             Ok(owner.is_some_and(|owner| owners.include(&owner)))
-        };
-        self.damages.noting(read).await
+        })
+        .await
     }
 }
 
 /// Deletes a job that has ended.
-pub(super) async fn delete(
-    change: &mut Change<'_>,
-    owners: Owners<'_>,
-    key: i64,
-) -> Result<Deletion> {
-    let job = change.find(key).await?;
+pub(super) fn delete(change: &mut Change<'_>, owners: &Owners, key: i64) -> Result<Deletion> {
+    let job = change.find(key)?;
     let Some(job) = job.filter(|job| owners.include(&job.owner)) else {
         return Ok(Deletion::Unknown);
     };
     if !job.status.is_terminal() {
         return Ok(Deletion::Active);
     }
-    remove(change, &job).await?;
+    remove(change, &job)?;
     Ok(Deletion::Deleted)
 }
 
 /// Removes a job that has ended, and the sweep that it was the last job of.
-pub(super) async fn remove(change: &mut Change<'_>, job: &Job) -> Result<()> {
-    change.delete(job).await?;
+pub(super) fn remove(change: &mut Change<'_>, job: &Job) -> Result<()> {
+    change.delete(job)?;
     if let Some(sweep) = job.sweep
-        && !sweeps::remove_without_jobs(change, sweep).await?
+        && !sweeps::remove_without_jobs(change, sweep)?
     {
-        sweeps::keep_failures(change.sql().await?, job).await?;
+        sweeps::keep_failures(change.sql()?, job)?;
     }
     Ok(())
 }
 
 /// The owner of a job that was deleted recently; `None` if there was no such job.
-pub(super) async fn owner_of_deleted(
-    connection: &mut SqliteConnection,
-    id: JobId,
-) -> Result<Option<String>> {
-    Ok(
-        sqlx::query_scalar("select owner from deleted_job where uuid = ?")
-            .bind(id.0.to_string())
-            .fetch_optional(connection)
-            .await?,
-    )
+pub(super) fn owner_of_deleted(connection: &Connection, id: JobId) -> Result<Option<String>> {
+    let owner = "select owner from deleted_job where uuid = ?";
+    connection.optional_value(owner, [id.0.to_string()])
 }
 
 /// The public id of a deleted job, by its key.
-pub(super) async fn deleted_id(
-    connection: &mut SqliteConnection,
-    key: i64,
-) -> Result<Option<JobId>> {
-    let uuid: Option<String> = sqlx::query_scalar("select uuid from deleted_job where id = ?")
-        .bind(key)
-        .fetch_optional(connection)
-        .await?;
+pub(super) fn deleted_id(connection: &Connection, key: i64) -> Result<Option<JobId>> {
+    let uuid = "select uuid from deleted_job where id = ?";
+    let uuid: Option<String> = connection.optional_value(uuid, [key])?;
     Ok(uuid.and_then(|text| text.parse().ok()).map(JobId))
 }

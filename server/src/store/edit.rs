@@ -1,8 +1,14 @@
 //! Editing a job: its name and labels, its priority, whether it is pinned.
 
-use std::{collections::BTreeMap, mem};
+use std::{collections::BTreeMap, mem, sync::Arc};
 
-use super::{coalescing, database::Store, error::Result, labels, rows::with_id};
+use super::{
+    coalescing,
+    database::{Store, Writer},
+    error::Result,
+    labels,
+    rows::with_id,
+};
 use crate::{
     caller::Owners,
     job::{Job, JobId},
@@ -37,46 +43,49 @@ impl Store {
     /// Edits a job, if it has one of these versions or none are given. `Err` holds the version that it has
     /// instead; `None`: there is no such job.
     pub async fn edit(
-        &self,
-        owners: Owners<'_>,
+        self: &Arc<Self>,
+        owners: Owners,
         id: JobId,
         edit: &Edit,
         versions: Option<&[i64]>,
     ) -> Result<Option<std::result::Result<Job, i64>>> {
-        self.control(|| self.try_to_edit(owners, id, edit, versions))
-            .await
+        let (edit, versions) = (edit.clone(), versions.map(<[i64]>::to_vec));
+        let mut edited = self
+            .control(move |writer| try_to_edit(writer, &owners, id, &edit, versions.as_deref()))
+            .await?;
+        if let Some(Ok(job)) = &mut edited {
+            self.try_complete(std::slice::from_mut(job)).await;
+        }
+        Ok(edited)
     }
+}
 
-    async fn try_to_edit(
-        &self,
-        owners: Owners<'_>,
-        id: JobId,
-        edit: &Edit,
-        versions: Option<&[i64]>,
-    ) -> Result<Option<std::result::Result<Job, i64>>> {
-        let mut change = self.control_change().await?;
-        let Some(job) = with_id(change.sql().await?, owners, id).await? else {
-            return Ok(None);
-        };
-        if versions.is_some_and(|versions| !versions.contains(&job.version)) {
-            return Ok(Some(Err(job.version)));
-        }
-        let key = job.key;
-        let edited = change.set(key, |row| edit.apply(&mut row.job)).await?;
-        if edited.labels != job.labels {
-            labels::replace(&mut change, &edited).await?;
-        }
-        if edited.waits_for_a_worker() && edited.priority != job.priority {
-            coalescing::replace_if_outranked(&mut change, key).await?;
-        }
-        if let Some(primary) = edited.coalesced_into {
-            coalescing::detach_if_ahead(&mut change, &edited, primary).await?;
-        }
-        let edited = change.read(key).await?;
-        change.commit().await?;
-        let mut edited = [edited];
-        self.try_complete(&mut edited).await;
-        let [edited] = edited;
-        Ok(Some(Ok(edited)))
+fn try_to_edit(
+    writer: &Writer<'_>,
+    owners: &Owners,
+    id: JobId,
+    edit: &Edit,
+    versions: Option<&[i64]>,
+) -> Result<Option<std::result::Result<Job, i64>>> {
+    let mut change = writer.control_change()?;
+    let Some(job) = with_id(change.sql()?, owners, id)? else {
+        return Ok(None);
+    };
+    if versions.is_some_and(|versions| !versions.contains(&job.version)) {
+        return Ok(Some(Err(job.version)));
     }
+    let key = job.key;
+    let edited = change.set(key, |row| edit.apply(&mut row.job))?;
+    if edited.labels != job.labels {
+        labels::replace(&mut change, &edited)?;
+    }
+    if edited.waits_for_a_worker() && edited.priority != job.priority {
+        coalescing::replace_if_outranked(&mut change, key)?;
+    }
+    if let Some(primary) = edited.coalesced_into {
+        coalescing::detach_if_ahead(&mut change, &edited, primary)?;
+    }
+    let edited = change.read(key)?;
+    change.commit()?;
+    Ok(Some(Ok(edited)))
 }

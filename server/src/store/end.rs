@@ -2,13 +2,15 @@
 
 use std::{
     collections::HashSet,
-    sync::{MutexGuard, PoisonError},
+    sync::{Arc, MutexGuard, PoisonError},
 };
+
+use rusqlite::params;
 
 use super::{
     change::Change,
     coalescing,
-    database::Store,
+    database::{Store, Writer},
     end_job::end_job,
     error::{Result, StoreError},
     events::FinalBatch,
@@ -16,6 +18,7 @@ use super::{
     results,
     rows::JobRow,
     rules::{self, Cancel, Ending},
+    sql::Sql,
 };
 use crate::{
     failpoint::{self, Point},
@@ -39,90 +42,33 @@ pub enum CancelOutcome {
 
 impl Store {
     /// Records that a client has asked the job to stop; a queued one is canceled at once.
-    pub async fn request_cancel(&self, key: i64) -> Result<CancelOutcome> {
-        self.control(|| self.try_to_request_cancel(key)).await
-    }
-
-    async fn try_to_request_cancel(&self, key: i64) -> Result<CancelOutcome> {
-        let mut change = self.control_change().await?;
-        let Some(job) = change.find(key).await? else {
-            return Ok(CancelOutcome::AlreadyTerminal); // and was deleted since
-        };
-        let attempt = job.attempt;
-        match rules::canceling(&job) {
-            Cancel::End => {
-                end(&mut change, key, &Ending::canceled()).await?;
-                return Ok(CancelOutcome::Canceled(change.commit().await?));
-            }
-            Cancel::Asked => {}
-            Cancel::Ask => {
-                // kept even if it cannot be stored: no later result makes the job succeed
-                self.cancels().insert(key);
-                change.set(key, JobRow::ask_to_stop).await?;
-                change.commit().await?;
-            }
-            Cancel::TooLate => return Ok(CancelOutcome::AlreadyTerminal),
-        }
-        Ok(CancelOutcome::Requested { attempt })
+    pub async fn request_cancel(self: &Arc<Self>, key: i64) -> Result<CancelOutcome> {
+        self.control(move |writer| request_cancel(writer, key))
+            .await
     }
 
     /// Ends a running job, with its last events and the rest of its result. Returns the jobs that have changed;
     /// `None` when this attempt is no longer the current one, because the job was canceled or requeued meanwhile.
     pub async fn finish(
-        &self,
+        self: &Arc<Self>,
         key: i64,
         attempt: i32,
         ending: &Ending,
         last: FinalBatch,
-        result: Option<&Parts>,
+        result: Option<&Arc<Parts>>,
     ) -> Result<Option<Vec<i64>>> {
+        let (ending, result) = (ending.clone(), result.cloned());
         // the end of a canceled job needs little space
         match result {
-            Some(_) => {
-                let finishing = self.try_to_finish(key, attempt, ending, &last, result);
-                self.writing(finishing).await
+            Some(parts) => {
+                self.write(move |writer| finish(writer, key, attempt, &ending, &last, Some(&parts)))
+                    .await
             }
             None => {
-                self.control(|| self.try_to_finish(key, attempt, ending, &last, None))
+                self.control(move |writer| finish(writer, key, attempt, &ending, &last, None))
                     .await
             }
         }
-    }
-
-    async fn try_to_finish(
-        &self,
-        key: i64,
-        attempt: i32,
-        ending: &Ending,
-        last: &FinalBatch,
-        result: Option<&Parts>,
-    ) -> Result<Option<Vec<i64>>> {
-        let mut change = match result {
-            Some(_) => self.change().await?,
-            None => self.control_change().await?,
-        };
-        if !change.is_current(key, attempt).await? {
-            return Ok(None);
-        }
-        if let Some(parts) = result {
-            results::attach(&mut change, key, parts).await?;
-        }
-        if !last.events.is_empty() {
-            change
-                .append_with_progress(key, &last.events, &last.progress)
-                .await?;
-        }
-        let job = change.read(key).await?;
-        match self.is_asked_to_stop(&job) {
-            true => end(&mut change, key, &ending.after_a_request_to_stop()).await?,
-            false => end(&mut change, key, ending).await?,
-        }
-        if failpoint::fails(Point::Ended, job.id) {
-            return Err(StoreError::Full);
-        }
-        let changed = change.commit().await?;
-        self.cancels().remove(&key);
-        Ok(Some(changed))
     }
 
     /// Whether a client has asked a running job to stop, even if that could not be stored.
@@ -138,43 +84,102 @@ impl Store {
 
     /// Ends jobs that have waited longer than allowed, some at a time. A job coalesced into one that runs does
     /// not wait for a worker, and is left alone.
-    pub async fn expire_queued(&self, now: Time) -> Result<Vec<i64>> {
+    pub async fn expire_queued(self: &Arc<Self>, now: Time) -> Result<Vec<i64>> {
         let now = self.by_our_clock(now);
         // nearly always there is none, which a reader finds without occupying the writer
-        let some = sqlx::query(EXPIRED).bind(now.micros()).bind(1);
-        let some = async { Ok(some.fetch_optional(&self.reader).await?) };
-        match self.writing(some).await? {
-            Some(_) => self.control(|| self.end_expired(now)).await,
-            None => Ok(vec![]),
+        let some = self.read(move |_, connection| {
+            connection.optional_value::<i64>(EXPIRED, params![now.micros(), 1])
+        });
+        match some.await {
+            Ok(None) => Ok(vec![]),
+            // the writer meets the same damage, and finds out whether anything can be written
+            Ok(Some(_)) | Err(StoreError::Damaged(_)) => {
+                self.control(move |writer| end_expired(writer, now)).await
+            }
+            Err(cause) => Err(cause),
         }
     }
+}
 
-    async fn end_expired(&self, now: Time) -> Result<Vec<i64>> {
-        const AT_ONCE: i64 = 100;
-        let mut change = self.control_change().await?;
-        let expired: Vec<i64> = sqlx::query_scalar(EXPIRED)
-            .bind(now.micros())
-            .bind(AT_ONCE)
-            .fetch_all(change.sql().await?)
-            .await?;
-        for key in expired {
-            // as it is now: it may have been coalesced into one that has just ended
-            let Ok(job) = self.damages.noting(change.read(key)).await else {
-                continue; // damaged: others still end
-            };
-            let detail = format!(
-                "the job was not started within {} s; see limits.queue_ttl_s",
-                job.limits.queue_ttl_s
-            );
-            end(
-                &mut change,
-                key,
-                &Ending::failed(Reason::QueueExpired, detail),
-            )
-            .await?;
+fn request_cancel(writer: &Writer<'_>, key: i64) -> Result<CancelOutcome> {
+    let mut change = writer.control_change()?;
+    let Some(job) = change.find(key)? else {
+        return Ok(CancelOutcome::AlreadyTerminal); // and was deleted since
+    };
+    let attempt = job.attempt;
+    match rules::canceling(&job) {
+        Cancel::End => {
+            end(&mut change, key, &Ending::canceled())?;
+            return Ok(CancelOutcome::Canceled(change.commit()?));
         }
-        change.commit().await
+        Cancel::Asked => {}
+        Cancel::Ask => {
+            // kept even if it cannot be stored: no later result makes the job succeed
+            writer.store.cancels().insert(key);
+            change.set(key, JobRow::ask_to_stop)?;
+            change.commit()?;
+        }
+        Cancel::TooLate => return Ok(CancelOutcome::AlreadyTerminal),
     }
+    Ok(CancelOutcome::Requested { attempt })
+}
+
+fn finish(
+    writer: &Writer<'_>,
+    key: i64,
+    attempt: i32,
+    ending: &Ending,
+    last: &FinalBatch,
+    result: Option<&Parts>,
+) -> Result<Option<Vec<i64>>> {
+    let mut change = match result {
+        Some(_) => writer.change()?,
+        None => writer.control_change()?,
+    };
+    if !change.is_current(key, attempt)? {
+        return Ok(None);
+    }
+    if let Some(parts) = result {
+        results::attach(&mut change, key, parts)?;
+    }
+    if !last.events.is_empty() {
+        change.append_with_progress(key, &last.events, &last.progress)?;
+    }
+    let job = change.read(key)?;
+    match writer.store.is_asked_to_stop(&job) {
+        true => end(&mut change, key, &ending.after_a_request_to_stop())?,
+        false => end(&mut change, key, ending)?,
+    }
+    if failpoint::fails(Point::Ended, job.id) {
+        return Err(StoreError::Full);
+    }
+    let changed = change.commit()?;
+    writer.store.cancels().remove(&key);
+    Ok(Some(changed))
+}
+
+fn end_expired(writer: &Writer<'_>, now: Time) -> Result<Vec<i64>> {
+    const AT_ONCE: i64 = 100;
+    let mut change = writer.control_change()?;
+    let expired: Vec<i64> = change
+        .sql()?
+        .values(EXPIRED, params![now.micros(), AT_ONCE])?;
+    for key in expired {
+        // as it is now: it may have been coalesced into one that has just ended
+        let Ok(job) = writer.store.damages.noting(change.read(key)) else {
+            continue; // damaged: others still end
+        };
+        let detail = format!(
+            "the job was not started within {} s; see limits.queue_ttl_s",
+            job.limits.queue_ttl_s
+        );
+        end(
+            &mut change,
+            key,
+            &Ending::failed(Reason::QueueExpired, detail),
+        )?;
+    }
+    change.commit()
 }
 
 /// Jobs that have waited too long, up to a limit.
@@ -185,7 +190,7 @@ pub(super) const EXPIRED: &str = "select id from job indexed by job_expiry
      order by expires_at limit ?";
 
 /// Ends a job, and the jobs coalesced into it or replaces it by the first of them.
-pub(super) async fn end(change: &mut Change<'_>, key: i64, ending: &Ending) -> Result<()> {
-    end_job(change, key, ending).await?;
-    coalescing::end_coalesced(change, key).await
+pub(super) fn end(change: &mut Change<'_>, key: i64, ending: &Ending) -> Result<()> {
+    end_job(change, key, ending)?;
+    coalescing::end_coalesced(change, key)
 }

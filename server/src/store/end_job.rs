@@ -4,17 +4,17 @@ use super::{change::Change, error::Result, results, rules::Ending, sizes};
 use crate::{event::Payload, job::ResultAvailable};
 
 /// Ends a job, with its one `done` event. Jobs coalesced into it stay as they are.
-pub(super) async fn end_job(change: &mut Change<'_>, key: i64, ending: &Ending) -> Result<()> {
+pub(super) fn end_job(change: &mut Change<'_>, key: i64, ending: &Ending) -> Result<()> {
     let now = change.now();
-    let mut ended = change.update(key, |row| row.end(ending, now)).await?;
-    let tx = change.sql().await?;
+    let mut ended = change.update(key, |row| row.end(ending, now))?;
+    let tx = change.sql()?;
     // one that never ran has none; thousands of such jobs may be canceled at once
     if ended.result_available == ResultAvailable::None && ended.attempt > 0 {
-        results::remove(tx, key).await?;
+        results::remove(tx, key)?;
     }
-    sizes::count(tx, key).await?;
-    sizes::add_sizes(tx, std::slice::from_mut(&mut ended)).await?;
+    sizes::count(tx, key)?;
+    sizes::add_sizes(tx, std::slice::from_mut(&mut ended))?;
     let at = ended.finished_at.unwrap_or(now);
     let job = Box::new(ended);
-    change.append(key, &[(at, Payload::Done { job })]).await
+    change.append(key, &[(at, Payload::Done { job })])
 }

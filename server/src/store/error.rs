@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use sqlx::migrate::MigrateError;
+use rusqlite::{Error as SqlError, ffi::ErrorCode, types::FromSqlError};
 use uuid::Uuid;
 
 use crate::job::JobId;
@@ -60,10 +60,7 @@ pub enum StoreError {
     Unexpected(String),
     /// An error of the database.
     #[error("database: {0}")]
-    Database(sqlx::Error),
-    /// The tables cannot be brought up to date.
-    #[error("migration: {0}")]
-    Migrate(#[from] MigrateError),
+    Database(SqlError),
 }
 
 /// A stored record, as errors name it.
@@ -135,51 +132,49 @@ impl Record {
     }
 }
 
-/// SQLite's numbers of errors.
-mod code {
-    pub(super) const READ_ONLY: u32 = 8;
-    pub(super) const CORRUPT: u32 = 11;
-    pub(super) const FULL: u32 = 13;
-    pub(super) const CANNOT_OPEN: u32 = 14;
-    // a gigabyte and more: nothing that was written is so large
-    pub(super) const TOO_BIG: u32 = 18;
-    pub(super) const NOT_A_DATABASE: u32 = 26;
-    // of these, the details: reading failed, or ended early
-    pub(super) const IOERR_READ: u32 = 266;
-    pub(super) const IOERR_SHORT_READ: u32 = 522;
-    // writing failed: over a quota, a limit on files, or on a disk that fails
-    pub(super) const IOERR_WRITE: u32 = 778;
-}
+/// SQLite's numbers of errors that [`ErrorCode`] does not tell apart: reading failed, or ended early.
+const IOERR_READ: i32 = 266;
+const IOERR_SHORT_READ: i32 = 522;
+/// Writing failed: over a quota, a limit on files, or on a disk that fails.
+const IOERR_WRITE: i32 = 778;
 
-impl From<sqlx::Error> for StoreError {
-    fn from(error: sqlx::Error) -> Self {
-        let number = match &error {
-            sqlx::Error::Database(cause) => cause.code().and_then(|code| code.parse().ok()),
-            _ => None,
+impl From<SqlError> for StoreError {
+    fn from(error: SqlError) -> Self {
+        let (cause, message) = match &error {
+            SqlError::SqliteFailure(cause, message) => (cause, message),
+            // what is stored is not what is expected there
+            SqlError::FromSqlConversionFailure(..)
+            | SqlError::IntegralValueOutOfRange(..)
+            | SqlError::InvalidColumnType(..)
+            | SqlError::Utf8Error(..) => return Record::named("record").damaged(error),
+            _ => return StoreError::Database(error),
         };
-        let number: u32 = number.unwrap_or_default();
-        let told = match &error {
-            sqlx::Error::Database(cause) => format!("SQLite: {} (error {number})", cause.message()),
-            other => other.to_string(),
+        let number = cause.extended_code;
+        let told = match message {
+            Some(message) => format!("SQLite: {message} (error {number})"),
+            None => format!("SQLite: {cause} (error {number})"),
         };
-        match &error {
-            _ if matches!(number & 0xff, code::CORRUPT | code::NOT_A_DATABASE) => {
+        match (cause.code, number) {
+            (ErrorCode::DatabaseCorrupt | ErrorCode::NotADatabase, _) => {
                 Record::database().damaged(told)
             }
-            _ if number == code::TOO_BIG => Record::named("record").damaged(told),
-            _ if matches!(number, code::IOERR_READ | code::IOERR_SHORT_READ) => {
+            // a gigabyte and more: nothing that was written is so large
+            (ErrorCode::TooBig, _) => Record::named("record").damaged(told),
+            (_, IOERR_READ | IOERR_SHORT_READ) => {
                 Record::named("page of the database").damaged(told)
             }
-            _ if matches!(number, code::FULL | code::IOERR_WRITE) => StoreError::Full,
-            _ if matches!(number & 0xff, code::READ_ONLY | code::CANNOT_OPEN) => {
+            (ErrorCode::DiskFull, _) | (_, IOERR_WRITE) => StoreError::Full,
+            (ErrorCode::ReadOnly | ErrorCode::CannotOpen, _) => {
                 StoreError::Folder(format!("the database cannot be written: {told}"))
-            }
-            sqlx::Error::PoolTimedOut => StoreError::Busy,
-            sqlx::Error::Decode(_) | sqlx::Error::ColumnDecode { .. } => {
-                Record::named("record").damaged(error)
             }
             _ => StoreError::Database(error),
         }
+    }
+}
+
+impl From<FromSqlError> for StoreError {
+    fn from(error: FromSqlError) -> Self {
+        Record::named("record").damaged(error)
     }
 }
 

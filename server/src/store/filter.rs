@@ -1,7 +1,8 @@
 //! Which jobs a list contains, and in what order. A filter is defined here, in `job_filters`; REST, gRPC, the command
 //! line and the documentation follow.
 
-use serde_json::{Value, json};
+use rusqlite::types::Value;
+use serde_json::json;
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
 use crate::{
@@ -74,7 +75,7 @@ pub struct Field {
     /// Several values may be given: those of any of them match.
     pub several: bool,
     /// The JSON Schema of a value.
-    pub schema: fn() -> Value,
+    pub schema: fn() -> serde_json::Value,
     /// The possible values in words.
     pub expected: fn() -> String,
     /// Adds a value from its text; false if it is not one.
@@ -83,14 +84,7 @@ pub struct Field {
     pub(super) comparison: &'static str,
     pub(super) index: Option<&'static str>,
     /// The values that are asked for, as they are stored.
-    pub(super) values: fn(&Filter) -> Vec<Stored>,
-}
-
-/// A value as it is stored.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Stored {
-    Text(String),
-    Micros(i64),
+    pub(super) values: fn(&Filter) -> Vec<Value>,
 }
 
 /// The ids of sweeps.
@@ -117,7 +111,7 @@ impl Values for SweepIds {
 trait Asked: Sized {
     fn allowed() -> impl Values<Value = Self>;
 
-    fn stored(&self) -> Stored;
+    fn stored(&self) -> Value;
 }
 
 impl Asked for Status {
@@ -125,8 +119,8 @@ impl Asked for Status {
         Words::all()
     }
 
-    fn stored(&self) -> Stored {
-        Stored::Text(<&str>::from(*self).to_owned())
+    fn stored(&self) -> Value {
+        Value::Text(<&str>::from(*self).to_owned())
     }
 }
 
@@ -135,8 +129,8 @@ impl Asked for String {
         Text
     }
 
-    fn stored(&self) -> Stored {
-        Stored::Text(self.clone())
+    fn stored(&self) -> Value {
+        Value::Text(self.clone())
     }
 }
 
@@ -145,8 +139,8 @@ impl Asked for SweepId {
         SweepIds
     }
 
-    fn stored(&self) -> Stored {
-        Stored::Text(self.0.to_string())
+    fn stored(&self) -> Value {
+        Value::Text(self.0.to_string())
     }
 }
 
@@ -155,8 +149,8 @@ impl Asked for Time {
         Times
     }
 
-    fn stored(&self) -> Stored {
-        Stored::Micros(self.micros())
+    fn stored(&self) -> Value {
+        Value::Integer(self.micros())
     }
 }
 
@@ -174,7 +168,7 @@ trait Criterion {
         value.map(|value| self.add(value)).is_some()
     }
 
-    fn stored(&self) -> Vec<Stored> {
+    fn stored(&self) -> Vec<Value> {
         self.values().iter().map(Asked::stored).collect()
     }
 }
@@ -220,11 +214,11 @@ impl Filter {
     }
 
     /// The same filter restricted to these owners; `None` if it requests the jobs of another.
-    pub(super) fn among(&self, owners: Owners<'_>) -> Option<Self> {
+    pub(super) fn among(&self, owners: &Owners) -> Option<Self> {
         let mut filter = self.clone();
         if let Owners::Only(owner) = owners {
-            let asked = filter.owner.get_or_insert_with(|| owner.to_owned());
-            if asked != owner {
+            let asked = filter.owner.get_or_insert_with(|| owner.to_string());
+            if **asked != **owner {
                 return None;
             }
         }

@@ -1,6 +1,10 @@
 //! The ids of deleted jobs and sweeps are remembered for a while, and with them the keys of the requests that submitted them.
 
-use super::{database::Store, delete::PAUSE, error::Result, keys, sweeps};
+use std::sync::Arc;
+
+use rusqlite::params;
+
+use super::{database::Store, delete::PAUSE, error::Result, keys, sql::Sql, sweeps};
 use crate::time::Time;
 
 /// How long the id of a deleted job is answered with *deleted*; then it is unknown.
@@ -13,56 +17,49 @@ const FORGOTTEN_AT_ONCE: u32 = 250;
 
 impl Store {
     /// Removes the ids of jobs and sweeps that were deleted long ago.
-    pub async fn forget_deleted(&self, now: Time) -> Result<()> {
+    pub async fn forget_deleted(self: &Arc<Self>, now: Time) -> Result<()> {
         let before = self.cutoff(self.by_our_clock(now), REMEMBERED_S).micros();
         self.forget_up_to(before - 1).await?;
         let some = "select exists (select 1 from deleted_sweep where deleted_at < ?)";
-        let some = sqlx::query_scalar(some).bind(before);
-        if !some.fetch_one(&self.reader).await? {
+        let some = self.read(move |_, connection| connection.value::<bool>(some, [before]));
+        if !some.await? {
             return Ok(());
         }
-        self.control(|| async {
-            let mut tx = self.begin_control().await?;
-            sweeps::forget_deleted(&mut tx, before).await?;
-            tx.commit().await
+        self.control(move |writer| {
+            let tx = writer.begin_control()?;
+            sweeps::forget_deleted(&tx, before)?;
+            tx.commit()
         })
         .await
     }
 
     /// Removes the oldest ids of deleted jobs beyond so many.
-    pub(super) async fn forget_beyond(&self, most: u32) -> Result<()> {
-        let newest: Option<i64> = sqlx::query_scalar(BEYOND)
-            .bind(most)
-            .fetch_optional(&self.reader)
-            .await?;
-        match newest {
+    pub(super) async fn forget_beyond(self: &Arc<Self>, most: u32) -> Result<()> {
+        let newest = self.read(move |_, connection| connection.optional_value(BEYOND, [most]));
+        match newest.await? {
             Some(newest) => self.forget_up_to(newest).await,
             None => Ok(()),
         }
     }
 
     /// Removes the ids of jobs that were deleted until then, some at a time.
-    async fn forget_up_to(&self, last: i64) -> Result<()> {
+    async fn forget_up_to(self: &Arc<Self>, last: i64) -> Result<()> {
         let some = "select exists (select 1 from deleted_job where deleted_at <= ?)";
-        while sqlx::query_scalar(some)
-            .bind(last)
-            .fetch_one(&self.reader)
+        while self
+            .read(move |_, connection| connection.value::<bool>(some, [last]))
             .await?
         {
-            let forget = self.control(|| async {
-                let mut tx = self.begin_control().await?;
-                let gone: Vec<i64> = sqlx::query_scalar(
+            let forget = self.control(move |writer| {
+                let tx = writer.begin_control()?;
+                let gone: Vec<i64> = tx.values(
                     "delete from deleted_job where uuid in (select uuid from deleted_job indexed by deleted_job_by_time
                      where deleted_at <= ? order by deleted_at limit ?) returning id",
-                )
-                .bind(last)
-                .bind(FORGOTTEN_AT_ONCE)
-                .fetch_all(&mut *tx)
-                .await?;
+                    params![last, FORGOTTEN_AT_ONCE],
+                )?;
                 for job in gone {
-                    keys::forget(&mut tx, job).await?;
+                    keys::forget(&tx, job)?;
                 }
-                tx.commit().await
+                tx.commit()
             });
             forget.await?;
             tokio::time::sleep(PAUSE).await;

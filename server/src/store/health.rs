@@ -1,19 +1,27 @@
 //! Whether the store works: what `/readyz` tells, and what is watched meanwhile.
 
-use std::{sync::Weak, time::Duration};
+use std::{
+    sync::{Arc, Weak},
+    time::Duration,
+};
 
+use rusqlite::Connection;
+use tokio::time::timeout;
 use uuid::Uuid;
 
-use crate::{error::number_of, time::Time};
+use crate::{error::number_of, job::Job, time::Time};
 
 use super::{
     database::Store,
     error::{Result, StoreError},
     rows::from_row,
+    sql::Sql,
 };
 
 /// How often the files are looked at.
 const INTERVAL: Duration = Duration::from_secs(1);
+/// How long a connection may be in use by another.
+const PATIENCE: Duration = Duration::from_secs(30);
 
 /// How well the store works.
 #[derive(Clone, Debug, Default)]
@@ -56,19 +64,14 @@ impl Health {
 impl Store {
     /// Reads the newest and the oldest job as clients do, and looks at the files; an error if that does not work. A
     /// damaged record is none: the others can be read.
-    pub async fn health(&self) -> Result<Health> {
+    pub async fn health(self: &Arc<Self>) -> Result<Health> {
         self.identity.check()?;
         self.identity.check_header()?;
         self.damages.can_write()?;
-        for (pool, job) in [
-            (&self.reader, "select * from job order by id desc limit 1"),
-            (&self.lists, "select * from job order by id limit 1"),
-        ] {
-            let read = async {
-                let row = sqlx::query(job).fetch_optional(pool).await?;
-                row.as_ref().map(from_row).transpose()
-            };
-            match self.damages.noting(read).await {
+        let newest = self.read(first("select * from job order by id desc limit 1"));
+        let oldest = self.read_list(first("select * from job order by id limit 1"));
+        for read in [newest.await, oldest.await] {
+            match read {
                 // of a job: the others can be read
                 Err(StoreError::Damaged(damage)) if damage.record.job.is_some() => {}
                 // lists use all connections, which shows that they are answered
@@ -88,22 +91,31 @@ impl Store {
 impl Store {
     /// Returns when the single writer and a reader have answered, and be it with an error: neither a full disk nor a damaged
     /// database gets better by a restart. False if a connection is not given back.
-    pub async fn answers(&self) -> bool {
-        let writer = match self.writer.begin_with("begin immediate").await {
-            Ok(tx) => tx.rollback().await,
-            Err(error) => Err(error),
-        };
-        let read = sqlx::query("select 1 from job limit 1").fetch_optional(&self.reader);
-        let read = read.await.map(drop);
-        ![writer, read]
-            .iter()
-            .any(|answer| matches!(answer, Err(sqlx::Error::PoolTimedOut)))
+    pub async fn answers(self: &Arc<Self>) -> bool {
+        let write = self.write(|writer| {
+            let _ = writer
+                .connection()
+                .execute_batch("begin immediate; rollback");
+            Ok(())
+        });
+        let read = self.read(|_, connection| {
+            let _ = connection.optional_value::<i64>("select 1 from job limit 1", ());
+            Ok(())
+        });
+        timeout(PATIENCE, write).await.is_ok() && timeout(PATIENCE, read).await.is_ok()
     }
 
     /// An error if the disk is full but for what control needs; for what is written beside the database.
     pub fn has_room(&self) -> Result<()> {
         self.reserve.has_room()
     }
+}
+
+/// Reads the first job of a query.
+fn first(
+    query: &'static str,
+) -> impl FnOnce(&Store, &Connection) -> Result<Option<Job>> + Send + 'static {
+    move |_, connection| connection.row(query, (), from_row)
 }
 
 /// Looks at the files of the store, flushes the record of its progress, and takes its reserve again, until the store is
@@ -121,7 +133,7 @@ pub(super) async fn watch(store: Weak<Store>) {
             set_by_s = now_s;
         }
         let Some(store) = store.upgrade() else { return };
-        if store.writer.is_closed() {
+        if store.is_closed() {
             return;
         }
         let watched = tokio::task::spawn_blocking(move || {

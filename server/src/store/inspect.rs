@@ -5,14 +5,12 @@
 
 use std::{collections::BTreeSet, path::Path};
 
-use sqlx::{
-    AssertSqlSafe, ConnectOptions, Connection, Row, SqliteConnection,
-    sqlite::{SqliteConnectOptions, SqliteRow},
-};
+use rusqlite::{Connection, Row};
 
 use super::{
+    connections::{Mode, blocking, open},
     content::{self, Holder, name},
-    database::{Store, Writing, compare_with_the_past},
+    database::{Writer, Writing, compare_with_the_past},
     error::{Record, Result, StoreError},
     events,
     folder::{DATABASE, Folder, unusable},
@@ -20,7 +18,8 @@ use super::{
     progress::{self, Known},
     results::StoredResult,
     rows::find,
-    salvage::{copy_content, copy_job, copy_the_rest, insert, new_store},
+    salvage::{StoredRow, copy_content, copy_job, copy_the_rest, new_store},
+    sql::Sql,
     sweeps, tokens,
 };
 use crate::{
@@ -51,59 +50,41 @@ const EVENTS_PER_READ: i64 = 1000;
 
 /// Checks everything in the store of this folder; with `new`, which must be empty or missing, copies what is intact.
 pub async fn inspect(folder: &Path, new: Option<&Path>) -> Result<Report> {
-    // to lock it would create it
-    match folder.join(DATABASE).try_exists() {
-        Ok(true) => {}
-        Ok(false) => return Err(unusable(folder, absent(folder))),
-        Err(error) => return Err(unusable(folder, error)),
-    }
-    let _locked = Folder::lock(folder)?;
-    let mut report = Report::default();
-    let options = SqliteConnectOptions::new().filename(folder.join(DATABASE));
-    let known = progress::read(folder)?;
-    match compare_with_the_past(folder, &known, options.clone()).await {
-        Ok(doubt) => report.findings.extend(doubt),
-        Err(StoreError::Folder(why)) => {
-            let advice = "to read a database, SQLite writes beside it: copy the folder to where that is allowed, and \
-                          check the copy";
-            return Err(unusable(folder, format!("{why}; {advice}")));
+    let folder = folder.to_owned();
+    let (_locked, report, folder) = blocking(move || {
+        // to lock it would create it
+        match folder.join(DATABASE).try_exists() {
+            Ok(true) => {}
+            Ok(false) => return Err(unusable(&folder, absent(&folder))),
+            Err(error) => return Err(unusable(&folder, error)),
         }
-        Err(error) => report.finding("database", &error),
-    }
-    let target = match new {
-        Some(new) => Some(new_store(new).await?),
-        None => None,
+        let locked = Folder::lock(&folder)?;
+        Ok((locked, Report::begin(&folder)?, folder))
+    })
+    .await?;
+    let report = match new {
+        Some(new) => {
+            let target = new_store(new).await?;
+            let copied = target.write(move |writer| report.complete(&folder, Some(writer)));
+            let report = copied.await?;
+            target.close().await;
+            report
+        }
+        None => blocking(move || report.complete(&folder, None)).await?,
     };
-    match options.read_only(true).connect().await {
-        Ok(mut source) => {
-            // damage to the list of steps is found below, as damage
-            if let Err(error @ StoreError::Schema(_)) = migrations::are_current(&mut source).await {
-                return Err(error);
-            }
-            let inspected = report.inspect(&mut source, target.as_ref()).await;
-            source.close().await?;
-            inspected?;
-        }
-        Err(error) => report.finding("database", &StoreError::from(error)),
-    }
-    if let Some(target) = target {
-        target.close().await;
-    }
     Ok(report)
 }
 
 /// Checks the database of a backup that is being made, which has no log. If its tables are of an earlier version, only
 /// whether it can be read: what they contain is not known here.
-pub(super) async fn check_copy(folder: &Path) -> Result<Vec<String>> {
-    let options = SqliteConnectOptions::new().filename(folder.join(DATABASE));
-    let mut copy = options.read_only(true).connect().await?;
+pub(super) fn check_copy(folder: &Path) -> Result<Vec<String>> {
+    let copy = open(&folder.join(DATABASE), Mode::Read)?;
     let mut report = Report::default();
-    match migrations::are_current(&mut copy).await {
-        Ok(()) => report.inspect(&mut copy, None).await?,
-        Err(StoreError::Schema(_)) => report.check_pages(&mut copy).await,
+    match migrations::are_current(&copy) {
+        Ok(()) => report.inspect(&copy, None)?,
+        Err(StoreError::Schema(_)) => report.check_pages(&copy),
         Err(error) => return Err(error),
     }
-    copy.close().await?;
     Ok(report.findings)
 }
 
@@ -118,6 +99,37 @@ pub(super) fn absent(folder: &Path) -> String {
 }
 
 impl Report {
+    /// What the comparison with the past says.
+    fn begin(folder: &Path) -> Result<Report> {
+        let mut report = Report::default();
+        let known = progress::read(folder)?;
+        match compare_with_the_past(folder, &known, &folder.join(DATABASE)) {
+            Ok(doubt) => report.findings.extend(doubt),
+            Err(StoreError::Folder(why)) => {
+                let advice = "to read a database, SQLite writes beside it: copy the folder to where that is allowed, and \
+                              check the copy";
+                return Err(unusable(folder, format!("{why}; {advice}")));
+            }
+            Err(error) => report.finding("database", &error),
+        }
+        Ok(report)
+    }
+
+    /// The same with what the store in this folder contains.
+    fn complete(mut self, folder: &Path, target: Option<&Writer<'_>>) -> Result<Report> {
+        match open(&folder.join(DATABASE), Mode::Read) {
+            Ok(source) => {
+                // damage to the list of steps is found below, as damage
+                if let Err(error @ StoreError::Schema(_)) = migrations::are_current(&source) {
+                    return Err(error);
+                }
+                self.inspect(&source, target)?;
+            }
+            Err(error) => self.finding("database", &error),
+        }
+        Ok(self)
+    }
+
     fn finding(&mut self, what: &str, error: &StoreError) {
         let text = match error {
             StoreError::Damaged(damage) if damage.record.name == what => damage.cause.clone(),
@@ -132,49 +144,44 @@ impl Report {
     }
 
     /// Checks one table after the other; an error only if the new store cannot be written.
-    async fn inspect(
-        &mut self,
-        source: &mut SqliteConnection,
-        target: Option<&Store>,
-    ) -> Result<()> {
-        let tables = sqlx::query("select name from sqlite_schema");
-        if let Err(error) = tables.fetch_all(&mut *source).await {
+    fn inspect(&mut self, source: &Connection, target: Option<&Writer<'_>>) -> Result<()> {
+        let tables = source.rows("select name from sqlite_schema", (), |_| Ok(()));
+        if let Err(error) = tables {
             // every table would tell the same
             self.incomplete = true;
-            self.finding("database", &error.into());
+            self.finding("database", &error);
             return Ok(());
         }
-        self.check_pages(source).await;
-        let mut last = last_key(source).await;
-        let listed = keys_after(source, MOST_NUMBERS).await;
-        let listed = listed.unwrap_or_else(|error| {
+        self.check_pages(source);
+        let mut last = last_key(source);
+        let listed = keys_after(source, MOST_NUMBERS).unwrap_or_else(|error| {
             self.finding("jobs", &error);
             self.incomplete = true;
             vec![]
         });
-        let mut writing: Option<Writing> = None;
+        let mut writing: Option<Writing<'_>> = None;
         for key in (1..=last).chain(listed) {
-            let Some(job) = self.check_job(source, key).await else {
+            let Some(job) = self.check_job(source, key) else {
                 continue;
             };
             last = last.max(key);
             let Some(target) = target else { continue };
-            let mut tx = match writing.take() {
+            let tx = match writing.take() {
                 Some(tx) => tx,
-                None => target.begin().await?,
+                None => target.begin()?,
             };
-            copy_job(source, &mut tx, &job).await?;
+            copy_job(source, &tx, &job)?;
             match self.intact % JOBS_PER_COMMIT {
-                0 => tx.commit().await?,
+                0 => tx.commit()?,
                 _ => writing = Some(tx),
             }
         }
         if let Some(tx) = writing {
-            tx.commit().await?;
+            tx.commit()?;
         }
         let mut lost = BTreeSet::new();
         for (table, check) in TABLES {
-            if !self.check_table(source, target, table, check).await? {
+            if !self.check_table(source, target, table, check)? {
                 lost.insert(table);
             }
         }
@@ -184,36 +191,34 @@ impl Report {
                 .any(|table| matches!(*table, "token" | "setting"))
         {
             // it may have been the last one: the new store lets nobody in without a token
-            let mut tx = target.begin().await?;
-            tokens::require_tokens(&mut tx).await?;
-            tx.commit().await?;
+            let tx = target.begin()?;
+            tokens::require_tokens(&tx)?;
+            tx.commit()?;
         }
         match target {
-            Some(target) => copy_the_rest(source, target, last).await,
+            Some(target) => copy_the_rest(source, target, last),
             None => Ok(()),
         }
     }
 
     /// Checks the tables and indexes as such.
-    async fn check_pages(&mut self, source: &mut SqliteConnection) {
-        let complaints = sqlx::query_scalar("pragma integrity_check(20)");
-        let complaints: sqlx::Result<Vec<String>> = complaints.fetch_all(&mut *source).await;
-        match complaints {
+    fn check_pages(&mut self, source: &Connection) {
+        match source.values::<String>("pragma integrity_check(20)", ()) {
             Ok(lines) => {
                 let lines = lines.iter().filter(|line| *line != "ok");
                 self.findings
                     .extend(lines.map(|line| format!("database: {line}")));
             }
-            Err(error) => self.finding("database", &error.into()),
+            Err(error) => self.finding("database", &error),
         }
     }
 
     /// Reads everything of a job; returns it if it is intact.
-    async fn check_job(&mut self, source: &mut SqliteConnection, key: i64) -> Option<Job> {
-        let job = match find(source, key).await {
+    fn check_job(&mut self, source: &Connection, key: i64) -> Option<Job> {
+        let job = match find(source, key) {
             Ok(Some(job)) => job,
             Ok(None) => {
-                if has_events(source, key).await && !was_deleted(source, key).await {
+                if has_events(source, key) && !was_deleted(source, key) {
                     self.jobs += 1;
                     self.findings
                         .push(format!("job number {key}: record: it is missing"));
@@ -222,15 +227,12 @@ impl Report {
             }
             Err(error) => {
                 self.jobs += 1;
-                self.finding(
-                    &format!("{} (number {key})", name(source, key).await),
-                    &error,
-                );
+                self.finding(&format!("{} (number {key})", name(source, key)), &error);
                 return None;
             }
         };
         self.jobs += 1;
-        match check_parts(source, &job).await {
+        match check_parts(source, &job) {
             Ok(()) => {
                 self.intact += 1;
                 Some(job)
@@ -243,132 +245,123 @@ impl Report {
     }
 
     /// Checks the rows of a table, one after the other, and copies those that are intact, a mesh with its body; whether all are.
-    async fn check_table(
+    fn check_table(
         &mut self,
-        source: &mut SqliteConnection,
-        target: Option<&Store>,
+        source: &Connection,
+        target: Option<&Writer<'_>>,
         table: &'static str,
         check: Check,
     ) -> Result<bool> {
-        let statement = AssertSqlSafe(format!("select * from {table}"));
-        let rows = match sqlx::query(statement).fetch_all(&mut *source).await {
+        let checked = |row: &Row<'_>| check(source, row).and_then(|()| StoredRow::read(row));
+        let statement = format!("select * from {table}");
+        let rows = match source.rows(&statement, (), |row| Ok(checked(row))) {
             Ok(rows) => rows,
             Err(error) => {
-                self.finding(table, &error.into());
+                self.finding(table, &error);
                 return Ok(false);
             }
         };
         let mut whole = true;
-        let mut tx = match target {
-            Some(target) => Some(target.begin().await?),
-            None => None,
-        };
-        for row in &rows {
-            let checked = match (check(row), table) {
-                (Ok(()), "mesh") => check_body(source, row).await,
-                (checked, _) => checked,
+        let tx = target.map(Writer::begin).transpose()?;
+        for row in rows {
+            let row = match row {
+                Ok(row) => row,
+                Err(error) => {
+                    self.finding(table, &error);
+                    whole = false;
+                    continue;
+                }
             };
-            if let Err(error) = checked {
-                self.finding(table, &error);
-                whole = false;
-                continue;
-            }
-            let Some(tx) = &mut tx else { continue };
-            insert(tx, table, row).await?;
-            if table == "mesh" {
-                copy_content(source, tx, Holder::Mesh(row.try_get("id")?)).await?;
+            let Some(tx) = &tx else { continue };
+            row.insert(tx, table)?;
+            if let ("mesh", Some(key)) = (table, row.id()) {
+                copy_content(source, tx, Holder::Mesh(key))?;
             }
         }
         if let Some(tx) = tx {
-            tx.commit().await?;
+            tx.commit()?;
         }
         Ok(whole)
     }
 }
 
 /// What is wrong with a row.
-type Check = fn(&SqliteRow) -> Result<()>;
+type Check = fn(&Connection, &Row<'_>) -> Result<()>;
 
 /// What is no part of a job: tables that are checked and copied row by row, in this order.
 const TABLES: [(&str, Check); 9] = [
-    ("mesh", |row| meshes::described(row).map(drop)),
+    ("mesh", check_mesh),
     // one whose owner cannot be read becomes an administrator's
-    ("mesh_owner", |_| Ok(())),
-    ("request_key", keys::check),
-    ("sweep", |row| sweeps::intact(row, row.try_get("id")?)),
-    ("sweep_member", sweeps::check_member),
-    ("deleted_sweep", |_| Ok(())),
-    ("deleted_job", |_| Ok(())),
-    ("token", |row| tokens::read(row).map(drop)),
-    ("setting", |_| Ok(())),
+    ("mesh_owner", |_, _| Ok(())),
+    ("request_key", |_, row| keys::check(row)),
+    ("sweep", |_, row| sweeps::intact(row, row.get("id")?)),
+    ("sweep_member", |_, row| sweeps::check_member(row)),
+    ("deleted_sweep", |_, _| Ok(())),
+    ("deleted_job", |_, _| Ok(())),
+    ("token", |_, row| tokens::read(row).map(drop)),
+    ("setting", |_, _| Ok(())),
 ];
 
-/// An error if the body of a mesh is missing or damaged.
-async fn check_body(source: &mut SqliteConnection, row: &SqliteRow) -> Result<()> {
-    let body = meshes::read_body(source, row.try_get("hash")?).await;
-    body.map(drop)
+/// An error if a mesh is damaged, or its body is missing or damaged.
+fn check_mesh(source: &Connection, row: &Row<'_>) -> Result<()> {
+    meshes::described(row)?;
+    let hash: String = row.get("hash")?;
+    meshes::read_body(source, &hash).map(drop)
 }
 
 /// The numbers of jobs after this one of which there is a trace, in order.
-async fn keys_after(source: &mut SqliteConnection, key: i64) -> Result<Vec<i64>> {
-    let keys = sqlx::query_scalar(
+fn keys_after(source: &Connection, key: i64) -> Result<Vec<i64>> {
+    source.values(
         "select id from job where id > ?1 union select distinct job_id from event where job_id > ?1 order by 1",
-    );
-    Ok(keys.bind(key).fetch_all(source).await?)
+        [key],
+    )
 }
 
 /// The highest number of a job up to [`MOST_NUMBERS`] that is found anywhere.
-async fn last_key(source: &mut SqliteConnection) -> i64 {
+fn last_key(source: &Connection) -> i64 {
     let mut last = 0;
     for statement in [
         "select seq from sqlite_sequence where name = 'job' and seq <= ?",
         "select max(id) from job where id <= ?",
         "select max(job_id) from event where job_id <= ?",
     ] {
-        let found: Option<Option<i64>> = sqlx::query_scalar(statement)
-            .bind(MOST_NUMBERS)
-            .fetch_optional(&mut *source)
-            .await
-            .ok()
-            .flatten();
-        last = last.max(found.flatten().unwrap_or(0));
+        let found = source.optional_value::<Option<i64>>(statement, [MOST_NUMBERS]);
+        last = last.max(found.ok().flatten().flatten().unwrap_or(0));
     }
     last
 }
 
-async fn exists(source: &mut SqliteConnection, statement: &'static str, key: i64) -> bool {
-    let found = sqlx::query(statement).bind(key).fetch_optional(source);
-    found.await.is_ok_and(|row| row.is_some())
+fn exists(source: &Connection, statement: &str, key: i64) -> bool {
+    let found = source.row(statement, [key], |_| Ok(()));
+    found.is_ok_and(|row| row.is_some())
 }
 
-async fn has_events(source: &mut SqliteConnection, key: i64) -> bool {
-    exists(source, "select 1 from event where job_id = ? limit 1", key).await
+fn has_events(source: &Connection, key: i64) -> bool {
+    exists(source, "select 1 from event where job_id = ? limit 1", key)
 }
 
-async fn was_deleted(source: &mut SqliteConnection, key: i64) -> bool {
-    exists(source, "select 1 from deleted_job where id = ?", key).await
+fn was_deleted(source: &Connection, key: i64) -> bool {
+    exists(source, "select 1 from deleted_job where id = ?", key)
 }
 
 /// The public id of a job with a damaged row, as far as it can be read.
-async fn name(source: &mut SqliteConnection, key: i64) -> String {
-    let uuid = sqlx::query_scalar("select uuid from job where id = ?").bind(key);
-    let uuid: sqlx::Result<Option<String>> = uuid.fetch_optional(source).await;
-    match uuid {
+fn name(source: &Connection, key: i64) -> String {
+    match source.optional_value::<String>("select uuid from job where id = ?", [key]) {
         Ok(Some(uuid)) => format!("job_{uuid}"),
         _ => "job".into(),
     }
 }
 
 /// An error if the problem, an event or a part of the result of a job is missing or damaged.
-async fn check_parts(source: &mut SqliteConnection, job: &Job) -> Result<()> {
+fn check_parts(source: &Connection, job: &Job) -> Result<()> {
     let has = Holder::Job(job.key);
-    content::read_text(source, has, name::PROBLEM).await?;
+    content::read_text(source, has, name::PROBLEM)?;
     if job.sweep.is_some() {
-        content::read_text(source, has, name::DEFINITION).await?;
+        content::read_text(source, has, name::DEFINITION)?;
     }
     let (mut after, mut ended) = (0, false);
     loop {
-        let events = events::read(source, job.key, after, EVENTS_PER_READ).await?;
+        let events = events::read(source, job.key, after, EVENTS_PER_READ)?;
         let Some(last) = events.last() else { break };
         ended = matches!(last.payload, Payload::Done { .. });
         after = last.seq;
@@ -382,8 +375,8 @@ async fn check_parts(source: &mut SqliteConnection, job: &Job) -> Result<()> {
         ResultAvailable::None => Ok(()),
         ResultAvailable::Partial | ResultAvailable::Final => {
             let missing = || Record::of_job(job.key, "result").damaged("it is missing");
-            let result = StoredResult::of(source, job.key).await?;
-            result.ok_or_else(missing)?.check(source).await
+            let result = StoredResult::of(source, job.key)?;
+            result.ok_or_else(missing)?.check(source)
         }
     }
 }

@@ -5,7 +5,7 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-use sqlx::SqliteConnection;
+use rusqlite::Connection;
 
 use super::{
     content::{Content, name},
@@ -37,8 +37,8 @@ impl Intact {
 
 /// Compares the content of a result with its hash, without decoding it, which would take a hundred times as long: what is in
 /// it is compared when it is served. What was found intact before is not read again.
-pub(super) async fn check_result(
-    connection: &mut SqliteConnection,
+pub(super) fn check_result(
+    connection: &Connection,
     intact: &Intact,
     key: i64,
     attached: Vec<Content>,
@@ -48,20 +48,16 @@ pub(super) async fn check_result(
     }
     for content in attached {
         if name::OF_RESULT.contains(&content.name.as_str()) {
-            check(connection, intact, &content).await?;
+            check(connection, intact, &content)?;
         }
     }
     Ok(())
 }
 
 /// Compares content with its hash, unless it was found intact before.
-pub(super) async fn check(
-    connection: &mut SqliteConnection,
-    intact: &Intact,
-    content: &Content,
-) -> Result<()> {
+pub(super) fn check(connection: &Connection, intact: &Intact, content: &Content) -> Result<()> {
     if !intact.contains(content.id) {
-        let checked = content.check(connection).await;
+        let checked = content.check(connection);
         checked.map_err(|error| error.reading(|| content.record()))?;
         intact.insert(content.id);
     }

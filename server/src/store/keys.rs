@@ -1,8 +1,8 @@
 //! Repeated requests: with a request key, or with an id chosen by the client. Both belong to an owner.
 
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
-use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
+use rusqlite::{Connection, Row, params};
 
 use super::{
     change::Change,
@@ -12,6 +12,7 @@ use super::{
     delete::{deleted_id, owner_of_deleted},
     error::{Record, Result, StoreError},
     rows::find,
+    sql::Sql,
     submission::{NewJob, RequestKey},
 };
 use crate::{
@@ -21,58 +22,63 @@ use crate::{
 
 impl Store {
     /// The jobs that this owner has submitted under a key.
-    pub async fn replay(&self, owner: &str, key: &RequestKey) -> Result<Option<Vec<Job>>> {
+    pub async fn replay(
+        self: &Arc<Self>,
+        owner: &str,
+        key: &RequestKey,
+    ) -> Result<Option<Vec<Job>>> {
         self.keys_were_read().await;
-        let read = async {
-            let mut connection = self.reader.acquire().await?;
-            let Some(keys) = jobs_of_key(&mut connection, owner, key).await? else {
-                self.damages.have_all_keys(&key.payload)?;
+        let (owner, key) = (owner.to_owned(), key.clone());
+        self.read(move |store, connection| {
+            let Some(keys) = jobs_of_key(connection, &owner, &key)? else {
+                store.damages.have_all_keys(&key.payload)?;
                 return Ok(None);
             };
-            let Some(mut jobs) = remaining(&mut connection, keys).await? else {
-                self.damages.have_all(&[Table::Jobs, Table::Deleted])?;
+            let Some(mut jobs) = remaining(connection, keys)? else {
+                store.damages.have_all(&[Table::Jobs, Table::Deleted])?;
                 return Ok(None);
             };
-            self.complete(&mut connection, &mut jobs).await?;
+            store.complete(connection, &mut jobs)?;
             Ok(Some(jobs))
-        };
-        self.damages.noting(read).await
+        })
+        .await
     }
 
     /// The job with an id chosen by the client, if this owner submitted it with this payload.
     pub async fn replay_with_id(
-        &self,
+        self: &Arc<Self>,
         owner: &str,
         id: JobId,
         payload: &str,
     ) -> Result<Option<Job>> {
-        let same: Option<i64> =
-            sqlx::query_scalar("select id from job where uuid = ? and payload = ?")
-                .bind(id.0.to_string())
-                .bind(payload)
-                .fetch_optional(&self.reader)
-                .await?;
-        match same {
-            Some(_) => self.job(Owners::Only(owner), id).await,
-            None => {
-                self.damages.have_all(&[Table::Jobs])?;
-                Ok(None)
+        let payload = payload.to_owned();
+        let same = self.read(move |store, connection| {
+            let same = "select id from job where uuid = ? and payload = ?";
+            let same =
+                connection.optional_value::<i64>(same, params![id.0.to_string(), payload])?;
+            if same.is_none() {
+                store.damages.have_all(&[Table::Jobs])?;
             }
+            Ok(same)
+        });
+        match same.await? {
+            Some(_) => self.job(Owners::Only(owner.into()), id).await,
+            None => Ok(None),
         }
     }
 }
 
 /// The jobs of a submission that repeats an earlier one, by its key or by a client's id.
-pub(super) async fn already_submitted(
+pub(super) fn already_submitted(
     change: &mut Change<'_>,
     owner: &str,
     jobs: &[NewJob],
     key: Option<&RequestKey>,
 ) -> Result<Option<Vec<Job>>> {
     if let Some(key) = key {
-        match jobs_of_key(change.sql().await?, owner, key).await? {
+        match jobs_of_key(change.sql()?, owner, key)? {
             None => change.damages().have_all_keys(&key.payload)?,
-            Some(keys) => match remaining(change.sql().await?, keys).await? {
+            Some(keys) => match remaining(change.sql()?, keys)? {
                 Some(old) => return Ok(Some(old)),
                 None => change.damages().have_all(&[Table::Jobs, Table::Deleted])?,
             },
@@ -81,19 +87,19 @@ pub(super) async fn already_submitted(
     let mut old = vec![];
     for new in jobs {
         let Some(id) = new.id else { continue };
+        let found = "select id, owner, payload from job where uuid = ?";
         let found: Option<(i64, String, Option<String>)> =
-            sqlx::query_as("select id, owner, payload from job where uuid = ?")
-                .bind(id.0.to_string())
-                .fetch_optional(change.sql().await?)
-                .await?;
+            change
+                .sql()?
+                .row(found, [id.0.to_string()], |row| Ok(row.try_into()?))?;
         match found {
             Some((key, theirs, Some(payload)))
                 if theirs == owner && payload == new.payload && jobs.len() == 1 =>
             {
-                old.push(change.read(key).await?);
+                old.push(change.read(key)?);
             }
             Some(_) => return Err(StoreError::IdConflict(id)),
-            None => match owner_of_deleted(change.sql().await?, id).await? {
+            None => match owner_of_deleted(change.sql()?, id)? {
                 Some(theirs) if theirs == owner => return Err(StoreError::Deleted(id)),
                 // of another owner: whether that job still exists is not revealed
                 Some(_) => return Err(StoreError::IdConflict(id)),
@@ -105,42 +111,36 @@ pub(super) async fn already_submitted(
 }
 
 /// Records that these jobs, numbered without a gap, were accepted under a key.
-pub(super) async fn remember(
+pub(super) fn remember(
     change: &mut Change<'_>,
     owner: &str,
     key: &RequestKey,
     jobs: &[i64],
 ) -> Result<()> {
     let (first, count) = (jobs.first().copied().unwrap_or_default(), jobs.len() as i64);
-    sqlx::query(
+    let (now, sum) = (
+        change.now().micros(),
+        checksum(owner, key, first, count).stored(),
+    );
+    change.sql()?.run(
         "insert or replace into request_key (owner, key, payload, first_job, jobs, created_at, checksum)
          values (?, ?, ?, ?, ?, ?, ?)",
-    )
-    .bind(owner)
-    .bind(&key.key)
-    .bind(&key.payload)
-    .bind(first)
-    .bind(count)
-    .bind(change.now().micros())
-    .bind(checksum(owner, key, first, count).stored())
-    .execute(change.sql().await?)
-    .await?;
+        params![owner, key.key, key.payload, first, count, now, sum],
+    )?;
     Ok(())
 }
 
 /// The jobs that were accepted under a request key, by number.
-async fn jobs_of_key(
-    connection: &mut SqliteConnection,
+fn jobs_of_key(
+    connection: &Connection,
     owner: &str,
     key: &RequestKey,
 ) -> Result<Option<Range<i64>>> {
-    let found: Option<(String, i64, i64, Option<i64>)> = sqlx::query_as(
+    let found: Option<(String, i64, i64, Option<i64>)> = connection.row(
         "select payload, first_job, jobs, checksum from request_key where owner = ? and key = ?",
-    )
-    .bind(owner)
-    .bind(&key.key)
-    .fetch_optional(connection)
-    .await?;
+        params![owner, key.key],
+        |row| Ok(row.try_into()?),
+    )?;
     let Some((payload, first, jobs, stored)) = found else {
         return Ok(None);
     };
@@ -157,20 +157,16 @@ async fn jobs_of_key(
 }
 
 /// An error if a row of the table is not as it was written.
-pub(super) fn check(row: &SqliteRow) -> Result<()> {
+pub(super) fn check(row: &Row<'_>) -> Result<()> {
     let key = RequestKey {
-        key: row.try_get("key")?,
-        payload: row.try_get("payload")?,
+        key: row.get("key")?,
+        payload: row.get("payload")?,
     };
-    checksum(
-        row.try_get("owner")?,
-        &key,
-        row.try_get("first_job")?,
-        row.try_get("jobs")?,
-    )
-    .verify(row.try_get("checksum")?, || {
-        Record::named("record of a request key")
-    })
+    let owner = row.get_ref("owner")?.as_str()?;
+    checksum(owner, &key, row.get("first_job")?, row.get("jobs")?)
+        .verify(row.get("checksum")?, || {
+            Record::named("record of a request key")
+        })
 }
 
 fn checksum(owner: &str, key: &RequestKey, first: i64, jobs: i64) -> Checksum {
@@ -179,8 +175,8 @@ fn checksum(owner: &str, key: &RequestKey, first: i64, jobs: i64) -> Checksum {
 }
 
 /// Forgets the key under which this job was submitted, whose id was forgotten, unless others of its jobs are still known.
-pub(super) async fn forget(tx: &mut SqliteConnection, job: i64) -> Result<()> {
-    sqlx::query(FORGET).bind(job).execute(tx).await?;
+pub(super) fn forget(tx: &Connection, job: i64) -> Result<()> {
+    tx.run(FORGET, [job])?;
     Ok(())
 }
 
@@ -191,15 +187,12 @@ pub(super) const FORGET: &str = "delete from request_key
 
 /// Those of these jobs that still exist. If all of them were deleted, that is an error as long as their ids are
 /// kept; after that the key may be used again.
-async fn remaining(
-    connection: &mut SqliteConnection,
-    keys: Range<i64>,
-) -> Result<Option<Vec<Job>>> {
+fn remaining(connection: &Connection, keys: Range<i64>) -> Result<Option<Vec<Job>>> {
     let (mut jobs, mut deleted) = (vec![], None);
     for key in keys {
-        match find(connection, key).await? {
+        match find(connection, key)? {
             Some(job) => jobs.push(job),
-            None => deleted = deleted_id(connection, key).await?.or(deleted),
+            None => deleted = deleted_id(connection, key)?.or(deleted),
         }
     }
     match (jobs.is_empty(), deleted) {

@@ -5,16 +5,18 @@
 //! row, for at most [`MOST_CHECKED`] rows: then the page is short, and the next one goes on behind the last row that was
 //! checked. Of several indexes the one is taken that gets furthest in so many rows; their lengths need not be known.
 
-use futures_util::TryStreamExt;
-use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
+use std::sync::Arc;
+
+use rusqlite::{Connection, types::Value};
 
 use super::{
     damage::Table,
     database::Store,
     entries::{Entries, bytes_of},
     error::Result,
-    filter::{Cursor, FILTERS, Field, Filter, GroupBy, Order, OrderBy, Stored},
+    filter::{Cursor, FILTERS, Field, Filter, GroupBy, Order, OrderBy},
     rows::from_row,
+    sql::{Query, Sql},
 };
 use crate::{caller::Owners, job::Job};
 
@@ -29,7 +31,7 @@ enum Lane<'a> {
     /// Of a label.
     Label(&'a (String, String)),
     /// Of a value of a column.
-    Value(&'static str, &'static Field, &'a Stored),
+    Value(&'static str, &'static Field, &'a Value),
     /// All jobs, or all that have ended.
     All,
 }
@@ -79,8 +81,8 @@ impl Store {
     /// At most `limit` jobs of a list, after `cursor`, from as many pages as that takes.
     #[cfg(test)]
     pub async fn jobs(
-        &self,
-        owners: Owners<'_>,
+        self: &Arc<Self>,
+        owners: Owners,
         filter: &Filter,
         order: Order,
         mut cursor: Option<Cursor>,
@@ -89,7 +91,8 @@ impl Store {
         let mut all = vec![];
         loop {
             let rest = limit - all.len() as i64;
-            let found = self.some_jobs(owners, filter, order, cursor, rest).await?;
+            let found = self.some_jobs(owners.clone(), filter, order, cursor, rest);
+            let found = found.await?;
             all.extend(found.items);
             cursor = found.checked_to;
             if cursor.is_none() || all.len() as i64 >= limit {
@@ -100,90 +103,90 @@ impl Store {
 
     /// At most `limit` jobs of a list, after `cursor`; fewer if their labels are large or many rows had to be checked.
     pub async fn some_jobs(
-        &self,
-        owners: Owners<'_>,
+        self: &Arc<Self>,
+        owners: Owners,
         filter: &Filter,
         order: Order,
         cursor: Option<Cursor>,
         limit: i64,
     ) -> Result<Entries<Job>> {
-        let Some(filter) = &filter.among(owners) else {
+        let Some(filter) = filter.among(&owners) else {
             return Ok(Entries::default());
         };
-        let read = async {
-            let mut connection = self.lists.acquire().await?;
-            let values = values_of(filter);
-            let (path, window) = choose(&mut connection, filter, &values, order, cursor).await?;
-            let mut query = page("job.*", filter, &path, window, i64::MAX, limit);
+        self.read_list(move |store, connection| {
+            let values = values_of(&filter);
+            let (path, window) = choose(connection, &filter, &values, order, cursor)?;
+            let query = page("job.*", &filter, &path, window, i64::MAX, limit);
             let mut jobs = Entries::default();
             jobs.checked_to = window.last;
-            let mut rows = query.build().fetch(&mut *connection);
-            while let Some(row) = rows.try_next().await? {
-                let job = from_row(&row)?;
+            let mut statement = connection.prepare_cached(query.sql())?;
+            let mut rows = statement.query(query.values())?;
+            while let Some(row) = rows.next()? {
+                let job = from_row(row)?;
                 let bytes = bytes_of(&job.labels);
                 if jobs.add(job, bytes).is_break() {
                     break;
                 }
             }
-            drop(rows);
-            self.complete(&mut connection, &mut jobs.items).await?;
-            self.damages.have_all(tables_of(filter))?;
+            store.complete(connection, &mut jobs.items)?;
+            store.damages.have_all(tables_of(&filter))?;
             Ok(jobs)
-        };
-        self.damages.noting(read).await
+        })
+        .await
     }
 
     /// How many jobs there are, by group if requested; the groups are sorted by name.
     pub async fn count(
-        &self,
-        owners: Owners<'_>,
+        self: &Arc<Self>,
+        owners: Owners,
         filter: &Filter,
         group_by: Option<GroupBy>,
     ) -> Result<Vec<(String, i64)>> {
-        let Some(filter) = &filter.among(owners) else {
+        let Some(filter) = filter.among(&owners) else {
             return Ok(vec![]);
         };
-        let read = async {
-            let mut query = counted(filter, group_by);
-            let rows = query.build().fetch_all(&self.lists).await?;
-            self.damages.have_all(tables_of(filter))?;
-            rows.iter()
-                .map(|row| Ok((row.try_get("kind")?, row.try_get("jobs")?)))
-                .collect()
-        };
-        self.damages.noting(read).await
+        self.read_list(move |store, connection| {
+            let query = counted(&filter, group_by);
+            let groups = connection.rows(query.sql(), query.values(), |row| Ok(row.try_into()?))?;
+            store.damages.have_all(tables_of(&filter))?;
+            Ok(groups)
+        })
+        .await
     }
 
     /// The keys of at most `limit` jobs, in order of arrival, after a place in that order and up to a key.
     pub async fn keys(
-        &self,
-        owners: Owners<'_>,
+        self: &Arc<Self>,
+        owners: Owners,
         filter: &Filter,
         after: Option<Cursor>,
         up_to: i64,
         limit: i64,
     ) -> Result<Keys> {
-        let (mut keys, mut next) = (vec![], None);
-        if let Some(filter) = &filter.among(owners) {
-            let mut connection = self.lists.acquire().await?;
-            let values = values_of(filter);
+        let Some(filter) = filter.among(&owners) else {
+            let (keys, next) = (vec![], None);
+            return Ok(Keys { keys, next });
+        };
+        self.read_list(move |store, connection| {
+            let values = values_of(&filter);
             let order = Order::OLDEST_FIRST;
-            let (path, window) = choose(&mut connection, filter, &values, order, after).await?;
+            let (path, window) = choose(connection, &filter, &values, order, after)?;
             let columns = "job.id, job.created_at";
-            let mut query = page(columns, filter, &path, window, up_to, limit);
+            let query = page(columns, &filter, &path, window, up_to, limit);
             let places: Vec<(i64, i64)> =
-                query.build_query_as().fetch_all(&mut *connection).await?;
-            next = match places.last() {
+                connection.rows(query.sql(), query.values(), |row| Ok(row.try_into()?))?;
+            store.damages.have_all(tables_of(&filter))?;
+            let next = match places.last() {
                 Some((key, micros)) if places.len() as i64 == limit => Some(Cursor {
                     micros: *micros,
                     key: *key,
                 }),
                 _ => window.last,
             };
-            keys = places.into_iter().map(|(key, _)| key).collect();
-            self.damages.have_all(tables_of(filter))?;
-        }
-        Ok(Keys { keys, next })
+            let keys = places.into_iter().map(|(key, _)| key).collect();
+            Ok(Keys { keys, next })
+        })
+        .await
     }
 }
 
@@ -196,7 +199,7 @@ fn tables_of(filter: &Filter) -> &'static [Table] {
 }
 
 /// The filters that are given, each with its values.
-pub(super) fn values_of(filter: &Filter) -> Vec<(&'static Field, Vec<Stored>)> {
+pub(super) fn values_of(filter: &Filter) -> Vec<(&'static Field, Vec<Value>)> {
     let each = FILTERS.iter().map(|field| (field, (field.values)(filter)));
     each.filter(|(_, values)| !values.is_empty()).collect()
 }
@@ -204,7 +207,7 @@ pub(super) fn values_of(filter: &Filter) -> Vec<(&'static Field, Vec<Stored>)> {
 /// All ways to find the jobs of a list. The last one finds all jobs in the order of the list.
 pub(super) fn paths<'a>(
     filter: &'a Filter,
-    values: &'a [(&'static Field, Vec<Stored>)],
+    values: &'a [(&'static Field, Vec<Value>)],
     order: Order,
 ) -> Vec<Path<'a>> {
     let mut paths = vec![];
@@ -234,10 +237,10 @@ pub(super) fn paths<'a>(
 
 /// The path of a page and its part. One in the order of the list is read as far as the limit permits; one in another
 /// order only if that is to its end, since its rows are sorted.
-async fn choose<'a>(
-    connection: &mut SqliteConnection,
+fn choose<'a>(
+    connection: &Connection,
     filter: &'a Filter,
-    values: &'a [(&'static Field, Vec<Stored>)],
+    values: &'a [(&'static Field, Vec<Value>)],
     order: Order,
     after: Option<Cursor>,
 ) -> Result<(Path<'a>, Window)> {
@@ -252,14 +255,14 @@ async fn choose<'a>(
     for path in paths(filter, values, order) {
         let ordered = path.by == order.by;
         let begin = after.filter(|_| ordered);
-        let reached = reach(filter, &path, path.order(order), begin, most)
-            .build_query_as()
-            .fetch_optional(&mut *connection)
-            .await?;
-        let Some((micros, key)) = reached else {
+        let query = reach(filter, &path, path.order(order), begin, most);
+        let reached = connection.row(query.sql(), query.values(), |row| {
+            let (micros, key) = row.try_into()?;
+            Ok(Cursor { micros, key })
+        })?;
+        let Some(reached) = reached else {
             return Ok((path, end));
         };
-        let reached = Cursor { micros, key };
         if ordered
             && furthest
                 .1
@@ -280,8 +283,8 @@ pub(super) fn reach(
     order: Order,
     after: Option<Cursor>,
     most: i64,
-) -> QueryBuilder<Sqlite> {
-    let mut query = QueryBuilder::<Sqlite>::new("");
+) -> Query {
+    let mut query = Query::default();
     let window = Window {
         after,
         last: None,
@@ -294,7 +297,7 @@ pub(super) fn reach(
         bounds(query, filter, place, window);
         query.push(ordered(at, id, order));
     });
-    query.push(" limit 1 offset ").push_bind(most - 1);
+    query.push(" limit 1 offset ").push_value(most - 1);
     query
 }
 
@@ -306,8 +309,8 @@ pub(super) fn page(
     window: Window,
     up_to: i64,
     limit: i64,
-) -> QueryBuilder<Sqlite> {
-    let mut query = QueryBuilder::<Sqlite>::new("");
+) -> Query {
+    let mut query = Query::default();
     let order = window.order;
     let by = <&str>::from(order.by);
     merged(&mut query, path, by, order, limit, |query, lane| {
@@ -321,24 +324,24 @@ pub(super) fn page(
             query.push(" and job.finished_at is not null");
         }
         if up_to < i64::MAX {
-            query.push(" and job.id <= ").push_bind(up_to);
+            query.push(" and job.id <= ").push_value(up_to);
         }
         conditions(query, filter, Some(lane), order.by);
         bounds(query, filter, place, window);
         query.push(ordered(place.at, place.id, order));
     });
-    query.push(" limit ").push_bind(limit);
+    query.push(" limit ").push_value(limit);
     query
 }
 
 /// The lanes of a path, each with at most `most` rows, merged in order.
 fn merged<'a>(
-    query: &mut QueryBuilder<Sqlite>,
+    query: &mut Query,
     path: &Path<'a>,
     by: &str,
     order: Order,
     most: i64,
-    lane: impl Fn(&mut QueryBuilder<Sqlite>, Lane<'a>),
+    lane: impl Fn(&mut Query, Lane<'a>),
 ) {
     if let [only] = path.lanes[..] {
         return lane(query, only);
@@ -350,7 +353,7 @@ fn merged<'a>(
             " union all select * from ("
         });
         lane(query, *one);
-        query.push(" limit ").push_bind(most).push(")");
+        query.push(" limit ").push_value(most).push(")");
     }
     query.push(ordered(by, "id", order));
 }
@@ -361,7 +364,7 @@ fn ordered(at: &str, id: &str, order: Order) -> String {
 }
 
 /// The rows of a lane. `indexed by`: the planner does not know how many jobs a filter matches, and would guess.
-fn from(query: &mut QueryBuilder<Sqlite>, lane: Lane<'_>, by: OrderBy, columns: &str) {
+fn from(query: &mut Query, lane: Lane<'_>, by: OrderBy, columns: &str) {
     match lane {
         Lane::Label((key, value)) => {
             // a place in the index needs no job
@@ -372,15 +375,17 @@ fn from(query: &mut QueryBuilder<Sqlite>, lane: Lane<'_>, by: OrderBy, columns: 
             query.push(format!(
                 "select {columns} from job_label{job} where job_label.key = "
             ));
-            query.push_bind(key.clone()).push(" and job_label.value = ");
-            query.push_bind(value.clone());
+            query
+                .push_value(key.clone())
+                .push(" and job_label.value = ");
+            query.push_value(value.clone());
         }
         Lane::Value(index, field, value) => {
             let column = field.column;
             query.push(format!(
                 "select {columns} from job indexed by {index} where {column} = "
             ));
-            push_value(query, value);
+            query.push_value(value.clone());
         }
         Lane::All => {
             let (index, all) = match by {
@@ -394,17 +399,11 @@ fn from(query: &mut QueryBuilder<Sqlite>, lane: Lane<'_>, by: OrderBy, columns: 
     }
 }
 
-fn push_value(query: &mut QueryBuilder<Sqlite>, value: &Stored) {
-    match value {
-        Stored::Text(text) => query.push_bind(text.clone()),
-        Stored::Micros(micros) => query.push_bind(*micros),
-    };
-}
-
 /// The number of jobs in each group.
-pub(super) fn counted(filter: &Filter, group_by: Option<GroupBy>) -> QueryBuilder<Sqlite> {
+pub(super) fn counted(filter: &Filter, group_by: Option<GroupBy>) -> Query {
     let group = group_by.map_or("''", Into::into);
-    let mut query = QueryBuilder::<Sqlite>::new(format!(
+    let mut query = Query::default();
+    query.push(format!(
         "select {group} as kind, count(*) as jobs from job where true"
     ));
     conditions(&mut query, filter, None, OrderBy::CreatedAt);
@@ -420,12 +419,7 @@ pub(super) fn counted(filter: &Filter, group_by: Option<GroupBy>) -> QueryBuilde
 }
 
 /// The conditions of a filter, except for that of the lane and for bounds of the time that orders the list.
-fn conditions(
-    query: &mut QueryBuilder<Sqlite>,
-    filter: &Filter,
-    lane: Option<Lane<'_>>,
-    by: OrderBy,
-) {
+fn conditions(query: &mut Query, filter: &Filter, lane: Option<Lane<'_>>, by: OrderBy) {
     for (field, values) in values_of(filter) {
         let of_lane = matches!(lane, Some(Lane::Value(_, own, _)) if own.name == field.name);
         if of_lane || field.column == <&str>::from(by) {
@@ -433,13 +427,15 @@ fn conditions(
         }
         if field.comparison != "=" {
             query.push(format!(" and job.{} {} ", field.column, field.comparison));
-            values.iter().for_each(|value| push_value(query, value));
+            for value in values {
+                query.push_value(value);
+            }
             continue;
         }
         query.push(format!(" and job.{} in (", field.column));
-        for (n, value) in values.iter().enumerate() {
+        for (n, value) in values.into_iter().enumerate() {
             query.push(if n == 0 { "" } else { ", " });
-            push_value(query, value);
+            query.push_value(value);
         }
         query.push(")");
     }
@@ -453,8 +449,8 @@ fn conditions(
             None => query.push(" and job.id in (select job_id from job_label where key = "),
         };
         let (key, value) = label.clone();
-        query.push_bind(key).push(" and value = ");
-        query.push_bind(value).push(")");
+        query.push_value(key).push(" and value = ");
+        query.push_value(value).push(")");
     }
 }
 
@@ -487,7 +483,7 @@ impl Place {
 /// The bounds of the time that orders the rows, and those of the window. No job ends before it was accepted: a bound on
 /// one time is also one on the other. A bound that the window implies is left out, since the index would be read from
 /// the weaker one as well.
-fn bounds(query: &mut QueryBuilder<Sqlite>, filter: &Filter, place: Place, window: Window) {
+fn bounds(query: &mut Query, filter: &Filter, place: Place, window: Window) {
     let Place { at, id } = place;
     let Window { after, last, order } = window;
     let (least, most) = match order.by {
@@ -507,7 +503,7 @@ fn bounds(query: &mut QueryBuilder<Sqlite>, filter: &Filter, place: Place, windo
     for (time, comparison, implied) in [(least, ">=", lower), (most, "<", upper)] {
         if let (Some(time), None) = (time, implied) {
             query.push(format!(" and {at} {comparison} "));
-            query.push_bind(time.micros());
+            query.push_value(time.micros());
         }
     }
     for (place, comparison) in [
@@ -516,7 +512,11 @@ fn bounds(query: &mut QueryBuilder<Sqlite>, filter: &Filter, place: Place, windo
     ] {
         if let Some(Cursor { micros, key }) = place {
             query.push(format!(" and ({at}, {id}) {comparison} ("));
-            query.push_bind(micros).push(", ").push_bind(key).push(")");
+            query
+                .push_value(micros)
+                .push(", ")
+                .push_value(key)
+                .push(")");
         }
     }
 }

@@ -1,11 +1,14 @@
 //! One job: found by its public id; details of it by its key.
 
+use std::sync::Arc;
+
 use super::{
     content::{self, Holder, name},
     damage::Table,
     database::Store,
     error::Result,
     rows::{find_row, with_id},
+    sql::Sql,
 };
 use crate::{
     caller::Owners,
@@ -14,57 +17,57 @@ use crate::{
 
 impl Store {
     /// The job with this public id, with its queue position.
-    pub async fn job(&self, owners: Owners<'_>, id: JobId) -> Result<Option<Job>> {
-        let read = async {
-            let mut connection = self.reader.acquire().await?;
-            let Some(mut job) = with_id(&mut connection, owners, id).await? else {
-                self.damages.have_all(&[Table::Jobs])?;
+    pub async fn job(self: &Arc<Self>, owners: Owners, id: JobId) -> Result<Option<Job>> {
+        self.read(move |store, connection| {
+            let Some(mut job) = with_id(connection, &owners, id)? else {
+                store.damages.have_all(&[Table::Jobs])?;
                 return Ok(None);
             };
-            self.complete(&mut connection, std::slice::from_mut(&mut job))
-                .await?;
+            store.complete(connection, std::slice::from_mut(&mut job))?;
             Ok(Some(job))
-        };
-        self.damages.noting(read).await
+        })
+        .await
     }
 
     /// The title of a job, and its problem as JSON without the title.
-    pub async fn problem(&self, key: i64) -> Result<Option<(Option<String>, String)>> {
-        let read = async {
-            let mut tx = self.reader.begin().await?;
-            let Some((row, _)) = find_row(&mut tx, key).await? else {
+    pub async fn problem(self: &Arc<Self>, key: i64) -> Result<Option<(Option<String>, String)>> {
+        self.read(move |_, connection| {
+            let tx = connection.unchecked_transaction()?;
+            let Some((row, _)) = find_row(&tx, key)? else {
                 return Ok(None);
             };
-            let body = content::read_text(&mut tx, Holder::Job(key), name::PROBLEM).await?;
+            let body = content::read_text(&tx, Holder::Job(key), name::PROBLEM)?;
             Ok(Some((row.title, body)))
-        };
-        self.damages.noting(read).await
+        })
+        .await
     }
 
     /// Whether the job is terminal, so that its events contain `done`; `None` if it no longer exists.
-    pub async fn has_ended(&self, key: i64) -> Result<Option<bool>> {
-        let status: Option<String> = sqlx::query_scalar("select status from job where id = ?")
-            .bind(key)
-            .fetch_optional(&self.reader)
-            .await?;
-        Ok(status.map(|word| word.parse().is_ok_and(Status::is_terminal)))
+    pub async fn has_ended(self: &Arc<Self>, key: i64) -> Result<Option<bool>> {
+        self.read(move |_, connection| {
+            let status = "select status from job where id = ?";
+            let status: Option<String> = connection.optional_value(status, [key])?;
+            Ok(status.map(|word| word.parse().is_ok_and(Status::is_terminal)))
+        })
+        .await
     }
 
     /// The age of the oldest job that waits for a worker (seconds).
-    pub async fn oldest_wait_s(&self) -> Result<Option<f64>> {
+    pub async fn oldest_wait_s(self: &Arc<Self>) -> Result<Option<f64>> {
         let Some(key) = self.waiting_jobs().oldest() else {
             return Ok(None);
         };
-        let created: Option<i64> = sqlx::query_scalar("select created_at from job where id = ?")
-            .bind(key)
-            .fetch_optional(&self.reader)
-            .await?;
-        Ok(created.map(|at| (self.now().micros() - at).max(0) as f64 / 1e6))
+        self.read(move |store, connection| {
+            let created = "select created_at from job where id = ?";
+            let created: Option<i64> = connection.optional_value(created, [key])?;
+            Ok(created.map(|at| (store.now().micros() - at).max(0) as f64 / 1e6))
+        })
+        .await
     }
 
     /// The key of the newest job; 0 when there is none.
-    pub async fn last_key(&self) -> Result<i64> {
-        let last = sqlx::query_scalar("select coalesce(max(id), 0) from job");
-        Ok(last.fetch_one(&self.reader).await?)
+    pub async fn last_key(self: &Arc<Self>) -> Result<i64> {
+        self.read(|_, connection| connection.value("select coalesce(max(id), 0) from job", ()))
+            .await
     }
 }

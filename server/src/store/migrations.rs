@@ -1,19 +1,28 @@
 //! The tables and their history: `migrations/`, compiled in.
 
-use std::{borrow::Cow, collections::BTreeMap, path::Path};
+use std::{collections::BTreeMap, path::Path, time::Instant};
 
-use sqlx::{
-    Connection, SqlSafeStr, SqliteConnection, SqlitePool,
-    migrate::{Migration, MigrationType, Migrator},
-};
+use rusqlite::{Connection, params};
+use sha2::{Digest, Sha384};
 
 use super::{
     error::{Result, StoreError},
     model_files, old_content,
+    sql::Sql,
 };
 
-/// Every step, with the name of its file. They are listed here instead of found by `sqlx::migrate!`, which would
-/// compile sqlx and SQLite a second time for the compiler to run; a test compares the list with the folder.
+/// Where the applied steps are listed. The table, its name and the checksums are those of sqlx, with which earlier versions
+/// applied them.
+const APPLIED: &str = "create table if not exists _sqlx_migrations (
+    version BIGINT PRIMARY KEY,
+    description TEXT NOT NULL,
+    installed_on TIMESTAMP NOT NULL DEFAULT CURRENT_TIMESTAMP,
+    success BOOLEAN NOT NULL,
+    checksum BLOB NOT NULL,
+    execution_time BIGINT NOT NULL
+)";
+
+/// Every step, with the name of its file; a test compares the list with the folder.
 const STEPS: [(i64, &str, &str); 18] = [
     (1, "jobs", include_str!("../../../migrations/0001_jobs.sql")),
     (
@@ -109,20 +118,17 @@ pub(super) fn last_step() -> i64 {
 }
 
 /// Brings the tables of the store in this folder up to date, and checks that they are those of this version.
-pub(super) async fn run(database: &SqlitePool, folder: &Path) -> Result<()> {
-    model_files::write(&mut *database.acquire().await?, folder).await?;
-    if !has_step(&mut *database.acquire().await?, CONTENT + 1).await? {
-        migrator_to(CONTENT).run(database).await?;
-        old_content::move_all(database).await?;
+pub(super) fn run(database: &Connection, folder: &Path) -> Result<()> {
+    model_files::write(database, folder)?;
+    if !has_step(database, CONTENT + 1)? {
+        run_to(database, CONTENT)?;
+        old_content::move_all(database)?;
     }
-    migrator().run(database).await?;
-    let mut connection = database.acquire().await?;
-    let found = schema(&mut connection).await?;
-    let mut empty = SqliteConnection::connect("sqlite::memory:")
-        .await
-        .map_err(StoreError::from)?;
-    migrator().run_direct(None, &mut empty, false).await?;
-    let expected = schema(&mut empty).await?;
+    run_to(database, last_step())?;
+    let found = schema(database)?;
+    let empty = Connection::open_in_memory()?;
+    run_to(&empty, last_step())?;
+    let expected = schema(&empty)?;
     for (name, sql) in &expected {
         if found.get(name) != Some(sql) {
             return Err(StoreError::Schema(format!(
@@ -134,40 +140,30 @@ pub(super) async fn run(database: &SqlitePool, folder: &Path) -> Result<()> {
 }
 
 /// An error if the tables are of a later version, or not of this program. Nothing is written.
-pub(super) async fn check(connection: &mut SqliteConnection) -> Result<()> {
-    let ours: bool = sqlx::query_scalar(
-        "select exists (select 1 from sqlite_schema where name = '_sqlx_migrations')
-                or not exists (select 1 from sqlite_schema)",
-    )
-    .fetch_one(&mut *connection)
-    .await?;
-    if !ours {
-        return Err(StoreError::Schema(
-            "the database does not belong to this program".into(),
-        ));
+pub(super) fn check(connection: &Connection) -> Result<()> {
+    if !is_listed(connection)? {
+        return match connection.value("select exists (select 1 from sqlite_schema)", ())? {
+            true => Err(StoreError::Schema(
+                "the database does not belong to this program".into(),
+            )),
+            false => Ok(()),
+        };
     }
-    let applied = "select exists (select 1 from sqlite_schema where name = '_sqlx_migrations')";
-    if !sqlx::query_scalar::<_, bool>(applied)
-        .fetch_one(&mut *connection)
-        .await?
-    {
-        return Ok(());
-    }
-    let applied: Vec<(i64, Vec<u8>)> =
-        sqlx::query_as("select version, checksum from _sqlx_migrations order by version")
-            .fetch_all(connection)
-            .await?;
-    let known = migrator();
-    for (version, checksum) in applied {
-        match known.iter().find(|step| step.version == version) {
+    let applied: Vec<(i64, Vec<u8>)> = connection.rows(
+        "select version, checksum from _sqlx_migrations order by version",
+        (),
+        |row| Ok(row.try_into()?),
+    )?;
+    for (version, found) in applied {
+        match STEPS.iter().find(|(step, ..)| *step == version) {
             None => {
                 return Err(StoreError::Schema(format!(
                     "the store was written by a later version of this program (its tables have step {version}, the last one known \
                      here is {}); use that version",
-                    STEPS.last().map_or(0, |(version, ..)| *version)
+                    last_step()
                 )));
             }
-            Some(step) if step.checksum[..] != checksum[..] => {
+            Some((.., sql)) if checksum(sql) != found => {
                 return Err(StoreError::Schema(format!(
                     "the store does not belong to this program, or is damaged: step {version} of its tables is different"
                 )));
@@ -179,11 +175,8 @@ pub(super) async fn check(connection: &mut SqliteConnection) -> Result<()> {
 }
 
 /// An error if the tables are of an earlier version.
-pub(super) async fn are_current(connection: &mut SqliteConnection) -> Result<()> {
-    let steps: i64 = sqlx::query_scalar("select count(*) from _sqlx_migrations")
-        .fetch_one(&mut *connection)
-        .await?;
-    match steps == STEPS.len() as i64 {
+pub(super) fn are_current(connection: &Connection) -> Result<()> {
+    match has_step(connection, last_step())? {
         true => Ok(()),
         false => Err(StoreError::Schema(
             "the store is of an earlier version of this program: start the service on it once to update it".into(),
@@ -192,48 +185,52 @@ pub(super) async fn are_current(connection: &mut SqliteConnection) -> Result<()>
 }
 
 /// The statements that made the tables and indexes, by name.
-async fn schema(connection: &mut SqliteConnection) -> Result<BTreeMap<String, Option<String>>> {
-    let all: Vec<(String, Option<String>)> =
-        sqlx::query_as("select name, sql from sqlite_schema where name not like 'sqlite_stat%'")
-            .fetch_all(connection)
-            .await?;
+fn schema(connection: &Connection) -> Result<BTreeMap<String, Option<String>>> {
+    let all = "select name, sql from sqlite_schema
+               where name not like 'sqlite_stat%' and name not like '%_sqlx_migrations%'";
+    let all = connection.rows(all, (), |row| Ok(row.try_into()?))?;
     Ok(all.into_iter().collect())
 }
 
 /// The step after which `old_content` moves what earlier versions stored.
 pub(super) const CONTENT: i64 = 17;
 
-/// Whether the tables have this step.
-async fn has_step(connection: &mut SqliteConnection, version: i64) -> Result<bool> {
+/// Whether there is a list of steps.
+fn is_listed(connection: &Connection) -> Result<bool> {
     let any = "select exists (select 1 from sqlite_schema where name = '_sqlx_migrations')";
-    if !sqlx::query_scalar(any).fetch_one(&mut *connection).await? {
-        return Ok(false);
-    }
+    connection.value(any, ())
+}
+
+/// Whether the tables have this step.
+fn has_step(connection: &Connection, version: i64) -> Result<bool> {
     let step = "select exists (select 1 from _sqlx_migrations where version = ?)";
-    let step = sqlx::query_scalar(step).bind(version);
-    Ok(step.fetch_one(connection).await?)
+    Ok(is_listed(connection)? && connection.value(step, [version])?)
 }
 
-/// All steps: they bring the tables of an older version up to date.
-pub(super) fn migrator() -> Migrator {
-    migrator_to(last_step())
+/// Applies the steps up to this one which the tables do not have, each in a transaction.
+pub(super) fn run_to(connection: &Connection, last: i64) -> Result<()> {
+    connection.execute_batch(APPLIED)?;
+    check(connection)?;
+    for (version, description, sql) in STEPS {
+        if version > last || has_step(connection, version)? {
+            continue;
+        }
+        let start = Instant::now();
+        let tx = connection.unchecked_transaction()?;
+        tx.execute_batch(sql)?;
+        let took = i64::try_from(start.elapsed().as_nanos()).unwrap_or(i64::MAX);
+        tx.run(
+            "insert into _sqlx_migrations (version, description, success, checksum, execution_time)
+             values (?, ?, true, ?, ?)",
+            params![version, description, checksum(sql), took],
+        )?;
+        tx.commit()?;
+    }
+    Ok(())
 }
 
-/// The steps up to this one.
-pub(super) fn migrator_to(last: i64) -> Migrator {
-    let migration = |(version, description, sql): (i64, &'static str, &'static str)| {
-        let description = Cow::Borrowed(description);
-        let without_transaction = false;
-        Migration::new(
-            version,
-            description,
-            MigrationType::Simple,
-            sql.into_sql_str(),
-            without_transaction,
-        )
-    };
-    let steps = STEPS.into_iter().filter(|(version, ..)| *version <= last);
-    Migrator::with_migrations(steps.map(migration).collect())
+fn checksum(sql: &str) -> Vec<u8> {
+    Sha384::digest(sql).to_vec()
 }
 
 #[cfg(test)]
@@ -242,24 +239,22 @@ mod tests {
 
     use super::*;
 
-    #[tokio::test]
-    async fn every_file_of_the_folder_is_a_step_under_its_name() {
+    #[test]
+    fn every_file_of_the_folder_is_a_step_under_its_name() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../migrations");
-        let files = Migrator::new(folder).await.unwrap();
-        let fields = |migrator: &Migrator| -> Vec<_> {
-            let steps = migrator.iter().cloned();
-            steps
-                .map(|m| {
-                    (
-                        m.version,
-                        m.description,
-                        m.migration_type,
-                        m.checksum,
-                        m.no_tx,
-                    )
-                })
-                .collect()
-        };
-        assert_eq!(fields(&migrator()), fields(&files));
+        let files = std::fs::read_dir(folder).unwrap();
+        let files = files.map(|file| file.unwrap().path());
+        let mut files: Vec<_> = files
+            .map(|file| {
+                let name = file.file_name().unwrap().to_str().unwrap().to_owned();
+                (name, std::fs::read_to_string(file).unwrap())
+            })
+            .collect();
+        files.sort_unstable();
+        let steps = STEPS.iter().map(|(version, description, sql)| {
+            let name = format!("{version:04}_{}.sql", description.replace(' ', "_"));
+            (name, (*sql).to_owned())
+        });
+        assert_eq!(files, steps.collect::<Vec<_>>());
     }
 }

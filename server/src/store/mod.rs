@@ -2,7 +2,8 @@
 //!
 //! One connection writes, always in `begin immediate`, so that no transaction fails half-way
 //! because it cannot get a lock; others read at the same time (WAL). A commit is on the disk when it returns
-//! (synchronous FULL). Each method runs one query or change, in one transaction.
+//! (synchronous FULL). Each method runs one query or change, in one transaction, on a thread that may block: all code below it
+//! is plain functions of a connection.
 //!
 //! Queries by public id, lists and counts have a parameter for the owners whose jobs they may return ([`Owners`]): a
 //! job of another owner is not found, as if it did not exist. Keys, the store's own numbers of jobs, come only from
@@ -44,7 +45,7 @@
 //! | how far the store had come | `progress` |
 //! | space for control on a full disk | `reserve` |
 //! | tables and migrations | `migrations`, `migrations/0001_jobs.sql` and those after it |
-//! | connections to the database | `database` |
+//! | connections to the database, statements | `database`, `connections`, `sql` |
 //! | the clock of the store, and time that it has not seen pass | `clock`, `pauses` |
 //! | whether the store works (`/readyz`) | `health` |
 //! | retention | `retention` |
@@ -63,11 +64,13 @@
 
 // Input and output types, and errors.
 mod checksum;
+mod connections;
 mod encoding;
 mod entries;
 mod error;
 mod filter;
 mod repeated_error;
+mod sql;
 mod submission;
 
 // Bytes by their hash, and what has them.
@@ -198,13 +201,15 @@ impl Store {
 
     /// The same, without the tasks that look after it from time to time.
     async fn open_unwatched(folder: &Path) -> Result<Arc<Store>> {
-        let (store, submissions) = Store::connect(folder, Rebuild::IfItCannotGiveBack).await?;
+        let folder = folder.to_owned();
+        let connect = move || Store::connect(&folder, Rebuild::IfItCannotGiveBack);
+        let (store, submissions) = connections::blocking(connect).await?;
+        let store = Arc::new(store);
         store.read_waiting_jobs().await?;
         store.read_settings().await?;
         store.read_tokens().await?;
         store.read_clock().await?;
         store.read_pauses().await?;
-        let store = Arc::new(store);
         let committing = submit::commit_submissions(Arc::downgrade(&store), submissions);
         tokio::spawn(committing);
         Ok(store)

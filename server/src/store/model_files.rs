@@ -8,13 +8,14 @@ use std::{
     path::Path,
 };
 
+use rusqlite::{Connection, Row};
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
-use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 
 use super::{
     checksum::{self, Checksum},
     error::{Record, Result, StoreError},
+    sql::{Sql, text},
 };
 
 /// The folder of the files, in that of the store.
@@ -42,17 +43,10 @@ struct Description<'a> {
 
 /// Writes each model to `models/NAME,OWNER.json`: neither name can contain a comma. Does nothing without the tables. A damaged
 /// model is left out, and the log says so. The files are on the disk when this returns.
-pub(super) async fn write(connection: &mut SqliteConnection, store: &Path) -> Result<()> {
+pub(super) fn write(connection: &Connection, store: &Path) -> Result<()> {
     let exists = "select exists (select 1 from sqlite_schema where name = 'model_problem')";
-    if !sqlx::query_scalar(exists)
-        .fetch_one(&mut *connection)
-        .await?
-    {
-        return Ok(());
-    }
-    let rows = sqlx::query("select * from model order by id");
-    let rows = rows.fetch_all(&mut *connection).await?;
-    if rows.is_empty() {
+    let any = "select exists (select 1 from model)";
+    if !connection.value::<bool>(exists, ())? || !connection.value::<bool>(any, ())? {
         return Ok(());
     }
     let folder = store.join(FOLDER);
@@ -65,8 +59,10 @@ pub(super) async fn write(connection: &mut SqliteConnection, store: &Path) -> Re
         .create(&folder)
         .map_err(failed)?;
     let mut written = 0;
-    for row in &rows {
-        match definition(connection, row).await {
+    let mut statement = connection.prepare("select * from model order by id")?;
+    let mut rows = statement.query(())?;
+    while let Some(row) = rows.next()? {
+        match definition(connection, row) {
             Ok((name, text)) => {
                 write_file(&folder.join(name), &text).map_err(failed)?;
                 written += 1;
@@ -104,34 +100,27 @@ fn write_file(path: &Path, text: &str) -> io::Result<()> {
 }
 
 /// The name of the file of a model, and its content.
-async fn definition(
-    connection: &mut SqliteConnection,
-    row: &SqliteRow,
-) -> Result<(String, String)> {
-    let (key, name, owner): (i64, String, String) = (
-        row.try_get("id")?,
-        row.try_get("name")?,
-        row.try_get("owner")?,
-    );
+fn definition(connection: &Connection, row: &Row<'_>) -> Result<(String, String)> {
+    let key: i64 = row.get("id")?;
+    let (name, owner) = (text(row, "name")?, text(row, "owner")?);
     let record = || Record::named(format!("model number {key}"));
     // of the first versions some have none
-    let sealed = row.try_get::<Option<i64>, _>("checksum")?.is_some();
+    let sealed = row.get::<_, Option<i64>>("checksum")?.is_some();
     if sealed && !checksum::row_is_intact(row)? {
         return Err(record().damaged("its checksum does not match its content"));
     }
-    let problem = sqlx::query("select body, checksum from model_problem where model = ?").bind(key);
-    let problem = problem.fetch_optional(connection).await?;
-    let problem = problem.ok_or_else(|| record().damaged("its problem is missing"))?;
-    let body: String = problem.try_get("body")?;
+    let problem = "select body, checksum from model_problem where model = ?";
+    let problem: Option<(String, Option<i64>)> =
+        connection.row(problem, [key], |row| Ok(row.try_into()?))?;
+    let (body, stored) = problem.ok_or_else(|| record().damaged("its problem is missing"))?;
     let sum = Checksum::new().int(key).text(&body);
-    sum.verify(problem.try_get("checksum")?, record)?;
-    let description: String = row.try_get("description")?;
+    sum.verify(stored, record)?;
     let damaged = |error| record().damaged(error);
     let Description {
         title,
         inputs,
         outputs,
-    } = serde_json::from_str(&description).map_err(damaged)?;
+    } = serde_json::from_str(text(row, "description")?).map_err(damaged)?;
     let definition = Definition {
         title,
         inputs,

@@ -1,6 +1,6 @@
 //! The pages of the database: how large it is, and how much of it is free.
 
-use sqlx::sqlite::SqliteExecutor;
+use rusqlite::Connection;
 
 use super::error::Result;
 
@@ -17,13 +17,10 @@ pub(super) struct Pages {
 
 impl Pages {
     /// As they are now.
-    pub(super) async fn of(database: impl SqliteExecutor<'_>) -> Result<Pages> {
-        let (count, free, bytes) = sqlx::query_as(
-            "select page_count, freelist_count, page_size
-             from pragma_page_count, pragma_freelist_count, pragma_page_size",
-        )
-        .fetch_one(database)
-        .await?;
+    pub(super) fn of(database: &Connection) -> Result<Pages> {
+        let pages = "select page_count, freelist_count, page_size
+                     from pragma_page_count, pragma_freelist_count, pragma_page_size";
+        let (count, free, bytes) = database.query_row(pages, (), |row| row.try_into())?;
         Ok(Pages { count, free, bytes })
     }
 

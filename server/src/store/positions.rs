@@ -1,14 +1,15 @@
 //! The position of a job in the queue, from the mirror in memory.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, sync::Arc};
 
-use sqlx::SqliteConnection;
+use rusqlite::Connection;
 
 use super::{
     database::Store,
     error::Result,
     rows::find,
     sizes,
+    sql::Sql,
     waiting::{Move, Owner, Place, WaitingJobs},
 };
 use crate::job::{Job, QueuePosition, Status, Waiting};
@@ -19,76 +20,15 @@ pub(super) const WAITING: &str = "select priority, owner, id from job indexed by
 
 impl Store {
     /// Reads the waiting jobs, when the store is opened.
-    pub(super) async fn read_waiting_jobs(&self) -> Result<()> {
+    pub(super) async fn read_waiting_jobs(self: &Arc<Self>) -> Result<()> {
         *self.waiting_jobs() = self.waiting_in_database().await?;
         Ok(())
     }
 
     /// The waiting jobs as the database has them; whose turn it was is not stored.
-    pub(super) async fn waiting_in_database(&self) -> Result<WaitingJobs> {
-        let waiting = match sqlx::query_as(WAITING).fetch_all(&self.reader).await {
-            Ok(waiting) => waiting,
-            // a page or a name that cannot be read: the others go on
-            Err(_) => self.waiting_one_by_one().await?,
-        };
-        let owners_of = |statement| sqlx::query_scalar::<_, String>(statement);
-        let coalesced = owners_of("select owner from job where coalesced_into is not null")
-            .fetch_all(&self.reader)
+    pub(super) async fn waiting_in_database(self: &Arc<Self>) -> Result<WaitingJobs> {
+        self.read(|_, connection| waiting_in_database(connection))
             .await
-            .unwrap_or_default(); // what cannot be read counts for nobody
-        let running = owners_of("select owner from job where status = 'running'")
-            .fetch_all(&self.reader)
-            .await
-            .unwrap_or_default();
-        let mut mirror = WaitingJobs::default();
-        let mut names: BTreeSet<Owner> = BTreeSet::new();
-        // one text for all jobs of an owner
-        let mut named = |name: String| match names.get(name.as_str()) {
-            Some(known) => known.clone(),
-            None => {
-                let name = Owner::from(name);
-                names.insert(name.clone());
-                name
-            }
-        };
-        for (priority, owner, key) in waiting {
-            let owner = named(owner);
-            mirror.apply(Move::Enter(Place {
-                priority,
-                owner,
-                key,
-            }));
-        }
-        for owner in coalesced {
-            mirror.apply(Move::Attach(named(owner)));
-        }
-        for owner in running {
-            mirror.apply(Move::Start(named(owner)));
-        }
-        Ok(mirror)
-    }
-
-    /// The same as `WAITING`, without jobs that cannot be read.
-    async fn waiting_one_by_one(&self) -> Result<Vec<(i32, String, i64)>> {
-        let keys: Vec<(i32, i64)> = sqlx::query_as(
-            "select priority, id from job indexed by job_queue
-             where status = 'queued' and coalesced_into is null order by priority desc, id",
-        )
-        .fetch_all(&self.reader)
-        .await?;
-        let mut found = vec![];
-        for (priority, key) in keys {
-            let owner = sqlx::query_scalar::<_, String>("select owner from job where id = ?")
-                .bind(key)
-                .fetch_one(&self.reader);
-            match owner.await {
-                Ok(owner) => found.push((priority, owner, key)),
-                Err(error) => {
-                    tracing::error!(job.key = key, %error, "a waiting job cannot be read and will not be started: {error}");
-                }
-            }
-        }
-        Ok(found)
     }
 
     /// How many jobs of this owner wait, and how many run.
@@ -119,28 +59,32 @@ impl Store {
 
     /// Fills in the queue positions, and what jobs keep that have ended, if they can be read: a request that has changed
     /// something is answered even without them.
-    pub async fn try_complete(&self, jobs: &mut [Job]) {
+    pub async fn try_complete(self: &Arc<Self>, jobs: &mut [Job]) {
         if jobs.iter().all(|job| job.status == Status::Running) {
             return;
         }
-        let added = async {
-            let mut connection = self.reader.acquire().await?;
-            self.complete(&mut connection, jobs).await
-        };
-        if let Err(cause) = added.await {
-            tracing::warn!(%cause, "queue positions and sizes could not be read: {cause}");
+        let mut completed = jobs.to_vec();
+        let completed = self.read(move |store, connection| {
+            store.complete(connection, &mut completed)?;
+            Ok(completed)
+        });
+        match completed.await {
+            Ok(completed) => {
+                for (job, completed) in jobs.iter_mut().zip(completed) {
+                    *job = completed;
+                }
+            }
+            Err(cause) => {
+                tracing::warn!(%cause, "queue positions and sizes could not be read: {cause}");
+            }
         }
     }
 
     /// Fills in what is not in the row of a job: its position in the queue, and what it keeps once it has ended.
-    pub(super) async fn complete(
-        &self,
-        connection: &mut SqliteConnection,
-        jobs: &mut [Job],
-    ) -> Result<()> {
-        self.add_queue_positions(connection, jobs).await?;
+    pub(super) fn complete(&self, connection: &Connection, jobs: &mut [Job]) -> Result<()> {
+        self.add_queue_positions(connection, jobs)?;
         self.add_full_disk(jobs);
-        sizes::add_sizes(connection, jobs).await
+        sizes::add_sizes(connection, jobs)
     }
 
     /// What running jobs find cannot be stored while the disk is full: one that is solved stays running.
@@ -157,11 +101,7 @@ impl Store {
 
     /// Fills in the queue positions of those that are queued. A coalesced job has the position and the progress of
     /// its primary.
-    async fn add_queue_positions(
-        &self,
-        connection: &mut SqliteConnection,
-        jobs: &mut [Job],
-    ) -> Result<()> {
+    fn add_queue_positions(&self, connection: &Connection, jobs: &mut [Job]) -> Result<()> {
         for job in jobs.iter_mut().filter(|job| job.status == Status::Queued) {
             let position = |job: &Job| {
                 let waiting = self.waiting_jobs();
@@ -186,7 +126,7 @@ impl Store {
                 });
                 continue;
             };
-            let Some(primary) = find(connection, primary).await? else {
+            let Some(primary) = find(connection, primary)? else {
                 continue; // it ended, and was deleted, since this job was read
             };
             let (position, ahead) = position(&primary).unwrap_or_default();
@@ -199,4 +139,64 @@ impl Store {
         }
         Ok(())
     }
+}
+
+/// The waiting jobs as the database has them; whose turn it was is not stored.
+fn waiting_in_database(connection: &Connection) -> Result<WaitingJobs> {
+    let waiting = match connection.rows(WAITING, (), |row| Ok(row.try_into()?)) {
+        Ok(waiting) => waiting,
+        // a page or a name that cannot be read: the others go on
+        Err(_) => waiting_one_by_one(connection)?,
+    };
+    // what cannot be read counts for nobody
+    let owners_of = |statement| connection.values(statement, ()).unwrap_or_default();
+    let coalesced: Vec<String> =
+        owners_of("select owner from job where coalesced_into is not null");
+    let running = owners_of("select owner from job where status = 'running'");
+    let mut mirror = WaitingJobs::default();
+    let mut names: BTreeSet<Owner> = BTreeSet::new();
+    // one text for all jobs of an owner
+    let mut named = |name: String| match names.get(name.as_str()) {
+        Some(known) => known.clone(),
+        None => {
+            let name = Owner::from(name);
+            names.insert(name.clone());
+            name
+        }
+    };
+    for (priority, owner, key) in waiting {
+        let owner = named(owner);
+        mirror.apply(Move::Enter(Place {
+            priority,
+            owner,
+            key,
+        }));
+    }
+    for owner in coalesced {
+        mirror.apply(Move::Attach(named(owner)));
+    }
+    for owner in running {
+        mirror.apply(Move::Start(named(owner)));
+    }
+    Ok(mirror)
+}
+
+/// The same as `WAITING`, without jobs that cannot be read.
+fn waiting_one_by_one(connection: &Connection) -> Result<Vec<(i32, String, i64)>> {
+    let keys: Vec<(i32, i64)> = connection.rows(
+        "select priority, id from job indexed by job_queue
+         where status = 'queued' and coalesced_into is null order by priority desc, id",
+        (),
+        |row| Ok(row.try_into()?),
+    )?;
+    let mut found = vec![];
+    for (priority, key) in keys {
+        match connection.value("select owner from job where id = ?", [key]) {
+            Ok(owner) => found.push((priority, owner, key)),
+            Err(error) => {
+                tracing::error!(job.key = key, %error, "a waiting job cannot be read and will not be started: {error}");
+            }
+        }
+    }
+    Ok(found)
 }

@@ -13,9 +13,12 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 
-use sqlx::SqliteConnection;
+use rusqlite::Connection;
 
-use super::error::{Result, StoreError};
+use super::{
+    error::{Result, StoreError},
+    sql::Sql,
+};
 
 /// The name of the file.
 pub(super) const FILE: &str = "signorini.progress";
@@ -71,22 +74,18 @@ pub(super) fn read(folder: &Path) -> Result<Known> {
 }
 
 /// What the database says; `None` if it is of a version that did not count.
-pub(super) async fn in_database(connection: &mut SqliteConnection) -> Result<Option<LastCommit>> {
+pub(super) fn in_database(connection: &Connection) -> Result<Option<LastCommit>> {
     let counted = "select exists (select 1 from sqlite_schema where name = 'progress')";
-    if !sqlx::query_scalar::<_, bool>(counted)
-        .fetch_one(&mut *connection)
-        .await?
-    {
+    if !connection.value::<bool>(counted, ())? {
         return Ok(None);
     }
-    let row = sqlx::query_as("select store, commits from progress").fetch_one(connection);
-    let (store, commits) = row.await?;
-    let stopped = false;
-    Ok(Some(LastCommit {
-        store,
-        commits,
-        stopped,
-    }))
+    connection.row("select store, commits from progress", (), |row| {
+        Ok(LastCommit {
+            store: row.get("store")?,
+            commits: row.get("commits")?,
+            stopped: false,
+        })
+    })
 }
 
 /// An error if the database is not the one that the file tells of, or has not come as far. If that cannot be known, why.

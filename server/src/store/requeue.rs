@@ -1,16 +1,19 @@
 //! Running jobs back in the queue: when the service stops, and after it has crashed.
 
-use sqlx::SqliteConnection;
+use std::sync::Arc;
+
+use rusqlite::{Connection, params};
 use tracing::info;
 
 use super::{
     change::Change,
     coalescing,
-    database::Store,
+    database::{Store, Writer},
     end::end,
     error::Result,
     rows::from_row,
     rules::{self, Ending, Interrupted},
+    sql::Sql,
 };
 use crate::{
     event::Requeue,
@@ -20,92 +23,103 @@ use crate::{
 impl Store {
     /// Requeues a running job because the service stops, which does not count against its attempts; one that was
     /// asked to stop is canceled instead. Returns its new status; `None` when the attempt is no longer the current one.
-    pub async fn requeue_drained(&self, key: i64, attempt: i32) -> Result<Option<Status>> {
-        self.control(|| self.try_to_requeue_drained(key, attempt))
+    pub async fn requeue_drained(
+        self: &Arc<Self>,
+        key: i64,
+        attempt: i32,
+    ) -> Result<Option<Status>> {
+        self.control(move |writer| requeue_drained(writer, key, attempt))
             .await
-    }
-
-    async fn try_to_requeue_drained(&self, key: i64, attempt: i32) -> Result<Option<Status>> {
-        let mut change = self.control_change().await?;
-        if !change.is_current(key, attempt).await? {
-            return Ok(None);
-        }
-        let job = change.read(key).await?;
-        // the client that asked it to stop does not have to wait for the restart
-        let stop = self.is_asked_to_stop(&job);
-        interrupt(&mut change, &job, Requeue::Drain, stop, "").await?;
-        let status = change.read(key).await?.status;
-        change.commit().await?;
-        self.cancels().remove(&key);
-        Ok(Some(status))
     }
 
     /// Requeues the jobs that were running when the service ended; ends those that were asked to stop, and, if the process
     /// died, those whose attempts are used up. To be called before the listener opens. Returns their number.
-    pub async fn requeue_interrupted(&self) -> Result<usize> {
-        self.control(|| self.try_to_requeue_interrupted()).await
-    }
-
-    async fn try_to_requeue_interrupted(&self) -> Result<usize> {
-        let mut change = self.control_change().await?;
-        let rows = sqlx::query("select * from job where status = 'running'")
-            .fetch_all(change.sql().await?)
-            .await?;
-        if rows.is_empty() {
-            return Ok(0); // nothing is written: the disk may be full
-        }
-        let mut interrupted = vec![];
-        for row in &rows {
-            let Ok(job) = self.damages.noting(async { from_row(row) }).await else {
-                continue; // damaged: the service starts with the others
-            };
-            // the service that stopped could not store that it requeued it
-            let why = match self.was_stopped {
-                true => Requeue::Drain,
-                false => Requeue::WorkerLost,
-            };
-            let (stop, how) = (job.cancel_requested, "the service died with it");
-            interrupt(&mut change, &job, why, stop, how).await?;
-            interrupted.push(job);
-        }
-        change.commit().await?;
-        for Job { id, attempt, .. } in &interrupted {
-            info!(job.id = %id, attempt, "job {id} was interrupted when the service last ended");
-        }
-        Ok(interrupted.len())
+    pub async fn requeue_interrupted(self: &Arc<Self>) -> Result<usize> {
+        self.control(requeue_interrupted).await
     }
 
     /// The jobs that run, with the numbers of their attempts.
-    pub async fn running(&self) -> Result<Vec<(i64, i32)>> {
-        let running = sqlx::query_as("select id, attempt from job where status = 'running'");
-        let read = async { Ok(running.fetch_all(&self.reader).await?) };
-        self.damages.noting(read).await
+    pub async fn running(self: &Arc<Self>) -> Result<Vec<(i64, i32)>> {
+        self.read(|_, connection| {
+            let running = "select id, attempt from job where status = 'running'";
+            connection.rows(running, (), |row| Ok(row.try_into()?))
+        })
+        .await
     }
 
     /// Requeues a running job whose own process died; ends it if it was asked to stop, or if its attempts are used up.
     /// `how` it died is told to the client then. Returns the jobs that have changed.
-    pub async fn requeue_lost(&self, key: i64, attempt: i32, how: &str) -> Result<Vec<i64>> {
-        self.control(|| self.try_to_requeue_lost(key, attempt, how))
+    pub async fn requeue_lost(
+        self: &Arc<Self>,
+        key: i64,
+        attempt: i32,
+        how: &str,
+    ) -> Result<Vec<i64>> {
+        let how = how.to_owned();
+        self.control(move |writer| requeue_lost(writer, key, attempt, &how))
             .await
     }
+}
 
-    async fn try_to_requeue_lost(&self, key: i64, attempt: i32, how: &str) -> Result<Vec<i64>> {
-        let mut change = self.control_change().await?;
-        if !change.is_current(key, attempt).await? {
-            return Ok(vec![]);
-        }
-        let job = change.read(key).await?;
-        let stop = self.is_asked_to_stop(&job);
-        interrupt(&mut change, &job, Requeue::WorkerLost, stop, how).await?;
-        let changed = change.commit().await?;
-        self.cancels().remove(&key);
-        Ok(changed)
+fn requeue_drained(writer: &Writer<'_>, key: i64, attempt: i32) -> Result<Option<Status>> {
+    let mut change = writer.control_change()?;
+    if !change.is_current(key, attempt)? {
+        return Ok(None);
     }
+    let job = change.read(key)?;
+    // the client that asked it to stop does not have to wait for the restart
+    let stop = writer.store.is_asked_to_stop(&job);
+    interrupt(&mut change, &job, Requeue::Drain, stop, "")?;
+    let status = change.read(key)?.status;
+    change.commit()?;
+    writer.store.cancels().remove(&key);
+    Ok(Some(status))
+}
+
+fn requeue_interrupted(writer: &Writer<'_>) -> Result<usize> {
+    let mut change = writer.control_change()?;
+    let running = "select * from job where status = 'running'";
+    let running = change.sql()?.rows(running, (), |row| Ok(from_row(row)))?;
+    if running.is_empty() {
+        return Ok(0); // nothing is written: the disk may be full
+    }
+    let mut interrupted = vec![];
+    for job in running {
+        let Ok(job) = writer.store.damages.noting(job) else {
+            continue; // damaged: the service starts with the others
+        };
+        // the service that stopped could not store that it requeued it
+        let why = match writer.store.was_stopped {
+            true => Requeue::Drain,
+            false => Requeue::WorkerLost,
+        };
+        let (stop, how) = (job.cancel_requested, "the service died with it");
+        interrupt(&mut change, &job, why, stop, how)?;
+        interrupted.push(job);
+    }
+    change.commit()?;
+    for Job { id, attempt, .. } in &interrupted {
+        info!(job.id = %id, attempt, "job {id} was interrupted when the service last ended");
+    }
+    Ok(interrupted.len())
+}
+
+fn requeue_lost(writer: &Writer<'_>, key: i64, attempt: i32, how: &str) -> Result<Vec<i64>> {
+    let mut change = writer.control_change()?;
+    if !change.is_current(key, attempt)? {
+        return Ok(vec![]);
+    }
+    let job = change.read(key)?;
+    let stop = writer.store.is_asked_to_stop(&job);
+    interrupt(&mut change, &job, Requeue::WorkerLost, stop, how)?;
+    let changed = change.commit()?;
+    writer.store.cancels().remove(&key);
+    Ok(changed)
 }
 
 /// Requeues a job that was interrupted, or ends it. `stop`: a client has asked it to stop; `how`: in which way its process
 /// died, if it did.
-async fn interrupt(
+fn interrupt(
     change: &mut Change<'_>,
     job: &Job,
     why: Requeue,
@@ -113,35 +127,35 @@ async fn interrupt(
     how: &str,
 ) -> Result<()> {
     match rules::interrupted(job, why, stop) {
-        Interrupted::Cancel => end(change, job.key, &Ending::canceled()).await,
-        Interrupted::Requeue(why) => requeue(change, job.key, why).await,
+        Interrupted::Cancel => end(change, job.key, &Ending::canceled()),
+        Interrupted::Requeue(why) => requeue(change, job.key, why),
         Interrupted::Fail => {
-            let deaths = count_deaths(change.sql().await?, job.key).await? + 1;
+            let deaths = count_deaths(change.sql()?, job.key)? + 1;
             let detail = format!(
                 "the process died during {deaths} attempts to solve this job; the last time {how}"
             );
-            end(change, job.key, &Ending::failed(Reason::WorkerLost, detail)).await
+            end(change, job.key, &Ending::failed(Reason::WorkerLost, detail))
         }
     }
 }
 
 /// How many attempts at a job ended with the process, before the current one.
-async fn count_deaths(tx: &mut SqliteConnection, key: i64) -> Result<i64> {
-    let counting = sqlx::query_scalar(
-        "select count(*) from event where job_id = ? and type = 'status' and json_extract(body, '$.reason') = ?",
-    );
+fn count_deaths(tx: &Connection, key: i64) -> Result<i64> {
     let lost = <&str>::from(Requeue::WorkerLost);
-    Ok(counting.bind(key).bind(lost).fetch_one(tx).await?)
+    tx.value(
+        "select count(*) from event where job_id = ? and type = 'status' and json_extract(body, '$.reason') = ?",
+        params![key, lost],
+    )
 }
 
 /// Puts a running job back in the queue.
-async fn requeue(change: &mut Change<'_>, key: i64, why: Requeue) -> Result<()> {
+fn requeue(change: &mut Change<'_>, key: i64, why: Requeue) -> Result<()> {
     let now = change.now();
-    change.update(key, |row| row.requeue(why, now)).await?;
+    change.update(key, |row| row.requeue(why, now))?;
     // as its time in the queue begins again, so does that of the jobs coalesced into it
-    for job in coalescing::coalesced_jobs(change, key).await? {
-        change.set(job.key, |row| row.waits_from(now)).await?;
+    for job in coalescing::coalesced_jobs(change, key)? {
+        change.set(job.key, |row| row.waits_from(now))?;
     }
     // it no longer runs: a coalesced job of higher priority does not have to wait for it
-    coalescing::replace_if_outranked(change, key).await
+    coalescing::replace_if_outranked(change, key)
 }

@@ -7,10 +7,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use sqlx::{ConnectOptions, Connection, sqlite::SqliteConnectOptions};
-
 use super::{
     backup::{FORMAT, MANIFEST, Manifest, copy_and_digest, new_file, sync_folder},
+    connections::{Mode, blocking, open},
     error::{Result, StoreError},
     folder::{DATABASE, FILES, Folder, RESTORING, unusable},
     migrations,
@@ -34,6 +33,11 @@ pub struct Restored {
 /// Makes the backup in `backup` the store in `data`, which must be empty or missing, unless it is to be replaced. The
 /// service refuses to start on it until this is complete.
 pub async fn restore(backup: &Path, data: &Path, replace: bool) -> Result<Restored> {
+    let (backup, data) = (backup.to_owned(), data.to_owned());
+    blocking(move || write_store(&backup, &data, replace)).await
+}
+
+fn write_store(backup: &Path, data: &Path, replace: bool) -> Result<Restored> {
     let manifest = read_manifest(backup)?;
     let folder = Folder::lock(data)?;
     let unusable = |error: io::Error| unusable(data, error);
@@ -46,7 +50,7 @@ pub async fn restore(backup: &Path, data: &Path, replace: bool) -> Result<Restor
     }
     let new = data.join(RESTORING);
     let _ = fs::remove_file(&new); // of a restore that was interrupted
-    let last = copy(backup, &new, &manifest).await.inspect_err(|_| {
+    let last = copy(backup, &new, &manifest).inspect_err(|_| {
         let _ = fs::remove_file(&new); // nothing was moved yet
     })?;
     let replaced = match occupied {
@@ -112,11 +116,7 @@ fn is_occupied(data: &Path) -> io::Result<bool> {
 }
 
 /// Copies the database and compares it with the manifest; on the disk when this returns. Gives how far it had come.
-async fn copy(
-    backup: &Path,
-    new: &Path,
-    manifest: &Manifest,
-) -> Result<Option<progress::LastCommit>> {
+fn copy(backup: &Path, new: &Path, manifest: &Manifest) -> Result<Option<progress::LastCommit>> {
     let source = backup.join(DATABASE);
     let copied = || -> io::Result<_> {
         let mut file = new_file(new)?;
@@ -141,12 +141,9 @@ async fn copy(
             backup.display()
         )));
     }
-    let options = SqliteConnectOptions::new().filename(new).read_only(true);
-    let mut connection = options.connect().await?;
-    migrations::check(&mut connection).await?;
-    let last = progress::in_database(&mut connection).await?;
-    connection.close().await?;
-    Ok(last)
+    let connection = open(new, Mode::Read)?;
+    migrations::check(&connection)?;
+    progress::in_database(&connection)
 }
 
 /// Moves the store in this folder to a folder within it, whose name is returned. Until all of it is there, that folder is

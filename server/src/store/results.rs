@@ -1,6 +1,8 @@
 //! The result of a job: written, in pieces before its end, and read, part by part.
 
-use sqlx::SqliteConnection;
+use std::sync::Arc;
+
+use rusqlite::Connection;
 
 use super::{
     change::Change,
@@ -15,100 +17,107 @@ use super::{
 };
 use crate::job::ResultAvailable;
 
-/// Up to this size of its JSON a part is decoded where it is read: that takes a millisecond or two.
-const INLINE_BYTES: u64 = 256 << 10;
-
 impl Store {
     /// Writes the content of a large result in several short transactions; false when the attempt is no longer the current
     /// one. Small content is written when the job ends.
-    pub async fn write_before_end(&self, key: i64, attempt: i32, parts: &Parts) -> Result<bool> {
+    pub async fn write_before_end(
+        self: &Arc<Self>,
+        key: i64,
+        attempt: i32,
+        parts: &Parts,
+    ) -> Result<bool> {
         for (_, content) in parts.contents() {
             let pieces = content.pieces();
             if pieces.len() == 1 {
                 continue;
             }
             for (group, pieces) in pieces.chunks(PIECES_PER_COMMIT).enumerate() {
-                let current = async {
-                    let mut connection = self.reader.acquire().await?;
-                    is_current(&mut connection, key, attempt).await
-                };
-                if !self.writing(current).await? {
+                let first = group * PIECES_PER_COMMIT;
+                let pieces: Vec<Vec<u8>> = pieces.iter().map(|piece| piece.to_vec()).collect();
+                let fingerprint = content.fingerprint.clone().into_owned();
+                let written = self.write(move |writer| {
+                    if !is_current(writer.beside(), key, attempt)? {
+                        return Ok(false);
+                    }
+                    writer.write_pieces(&fingerprint, first, &pieces)?;
+                    Ok(true)
+                });
+                if !written.await? {
                     return Ok(false);
                 }
-                let first = group * PIECES_PER_COMMIT;
-                self.write_pieces(&content.fingerprint, first, pieces)
-                    .await?;
             }
         }
         Ok(true)
     }
 
     /// Removes what was written of a result that no job has.
-    pub async fn discard_parts(&self, parts: &Parts) -> Result<()> {
+    pub async fn discard_parts(self: &Arc<Self>, parts: &Parts) -> Result<()> {
         self.discard_content(&parts.fingerprints()).await
     }
 
     /// Stores the partial result of a running job (its finished load steps) in place of an earlier one; false when the attempt is
     /// no longer the current one.
-    pub async fn write_partial(&self, key: i64, attempt: i32, parts: &Parts) -> Result<bool> {
-        let write = async {
-            let mut change = self.change().await?;
-            if !change.is_current(key, attempt).await? {
+    pub async fn write_partial(
+        self: &Arc<Self>,
+        key: i64,
+        attempt: i32,
+        parts: &Arc<Parts>,
+    ) -> Result<bool> {
+        let parts = parts.clone();
+        self.write(move |writer| {
+            let mut change = writer.change()?;
+            if !change.is_current(key, attempt)? {
                 return Ok(false);
             }
-            attach(&mut change, key, parts).await?;
+            attach(&mut change, key, &parts)?;
             let partial = ResultAvailable::Partial;
-            change
-                .set(key, |row| row.job.result_available = partial)
-                .await?;
-            change.commit().await?;
+            change.set(key, |row| row.job.result_available = partial)?;
+            change.commit()?;
             Ok(true)
-        };
-        self.writing(write).await
+        })
+        .await
     }
 
     /// The memory that reading a part of the result of this job takes at most, in bytes; `None` if there is no such part.
-    pub async fn part_memory(&self, key: i64, part: &str) -> Result<Option<usize>> {
-        let read = async {
-            let mut connection = self.reader.acquire().await?;
-            let Some(found) = StoredResult::of(&mut connection, key).await? else {
+    pub async fn part_memory(self: &Arc<Self>, key: i64, part: &str) -> Result<Option<usize>> {
+        let part = part.to_owned();
+        self.read(move |store, connection| {
+            let Some(found) = StoredResult::of(connection, key)? else {
                 return Ok(None);
             };
             if part == name::FIELDS && found.fields().is_none() {
-                found.must_have_no_fields(&mut connection).await?;
+                found.must_have_no_fields(connection)?;
             }
-            found
-                .memory_to_read(&mut connection, &self.intact, part)
-                .await
-        };
-        self.damages.noting(read).await
+            found.memory_to_read(connection, &store.intact, &part)
+        })
+        .await
     }
 }
 
 /// Attaches a result to a job in place of an earlier one.
-pub(super) async fn attach(change: &mut Change<'_>, key: i64, parts: &Parts) -> Result<()> {
-    let tx = change.sql().await?;
-    remove(tx, key).await?;
+pub(super) fn attach(change: &mut Change<'_>, key: i64, parts: &Parts) -> Result<()> {
+    let tx = change.sql()?;
+    remove(tx, key)?;
     for (name, content) in parts.contents() {
         let job = Holder::Job(key);
         // large content was written before the end of the job; that of a partial result was not
         let written = content.fingerprint.pieces() > 1
-            && content::attach_written(tx, job, name, &content.fingerprint).await?;
+            && content::attach_written(tx, job, name, &content.fingerprint)?;
         if !written {
-            content::attach(tx, job, name, &content).await?;
+            content::attach(tx, job, name, &content)?;
         }
     }
     Ok(())
 }
 
 /// Gives a job the result of another one.
-pub(super) async fn share(tx: &mut SqliteConnection, from: i64, to: i64) -> Result<()> {
-    content::copy(tx, from, to, &name::OF_RESULT).await
+pub(super) fn share(tx: &Connection, from: i64, to: i64) -> Result<()> {
+    content::copy(tx, from, to, &name::OF_RESULT)
 }
 
 /// Removes the result of a job.
-pub(super) async fn remove(tx: &mut SqliteConnection, key: i64) -> Result<()> {
-    content::detach(tx, Holder::Job(key), &name::OF_RESULT).await
+pub(super) fn remove(tx: &Connection, key: i64) -> Result<()> {
+    content::detach(tx, Holder::Job(key), &name::OF_RESULT)
 }
 
 /// The result of a job as it is stored: its index is read, its parts are not.
@@ -124,20 +133,14 @@ pub(super) struct StoredResult {
 
 impl StoredResult {
     /// The result of a job, if it has one.
-    pub(super) async fn of(
-        connection: &mut SqliteConnection,
-        key: i64,
-    ) -> Result<Option<StoredResult>> {
-        let read = StoredResult::read_index(connection, key).await;
+    pub(super) fn of(connection: &Connection, key: i64) -> Result<Option<StoredResult>> {
+        let read = StoredResult::read_index(connection, key);
         read.map_err(|error| error.reading(|| Record::of_job(key, name::RESULT)))
     }
 
-    async fn read_index(
-        connection: &mut SqliteConnection,
-        key: i64,
-    ) -> Result<Option<StoredResult>> {
+    fn read_index(connection: &Connection, key: i64) -> Result<Option<StoredResult>> {
         let (mut content, mut fields) = (None, None);
-        for attached in content::all(connection, Holder::Job(key)).await? {
+        for attached in content::all(connection, Holder::Job(key))? {
             match attached.name.as_str() {
                 name::RESULT => content = Some(attached),
                 name::FIELDS => fields = Some(attached),
@@ -148,13 +151,13 @@ impl StoredResult {
             return Ok(None);
         };
         let damaged = |cause: String| content.record().damaged(cause);
-        let mut begin = content.piece(connection, 0).await?;
+        let mut begin = content.piece(connection, 0)?;
         let index_end = HEADER_BYTES + index_bytes(&begin).map_err(damaged)?;
         for number in 1..content.fingerprint.pieces() {
             if begin.len() >= index_end {
                 break;
             }
-            begin.extend(content.piece(connection, number).await?);
+            begin.extend(content.piece(connection, number)?);
         }
         let entries = read_index(&begin).map_err(damaged)?;
         Ok(Some(StoredResult {
@@ -180,12 +183,9 @@ impl StoredResult {
     }
 
     /// An error if there should be fields: they were not deleted, and are not attached any more.
-    pub(super) async fn must_have_no_fields(
-        &self,
-        connection: &mut SqliteConnection,
-    ) -> Result<()> {
+    pub(super) fn must_have_no_fields(&self, connection: &Connection) -> Result<()> {
         let had_some = self.find(name::FIELDS).is_some();
-        match had_some && !sizes::lost_fields(connection, self.key).await? {
+        match had_some && !sizes::lost_fields(connection, self.key)? {
             true => Err(self.record(name::FIELDS).damaged("it is missing")),
             false => Ok(()),
         }
@@ -208,9 +208,9 @@ impl StoredResult {
     }
 
     /// A part, compared with its size and hash; `None` if there is no such part.
-    pub(super) async fn read(
+    pub(super) fn read(
         &self,
-        connection: &mut SqliteConnection,
+        connection: &Connection,
         part: &str,
     ) -> Result<Option<(PartInfo, Decoded)>> {
         let Some((entry, place)) = self.find(part) else {
@@ -218,20 +218,11 @@ impl StoredResult {
         };
         let stored = match (part, &self.fields) {
             (name::FIELDS, None) => return Ok(None),
-            (name::FIELDS, Some(fields)) => fields.read(connection).await,
-            _ => self.bytes(connection, place, entry.bytes).await,
+            (name::FIELDS, Some(fields)) => fields.read(connection),
+            _ => self.bytes(connection, place, entry.bytes),
         };
         let stored = stored.map_err(|error| error.reading(|| self.record(part)))?;
-        let (expected, encoding) = (entry.info.clone(), entry.encoding);
-        let decode = move || decoded(stored, encoding, &expected);
-        // a large one takes a second, in which its thread would answer nobody
-        let decoded = match entry.info.bytes > INLINE_BYTES {
-            true => tokio::task::spawn_blocking(decode)
-                .await
-                .unwrap_or_else(|panic| Err(panic.to_string())),
-            false => decode(),
-        };
-        match decoded {
+        match decoded(stored, entry.encoding, &entry.info) {
             Ok((found, decoded)) if found == entry.info => Ok(Some((found, decoded))),
             Ok((found, _)) => Err(self.record(part).damaged(format!(
                 "{} bytes of another hash in place of {}",
@@ -242,12 +233,7 @@ impl StoredResult {
     }
 
     /// Bytes after the index, from the pieces that have them.
-    async fn bytes(
-        &self,
-        connection: &mut SqliteConnection,
-        place: usize,
-        length: usize,
-    ) -> Result<Vec<u8>> {
+    fn bytes(&self, connection: &Connection, place: usize, length: usize) -> Result<Vec<u8>> {
         let first = HEADER_BYTES + index_bytes(&self.begin).unwrap_or_default() + place;
         let end = first.saturating_add(length);
         if end > self.content.fingerprint.bytes {
@@ -258,7 +244,7 @@ impl StoredResult {
         while found.len() < length {
             let place = first + found.len();
             let (number, offset) = (place / content::PIECE_BYTES, place % content::PIECE_BYTES);
-            let piece = self.content.piece(connection, number).await?;
+            let piece = self.content.piece(connection, number)?;
             let more = piece.get(offset..).unwrap_or_default();
             if more.is_empty() {
                 return Err(self.content.record().damaged("a piece is cut off"));
@@ -269,9 +255,9 @@ impl StoredResult {
     }
 
     /// The memory that reading a part takes at most, in bytes; `None` if there is no such part.
-    async fn memory_to_read(
+    fn memory_to_read(
         &self,
-        connection: &mut SqliteConnection,
+        connection: &Connection,
         intact: &Intact,
         part: &str,
     ) -> Result<Option<usize>> {
@@ -282,8 +268,8 @@ impl StoredResult {
             (name::FIELDS, None) => return Ok(None),
             (name::FIELDS, Some(fields)) => {
                 // how much they take is told by their first bytes
-                intact::check(connection, intact, fields).await?;
-                (fields.piece(connection, 0).await?, fields.fingerprint.bytes)
+                intact::check(connection, intact, fields)?;
+                (fields.piece(connection, 0)?, fields.fingerprint.bytes)
             }
             _ => (vec![], entry.bytes),
         };
@@ -295,13 +281,13 @@ impl StoredResult {
     }
 
     /// Reads every part, to check it; an error if one is damaged or the summary is missing.
-    pub(super) async fn check(&self, connection: &mut SqliteConnection) -> Result<()> {
+    pub(super) fn check(&self, connection: &Connection) -> Result<()> {
         if !self.names().any(|name| name == "summary") {
             return Err(self.record("summary").damaged("it is missing"));
         }
-        self.content.check(connection).await?;
+        self.content.check(connection)?;
         for name in self.names() {
-            self.read(connection, name).await?;
+            self.read(connection, name)?;
         }
         Ok(())
     }

@@ -4,7 +4,14 @@
 //! Sums of what owners keep have no checksums: they are compared with those of the jobs before anything is removed for being
 //! too much, and a job is removed only if its own record says that it ended so long ago.
 
-use std::{collections::HashSet, num::ParseIntError, sync::Weak, time::Duration};
+use std::{
+    collections::HashSet,
+    num::ParseIntError,
+    sync::{Arc, Weak},
+    time::Duration,
+};
+
+use rusqlite::{Connection, params};
 
 use super::{
     bulk::{Batch, Discard},
@@ -14,6 +21,7 @@ use super::{
     error::{Record, Result, StoreError},
     forget::MOST_REMEMBERED,
     repeated_error::RepeatedError,
+    sql::Sql,
 };
 use crate::{error::size, time::Time};
 
@@ -111,7 +119,7 @@ pub async fn keep_within(store: Weak<Store>, retention: Retention) {
             store.note_alive().await;
         }
         let retired = store.retire(&retention, Time::now()).await;
-        if store.writer.is_closed() {
+        if store.is_closed() {
             return;
         }
         match retiring.note(retired) {
@@ -139,7 +147,7 @@ async fn pause(store: &Weak<Store>) {
     let mut left = INTERVAL;
     while !left.is_zero() {
         tokio::time::sleep(INTERVAL_WHEN_FULL).await;
-        let full = |store: std::sync::Arc<Store>| store.reserve.was_disk_full();
+        let full = |store: Arc<Store>| store.reserve.was_disk_full();
         if store.upgrade().is_none_or(full) {
             return;
         }
@@ -149,7 +157,7 @@ async fn pause(store: &Weak<Store>) {
 
 impl Store {
     /// Removes what is no longer kept. Jobs that cannot be removed, since they are damaged, stay.
-    pub async fn retire(&self, retention: &Retention, now: Time) -> Result<Retired> {
+    pub async fn retire(self: &Arc<Self>, retention: &Retention, now: Time) -> Result<Retired> {
         let now = self.by_our_clock(now);
         let mut retired = Retired::default();
         self.forget_beyond(MOST_REMEMBERED).await?;
@@ -175,7 +183,10 @@ impl Store {
         let not_young = self.cutoff(now, YOUNG_S);
         let mut compared = false;
         loop {
-            let jobs = self.too_much(retention, not_young, &left_alone).await?;
+            let (limits, alone) = (*retention, left_alone.clone());
+            let jobs = self
+                .read(move |_, connection| too_much(connection, &limits, not_young, &alone))
+                .await?;
             if jobs.is_empty() {
                 return Ok(retired);
             }
@@ -184,47 +195,51 @@ impl Store {
                 compared = true;
             }
             let old = Discard::OldJobs(not_young);
-            retired.jobs += self.discard(old, &jobs, &mut left_alone).await?;
+            retired.jobs += self.discard(&old, &jobs, &mut left_alone).await?;
             tokio::time::sleep(PAUSE).await;
         }
     }
 
     /// Warns before much is removed for its age.
-    async fn tell_if_much(&self, before: Time) -> Result<()> {
-        let count = |statement| sqlx::query_scalar(statement).bind(before.micros());
-        let old: i64 = count(COUNT_OLD).fetch_one(&self.reader).await?;
-        if old < MUCH {
-            return Ok(());
-        }
-        let young: i64 = count(COUNT_YOUNG).fetch_one(&self.reader).await?;
-        if old >= young {
-            tracing::warn!(
-                jobs = old, kept = young, %before,
-                "retention removes {old} of {} jobs that have ended, all that ended before {before} (--retain-days)",
-                old.saturating_add(young)
-            );
-        }
-        Ok(())
+    async fn tell_if_much(self: &Arc<Self>, before: Time) -> Result<()> {
+        self.read(move |_, connection| {
+            let old: i64 = connection.value(COUNT_OLD, [before.micros()])?;
+            if old < MUCH {
+                return Ok(());
+            }
+            let young: i64 = connection.value(COUNT_YOUNG, [before.micros()])?;
+            if old >= young {
+                tracing::warn!(
+                    jobs = old, kept = young, %before,
+                    "retention removes {old} of {} jobs that have ended, all that ended before {before} (--retain-days)",
+                    old.saturating_add(young)
+                );
+            }
+            Ok(())
+        })
+        .await
     }
 
     /// Discards all that a statement finds from before this time; how many jobs.
     async fn discard_old(
-        &self,
+        self: &Arc<Self>,
         statement: &'static str,
         before: Time,
-        what: Discard<'_>,
+        what: Discard,
         left_alone: &mut HashSet<i64>,
     ) -> Result<usize> {
         let mut discarded = 0;
         loop {
-            let old = sqlx::query_scalar(statement).bind(before.micros());
-            let old = old.bind((AT_ONCE + left_alone.len()) as i64);
-            let mut old: Vec<i64> = old.fetch_all(&self.reader).await?;
+            let limit = (AT_ONCE + left_alone.len()) as i64;
+            let old = self.read(move |_, connection| {
+                connection.values(statement, params![before.micros(), limit])
+            });
+            let mut old: Vec<i64> = old.await?;
             old.retain(|key| !left_alone.contains(key));
             if old.is_empty() {
                 return Ok(discarded);
             }
-            let done = self.discard(what, &old, left_alone).await?;
+            let done = self.discard(&what, &old, left_alone).await?;
             discarded += done;
             // what was cut off, since others write all the time, goes on when it is its turn again
             if done >= old.len() {
@@ -235,13 +250,13 @@ impl Store {
 
     /// Discards the first of these jobs; how many. Those that it meets and cannot discard are left alone.
     async fn discard(
-        &self,
-        what: Discard<'_>,
+        self: &Arc<Self>,
+        what: &Discard,
         keys: &[i64],
         left_alone: &mut HashSet<i64>,
     ) -> Result<usize> {
         let mut discarded = 0;
-        match self.control(|| self.try_to_discard(what, keys)).await {
+        match self.try_to_discard(what.clone(), keys).await {
             Ok(Batch { done, left, .. }) => {
                 left_alone.extend(left);
                 return Ok(done);
@@ -252,7 +267,7 @@ impl Store {
         }
         for key in keys {
             let one = std::slice::from_ref(key);
-            match self.control(|| self.try_to_discard(what, one)).await {
+            match self.try_to_discard(what.clone(), one).await {
                 Ok(Batch { done: 1, .. }) => discarded += 1,
                 Ok(_) | Err(StoreError::Damaged(_)) => {
                     left_alone.insert(*key);
@@ -263,135 +278,46 @@ impl Store {
         Ok(discarded)
     }
 
-    /// Some jobs that are too much: of one owner, or of all, and then of those who keep most.
-    async fn too_much(
-        &self,
-        retention: &Retention,
-        before: Time,
-        left_alone: &HashSet<i64>,
-    ) -> Result<Vec<i64>> {
-        let owners = self.kept().await?;
-        let beyond = |limit: Option<u64>, found: u64| found.saturating_sub(limit.unwrap_or(found));
-        for owner in &owners {
-            let excess = Kept {
-                owner: owner.owner.clone(),
-                jobs: beyond(retention.jobs_of_owner, owner.jobs),
-                bytes: beyond(retention.bytes_of_owner, owner.bytes),
-            };
-            let found = self.oldest(&excess, before, left_alone).await?;
-            if !found.is_empty() {
-                return Ok(found.into_iter().map(|(key, _)| key).collect());
-            }
-        }
-        let jobs: Vec<u64> = owners.iter().map(|owner| owner.jobs).collect();
-        let bytes: Vec<u64> = owners.iter().map(|owner| owner.bytes).collect();
-        let mut jobs_left = beyond(retention.jobs, jobs.iter().sum());
-        let mut bytes_left = beyond(retention.bytes, bytes.iter().sum());
-        let (jobs, bytes) = (
-            reductions(&jobs, retention.jobs),
-            reductions(&bytes, retention.bytes),
-        );
-        let mut keys = vec![];
-        for (owner, (jobs, bytes)) in owners.into_iter().zip(jobs.into_iter().zip(bytes)) {
-            let excess = Kept {
-                owner: owner.owner,
-                jobs: jobs.min(jobs_left),
-                bytes: bytes.min(bytes_left),
-            };
-            for (key, size) in self.oldest(&excess, before, left_alone).await? {
-                keys.push(key);
-                jobs_left = jobs_left.saturating_sub(1);
-                bytes_left = bytes_left.saturating_sub(size);
-            }
-            if keys.len() >= AT_ONCE {
-                break;
-            }
-        }
-        Ok(keys)
-    }
-
-    /// What every owner keeps.
-    async fn kept(&self) -> Result<Vec<Kept>> {
-        let rows: Vec<(String, i64, i64)> = sqlx::query_as(KEPT).fetch_all(&self.reader).await?;
-        let count = |count: i64| u64::try_from(count).unwrap_or(0);
-        let kept = |(owner, jobs, bytes)| Kept {
-            owner,
-            jobs: count(jobs),
-            bytes: count(bytes),
-        };
-        Ok(rows.into_iter().map(kept).collect())
-    }
-
-    /// The oldest jobs of an owner with their bytes, as many as are too many or have the bytes that are too many.
-    async fn oldest(
-        &self,
-        excess: &Kept,
-        before: Time,
-        left_alone: &HashSet<i64>,
-    ) -> Result<Vec<(i64, u64)>> {
-        if excess.jobs == 0 && excess.bytes == 0 {
-            return Ok(vec![]);
-        }
-        let rows: Vec<(i64, i64)> = sqlx::query_as(OLDEST_OF_OWNER)
-            .bind(&excess.owner)
-            .bind(before.micros())
-            .bind((AT_ONCE + left_alone.len()) as i64)
-            .fetch_all(&self.reader)
-            .await?;
-        let (mut jobs, mut bytes) = (excess.jobs, excess.bytes);
-        let mut found = vec![];
-        for (key, size) in rows {
-            if left_alone.contains(&key) {
-                continue;
-            }
-            if jobs == 0 && bytes == 0 {
-                break;
-            }
-            let size = u64::try_from(size).unwrap_or(0);
-            jobs = jobs.saturating_sub(1);
-            bytes = bytes.saturating_sub(size);
-            found.push((key, size));
-        }
-        Ok(found)
-    }
-
     /// An error unless the sums by owner are those of the jobs and meshes.
-    pub(super) async fn compare_sums(&self) -> Result<()> {
-        let differ: bool = sqlx::query_scalar(
-            "with of_jobs as (select owner, count(*) as jobs, sum(bytes) as bytes from job_size group by owner),
-                  of_meshes as (select owner, sum(bytes) as bytes
-                                from mesh_owner join mesh using (hash) join attachment on kind = 'mesh' and key = mesh.id
-                                     join content on content.id = content group by owner)
-             select exists (select 1 from owner_size left join of_jobs using (owner) left join of_meshes using (owner)
-                            where owner_size.jobs <> coalesce(of_jobs.jobs, 0) or job_bytes <> coalesce(of_jobs.bytes, 0)
-                                  or mesh_bytes <> coalesce(of_meshes.bytes, 0))
-                    or exists (select 1 from of_jobs where owner not in (select owner from owner_size))",
-        )
-        .fetch_one(&self.reader)
-        .await?;
-        match differ {
-            false => Ok(()),
-            true => Err(Record::named("sum of what owners keep").damaged(
-                "it does not match their jobs, so no jobs are removed for their size; `signorini doctor --salvage` counts again",
-            )),
-        }
+    pub(super) async fn compare_sums(self: &Arc<Self>) -> Result<()> {
+        self.read(|_, connection| {
+            let differ: bool = connection.value(
+                "with of_jobs as (select owner, count(*) as jobs, sum(bytes) as bytes from job_size group by owner),
+                      of_meshes as (select owner, sum(bytes) as bytes
+                                    from mesh_owner join mesh using (hash) join attachment on kind = 'mesh' and key = mesh.id
+                                         join content on content.id = content group by owner)
+                 select exists (select 1 from owner_size left join of_jobs using (owner) left join of_meshes using (owner)
+                                where owner_size.jobs <> coalesce(of_jobs.jobs, 0) or job_bytes <> coalesce(of_jobs.bytes, 0)
+                                      or mesh_bytes <> coalesce(of_meshes.bytes, 0))
+                        or exists (select 1 from of_jobs where owner not in (select owner from owner_size))",
+                (),
+            )?;
+            match differ {
+                false => Ok(()),
+                true => Err(Record::named("sum of what owners keep").damaged(
+                    "it does not match their jobs, so no jobs are removed for their size; `signorini doctor --salvage` counts again",
+                )),
+            }
+        })
+        .await
     }
 
     /// When retention begins, if the store is from before it.
-    async fn retention_begins(&self) -> Result<Option<Time>> {
-        let begins = "select value from setting where name = 'retention_begins'";
-        let begins: Option<String> = sqlx::query_scalar(begins)
-            .fetch_optional(&self.reader)
-            .await?;
-        let Some(text) = begins else { return Ok(None) };
-        let damaged =
-            |error: ParseIntError| Record::named("setting retention_begins").damaged(error);
-        let micros: i64 = text.parse().map_err(damaged)?;
-        Ok(Some(Time::from_micros(micros)))
+    async fn retention_begins(self: &Arc<Self>) -> Result<Option<Time>> {
+        self.read(|_, connection| {
+            let begins = "select value from setting where name = 'retention_begins'";
+            let begins: Option<String> = connection.optional_value(begins, ())?;
+            let Some(text) = begins else { return Ok(None) };
+            let damaged =
+                |error: ParseIntError| Record::named("setting retention_begins").damaged(error);
+            let micros: i64 = text.parse().map_err(damaged)?;
+            Ok(Some(Time::from_micros(micros)))
+        })
+        .await
     }
 
     /// Tells in the log what will be removed, if the store is from before retention.
-    async fn announce(&self, retention: &Retention) -> Result<()> {
+    async fn announce(self: &Arc<Self>, retention: &Retention) -> Result<()> {
         let begins = self.retention_begins().await?;
         let Some(begins) = begins.filter(|at| self.now() < *at) else {
             return Ok(());
@@ -410,17 +336,23 @@ impl Store {
     }
 
     /// About how many jobs, and bytes of them, would be removed at this time of those that there are.
-    pub(super) async fn foreseen(&self, retention: &Retention, at: Time) -> Result<(u64, u64)> {
+    pub(super) async fn foreseen(
+        self: &Arc<Self>,
+        retention: &Retention,
+        at: Time,
+    ) -> Result<(u64, u64)> {
         let oldest = retention
             .age_s
             .map_or(i64::MIN, |age_s| self.cutoff(at, age_s).micros());
-        let rows: Vec<(bool, i64, i64)> = sqlx::query_as(
-            "select job.finished_at < ? as old, count(*), sum(bytes) from job indexed by job_to_retire join job_size on job_id = id
-             where job.finished_at is not null and pinned = 0 group by old, job.owner",
-        )
-        .bind(oldest)
-        .fetch_all(&self.reader)
-        .await?;
+        let rows = self.read(move |_, connection| {
+            connection.rows(
+                "select job.finished_at < ? as old, count(*), sum(bytes) from job indexed by job_to_retire join job_size on job_id = id
+                 where job.finished_at is not null and pinned = 0 group by old, job.owner",
+                [oldest],
+                |row| Ok(row.try_into()?),
+            )
+        });
+        let rows: Vec<(bool, i64, i64)> = rows.await?;
         let (mut gone, mut all, mut kept) = ((0, 0), (0, 0), (0, 0));
         for (old, jobs, bytes) in rows {
             let (jobs, bytes) = (jobs.unsigned_abs(), bytes.unsigned_abs());
@@ -439,6 +371,98 @@ impl Store {
         let of_jobs = jobs.saturating_mul(all.1) / all.0.max(1);
         Ok((gone.0 + jobs.max(of_bytes), gone.1 + bytes.max(of_jobs)))
     }
+}
+
+/// Some jobs that are too much: of one owner, or of all, and then of those who keep most.
+fn too_much(
+    connection: &Connection,
+    retention: &Retention,
+    before: Time,
+    left_alone: &HashSet<i64>,
+) -> Result<Vec<i64>> {
+    let owners = kept(connection)?;
+    let beyond = |limit: Option<u64>, found: u64| found.saturating_sub(limit.unwrap_or(found));
+    for owner in &owners {
+        let excess = Kept {
+            owner: owner.owner.clone(),
+            jobs: beyond(retention.jobs_of_owner, owner.jobs),
+            bytes: beyond(retention.bytes_of_owner, owner.bytes),
+        };
+        let found = oldest(connection, &excess, before, left_alone)?;
+        if !found.is_empty() {
+            return Ok(found.into_iter().map(|(key, _)| key).collect());
+        }
+    }
+    let jobs: Vec<u64> = owners.iter().map(|owner| owner.jobs).collect();
+    let bytes: Vec<u64> = owners.iter().map(|owner| owner.bytes).collect();
+    let mut jobs_left = beyond(retention.jobs, jobs.iter().sum());
+    let mut bytes_left = beyond(retention.bytes, bytes.iter().sum());
+    let (jobs, bytes) = (
+        reductions(&jobs, retention.jobs),
+        reductions(&bytes, retention.bytes),
+    );
+    let mut keys = vec![];
+    for (owner, (jobs, bytes)) in owners.into_iter().zip(jobs.into_iter().zip(bytes)) {
+        let excess = Kept {
+            owner: owner.owner,
+            jobs: jobs.min(jobs_left),
+            bytes: bytes.min(bytes_left),
+        };
+        for (key, size) in oldest(connection, &excess, before, left_alone)? {
+            keys.push(key);
+            jobs_left = jobs_left.saturating_sub(1);
+            bytes_left = bytes_left.saturating_sub(size);
+        }
+        if keys.len() >= AT_ONCE {
+            break;
+        }
+    }
+    Ok(keys)
+}
+
+/// What every owner keeps.
+fn kept(connection: &Connection) -> Result<Vec<Kept>> {
+    let count = |count: i64| u64::try_from(count).unwrap_or(0);
+    connection.rows(KEPT, (), |row| {
+        Ok(Kept {
+            owner: row.get(0)?,
+            jobs: count(row.get(1)?),
+            bytes: count(row.get(2)?),
+        })
+    })
+}
+
+/// The oldest jobs of an owner with their bytes, as many as are too many or have the bytes that are too many.
+fn oldest(
+    connection: &Connection,
+    excess: &Kept,
+    before: Time,
+    left_alone: &HashSet<i64>,
+) -> Result<Vec<(i64, u64)>> {
+    if excess.jobs == 0 && excess.bytes == 0 {
+        return Ok(vec![]);
+    }
+    let limit = (AT_ONCE + left_alone.len()) as i64;
+    let rows: Vec<(i64, i64)> = connection.rows(
+        OLDEST_OF_OWNER,
+        params![excess.owner, before.micros(), limit],
+        |row| Ok(row.try_into()?),
+    )?;
+    let (mut jobs, mut bytes) = (excess.jobs, excess.bytes);
+    let mut found = vec![];
+    for (key, size) in rows {
+        if left_alone.contains(&key) {
+            continue;
+        }
+        if jobs == 0 && bytes == 0 {
+            break;
+        }
+        let size = u64::try_from(size).unwrap_or(0);
+        jobs = jobs.saturating_sub(1);
+        bytes = bytes.saturating_sub(size);
+        found.push((key, size));
+    }
+    Ok(found)
 }
 
 /// By how much each of these amounts is reduced so that their sum is within the limit: the largest, to an even rest.

@@ -2,13 +2,14 @@
 
 use std::{collections::BTreeMap, str::FromStr};
 
+use rusqlite::{Connection, Row, params, params_from_iter};
 use serde::Serialize;
-use sqlx::{AssertSqlSafe, Row, SqliteConnection, sqlite::SqliteRow};
 use uuid::Uuid;
 
 use super::{
     checksum::{self, Value},
     error::{Record, Result, StoreError},
+    sql::{Sql, optional_text, text},
 };
 use crate::{
     address::link,
@@ -40,73 +41,52 @@ pub(super) fn missing(key: i64) -> StoreError {
 }
 
 /// The job with this key, if it still exists.
-pub(super) async fn find(connection: &mut SqliteConnection, key: i64) -> Result<Option<Job>> {
-    Ok(find_row(connection, key).await?.map(|(row, _)| row.job))
+pub(super) fn find(connection: &Connection, key: i64) -> Result<Option<Job>> {
+    Ok(find_row(connection, key)?.map(|(row, _)| row.job))
 }
 
 /// The row of the job with this key, if it still exists, and its values as they are stored.
-pub(super) async fn find_row(
-    connection: &mut SqliteConnection,
-    key: i64,
-) -> Result<Option<(JobRow, Vec<Value>)>> {
-    let row = sqlx::query("select * from job where id = ?")
-        .bind(key)
-        .fetch_optional(connection)
-        .await?;
-    row.as_ref().map(checked).transpose()
+pub(super) fn find_row(connection: &Connection, key: i64) -> Result<Option<(JobRow, Vec<Value>)>> {
+    connection.row("select * from job where id = ?", [key], checked)
 }
 
 /// The job with this public id, without its queue position. A job of another owner is not found.
-pub(super) async fn with_id(
-    connection: &mut SqliteConnection,
-    owners: Owners<'_>,
-    id: JobId,
-) -> Result<Option<Job>> {
-    let row = sqlx::query("select * from job where uuid = ?")
-        .bind(id.0.to_string())
-        .fetch_optional(connection)
-        .await?;
-    let job = row.as_ref().map(from_row).transpose()?;
+pub(super) fn with_id(connection: &Connection, owners: &Owners, id: JobId) -> Result<Option<Job>> {
+    let job = "select * from job where uuid = ?";
+    let job = connection.row(job, [id.0.to_string()], from_row)?;
     Ok(job.filter(|job| owners.include(&job.owner)))
 }
 
 /// Whether this attempt of the job is the current one, and running.
-pub(super) async fn is_current(tx: &mut SqliteConnection, key: i64, attempt: i32) -> Result<bool> {
-    Ok(sqlx::query_scalar(
-        "select exists (select 1 from job where id = ? and status = 'running' and attempt = ?)",
-    )
-    .bind(key)
-    .bind(attempt)
-    .fetch_one(tx)
-    .await?)
+pub(super) fn is_current(tx: &Connection, key: i64, attempt: i32) -> Result<bool> {
+    let current =
+        "select exists (select 1 from job where id = ? and status = 'running' and attempt = ?)";
+    tx.value(current, (key, attempt))
 }
 
 /// The key of the next job: no key is given twice, not even that of a deleted job.
-pub(super) async fn next_key(tx: &mut SqliteConnection) -> Result<i64> {
+pub(super) fn next_key(tx: &Connection) -> Result<i64> {
     let next = "select coalesce((select seq from sqlite_sequence where name = 'job'), 0) + 1";
-    Ok(sqlx::query_scalar(next).fetch_one(tx).await?)
+    tx.value(next, ())
 }
 
 /// Inserts a row; returns its values as they are stored.
-pub(super) async fn insert(tx: &mut SqliteConnection, row: &JobRow) -> Result<Vec<Value>> {
+pub(super) fn insert(tx: &Connection, row: &JobRow) -> Result<Vec<Value>> {
     let (names, values) = row.columns()?;
     let places = "?, ".repeat(names.len());
     let names = names.join(", ");
     let statement = format!("insert into job ({names}, checksum) values ({places}?)");
-    checksum::bind(sqlx::query(AssertSqlSafe(statement)), values.iter())
-        .bind(checksum::of_values(&values))
-        .execute(tx)
-        .await?;
+    let checksum = Value::from(checksum::of_values(&values));
+    tx.run(
+        &statement,
+        params_from_iter(values.iter().chain([&checksum])),
+    )?;
     Ok(values)
 }
 
 /// Writes a row that is in the table as `stored`, and its checksum; returns its values as they are stored now. Columns that
 /// stay as they are, and with them their indexes, are not written.
-pub(super) async fn update(
-    tx: &mut SqliteConnection,
-    stored: &[Value],
-    row: &JobRow,
-) -> Result<Vec<Value>> {
+pub(super) fn update(tx: &Connection, stored: &[Value], row: &JobRow) -> Result<Vec<Value>> {
     let (names, values) = row.columns()?;
     let columns = names.iter().zip(values.iter().zip(stored));
     let changed: Vec<_> = columns.filter(|(_, (new, old))| new != old).collect();
@@ -117,121 +97,115 @@ pub(super) async fn update(
     let names: String = names.collect();
     let statement = format!("update job set {names}checksum = ? where id = ?");
     let new = changed.iter().map(|(_, (new, _))| *new);
-    let done = checksum::bind(sqlx::query(AssertSqlSafe(statement)), new)
-        .bind(checksum::of_values(&values))
-        .bind(row.job.key)
-        .execute(tx)
-        .await?;
-    match done.rows_affected() {
+    let last = [checksum::of_values(&values), row.job.key].map(Value::from);
+    match tx.run(&statement, params_from_iter(new.chain(&last)))? {
         1 => Ok(values),
         _ => Err(missing(row.job.key)),
     }
 }
 
-/// Deletes a job, and what only this job has. Statements are sent together: to hand one to the thread of the connection costs
-/// as much as to run it, and retention removes hundreds in a second.
-pub(super) async fn delete(tx: &mut SqliteConnection, job: &Job, now: Time) -> Result<()> {
-    let of_its_own = "
-        insert into deleted_job (uuid, id, owner, deleted_at) values (?2, ?1, ?3, ?4);
-        delete from event where job_id = ?1;
-        delete from job_label where job_id = ?1;
-        delete from job_size where job_id = ?1;
-        delete from attachment where kind = 'job' and key = ?1;
-        delete from job where id = ?1;";
-    sqlx::query(of_its_own)
-        .bind(job.key)
-        .bind(job.id.0.to_string())
-        .bind(&job.owner)
-        .bind(now.micros())
-        .execute(tx)
-        .await?;
+/// Deletes a job, and what only this job has.
+pub(super) fn delete(tx: &Connection, job: &Job, now: Time) -> Result<()> {
+    tx.run(
+        "insert into deleted_job (uuid, id, owner, deleted_at) values (?, ?, ?, ?)",
+        params![job.id.0.to_string(), job.key, job.owner, now.micros()],
+    )?;
+    for of_its_own in [
+        "delete from event where job_id = ?",
+        "delete from job_label where job_id = ?",
+        "delete from job_size where job_id = ?",
+        "delete from attachment where kind = 'job' and key = ?",
+        "delete from job where id = ?",
+    ] {
+        tx.run(of_its_own, [job.key])?;
+    }
     Ok(())
 }
 
 /// A row of the table as a job, if it is as it was written.
-pub(super) fn from_row(row: &SqliteRow) -> Result<Job> {
+pub(super) fn from_row(row: &Row<'_>) -> Result<Job> {
     checked(row).map(|(row, _)| row.job)
 }
 
 /// A row of the table, if it is as it was written, and its values.
-fn checked(row: &SqliteRow) -> Result<(JobRow, Vec<Value>)> {
+fn checked(row: &Row<'_>) -> Result<(JobRow, Vec<Value>)> {
     let read = || {
         let values = checksum::values(row)?;
-        match row.try_get::<Option<i64>, _>("checksum")? {
+        match row.get::<_, Option<i64>>("checksum")? {
             Some(sum) if sum == checksum::of_values(&values) => Ok((parse(row)?, values)),
             _ => Err(corrupt("checksum")),
         }
     };
     let record = || Record {
-        job: row.try_get("id").ok(),
+        job: row.get("id").ok(),
         name: "record".into(),
     };
     read().map_err(|error: StoreError| error.reading(record))
 }
 
-fn parse(row: &SqliteRow) -> Result<JobRow> {
-    let uuid: &str = row.try_get("uuid")?;
-    let reason: Option<&str> = row.try_get("reason")?;
+fn parse(row: &Row<'_>) -> Result<JobRow> {
+    let uuid = text(row, "uuid")?;
+    let reason = optional_text(row, "reason")?;
     let time = |name: &str| -> Result<Option<Time>> {
-        Ok(row.try_get::<Option<i64>, _>(name)?.map(Time::from_micros))
+        Ok(row.get::<_, Option<i64>>(name)?.map(Time::from_micros))
     };
-    let progress: Option<&str> = row.try_get("progress")?;
-    let memory_bytes: Option<i64> = row.try_get("memory_bytes")?;
-    let failure: Option<&str> = row.try_get("failure")?;
-    let warnings: Option<&str> = row.try_get("warnings")?;
+    let progress = optional_text(row, "progress")?;
+    let memory_bytes: Option<i64> = row.get("memory_bytes")?;
+    let failure = optional_text(row, "failure")?;
+    let warnings = optional_text(row, "warnings")?;
     let other = |name: &str| -> Result<Option<JobId>> {
-        let uuid: Option<&str> = row.try_get(name)?;
+        let uuid = optional_text(row, name)?;
         let read = |text| Uuid::try_parse(text).map(JobId).map_err(|_| corrupt(name));
         uuid.map(read).transpose()
     };
     let failure: Option<Failure> = failure.map(serde_json::from_str).transpose()?;
     let job = Job {
-        key: row.try_get("id")?,
-        coalesced_into: row.try_get("coalesced_into")?,
-        cache: word("cache", row.try_get("cache")?)?,
+        key: row.get("id")?,
+        coalesced_into: row.get("coalesced_into")?,
+        cache: word("cache", text(row, "cache")?)?,
         id: JobId(Uuid::try_parse(uuid).map_err(|_| corrupt("uuid"))?),
-        status: word("status", row.try_get("status")?)?,
+        status: word("status", text(row, "status")?)?,
         reason: reason.map(|text| word("reason", text)).transpose()?,
-        cancel_requested: row.try_get("cancel_requested")?,
-        version: row.try_get("version")?,
-        name: row.try_get("name")?,
-        labels: serde_json::from_str(row.try_get("labels")?)?,
-        owner: row.try_get("owner")?,
-        priority: row.try_get("priority")?,
-        attempt: row.try_get("attempt")?,
-        max_attempts: row.try_get("max_attempts")?,
-        input_hash: row.try_get("input_hash")?,
+        cancel_requested: row.get("cancel_requested")?,
+        version: row.get("version")?,
+        name: row.get("name")?,
+        labels: serde_json::from_str(text(row, "labels")?)?,
+        owner: row.get("owner")?,
+        priority: row.get("priority")?,
+        attempt: row.get("attempt")?,
+        max_attempts: row.get("max_attempts")?,
+        input_hash: row.get("input_hash")?,
         cached_from: other("cached_from")?,
         parent: other("parent")?,
         sweep: other("sweep")?.map(|JobId(uuid)| SweepId(uuid)),
-        pinned: row.try_get("pinned")?,
-        created_at: Time::from_micros(row.try_get("created_at")?),
+        pinned: row.get("pinned")?,
+        created_at: Time::from_micros(row.get("created_at")?),
         started_at: time("started_at")?,
         finished_at: time("finished_at")?,
         progress: progress.map(serde_json::from_str).transpose()?,
         limits: Limits {
-            timeout_s: row.try_get("timeout_s")?,
-            queue_ttl_s: row.try_get("queue_ttl_s")?,
+            timeout_s: row.get("timeout_s")?,
+            queue_ttl_s: row.get("queue_ttl_s")?,
         },
         // the prefix may be another one than when it was stored
         failure: failure.map(|failure| Failure {
             r#type: explained_at(&failure.code),
             ..failure
         }),
-        result_available: word("result_available", row.try_get("result_available")?)?,
+        result_available: word("result_available", text(row, "result_available")?)?,
         warnings: warnings.map_or(Ok(vec![]), serde_json::from_str)?,
-        mesh: row.try_get("mesh")?,
+        mesh: row.get("mesh")?,
         memory_bytes: memory_bytes.map(i64::unsigned_abs),
         // what follows from the rest, below; and what others fill in
         ..Job::default()
     };
     let mut row = JobRow {
         job,
-        title: row.try_get("title")?,
-        payload: row.try_get("payload")?,
+        title: row.get("title")?,
+        payload: row.get("payload")?,
         expires_at: time("expires_at")?,
-        solver_version: row.try_get("solver_version")?,
-        last_seq: row.try_get("last_seq")?,
+        solver_version: row.get("solver_version")?,
+        last_seq: row.get("last_seq")?,
     };
     row.derive();
     Ok(row)
@@ -259,42 +233,39 @@ impl JobRow {
         let columns = [
             ("id", job.key.into()),
             ("uuid", uuid(Some(job.id))),
-            ("status", <&str>::from(job.status).into()),
-            ("reason", job.reason.map(<&str>::from).into()),
+            ("status", word_of(job.status)),
+            ("reason", job.reason.map(word_of).into()),
             ("cancel_requested", i64::from(job.cancel_requested).into()),
             ("version", job.version.into()),
-            ("name", job.name.as_deref().into()),
-            ("title", self.title.as_deref().into()),
+            ("name", job.name.clone().into()),
+            ("title", self.title.clone().into()),
             ("labels", json(Some(&job.labels))?),
-            ("owner", job.owner.as_str().into()),
+            ("owner", job.owner.clone().into()),
             ("priority", i64::from(job.priority).into()),
             ("attempt", i64::from(job.attempt).into()),
             ("max_attempts", i64::from(job.max_attempts).into()),
-            ("input_hash", job.input_hash.as_str().into()),
+            ("input_hash", job.input_hash.clone().into()),
             ("created_at", micros(Some(job.created_at))),
             ("started_at", micros(job.started_at)),
             ("finished_at", micros(job.finished_at)),
             ("progress", json(job.progress.as_ref())?),
             ("failure", json(job.failure.as_ref())?),
-            (
-                "result_available",
-                <&str>::from(job.result_available).into(),
-            ),
+            ("result_available", word_of(job.result_available)),
             ("last_seq", self.last_seq.into()),
-            ("payload", self.payload.as_deref().into()),
+            ("payload", self.payload.clone().into()),
             ("parent", uuid(job.parent)),
             ("pinned", i64::from(job.pinned).into()),
-            ("cache", <&str>::from(job.cache).into()),
+            ("cache", word_of(job.cache)),
             ("cached_from", uuid(job.cached_from)),
             ("memory_bytes", memory_bytes.into()),
             ("coalesced_into", job.coalesced_into.into()),
             ("timeout_s", Value::Real(job.limits.timeout_s)),
             ("queue_ttl_s", Value::Real(job.limits.queue_ttl_s)),
             ("expires_at", micros(self.expires_at)),
-            ("solver_version", self.solver_version.as_deref().into()),
+            ("solver_version", self.solver_version.clone().into()),
             ("sweep", uuid(job.sweep.map(|SweepId(id)| JobId(id)))),
             ("warnings", json(warnings)?),
-            ("mesh", job.mesh.as_deref().into()),
+            ("mesh", job.mesh.clone().into()),
         ];
         Ok(columns.into_iter().unzip())
     }
@@ -303,6 +274,11 @@ impl JobRow {
 fn json<T: Serialize>(value: Option<&T>) -> Result<Value> {
     let text = value.map(serde_json::to_string).transpose()?;
     Ok(text.into())
+}
+
+fn word_of(word: impl Into<&'static str>) -> Value {
+    let word: &str = word.into();
+    word.to_owned().into()
 }
 
 /// The value of a word in this column.
@@ -376,10 +352,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::open(folder.path()).await.unwrap();
         let names = "select name from pragma_table_info('job') where name <> 'checksum'";
-        let names: Vec<String> = sqlx::query_scalar(names)
-            .fetch_all(&store.reader)
-            .await
-            .unwrap();
+        let names = store.read(|_, connection| connection.values::<String>(names, ()));
+        let names = names.await.unwrap();
         assert_eq!(names, JobRow::default().columns().unwrap().0);
     }
 }

@@ -4,19 +4,18 @@
 //! Events and what is attached to jobs and meshes are too large for it. Of them nothing is found by its content: they are
 //! compared when they are read, and by `doctor`.
 
-use std::{sync::Weak, time::Duration};
+use std::{path::Path, sync::Weak, time::Duration};
 
-use futures_util::TryStreamExt;
-use sqlx::{
-    ConnectOptions, Connection, Row, SqliteConnection,
-    sqlite::{SqliteConnectOptions, SqliteRow},
-};
+use rusqlite::{Connection, Row, params};
 
 use super::{
+    connections::{Mode, blocking, open},
     damage::Table,
     database::Store,
     error::{Record, Result, StoreError},
-    keys, meshes, rows, sweeps,
+    keys, meshes, rows,
+    sql::Sql,
+    sweeps,
 };
 
 /// How long after one reading the next begins.
@@ -32,7 +31,7 @@ const BETWEEN: Duration = Duration::from_millis(20);
 const BY_JOB: &str = "index of the request keys by job";
 
 /// What is wrong with a row.
-type Check = fn(&SqliteRow) -> Result<()>;
+type Check = fn(&Row<'_>) -> Result<()>;
 
 /// Tables whose rows are few, or small, with the check of a row if it has a checksum.
 const TABLES: [(Table, &str, Option<Check>); 9] = [
@@ -48,7 +47,7 @@ const TABLES: [(Table, &str, Option<Check>); 9] = [
     (
         Table::Sweeps,
         "sweep",
-        Some(|row| sweeps::intact(row, row.try_get("id")?)),
+        Some(|row| sweeps::intact(row, row.get("id")?)),
     ),
     (Table::Deleted, "deleted_job", None),
     (Table::Deleted, "deleted_sweep", None),
@@ -73,24 +72,24 @@ pub(super) async fn scrub(store: Weak<Store>) {
 
 /// Reads all of it once.
 pub(super) async fn read_once(store: &Weak<Store>) {
-    let Some(options) = store.upgrade().map(|store| store.reader.connect_options()) else {
+    let Some(file) = store.upgrade().map(|store| store.folder.database()) else {
         return;
     };
     for (table, name, check) in TABLES {
-        let mut read = read_table(store, &options, (table, name, check)).await;
+        let mut read = read_table(store, &file, (table, name, check)).await;
         for _ in 1..TRIES {
             if matches!(read, Ok(()) | Err(StoreError::Damaged(_))) || store.strong_count() == 0 {
                 break;
             }
             tokio::time::sleep(BEFORE_ANOTHER).await;
-            read = read_table(store, &options, (table, name, check)).await;
+            read = read_table(store, &file, (table, name, check)).await;
         }
         let Some(store) = store.upgrade() else { return };
         match read {
             Err(StoreError::Damaged(damage)) if damage.record.name != BY_JOB => {
-                store.damages.note_table(table, &damage.cause).await;
+                store.damages.note_table(table, &damage.cause);
             }
-            Err(StoreError::Damaged(damage)) => drop(store.damages.note(*damage).await),
+            Err(StoreError::Damaged(damage)) => drop(store.damages.note(*damage)),
             Err(cause) => tracing::warn!(
                 %cause,
                 "the table {name} could not be read {TRIES} times: {cause}; damage by the disk in it will be detected tomorrow"
@@ -103,34 +102,32 @@ pub(super) async fn read_once(store: &Weak<Store>) {
     }
     let _ = read_jobs(store).await; // what is damaged was noted
     if let Some(store) = store.upgrade() {
-        let _ = store.damages.noting(store.compare_sums()).await;
+        let _ = store.compare_sums().await;
     }
 }
 
 /// Compares a table with its indexes, and its rows with their checksums.
 async fn read_table(
     store: &Weak<Store>,
-    options: &SqliteConnectOptions,
-    (table, name, check): (Table, &str, Option<Check>),
+    file: &Path,
+    (table, name, check): (Table, &'static str, Option<Check>),
 ) -> Result<()> {
-    let mut connection = options.connect().await?;
-    let mut compared = indexes(&mut connection, table, name).await;
-    if let Some(check) = check {
-        let rows = rows_of(store, &mut connection, (table, name), check).await;
-        // what hides something counts more
-        compared = rows.and(compared);
-    }
-    connection.close().await?;
-    compared
+    let (store, file) = (store.clone(), file.to_owned());
+    blocking(move || {
+        let connection = open(&file, Mode::Read)?;
+        let compared = indexes(&connection, table, name);
+        match check {
+            // what hides something counts more
+            Some(check) => rows_of(&store, &connection, (table, name), check).and(compared),
+            None => compared,
+        }
+    })
+    .await
 }
 
-async fn indexes(connection: &mut SqliteConnection, table: Table, name: &str) -> Result<()> {
+fn indexes(connection: &Connection, table: Table, name: &str) -> Result<()> {
     // a few findings are enough
-    let found: Vec<String> = sqlx::query_scalar(sqlx::AssertSqlSafe(format!(
-        "pragma integrity_check({name})"
-    )))
-    .fetch_all(connection)
-    .await?;
+    let found: Vec<String> = connection.values(&format!("pragma integrity_check({name})"), ())?;
     // keys are looked for in the table itself, whose rows are compared below
     let hides_nothing = |line: &str| {
         table == Table::Keys && line.ends_with("missing from index request_key_by_job")
@@ -145,34 +142,33 @@ async fn indexes(connection: &mut SqliteConnection, table: Table, name: &str) ->
     }
 }
 
-async fn rows_of(
+fn rows_of(
     store: &Weak<Store>,
-    connection: &mut SqliteConnection,
+    connection: &Connection,
     (table, name): (Table, &str),
     check: Check,
 ) -> Result<()> {
-    let mut rows =
-        sqlx::query(sqlx::AssertSqlSafe(format!("select * from {name}"))).fetch(connection);
+    let mut statement = connection.prepare(&format!("select * from {name}"))?;
+    let mut rows = statement.query(())?;
     let mut last = None;
-    while let Some(row) = rows.try_next().await? {
+    while let Some(row) = rows.next()? {
         if table == Table::Keys {
-            let place: (String, String) = (row.try_get("owner")?, row.try_get("key")?);
+            let place: (String, String) = (row.get("owner")?, row.get("key")?);
             if last.as_ref().is_some_and(|last| *last >= place) {
                 return Err(table.damaged("its rows are not in order"));
             }
             last = Some(place);
         }
-        let Err(error) = check(&row) else { continue };
+        let Err(error) = check(row) else { continue };
         let Some(store) = store.upgrade() else {
             return Ok(());
         };
-        let noted = store.damages.noting(async { Err::<(), _>(error) }).await;
-        match (noted, table) {
+        match (store.damages.noting(Err(error)), table) {
             // only a submit of the same content can be the one that it was written for
             (Err(StoreError::Damaged(_)), Table::Keys) => {
                 store
                     .damages
-                    .suspect(row.try_get("payload").unwrap_or_default());
+                    .suspect(row.get("payload").unwrap_or_default());
             }
             (Err(other), _) => return Err(other),
             (Ok(()), _) => {}
@@ -188,18 +184,18 @@ async fn read_jobs(store: &Weak<Store>) -> Result<()> {
         let Some(store) = store.upgrade() else {
             return Ok(());
         };
-        let found = sqlx::query("select * from job where id > ? order by id limit ?")
-            .bind(after)
-            .bind(JOBS_AT_ONCE)
-            .fetch_all(&store.lists)
-            .await?;
+        let read = store.read_list(move |store, connection| {
+            let jobs = "select * from job where id > ? order by id limit ?";
+            connection.rows(jobs, params![after, JOBS_AT_ONCE], |row| {
+                let _ = store.damages.noting(rows::from_row(row));
+                Ok(row.get("id")?)
+            })
+        });
+        let found: Vec<i64> = read.await?;
         let Some(last) = found.last() else {
             return Ok(());
         };
-        after = last.try_get("id")?;
-        for row in &found {
-            let _ = store.damages.noting(async { rows::from_row(row) }).await;
-        }
+        after = *last;
         drop(store);
         tokio::time::sleep(BETWEEN).await;
     }

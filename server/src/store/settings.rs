@@ -2,18 +2,19 @@
 
 use std::sync::{Arc, atomic::Ordering};
 
-use super::{database::Store, error::Result};
+use super::{database::Store, error::Result, sql::Sql};
 use crate::memory::Budget;
 
 impl Store {
     /// Reads the settings, when the store is opened.
-    pub(super) async fn read_settings(&self) -> Result<()> {
-        let paused: bool =
-            sqlx::query_scalar("select exists (select 1 from setting where name = 'queue_paused')")
-                .fetch_one(&self.reader)
-                .await?;
-        self.paused.store(paused, Ordering::Relaxed);
-        Ok(())
+    pub(super) async fn read_settings(self: &Arc<Self>) -> Result<()> {
+        self.read(|store, connection| {
+            let paused = "select exists (select 1 from setting where name = 'queue_paused')";
+            let paused = connection.value(paused, ())?;
+            store.paused.store(paused, Ordering::Relaxed);
+            Ok(())
+        })
+        .await
     }
 
     /// Sets the memory that running jobs share; once and before any is claimed.
@@ -32,20 +33,19 @@ impl Store {
     }
 
     /// Pauses or resumes the queue; kept across restarts.
-    pub async fn set_paused(&self, paused: bool) -> Result<()> {
-        self.control(|| self.write_paused(paused)).await?;
-        self.paused.store(paused, Ordering::Relaxed);
-        Ok(())
-    }
-
-    async fn write_paused(&self, paused: bool) -> Result<()> {
-        let mut tx = self.begin_control().await?;
-        let statement = if paused {
-            "insert into setting (name, value) values ('queue_paused', 'true') on conflict do nothing"
-        } else {
-            "delete from setting where name = 'queue_paused'"
-        };
-        sqlx::query(statement).execute(&mut *tx).await?;
-        tx.commit().await
+    pub async fn set_paused(self: &Arc<Self>, paused: bool) -> Result<()> {
+        self.control(move |writer| {
+            let tx = writer.begin_control()?;
+            let statement = if paused {
+                "insert into setting (name, value) values ('queue_paused', 'true') on conflict do nothing"
+            } else {
+                "delete from setting where name = 'queue_paused'"
+            };
+            tx.run(statement, ())?;
+            tx.commit()?;
+            writer.store.paused.store(paused, Ordering::Relaxed);
+            Ok(())
+        })
+        .await
     }
 }

@@ -1,10 +1,10 @@
 //! What jobs and owners keep, in bytes.
 
-use std::collections::HashMap;
+use std::{collections::HashMap, sync::Arc};
 
-use sqlx::SqliteConnection;
+use rusqlite::Connection;
 
-use super::{database::Store, error::Result};
+use super::{database::Store, error::Result, sql::Sql};
 use crate::job::Job;
 
 /// What an owner keeps.
@@ -47,85 +47,81 @@ pub(super) const WAITING_BYTES: &str = "select coalesce(sum(bytes), 0) from cont
 
 impl Store {
     /// What an owner keeps.
-    pub async fn size_of_owner(&self, owner: &str) -> Result<OwnerSize> {
-        let row: Option<Columns> = sqlx::query_as(
-            "select owner, jobs, job_bytes, mesh_bytes from owner_size where owner = ?",
-        )
-        .bind(owner)
-        .fetch_optional(&self.reader)
-        .await?;
-        let nothing = || OwnerSize {
-            owner: owner.to_owned(),
-            ..OwnerSize::default()
-        };
-        Ok(row.map_or_else(nothing, size))
+    pub async fn size_of_owner(self: &Arc<Self>, owner: &str) -> Result<OwnerSize> {
+        let owner = owner.to_owned();
+        self.read(move |_, connection| {
+            let row: Option<Columns> = connection.row(
+                "select owner, jobs, job_bytes, mesh_bytes from owner_size where owner = ?",
+                [&owner],
+                |row| Ok(row.try_into()?),
+            )?;
+            let nothing = || OwnerSize {
+                owner,
+                ..OwnerSize::default()
+            };
+            Ok(row.map_or_else(nothing, size))
+        })
+        .await
     }
 
     /// Bytes of the problems of an owner's jobs that wait, each once.
-    pub async fn waiting_bytes_of(&self, owner: &str) -> Result<u64> {
-        let bytes: i64 = sqlx::query_scalar(WAITING_BYTES)
-            .bind(owner)
-            .fetch_one(&self.reader)
-            .await?;
-        Ok(u64::try_from(bytes).unwrap_or(0))
+    pub async fn waiting_bytes_of(self: &Arc<Self>, owner: &str) -> Result<u64> {
+        let owner = owner.to_owned();
+        self.read(move |_, connection| {
+            let bytes: i64 = connection.value(WAITING_BYTES, [owner])?;
+            Ok(u64::try_from(bytes).unwrap_or(0))
+        })
+        .await
     }
 
     /// What every owner keeps, who keeps most first: at most `limit` of them.
-    pub async fn sizes_of_owners(&self, limit: i64) -> Result<Vec<OwnerSize>> {
-        let rows: Vec<Columns> = sqlx::query_as(
-            "select owner, jobs, job_bytes, mesh_bytes from owner_size
-             order by job_bytes + mesh_bytes desc, owner limit ?",
-        )
-        .bind(limit)
-        .fetch_all(&self.reader)
-        .await?;
-        Ok(rows.into_iter().map(size).collect())
+    pub async fn sizes_of_owners(self: &Arc<Self>, limit: i64) -> Result<Vec<OwnerSize>> {
+        self.read(move |_, connection| {
+            connection.rows(
+                "select owner, jobs, job_bytes, mesh_bytes from owner_size
+                 order by job_bytes + mesh_bytes desc, owner limit ?",
+                [limit],
+                |row| Ok(size(row.try_into()?)),
+            )
+        })
+        .await
     }
 
     /// Whether the fields of this job were deleted by themselves.
-    pub async fn lost_fields(&self, key: i64) -> Result<bool> {
-        let read = async {
-            let mut connection = self.reader.acquire().await?;
-            lost_fields(&mut connection, key).await
-        };
-        self.damages.noting(read).await
+    pub async fn lost_fields(self: &Arc<Self>, key: i64) -> Result<bool> {
+        self.read(move |_, connection| lost_fields(connection, key))
+            .await
     }
 }
 
 /// Whether the fields of a job were deleted by themselves.
-pub(super) async fn lost_fields(connection: &mut SqliteConnection, key: i64) -> Result<bool> {
+pub(super) fn lost_fields(connection: &Connection, key: i64) -> Result<bool> {
     let lost = "select exists (select 1 from job_size where job_id = ? and fields = 2)";
-    Ok(sqlx::query_scalar(lost)
-        .bind(key)
-        .fetch_one(connection)
-        .await?)
+    connection.value(lost, [key])
 }
 
 /// Counts what a job keeps that has just ended.
-pub(super) async fn count(tx: &mut SqliteConnection, key: i64) -> Result<()> {
-    sqlx::query(
+pub(super) fn count(tx: &Connection, key: i64) -> Result<()> {
+    tx.run(
         "insert into job_size (job_id, owner, bytes, finished_at, fields)
          select job_id, owner, bytes, finished_at, fields from job_kept where job_id = ?",
-    )
-    .bind(key)
-    .execute(tx)
-    .await?;
+        [key],
+    )?;
     Ok(())
 }
 
 /// Fills in what jobs keep.
-pub(super) async fn add_sizes(connection: &mut SqliteConnection, jobs: &mut [Job]) -> Result<()> {
+pub(super) fn add_sizes(connection: &Connection, jobs: &mut [Job]) -> Result<()> {
     let ended = jobs.iter().filter(|job| job.status.is_terminal());
     let keys: Vec<i64> = ended.map(|job| job.key).collect();
     if keys.is_empty() {
         return Ok(());
     }
-    let sizes: Vec<(i64, i64)> = sqlx::query_as(
+    let sizes: Vec<(i64, i64)> = connection.rows(
         "select job_id, bytes from job_size where job_id in (select value from json_each(?))",
-    )
-    .bind(serde_json::to_string(&keys)?)
-    .fetch_all(connection)
-    .await?;
+        [serde_json::to_string(&keys)?],
+        |row| Ok(row.try_into()?),
+    )?;
     let sizes: HashMap<i64, i64> = sizes.into_iter().collect();
     for job in jobs {
         let bytes = sizes.get(&job.key);

@@ -1,16 +1,18 @@
 //! Reading the result of a job.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
+use rusqlite::Connection;
 use solver::solution::Fields;
-use sqlx::{Sqlite, Transaction};
 
 use super::{
+    connections::{Lease, blocking},
     content::name,
     damage::{Damages, Table},
     database::Store,
     encoding::{Decoded, PartInfo},
     error::{Record, Result},
+    events,
     parts::{ProfilePoints, profile_part},
     results::StoredResult,
     rows::with_id,
@@ -22,34 +24,32 @@ use crate::{
 
 impl Store {
     /// Size and hash of the JSON of the fields of this job, if they were read whole and found intact before.
-    pub async fn fields_info(&self, key: i64) -> Result<Option<PartInfo>> {
-        let read = async {
-            let mut connection = self.reader.acquire().await?;
-            let found = StoredResult::of(&mut connection, key).await?;
+    pub async fn fields_info(self: &Arc<Self>, key: i64) -> Result<Option<PartInfo>> {
+        self.read(move |store, connection| {
+            let found = StoredResult::of(connection, key)?;
             let fields = found.as_ref().and_then(StoredResult::fields);
-            let intact = fields.filter(|(content, _)| self.intact.contains(*content));
+            let intact = fields.filter(|(content, _)| store.intact.contains(*content));
             Ok(intact.map(|(_, info)| info.clone()))
-        };
-        self.damages.noting(read).await
+        })
+        .await
     }
 
     /// The memory that reading the fields of this job takes at most, in bytes; `None` if there are none.
-    pub async fn fields_memory(&self, key: i64) -> Result<Option<usize>> {
+    pub async fn fields_memory(self: &Arc<Self>, key: i64) -> Result<Option<usize>> {
         self.part_memory(key, name::FIELDS).await
     }
 
     /// The fields of this job, with size and hash of their JSON.
-    pub async fn fields(&self, key: i64) -> Result<Option<(PartInfo, Fields)>> {
-        let read = async {
-            let mut connection = self.reader.acquire().await?;
-            let Some(found) = StoredResult::of(&mut connection, key).await? else {
+    pub async fn fields(self: &Arc<Self>, key: i64) -> Result<Option<(PartInfo, Fields)>> {
+        self.read(move |store, connection| {
+            let Some(found) = StoredResult::of(connection, key)? else {
                 return Ok(None);
             };
             let Some((content, _)) = found.fields() else {
-                found.must_have_no_fields(&mut connection).await?;
+                found.must_have_no_fields(connection)?;
                 return Ok(None);
             };
-            let Some((info, decoded)) = found.read(&mut connection, name::FIELDS).await? else {
+            let Some((info, decoded)) = found.read(connection, name::FIELDS)? else {
                 return Ok(None);
             };
             let fields = match decoded {
@@ -57,29 +57,21 @@ impl Store {
                 Decoded::Json(json) => serde_json::from_slice(&json)
                     .map_err(|error| Record::of_job(key, name::FIELDS).damaged(error))?,
             };
-            self.intact.insert(content);
+            store.intact.insert(content);
             Ok(Some((info, fields)))
-        };
-        self.damages.noting(read).await
+        })
+        .await
     }
 
     /// A job and its result at one moment: the parts may be replaced while the job runs, and are removed when it is
     /// deleted.
-    pub async fn snapshot(&self, owners: Owners<'_>, id: JobId) -> Result<Option<Snapshot>> {
-        let read = async {
-            let mut tx = self.reader.begin().await?;
-            let job = with_id(&mut tx, owners, id).await?;
-            if job.is_none() {
-                self.damages.have_all(&[Table::Jobs])?;
-            }
-            Ok(job.map(|job| Snapshot {
-                job,
-                tx,
-                result: None,
-                damages: self.damages.clone(),
-            }))
-        };
-        self.damages.noting(read).await
+    pub async fn snapshot(self: &Arc<Self>, owners: Owners, id: JobId) -> Result<Option<Snapshot>> {
+        let (lease, store) = (self.reader.turn().await?, self.clone());
+        blocking(move || {
+            let taken = Snapshot::take(&store, lease, &owners, id);
+            store.damages.noting(taken)
+        })
+        .await
     }
 }
 
@@ -87,39 +79,69 @@ impl Store {
 pub struct Snapshot {
     /// The job, without its queue position.
     pub job: Job,
-    tx: Transaction<'static, Sqlite>,
-    /// Once it was asked for.
-    result: Option<StoredResult>,
+    /// A thread that may block has it while it reads.
+    stored: Arc<Mutex<Stored>>,
     damages: Arc<Damages>,
 }
 
-impl Snapshot {
-    /// The JSON of a part.
-    pub async fn part(&mut self, part: &str) -> Result<Option<Vec<u8>>> {
-        let damages = self.damages.clone();
-        let read = async {
-            self.read_index().await?;
-            match &self.result {
-                Some(result) => result.read(&mut self.tx, part).await,
-                None => Ok(None),
-            }
-        };
-        Ok(match damages.noting(read).await? {
-            Some((_, Decoded::Json(json))) => Some(json),
-            Some((_, Decoded::Fields(fields))) => Some(serde_json::to_vec(&fields)?),
-            None => None,
-        })
+/// What is stored of a job at one moment.
+struct Stored {
+    moment: Moment,
+    /// Its result, once it was asked for.
+    result: Option<StoredResult>,
+}
+
+/// A connection in a transaction that sees one state.
+struct Moment(Lease);
+
+impl Moment {
+    fn begin(mut lease: Lease) -> Result<Moment> {
+        lease.get()?.execute_batch("begin")?;
+        Ok(Moment(lease))
     }
 
-    async fn read_index(&mut self) -> Result<()> {
-        if self.result.is_none() {
-            let key = self.job.key;
-            self.result = StoredResult::of(&mut self.tx, key).await?;
-            if self.result.is_none() && self.job.result_available != ResultAvailable::None {
-                return Err(Record::of_job(key, name::RESULT).damaged("it is missing"));
-            }
+    fn connection(&mut self) -> Result<&Connection> {
+        self.0.get()
+    }
+}
+
+impl Drop for Moment {
+    fn drop(&mut self) {
+        let is_over = |connection: &Connection| {
+            connection.is_autocommit() || connection.execute_batch("rollback").is_ok()
+        };
+        if !self.0.get().is_ok_and(is_over) {
+            self.0.discard(); // the next one would see this state
         }
-        Ok(())
+    }
+}
+
+impl Snapshot {
+    fn take(store: &Store, lease: Lease, owners: &Owners, id: JobId) -> Result<Option<Snapshot>> {
+        let mut moment = Moment::begin(lease)?;
+        let Some(job) = with_id(moment.connection()?, owners, id)? else {
+            store.damages.have_all(&[Table::Jobs])?;
+            return Ok(None);
+        };
+        let result = None;
+        Ok(Some(Snapshot {
+            job,
+            stored: Arc::new(Mutex::new(Stored { moment, result })),
+            damages: store.damages.clone(),
+        }))
+    }
+
+    /// The JSON of a part.
+    pub async fn part(&mut self, part: &str) -> Result<Option<Vec<u8>>> {
+        let part = part.to_owned();
+        let read = self.read_result(move |result, connection| {
+            Ok(match result.read(connection, &part)? {
+                Some((_, Decoded::Json(json))) => Some(json),
+                Some((_, Decoded::Fields(fields))) => Some(serde_json::to_vec(&fields)?),
+                None => None,
+            })
+        });
+        Ok(read.await?.flatten())
     }
 
     /// The profile of a boundary, at the end or at the end of a load step (from 0).
@@ -134,13 +156,54 @@ impl Snapshot {
 
     /// The boundaries that have a profile.
     pub async fn profiled_boundaries(&mut self) -> Result<Vec<String>> {
-        let damages = self.damages.clone();
-        damages.noting(self.read_index()).await?;
-        let prefix = profile_part("", ProfilePoints::Nodes, None);
-        let names = self.result.iter().flat_map(StoredResult::names);
-        let boundaries = names.filter_map(|name| name.strip_prefix(&prefix));
-        let mut boundaries: Vec<String> = boundaries.map(str::to_owned).collect();
-        boundaries.sort_unstable();
-        Ok(boundaries)
+        let names = self.read_result(|result, _| {
+            let prefix = profile_part("", ProfilePoints::Nodes, None);
+            let names = result.names();
+            let boundaries = names.filter_map(|name| name.strip_prefix(&prefix));
+            let mut boundaries: Vec<String> = boundaries.map(str::to_owned).collect();
+            boundaries.sort_unstable();
+            Ok(boundaries)
+        });
+        Ok(names.await?.unwrap_or_default())
+    }
+
+    /// The iterations of the job's attempt, each as the JSON of its event, in order.
+    pub async fn iterations(&mut self) -> Result<Vec<String>> {
+        let (key, attempt) = (self.job.key, self.job.attempt);
+        self.read(move |stored| events::iterations(stored.moment.connection()?, key, attempt))
+            .await
+    }
+
+    /// Runs a query about the result, if there is one.
+    async fn read_result<T: Send + 'static>(
+        &mut self,
+        query: impl FnOnce(&StoredResult, &Connection) -> Result<T> + Send + 'static,
+    ) -> Result<Option<T>> {
+        let (key, available) = (self.job.key, self.job.result_available);
+        self.read(move |stored| {
+            let connection = stored.moment.connection()?;
+            if stored.result.is_none() {
+                stored.result = StoredResult::of(connection, key)?;
+            }
+            match &stored.result {
+                Some(result) => query(result, connection).map(Some),
+                None if available == ResultAvailable::None => Ok(None),
+                None => Err(Record::of_job(key, name::RESULT).damaged("it is missing")),
+            }
+        })
+        .await
+    }
+
+    async fn read<T: Send + 'static>(
+        &mut self,
+        query: impl FnOnce(&mut Stored) -> Result<T> + Send + 'static,
+    ) -> Result<T> {
+        let (stored, damages) = (self.stored.clone(), self.damages.clone());
+        blocking(move || {
+            // if a query has panicked, what is stored is still the same
+            let mut stored = stored.lock().unwrap_or_else(PoisonError::into_inner);
+            damages.noting(query(&mut stored))
+        })
+        .await
     }
 }

@@ -1,14 +1,16 @@
 //! The space of the database on the disk: how much it is, and what is free in it given back to the file system.
 
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
 use super::{
     compact,
+    connections::blocking,
     database::{Rebuild, Store, with_advice},
     delete::PAUSE,
     error::{Result, StoreError},
     folder::{DATABASE, LOG, LOG_BYTES},
     pages::Pages,
+    sql::Sql,
 };
 
 /// Free pages that stay in the file, since new rows fill them soon: 4 MiB.
@@ -27,21 +29,26 @@ pub struct Space {
 
 impl Store {
     /// The space of the store.
-    pub async fn space(&self) -> Result<Space> {
-        let pages = Pages::of(&self.reader).await?;
+    pub async fn space(self: &Arc<Self>) -> Result<Space> {
+        let pages = self.pages().await?;
         let folder = self.folder.path();
-        let log = std::fs::metadata(folder.join(LOG)).map_or(0, |log| log.len());
         let free = rustix::fs::statvfs(folder).map_or(0, |free| free.f_bavail * free.f_frsize);
         Ok(Space {
-            used: pages.bytes_of(pages.count) + log,
+            used: pages.bytes_of(pages.count) + self.length(LOG),
             unused: pages.bytes_of(pages.free),
             free,
         })
     }
 
+    /// The pages of its database.
+    async fn pages(self: &Arc<Self>) -> Result<Pages> {
+        self.read(|_, connection| Pages::of(connection)).await
+    }
+
     /// Gives free pages back to the file system, as long as there are many, or all of them if the disk is full; how many were.
-    pub async fn give_space_back(&self) -> Result<i64> {
-        let given = match compact::gives_back(&mut *self.reader.acquire().await?).await? {
+    pub async fn give_space_back(self: &Arc<Self>) -> Result<i64> {
+        let gives_back = self.read(|_, connection| compact::gives_back(connection));
+        let given = match gives_back.await? {
             true => self.free_pages().await?,
             false => 0, // of an earlier version
         };
@@ -50,29 +57,27 @@ impl Store {
     }
 
     /// Takes free pages out of the database, some at a time. Its file still has them until the log is copied into it.
-    async fn free_pages(&self) -> Result<i64> {
+    async fn free_pages(self: &Arc<Self>) -> Result<i64> {
         let kept = match self.has_room() {
             Ok(()) => KEPT_PAGES,
             Err(_) => 0,
         };
         let mut given = 0;
         loop {
-            let before = Pages::of(&self.reader).await?;
+            let before = self.pages().await?;
             if before.free <= kept {
                 return Ok(given);
             }
             // the log may be copied into the file with the commit
             self.identity.may_shrink_to(least_bytes(before));
-            let give = self.control(|| async {
-                let mut tx = self.begin_control().await?;
+            let give = self.control(|writer| {
+                let tx = writer.begin_control()?;
                 // 1 MiB; it takes a step for each page
-                sqlx::query("pragma incremental_vacuum(256)")
-                    .fetch_all(&mut *tx)
-                    .await?;
-                tx.commit().await
+                tx.rows("pragma incremental_vacuum(256)", (), |_| Ok(()))?;
+                tx.commit()
             });
             give.await?;
-            let after = Pages::of(&self.reader).await?;
+            let after = self.pages().await?;
             self.identity.may_shrink_to(after.bytes_of(after.count));
             given += before.free - after.free;
             if after.free >= before.free {
@@ -84,25 +89,30 @@ impl Store {
 
     /// Makes the files of the database as small as what is in them: SQLite does so only after a thousand more pages were
     /// written, and never on a disk that is full. Where a reader still needs what is in the log, the next call does it.
-    async fn shorten_files(&self) -> Result<()> {
-        let length =
-            |name| std::fs::metadata(self.folder.path().join(name)).map_or(0, |file| file.len());
-        let pages = Pages::of(&self.reader).await?;
+    async fn shorten_files(self: &Arc<Self>) -> Result<()> {
+        let pages = self.pages().await?;
         let content = pages.bytes_of(pages.count);
-        if length(DATABASE) > content {
+        if self.length(DATABASE) > content {
             self.identity.may_shrink_to(content);
-        } else if length(LOG) <= LOG_BYTES {
+        } else if self.length(LOG) <= LOG_BYTES {
             return Ok(());
         }
-        // waits for nobody
-        sqlx::query("pragma wal_checkpoint(passive)")
-            .fetch_all(&self.writer)
-            .await?;
-        if length(LOG) > LOG_BYTES {
-            // the next transaction begins the log anew
-            self.begin_control().await?.commit().await?;
-        }
-        Ok(())
+        self.write(|writer| {
+            // waits for nobody
+            let checkpoint = "pragma wal_checkpoint(passive)";
+            writer.connection().execute_batch(checkpoint)?;
+            if writer.store.length(LOG) > LOG_BYTES {
+                // the next transaction begins the log anew
+                writer.begin_control()?.commit()?;
+            }
+            Ok(())
+        })
+        .await
+    }
+
+    /// Bytes of a file in its folder.
+    fn length(&self, name: &str) -> u64 {
+        std::fs::metadata(self.folder.path().join(name)).map_or(0, |file| file.len())
     }
 }
 
@@ -118,15 +128,17 @@ pub async fn compact_folder(folder: &Path) -> Result<(u64, u64)> {
         let text = format!("there is no store in {}", folder.display());
         return Err(StoreError::Folder(text));
     }
-    let connected = Store::connect(folder, Rebuild::Never).await;
+    let path = folder.to_owned();
+    let connected = blocking(move || Store::connect(&path, Rebuild::Never)).await;
     let (store, _) = connected.map_err(|error| with_advice(error, folder))?;
+    let store = Arc::new(store);
     let before = store.space().await?.used;
     // only the one that writes may be open
-    store.lists.close().await;
-    store.reader.close().await;
-    let compacted = compact::compact(&mut *store.writer.acquire().await?).await;
+    store.close_readers().await;
+    let compacted = store.write(|writer| Ok(compact::compact(writer.connection())));
+    let compacted = compacted.await;
     store.close_as_found().await;
-    compacted?;
+    compacted??;
     let after = std::fs::metadata(folder.join(DATABASE)).map_or(0, |file| file.len());
     Ok((before, after))
 }

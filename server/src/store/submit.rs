@@ -11,8 +11,9 @@ use tokio::sync::{mpsc, oneshot};
 use super::{
     change::{Change, Savepoint},
     claim, coalescing,
+    connections::closed,
     content::{self, Holder, NewContent, name},
-    database::Store,
+    database::{Store, Writer},
     error::{Result, StoreError},
     keys, labels, meshes,
     rows::JobRow,
@@ -27,7 +28,7 @@ use crate::{
 impl Store {
     /// Accepts jobs. They are stored on the disk when this returns. With `claim` (a worker is free) the next job of the
     /// queue is claimed in the same commit, if it fits into the memory budget.
-    pub async fn submit(&self, submission: Submission, claim: bool) -> Result<Accepted> {
+    pub async fn submit(self: &Arc<Self>, submission: Submission, claim: bool) -> Result<Accepted> {
         for job in submission.jobs.iter().filter(|job| job.cache == Cache::Use) {
             self.check_earlier_result(&job.input_hash).await;
         }
@@ -35,7 +36,6 @@ impl Store {
             self.check_result_for_next().await;
         }
         let (reply, answer) = oneshot::channel();
-        let closed = || StoreError::Folder("the store is closed".into());
         let sent = self
             .inbox
             .0
@@ -50,34 +50,15 @@ impl Store {
     }
 
     /// Accepts submissions in one commit, and answers each.
-    async fn commit_together(&self, pending: Vec<Pending>) {
+    async fn commit_together(self: &Arc<Self>, pending: Vec<Pending>) {
         let (mut submissions, mut replies) = (vec![], vec![]);
         for one in pending {
             submissions.push((one.submission, one.claim));
             replies.push(one.reply);
         }
-        let mut answers = vec![];
-        let committed = self.writing(async {
-            let mut change = self.change().await?;
-            for (submission, claim) in submissions {
-                let savepoint = change.savepoint().await?;
-                match accept(&mut change, savepoint, submission, claim).await {
-                    Ok(accepted) => {
-                        change.release().await?;
-                        answers.push(Ok(accepted));
-                    }
-                    Err(cause) => match change.roll_back_to(savepoint).await {
-                        Ok(()) => answers.push(Err(cause)),
-                        // a full disk has made the database roll back everything: report that as the cause
-                        Err(_) => return Err(cause),
-                    },
-                }
-            }
-            change.commit().await
-        });
-        let committed = committed.await;
-        match committed {
-            Ok(_) => {
+        let committed = self.write(|writer| accept_together(writer, submissions));
+        match committed.await {
+            Ok(answers) => {
                 let jobs = answers.iter().flatten().flat_map(|answer| &answer.jobs);
                 jobs.for_each(|job| failpoint::pass(Point::Answered, job.id));
                 for (reply, accepted) in replies.into_iter().zip(answers) {
@@ -93,8 +74,33 @@ impl Store {
     }
 }
 
+/// Accepts submissions in one transaction; for each, what has become of it.
+fn accept_together(
+    writer: &Writer<'_>,
+    submissions: Vec<(Submission, bool)>,
+) -> Result<Vec<Result<Accepted>>> {
+    let mut change = writer.change()?;
+    let mut answers = vec![];
+    for (submission, claim) in submissions {
+        let savepoint = change.savepoint()?;
+        match accept(&mut change, savepoint, submission, claim) {
+            Ok(accepted) => {
+                change.release()?;
+                answers.push(Ok(accepted));
+            }
+            Err(cause) => match change.roll_back_to(savepoint) {
+                Ok(()) => answers.push(Err(cause)),
+                // a full disk has made the database roll back everything: report that as the cause
+                Err(_) => return Err(cause),
+            },
+        }
+    }
+    change.commit()?;
+    Ok(answers)
+}
+
 /// Accepts one submission within the transaction.
-async fn accept(
+fn accept(
     change: &mut Change<'_>,
     savepoint: Savepoint,
     submission: Submission,
@@ -107,7 +113,7 @@ async fn accept(
         key,
         limits,
     } = submission;
-    if let Some(old) = keys::already_submitted(change, &owner, &jobs, key.as_ref()).await? {
+    if let Some(old) = keys::already_submitted(change, &owner, &jobs, key.as_ref())? {
         return Ok(Accepted {
             jobs: old,
             replayed: true,
@@ -118,32 +124,32 @@ async fn accept(
     let mut inserted = vec![];
     let sweep_key = match &sweep {
         Some(new) => Some((
-            sweeps::insert(change, &owner, new).await?,
+            sweeps::insert(change, &owner, new)?,
             NewContent::new(new.definition.as_bytes()),
         )),
         None => None,
     };
     let mut groups = sweep.iter().flat_map(|sweep| &sweep.groups);
     for new in &jobs {
-        let key = insert(change, &owner, new, limits).await?;
+        let key = insert(change, &owner, new, limits)?;
         if let (Some((sweep, definition)), Some(members)) = (&sweep_key, groups.next()) {
-            let tx = change.sql().await?;
-            sweeps::insert_members(tx, *sweep, key, members).await?;
+            let tx = change.sql()?;
+            sweeps::insert_members(tx, *sweep, key, members)?;
             let is_first = inserted.is_empty();
-            sweeps::attach_definition(tx, key, definition, is_first).await?;
+            sweeps::attach_definition(tx, key, definition, is_first)?;
         }
         inserted.push(key);
     }
     if let Some(key) = &key {
-        keys::remember(change, &owner, key, &inserted).await?;
+        keys::remember(change, &owner, key, &inserted)?;
     }
     let claim = match claim {
-        true => claim::claim(change).await?,
+        true => claim::claim(change)?,
         false => None,
     };
     let mut accepted = vec![];
     for key in inserted {
-        accepted.push(change.read(key).await?);
+        accepted.push(change.read(key)?);
     }
     if accepted
         .iter()
@@ -170,7 +176,6 @@ pub(super) async fn commit_submissions(store: Weak<Store>, mut inbox: mpsc::Rece
             pending.push(next);
         }
         // in its own task: a panic there must not close the inbox for all later submissions
-        let store: Arc<Store> = store;
         let done = tokio::spawn(async move { store.commit_together(pending).await }).await;
         if let Err(panic) = done {
             tracing::error!(%panic, "submissions were lost to a panic: {panic}");
@@ -179,18 +184,18 @@ pub(super) async fn commit_submissions(store: Weak<Store>, mut inbox: mpsc::Rece
 }
 
 /// Inserts a job: waiting for a worker, answered at once by an earlier result, or coalesced into another.
-pub(super) async fn insert(
+pub(super) fn insert(
     change: &mut Change<'_>,
     owner: &str,
     new: &NewJob,
     limits: QueueLimits,
 ) -> Result<i64> {
     let answer = match new.cache {
-        Cache::Use => coalescing::earlier_result(change, &new.input_hash).await?,
+        Cache::Use => coalescing::earlier_result(change, &new.input_hash)?,
         Cache::Refresh | Cache::Off => None,
     };
     let coalesced_into = match (&answer, new.cache) {
-        (None, Cache::Use) => coalescing::primary_for(change, owner, new).await?,
+        (None, Cache::Use) => coalescing::primary_for(change, owner, new)?,
         _ => None,
     };
     if answer.is_none() && change.waiting() >= limits.queued as usize {
@@ -203,23 +208,21 @@ pub(super) async fn insert(
         return Err(StoreError::OwnerQueueFull);
     }
     if answer.is_none() {
-        meshes::require(change.sql().await?, new.mesh.as_deref()).await?;
+        meshes::require(change.sql()?, new.mesh.as_deref())?;
     }
     let now = change.now();
-    let key = change
-        .insert(|key| {
-            let mut row = JobRow::accepted(key, owner, new, now);
-            row.job.coalesced_into = coalesced_into;
-            row
-        })
-        .await?;
+    let key = change.insert(|key| {
+        let mut row = JobRow::accepted(key, owner, new, now);
+        row.job.coalesced_into = coalesced_into;
+        row
+    })?;
     let problem = NewContent::new(new.problem.as_bytes());
-    let tx = change.sql().await?;
-    content::attach(tx, Holder::Job(key), name::PROBLEM, &problem).await?;
-    let job = change.read(key).await?;
-    labels::write(change, &job).await?;
+    let tx = change.sql()?;
+    content::attach(tx, Holder::Job(key), name::PROBLEM, &problem)?;
+    let job = change.read(key)?;
+    labels::write(change, &job)?;
     if let Some(source) = answer {
-        coalescing::answer(change, key, &source).await?;
+        coalescing::answer(change, key, &source)?;
     }
     Ok(key)
 }

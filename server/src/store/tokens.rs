@@ -1,13 +1,14 @@
 //! Tokens. All of them are also kept in memory, since every request is identified by one.
 
-use std::sync::{PoisonError, RwLockReadGuard, RwLockWriteGuard, atomic::Ordering::Relaxed};
+use std::sync::{Arc, PoisonError, RwLockReadGuard, RwLockWriteGuard, atomic::Ordering::Relaxed};
 
-use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
+use rusqlite::{Connection, Row, params};
 
 use super::{
     checksum,
-    database::Store,
+    database::{Store, Writer},
     error::{Record, Result, StoreError},
+    sql::Sql,
 };
 use crate::{
     time::Time,
@@ -16,28 +17,26 @@ use crate::{
 
 impl Store {
     /// Reads the tokens, when the store is opened. One that is damaged identifies nobody.
-    pub(super) async fn read_tokens(&self) -> Result<()> {
-        let marked: bool = sqlx::query_scalar(
-            "select exists (select 1 from setting where name = 'tokens_required')",
-        )
-        .fetch_one(&self.reader)
-        .await?;
-        let rows = sqlx::query("select * from token")
-            .fetch_all(&self.reader)
-            .await?;
-        let mut tokens = Tokens::new();
-        for row in &rows {
-            match self.damages.noting(async { read(row) }).await {
-                Ok((token, hash)) => {
-                    tokens.insert(token.id.clone(), (token, hash));
+    pub(super) async fn read_tokens(self: &Arc<Self>) -> Result<()> {
+        self.read(|store, connection| {
+            let marked = "select exists (select 1 from setting where name = 'tokens_required')";
+            let marked: bool = connection.value(marked, ())?;
+            let rows = connection.rows("select * from token", (), |row| Ok(read(row)))?;
+            store.any_tokens.store(marked || !rows.is_empty(), Relaxed);
+            let mut tokens = Tokens::new();
+            for row in rows {
+                match store.damages.noting(row) {
+                    Ok((token, hash)) => {
+                        tokens.insert(token.id.clone(), (token, hash));
+                    }
+                    Err(StoreError::Damaged(_)) => {} // logged
+                    Err(error) => return Err(error),
                 }
-                Err(StoreError::Damaged(_)) => {} // logged
-                Err(error) => return Err(error),
             }
-        }
-        self.any_tokens.store(marked || !rows.is_empty(), Relaxed);
-        *self.tokens_mut() = tokens;
-        Ok(())
+            *store.tokens_mut() = tokens;
+            Ok(())
+        })
+        .await
     }
 
     /// Whether there is a token, or was: from then on every request needs one.
@@ -72,17 +71,19 @@ impl Store {
     }
 
     /// Stores a new token.
-    pub async fn insert_token(&self, token: &Token, hash: SecretHash) -> Result<()> {
-        self.control(|| self.write_token(token, hash, true)).await?;
-        self.any_tokens.store(true, Relaxed);
-        let entry = (token.clone(), hash);
-        self.tokens_mut().insert(token.id.clone(), entry);
-        Ok(())
+    pub async fn insert_token(self: &Arc<Self>, token: &Token, hash: SecretHash) -> Result<()> {
+        let token = token.clone();
+        self.control(move |writer| {
+            write(writer, &token, hash, "insert")?;
+            writer.store.any_tokens.store(true, Relaxed);
+            Ok(())
+        })
+        .await
     }
 
     /// Revokes a token, once and for all; `None` if there is none with this id.
-    pub async fn revoke_token(&self, id: &str, now: Time) -> Result<Option<Token>> {
-        self.change_token(id, |token, _| {
+    pub async fn revoke_token(self: &Arc<Self>, id: &str, now: Time) -> Result<Option<Token>> {
+        self.change_token(id, move |token, _| {
             token.revoked_at.get_or_insert(now);
         })
         .await
@@ -90,61 +91,34 @@ impl Store {
 
     /// Gives a valid token another secret; the old one is refused from then on.
     pub async fn rotate_token(
-        &self,
+        self: &Arc<Self>,
         id: &str,
         new: SecretHash,
         now: Time,
     ) -> Result<Option<Token>> {
         match self.is_valid_token(id, None, now) {
-            true => self.change_token(id, |_, hash| *hash = new).await,
+            true => self.change_token(id, move |_, hash| *hash = new).await,
             false => Ok(None),
         }
     }
 
     async fn change_token(
-        &self,
+        self: &Arc<Self>,
         id: &str,
-        change: impl FnOnce(&mut Token, &mut SecretHash),
+        change: impl Fn(&mut Token, &mut SecretHash) + Send + 'static,
     ) -> Result<Option<Token>> {
-        // one after the other: what two change at once would be what the later one has read
-        let _lock = self.change_lock.lock().await;
-        let found = self.tokens_in_memory().get(id).cloned();
-        let Some((mut token, mut hash)) = found else {
-            return Ok(None);
-        };
-        change(&mut token, &mut hash);
-        self.control(|| self.write_token(&token, hash, false))
-            .await?;
-        self.tokens_mut().insert(id.into(), (token.clone(), hash));
-        Ok(Some(token))
-    }
-
-    async fn write_token(&self, token: &Token, hash: SecretHash, new: bool) -> Result<()> {
-        let mut tx = self.begin_control().await?;
-        let statement = match new {
-            true => {
-                "insert into token (id, name, owner, scopes, hash, created_at, expires_at, revoked_at)
-                 values (?, ?, ?, ?, ?, ?, ?, ?)"
-            }
-            false => {
-                "insert or replace into token (id, name, owner, scopes, hash, created_at, expires_at, revoked_at)
-                 values (?, ?, ?, ?, ?, ?, ?, ?)"
-            }
-        };
-        sqlx::query(statement)
-            .bind(&token.id)
-            .bind(&token.name)
-            .bind(&token.owner)
-            .bind(serde_json::to_string(&token.scopes)?)
-            .bind(&hash.0[..])
-            .bind(token.created_at.micros())
-            .bind(token.expires_at.map(Time::micros))
-            .bind(token.revoked_at.map(Time::micros))
-            .execute(&mut *tx)
-            .await?;
-        checksum::seal(&mut tx, "token", "id", token.id.as_str()).await?;
-        require_tokens(&mut tx).await?;
-        tx.commit().await
+        let id = id.to_owned();
+        self.control(move |writer| {
+            // one after the other, by the one writer: what two change at once would be what the later one has read
+            let found = writer.store.tokens_in_memory().get(&id).cloned();
+            let Some((mut token, mut hash)) = found else {
+                return Ok(None);
+            };
+            change(&mut token, &mut hash);
+            write(writer, &token, hash, "insert or replace")?;
+            Ok(Some(token))
+        })
+        .await
     }
 
     fn tokens_in_memory(&self) -> RwLockReadGuard<'_, Tokens> {
@@ -156,36 +130,63 @@ impl Store {
     }
 }
 
+/// Writes a token, then keeps it in memory.
+fn write(writer: &Writer<'_>, token: &Token, hash: SecretHash, insert: &str) -> Result<()> {
+    let tx = writer.begin_control()?;
+    let statement = format!(
+        "{insert} into token (id, name, owner, scopes, hash, created_at, expires_at, revoked_at)
+         values (?, ?, ?, ?, ?, ?, ?, ?)"
+    );
+    tx.run(
+        &statement,
+        params![
+            token.id,
+            token.name,
+            token.owner,
+            serde_json::to_string(&token.scopes)?,
+            hash.0,
+            token.created_at.micros(),
+            token.expires_at.map(Time::micros),
+            token.revoked_at.map(Time::micros),
+        ],
+    )?;
+    checksum::seal(&tx, "token", "id", token.id.clone())?;
+    require_tokens(&tx)?;
+    tx.commit()?;
+    let entry = (token.clone(), hash);
+    writer.store.tokens_mut().insert(token.id.clone(), entry);
+    Ok(())
+}
+
 /// From now on every request needs a token, also if all of them are lost.
-pub(super) async fn require_tokens(tx: &mut SqliteConnection) -> Result<()> {
-    sqlx::query("insert into setting (name, value) values ('tokens_required', 'true') on conflict do nothing")
-        .execute(tx)
-        .await?;
+pub(super) fn require_tokens(tx: &Connection) -> Result<()> {
+    let required = "insert into setting (name, value) values ('tokens_required', 'true') on conflict do nothing";
+    tx.run(required, ())?;
     Ok(())
 }
 
 /// A row of the table.
-pub(super) fn read(row: &SqliteRow) -> Result<(Token, SecretHash)> {
-    let id: String = row.try_get("id")?;
+pub(super) fn read(row: &Row<'_>) -> Result<(Token, SecretHash)> {
+    let id: String = row.get("id")?;
     let record = || Record::named(format!("token {id}"));
     if !checksum::row_is_intact(row)? {
         return Err(record().damaged("its checksum does not match its content"));
     }
-    let scopes = serde_json::from_str(row.try_get("scopes")?);
+    let scopes = serde_json::from_str(row.get_ref("scopes")?.as_str()?);
     let scopes = scopes.map_err(|error| record().damaged(error))?;
-    let hash: Vec<u8> = row.try_get("hash")?;
+    let hash: Vec<u8> = row.get("hash")?;
     let hash = hash
         .try_into()
         .map_err(|_| record().damaged("its hash has another length"))?;
     let time = |name: &str| -> Result<Option<Time>> {
-        let micros: Option<i64> = row.try_get(name)?;
+        let micros: Option<i64> = row.get(name)?;
         Ok(micros.map(Time::from_micros))
     };
     let token = Token {
-        name: row.try_get("name")?,
-        owner: row.try_get("owner")?,
+        name: row.get("name")?,
+        owner: row.get("owner")?,
         scopes,
-        created_at: Time::from_micros(row.try_get("created_at")?),
+        created_at: Time::from_micros(row.get("created_at")?),
         expires_at: time("expires_at")?,
         revoked_at: time("revoked_at")?,
         id,

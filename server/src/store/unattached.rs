@@ -1,92 +1,102 @@
 //! Content that is not attached yet: written in several short transactions, and removed if nothing needs it any more.
 
+use std::sync::Arc;
+
+use rusqlite::Connection;
+
 use super::{
     content::{self, Fingerprint},
-    database::Store,
+    database::{Store, Writer},
     error::{Record, Result},
+    sql::Sql,
 };
 
 impl Store {
     /// Writes pieces of content, numbered from `first`. They are kept once it is attached.
     pub async fn write_pieces(
-        &self,
+        self: &Arc<Self>,
         content: &Fingerprint,
         first: usize,
-        pieces: &[impl AsRef<[u8]> + Sync],
+        pieces: Vec<Vec<u8>>,
     ) -> Result<()> {
-        let write = async {
-            let mut tx = self.begin().await?;
-            content::write_pieces(&mut tx, content, first, pieces).await?;
-            tx.commit().await
-        };
-        self.writing(write).await
+        let content = content.clone();
+        self.write(move |writer| writer.write_pieces(&content, first, &pieces))
+            .await
     }
 
     /// Removes content that was written and never attached. One who stores the same content meanwhile notices that it is gone.
-    pub async fn discard_content(&self, content: &[&Fingerprint]) -> Result<()> {
-        self.control(|| async {
-            let mut tx = self.begin_control().await?;
-            for fingerprint in content {
-                let id: Option<i64> = sqlx::query_scalar(
+    pub async fn discard_content(self: &Arc<Self>, content: &[&Fingerprint]) -> Result<()> {
+        let hashes: Vec<Vec<u8>> = content.iter().map(|content| content.hash.clone()).collect();
+        self.control(move |writer| {
+            let tx = writer.begin_control()?;
+            for hash in &hashes {
+                let id: Option<i64> = tx.optional_value(
                     "select id from content where hash = ?
                      and not exists (select 1 from attachment where content = content.id)",
-                )
-                .bind(&fingerprint.hash)
-                .fetch_optional(&mut *tx)
-                .await?;
-                content::remove(&mut tx, id.as_slice()).await?;
+                    [hash],
+                )?;
+                content::remove(&tx, id.as_slice())?;
             }
-            tx.commit().await
+            tx.commit()
         })
         .await
     }
 
     /// Removes all content that is not attached: what was being written when the service was interrupted. How many pieces.
-    pub async fn discard_unattached(&self) -> Result<u64> {
+    pub async fn discard_unattached(self: &Arc<Self>) -> Result<usize> {
         let mut pieces = 0;
         loop {
-            let unattached = self.damages.noting(self.unattached()).await?;
+            let unattached = self.read(|_, connection| unattached(connection)).await?;
             if unattached.is_empty() {
                 return Ok(pieces); // nothing is written: the disk may be full
             }
-            let removed = self
-                .control(|| async {
-                    let mut tx = self.begin_control().await?;
-                    let removed = content::remove(&mut tx, &unattached).await?;
-                    tx.commit().await?;
-                    Ok(removed)
-                })
-                .await?;
+            let removed = self.control(move |writer| {
+                let tx = writer.begin_control()?;
+                let removed = content::remove(&tx, &unattached)?;
+                tx.commit()?;
+                Ok(removed)
+            });
+            let removed = removed.await?;
             pieces += removed;
             if removed == 0 {
                 return Ok(pieces); // a disk has changed where they are
             }
         }
     }
+}
 
-    /// Some content that is not attached, by the index and by the table itself: what an index lacks must not be removed.
-    async fn unattached(&self) -> Result<Vec<i64>> {
-        const AT_ONCE: i64 = 100;
-        let by_index: Vec<i64> = sqlx::query_scalar(
-            "select id from content where not exists
-                 (select 1 from attachment indexed by attachment_by_content where content = content.id) limit ?",
-        )
-        .bind(AT_ONCE)
-        .fetch_all(&self.reader)
-        .await?;
-        if by_index.is_empty() {
-            return Ok(by_index);
-        }
-        let attached: Vec<i64> = sqlx::query_scalar(
-            "select content from attachment not indexed where content in (select value from json_each(?))",
-        )
-        .bind(serde_json::to_string(&by_index)?)
-        .fetch_all(&self.reader)
-        .await?;
-        match attached.is_empty() {
-            true => Ok(by_index),
-            false => Err(Record::named("index of what is attached")
-                .damaged("it lacks what the table has: nothing is removed")),
-        }
+impl Writer<'_> {
+    /// Writes pieces of content, numbered from `first`, in a transaction.
+    pub(super) fn write_pieces(
+        &self,
+        content: &Fingerprint,
+        first: usize,
+        pieces: &[Vec<u8>],
+    ) -> Result<()> {
+        let tx = self.begin()?;
+        content::write_pieces(&tx, content, first, pieces)?;
+        tx.commit()
+    }
+}
+
+/// Some content that is not attached, by the index and by the table itself: what an index lacks must not be removed.
+fn unattached(connection: &Connection) -> Result<Vec<i64>> {
+    const AT_ONCE: i64 = 100;
+    let by_index: Vec<i64> = connection.values(
+        "select id from content where not exists
+             (select 1 from attachment indexed by attachment_by_content where content = content.id) limit ?",
+        [AT_ONCE],
+    )?;
+    if by_index.is_empty() {
+        return Ok(by_index);
+    }
+    let attached: Vec<i64> = connection.values(
+        "select content from attachment not indexed where content in (select value from json_each(?))",
+        [serde_json::to_string(&by_index)?],
+    )?;
+    match attached.is_empty() {
+        true => Ok(by_index),
+        false => Err(Record::named("index of what is attached")
+            .damaged("it lacks what the table has: nothing is removed")),
     }
 }

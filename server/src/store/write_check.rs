@@ -1,7 +1,7 @@
 //! Checks whether a damaged database can still store a job, by writing one that is rolled back.
 
 use super::{
-    database::Store,
+    database::Writer,
     end::end,
     error::Result,
     keys,
@@ -19,9 +19,9 @@ const UNLIMITED: QueueLimits = QueueLimits {
     queued_of_owner: None,
 };
 
-impl Store {
+impl Writer<'_> {
     /// Writes all data of a small job, from its submission to its end, and rolls them back.
-    pub(super) async fn write_and_roll_back(&self) -> Result<()> {
+    pub(super) fn write_and_roll_back(&self) -> Result<()> {
         let id = JobId::default();
         let job = NewJob {
             id: Some(id),
@@ -48,12 +48,12 @@ impl Store {
             result: ResultAvailable::Partial,
             ..Ending::failed(Reason::Internal, "")
         };
-        let mut change = self.control_change().await?;
-        let key = submit::insert(&mut change, "", &job, UNLIMITED).await?;
-        keys::remember(&mut change, "", &request, &[key]).await?;
+        let mut change = self.control_change()?;
+        let key = submit::insert(&mut change, "", &job, UNLIMITED)?;
+        keys::remember(&mut change, "", &request, &[key])?;
         let now = change.now();
-        change.update(key, |row| row.start(now)).await?;
-        results::attach(&mut change, key, &result).await?;
-        end(&mut change, key, &ending).await
+        change.update(key, |row| row.start(now))?;
+        results::attach(&mut change, key, &result)?;
+        end(&mut change, key, &ending)
     }
 }

@@ -33,7 +33,7 @@ pub async fn history(
     let load = async {
         let mut found = jobs::snapshot(service, caller, id).await?;
         let available = found.job.result_available;
-        let content = StoredHistory::load(service, &mut found).await?;
+        let content = StoredHistory::load(&mut found).await?;
         Ok(Found {
             available,
             content,
@@ -72,10 +72,7 @@ pub(super) enum StoredHistory {
 }
 
 impl StoredHistory {
-    pub(super) async fn load(
-        service: &Service,
-        found: &mut Snapshot,
-    ) -> Result<StoredHistory, ApiError> {
+    pub(super) async fn load(found: &mut Snapshot) -> Result<StoredHistory, ApiError> {
         let job = &found.job;
         // a partial result ends with the last finished load step; the events go on
         if job.status.is_terminal() && job.result_available == ResultAvailable::Final {
@@ -84,9 +81,7 @@ impl StoredHistory {
                 return Ok(StoredHistory::Whole(whole));
             }
         }
-        let job = &found.job;
-        let lines = service.store.iterations(job.key, job.attempt).await?;
-        Ok(StoredHistory::Events(lines))
+        Ok(StoredHistory::Events(found.iterations().await?))
     }
 
     pub(super) fn read(self) -> Result<Vec<TimedIteration>, ApiError> {

@@ -98,7 +98,11 @@ pub async fn upload(
     out.flush().await.map_err(unwritten)?;
     drop(out);
     let hash = digest::sha256_text(hash);
-    if let Some(known) = service.store.mesh(Owners::Only(&owner), &hash).await? {
+    if let Some(known) = service
+        .store
+        .mesh(Owners::Only(owner.as_str().into()), &hash)
+        .await?
+    {
         return Ok((known, false));
     }
     service.may_keep_more(&owner).await?;
@@ -239,11 +243,12 @@ async fn write_pieces(
             }
             group.push(piece);
         }
-        if group.is_empty() {
+        let count = group.len();
+        if count == 0 {
             return Ok(());
         }
-        service.store.write_pieces(body, first, &group).await?;
-        first += group.len();
+        service.store.write_pieces(body, first, group).await?;
+        first += count;
     }
 }
 

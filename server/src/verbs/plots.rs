@@ -138,7 +138,7 @@ pub async fn plot(
             _ => found.part("summary").await?,
         };
         let history = match plot {
-            Plot::Convergence => Some(StoredHistory::load(service, &mut found).await?),
+            Plot::Convergence => Some(StoredHistory::load(&mut found).await?),
             _ => None,
         };
         let job = found.job.clone();

@@ -321,7 +321,7 @@ async fn of_jobs(
 /// The sweep in its present state.
 pub async fn get(service: &Service, caller: &Caller, id: SweepId) -> Result<Sweep, ApiError> {
     let owners = caller.visible_owners();
-    match service.store.sweep(owners, id).await? {
+    match service.store.sweep(owners.clone(), id).await? {
         Some(sweep) => Ok(sweep),
         None => Err(match service.store.sweep_was_deleted(owners, id).await? {
             true => ApiError::SweepDeleted(id),

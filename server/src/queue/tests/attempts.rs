@@ -405,17 +405,17 @@ async fn events_of_an_earlier_attempt_are_not_recorded() {
     rig.store.claim_next().await.unwrap().0.unwrap();
     rig.store.requeue_interrupted().await.unwrap();
     let again = rig.store.claim_next().await.unwrap().0.unwrap();
-    let events = [(crate::time::Time::now(), Payload::Iteration(fake::timed(1)))];
+    let events = vec![(crate::time::Time::now(), Payload::Iteration(fake::timed(1)))];
     assert!(
         !rig.store
-            .append_events(job.key, 1, &events, &Default::default())
+            .append_events(job.key, 1, events.clone(), &Default::default())
             .await
             .unwrap()
     );
     assert_eq!(rig.finish(&job, 1).await, None);
     assert!(
         rig.store
-            .append_events(job.key, again.job.attempt, &events, &Default::default())
+            .append_events(job.key, again.job.attempt, events, &Default::default())
             .await
             .unwrap()
     );
@@ -532,6 +532,7 @@ async fn a_full_disk_delays_a_job_and_does_not_end_it() {
         (done.status, done.reason),
         (Status::Failed, Some(Reason::TimedOut))
     );
-    let stored = rig.store.iterations(job.key, 1).await.unwrap();
+    let found = rig.store.snapshot(Owners::All, job.id).await;
+    let stored = found.unwrap().unwrap().iterations().await.unwrap();
     assert_eq!(stored.len(), done.progress.unwrap().iteration as usize);
 }

@@ -170,7 +170,7 @@ async fn a_job_answered_in_the_commit_of_another_submission_is_reported_as_chang
         result: ResultAvailable::Final,
         warnings: vec![],
     };
-    let parts = Parts::of_a_summary();
+    let parts = Arc::new(Parts::of_a_summary());
     let finished = rig
         .store
         .finish(primary.key, 1, &solved, FinalBatch::default(), Some(&parts));

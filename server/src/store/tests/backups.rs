@@ -16,12 +16,12 @@ fn folders() -> (tempfile::TempDir, PathBuf, PathBuf, PathBuf) {
     (top, data, backup, new)
 }
 
-async fn submit(store: &Store, input: &str) -> Job {
+async fn submit(store: &Arc<Store>, input: &str) -> Job {
     let accepted = store.submit(by("ada", vec![new(input)], None), false).await;
     accepted.unwrap().jobs.remove(0)
 }
 
-async fn with_token(store: &Store, id: &str) {
+async fn with_token(store: &Arc<Store>, id: &str) {
     let token = Token {
         id: id.into(),
         name: "laptop".into(),
@@ -138,7 +138,7 @@ async fn nobody_gets_into_a_saved_store_because_tokens_are_damaged() {
         with_token(&store, "000000000001").await;
         with_token(&store, "000000000002").await;
         if let Some(statement) = statement {
-            sqlx::query(statement).execute(&store.writer).await.unwrap();
+            run(&store, statement).await;
         }
         store.close().await;
         drop(store);

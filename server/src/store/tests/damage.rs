@@ -2,9 +2,10 @@
 
 use std::{fs, os::unix::fs::FileExt, path::Path};
 
-use sqlx::{AssertSqlSafe, ConnectOptions, Connection, Row};
-
-use super::*;
+use super::{
+    connections::{Mode, open},
+    *,
+};
 use crate::{
     job::{JobId, ResultAvailable},
     mesh::MeshInfo,
@@ -14,14 +15,14 @@ use crate::{
 const PARTS: [&str; 4] = ["summary", "history", "steps", "fields"];
 
 /// A result that no other job has.
-fn result_of(key: i64) -> Parts {
+fn result_of(key: i64) -> Arc<Parts> {
     let json = |name: &str| format!("{{\"{name}\":{key}.25}}");
     let part = |name: &&str| ResultPart::new(name.to_string(), json(name).as_bytes());
-    Parts::new(PARTS.iter().map(part).collect())
+    Arc::new(Parts::new(PARTS.iter().map(part).collect()))
 }
 
 /// Submits a job, solves it, and returns it.
-async fn solved(store: &Store, new: NewJob) -> Job {
+async fn solved(store: &Arc<Store>, new: NewJob) -> Job {
     store
         .submit(by("ada", vec![new], None), false)
         .await
@@ -46,7 +47,11 @@ async fn solved(store: &Store, new: NewJob) -> Job {
 }
 
 /// Everything that clients can read of a job, by name and as text.
-async fn everything(store: &Store, id: JobId, mesh: &str) -> Vec<(&'static str, Result<String>)> {
+async fn everything(
+    store: &Arc<Store>,
+    id: JobId,
+    mesh: &str,
+) -> Vec<(&'static str, Result<String>)> {
     fn text<T: std::fmt::Debug>(read: Result<T>) -> Result<String> {
         read.map(|read| format!("{read:?}"))
     }
@@ -65,48 +70,40 @@ async fn everything(store: &Store, id: JobId, mesh: &str) -> Vec<(&'static str, 
                 all.push((part, text(found.part(part).await)));
             }
             drop(found);
-            let mut connection = store.reader.acquire().await.unwrap();
-            let result = results::StoredResult::of(&mut connection, 1).await;
-            let info = |result: Option<results::StoredResult>| {
-                result.and_then(|result| result.fields().map(|(_, info)| info.clone()))
-            };
-            all.push(("info", text(result.map(info))));
+            let info = store.read(|_, connection| {
+                let result = results::StoredResult::of(connection, 1)?;
+                Ok(result.and_then(|result| result.fields().map(|(_, info)| info.clone())))
+            });
+            all.push(("info", text(info.await)));
         }
     }
     all
 }
 
 /// Sets a column of the only row of a table to a value written in SQL.
-async fn set(store: &Store, table: &str, row: i64, column: &str, value: &str) {
+async fn set(store: &Arc<Store>, table: &str, row: i64, column: &str, value: &str) {
     let key = if table == "event" { "seq" } else { "rowid" };
     let statement = format!("update {table} set {column} = {value} where {key} = {row}");
-    sqlx::query(AssertSqlSafe(statement))
-        .execute(&store.writer)
-        .await
-        .unwrap();
+    run(store, statement).await;
 }
 
 impl Store {
     /// Changes the record of a job, as a disk may.
-    pub(crate) async fn damage_job(&self, key: i64) {
+    pub(crate) async fn damage_job(self: &Arc<Self>, key: i64) {
         set(self, "job", key, "priority", "0.0 + 1").await;
     }
 
     /// Overwrites the first page of a table, as a disk may; nobody has the store open.
     pub(crate) async fn erase_table(folder: &Path, table: &str) {
         let database = folder.join("signorini.db");
-        let options = sqlx::sqlite::SqliteConnectOptions::new().filename(&database);
-        let mut connection = options.connect().await.unwrap();
+        let connection = open(&database, Mode::ReadWrite).unwrap();
         let place =
             "select rootpage - 1, page_size from sqlite_schema, pragma_page_size where name = ?";
-        let (page, bytes): (u64, u64) = sqlx::query_as(place)
-            .bind(table)
-            .fetch_one(&mut connection)
-            .await
-            .unwrap();
-        connection.close().await.unwrap();
+        let place = connection.row(place, [table], |row| Ok((row.get(0)?, row.get(1)?)));
+        let (page, bytes): (i64, i64) = place.unwrap().unwrap();
+        drop(connection);
         let file = fs::File::options().write(true).open(database).unwrap();
-        file.write_all_at(&vec![0; bytes as usize], page * bytes)
+        file.write_all_at(&vec![0; bytes as usize], (page * bytes) as u64)
             .unwrap();
     }
 }
@@ -115,10 +112,7 @@ impl Store {
 async fn no_column_can_change_unnoticed() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
-    sqlx::query("pragma foreign_keys = off")
-        .execute(&store.writer)
-        .await
-        .unwrap();
+    run(&store, "pragma foreign_keys = off").await;
     let mesh: MeshInfo = serde_json::from_value(serde_json::json!({
         "hash": "sha256:mesh", "format": "gmsh", "bytes": 1, "nodes": 8, "quadrilaterals": 1, "triangles": 0,
         "dofs": 16, "extent": [[0, 1], [0, 1]], "boundaries": {}, "groups": {}, "node_sets": {}, "warnings": [],
@@ -157,32 +151,21 @@ async fn no_column_can_change_unnoticed() {
             "attachment" => "name",
             _ => "rowid",
         };
-        let rows = format!("select {key} as place, * from {table}");
-        let rows = sqlx::query(AssertSqlSafe(rows))
-            .fetch_all(&store.writer)
-            .await
-            .unwrap();
-        for row in rows {
-            for column in row.columns().iter().map(sqlx::Column::name).skip(1) {
+        let columns = format!("select name from pragma_table_info('{table}')");
+        let columns: Vec<String> = values(&store, columns).await;
+        let places = format!("select quote({key}) from {table}");
+        let places: Vec<String> = values(&store, places).await;
+        for place in places {
+            for column in columns.iter().map(String::as_str) {
                 if not_compared(table).contains(&column) {
                     continue;
                 }
-                let place = match row.try_get::<i64, _>("place") {
-                    Ok(number) => number.to_string(),
-                    Err(_) => format!("'{}'", row.get::<String, _>("place")),
-                };
                 let old = format!("select quote({column}) from {table} where {key} = {place}");
-                let old: String = sqlx::query_scalar(AssertSqlSafe(old))
-                    .fetch_one(&store.writer)
-                    .await
-                    .unwrap();
+                let old: String = value(&store, old).await;
                 let put = async |value: &str, key: &str| {
                     let statement =
                         format!("update {table} set {column} = {value} where {key} = {place}");
-                    sqlx::query(AssertSqlSafe(statement))
-                        .execute(&store.writer)
-                        .await
-                        .unwrap();
+                    run(&store, statement).await;
                 };
                 let other = match old.as_str() {
                     "NULL" if column == "checksum" => continue,
@@ -214,10 +197,7 @@ async fn no_column_can_change_unnoticed() {
                 // the number by which it is found may be what was changed
                 if column == key {
                     let back = format!("update {table} set {column} = {old} where {key} = {other}");
-                    sqlx::query(AssertSqlSafe(back))
-                        .execute(&store.writer)
-                        .await
-                        .unwrap();
+                    run(&store, back).await;
                 } else {
                     put(&old, key).await;
                 }
@@ -241,14 +221,13 @@ async fn a_job_without_a_checksum_is_damaged_and_stays_so() {
     }
     let running = store.claim_next().await.unwrap().0.unwrap().job;
     assert_eq!(running.key, jobs[0].key);
-    let harm = "update job set checksum = null where id < 3";
-    sqlx::query(harm).execute(&store.writer).await.unwrap();
+    run(&store, "update job set checksum = null where id < 3").await;
     let damaged = |told: &StoreError| told.is_damage_of(1) || told.is_damage_of(2);
-    let (key, events) = (running.key, [(crate::time::Time::now(), fake_event())]);
+    let (key, events) = (running.key, vec![(crate::time::Time::now(), fake_event())]);
     let progress = Default::default();
-    let appended = store.append_events(key, 1, &events, &progress).await;
+    let appended = store.append_events(key, 1, events, &progress).await;
     assert!(appended.is_err_and(|told| damaged(&told)));
-    let parts = Parts::of_a_summary();
+    let parts = Arc::new(Parts::of_a_summary());
     let partial = store.write_partial(key, 1, &parts).await;
     assert!(partial.is_err_and(|told| damaged(&told)));
     let (ending, last) = (Ending::canceled(), FinalBatch::default());
@@ -274,10 +253,7 @@ async fn a_job_without_a_checksum_is_damaged_and_stays_so() {
     let next = store.claim_next().await.unwrap().0.unwrap().job;
     assert_eq!(next.key, jobs[2].key);
     let left = "select id from job where checksum is null order by id";
-    let left: Vec<i64> = sqlx::query_scalar(left)
-        .fetch_all(&store.reader)
-        .await
-        .unwrap();
+    let left: Vec<i64> = values(&store, left).await;
     assert_eq!(left, [1, 2]);
     assert_eq!(store.health().await.unwrap().damaged, 2);
     store.close().await;
@@ -345,12 +321,12 @@ async fn the_memory_for_fields_is_told_by_intact_ones_only() {
     let store = Store::open(folder.path()).await.unwrap();
     let noise = "update content_piece set body = zeroblob(length(body))
                  where content = (select content from attachment where name = 'fields')";
-    sqlx::query(noise).execute(&store.writer).await.unwrap();
+    run(&store, noise).await;
     let told = store.fields_memory(job.key).await;
     assert!(told.is_err_and(|told| told.is_damage_of(job.key)));
 }
 
-async fn submit_three(store: &Store) {
+async fn submit_three(store: &Arc<Store>) {
     for input in ["1", "2", "3"] {
         let job = NewJob {
             problem: format!("{{\"n\":{input}}}"),
@@ -412,8 +388,7 @@ async fn an_index_that_lacks_a_job_is_noticed() {
     let job = solved(&store, new("1")).await;
     store
         .damages
-        .note_table(Table::Jobs, "row 1 missing from index")
-        .await;
+        .note_table(Table::Jobs, "row 1 missing from index");
     assert!(store.job(Owners::All, job.id).await.is_ok());
     let unknown = store.job(Owners::All, JobId::default()).await;
     assert!(
@@ -553,14 +528,11 @@ async fn what_is_intact_is_saved_and_the_rest_is_named() {
     set(&store, "event", 2, "t", "t + 1").await; // the second event of every job that has one
     for key in [1, 3, 4] {
         let back = format!("update event set t = t - 1 where seq = 2 and job_id = {key}");
-        sqlx::query(AssertSqlSafe(back))
-            .execute(&store.writer)
-            .await
-            .unwrap();
+        run(&store, back).await;
     }
     let third = "update content_piece set body = x'00'
                  where content = (select content from attachment where key = 3 and name = 'fields')";
-    sqlx::query(third).execute(&store.writer).await.unwrap();
+    run(&store, third).await;
     set(&store, "job", 5, "owner", "'bob'").await;
     store.close().await;
     drop(store);
@@ -651,7 +623,7 @@ async fn a_page_of_one_job_that_cannot_be_read_disturbs_no_other() {
         problem: format!("\"{}\"", character.repeat(50_000)),
         ..new(input)
     };
-    let submit = async |store: &Store, job| {
+    let submit = async |store: &Arc<Store>, job| {
         let accepted = store.submit(by("ada", vec![job], None), false).await;
         accepted.unwrap().jobs.remove(0)
     };
@@ -671,6 +643,7 @@ async fn a_page_of_one_job_that_cannot_be_read_disturbs_no_other() {
         ResultPart::plain(large),
     ]);
     let last = FinalBatch::default();
+    let result = Arc::new(result);
     let finished = store.finish(first.key, 1, &ending, last, Some(&result));
     finished.await.unwrap().unwrap();
     store.close().await;
@@ -714,7 +687,7 @@ async fn a_damaged_problem_that_is_submitted_again_is_mended_before_it_is_claime
     let first = store.submit(by("ada", vec![large()], None), true).await;
     first.unwrap().claim.unwrap();
     let harm = "update content_piece set body = zeroblob(length(body)) where piece = 1";
-    sqlx::query(harm).execute(&store.writer).await.unwrap();
+    run(&store, harm).await;
     let again = store.submit(by("ada", vec![large()], None), true).await;
     assert_eq!(again.unwrap().claim.unwrap().problem, large().problem);
 }

@@ -9,7 +9,7 @@ use super::*;
 use crate::job::JobId;
 
 /// Jobs of all kinds, some of which have ended, in another order than that of their arrival.
-async fn many(store: &Store, dice: &mut Rng) -> Vec<Job> {
+async fn many(store: &Arc<Store>, dice: &mut Rng) -> Vec<Job> {
     for n in 0..60 {
         let owner = ["ada", "bob", "cyd"][dice.usize(0..3)];
         let labels = [("half", n % 2), ("part", n % 9)];
@@ -122,7 +122,7 @@ async fn pages_have_the_jobs_that_match_in_order() {
     let (mut short, mut empty, mut found_some) = (0, 0, 0);
     for _ in 0..400 {
         let filter = some_filter(&jobs, &mut dice);
-        let owners = [Owners::All, Owners::Only("ada")][dice.usize(0..2)];
+        let owners = [Owners::All, Owners::Only("ada".into())][dice.usize(0..2)].clone();
         let by = [OrderBy::CreatedAt, OrderBy::FinishedAt][dice.usize(0..2)];
         let order = Order {
             by,
@@ -143,7 +143,7 @@ async fn pages_have_the_jobs_that_match_in_order() {
         let (mut listed, mut cursor) = (vec![], None);
         loop {
             let page = store
-                .some_jobs(owners, &filter, order, cursor, limit)
+                .some_jobs(owners.clone(), &filter, order, cursor, limit)
                 .await
                 .unwrap();
             assert!(page.items.len() as i64 <= limit);
@@ -166,7 +166,7 @@ async fn pages_have_the_jobs_that_match_in_order() {
             let (mut keys, mut after) = (vec![], None);
             loop {
                 let some = store
-                    .keys(owners, &filter, after, jobs[49].key, limit)
+                    .keys(owners.clone(), &filter, after, jobs[49].key, limit)
                     .await
                     .unwrap();
                 keys.extend(some.keys);
@@ -179,7 +179,7 @@ async fn pages_have_the_jobs_that_match_in_order() {
             let expected: Vec<i64> = expected.filter(|key| *key <= jobs[49].key).collect();
             assert_eq!(keys, expected, "{filter:?}");
         }
-        let counted = store.count(owners, &filter, None).await.unwrap();
+        let counted = store.count(owners.clone(), &filter, None).await.unwrap();
         let all = jobs
             .iter()
             .filter(mine)

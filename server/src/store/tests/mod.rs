@@ -12,7 +12,9 @@ mod starts;
 mod sweeps;
 mod upgrades;
 
-use super::*;
+use rusqlite::types::FromSql;
+
+use super::{sql::Sql, *};
 use crate::{
     caller::Owners,
     job::{Cache, Job, Limits, ResultAvailable, Status},
@@ -20,37 +22,63 @@ use crate::{
 
 impl Store {
     /// Makes the disk full after this number of further pages, until a write fails: the connection is then replaced.
-    pub(crate) async fn bound(&self, more: i64) {
-        let pages: i64 = sqlx::query_scalar("pragma page_count")
-            .fetch_one(&self.writer)
-            .await
-            .unwrap();
-        let limit = sqlx::AssertSqlSafe(format!("pragma max_page_count = {}", pages + more));
-        sqlx::query(limit).execute(&self.writer).await.unwrap();
+    pub(crate) async fn bound(self: &Arc<Self>, more: i64) {
+        let bounded = self.write(move |writer| {
+            let connection = writer.connection();
+            let pages: i64 = connection.value("pragma page_count", ())?;
+            let limit = format!("pragma max_page_count = {}", pages + more);
+            Ok(connection.execute_batch(&limit)?)
+        });
+        bounded.await.unwrap();
     }
 
     /// Whether no write has failed yet.
-    pub(crate) async fn is_bound(&self) -> bool {
-        let pages: i64 = sqlx::query_scalar("pragma max_page_count")
-            .fetch_one(&self.writer)
-            .await
-            .unwrap();
-        pages < 1_000_000
+    pub(crate) async fn is_bound(self: &Arc<Self>) -> bool {
+        let pages = self.write(|writer| {
+            let pages = "pragma max_page_count";
+            writer.connection().value::<i64>(pages, ())
+        });
+        pages.await.unwrap() < 1_000_000
     }
+}
+
+/// Runs statements of which the store does not know.
+async fn run(store: &Arc<Store>, statements: impl Into<String>) {
+    let statements = statements.into();
+    let done = store.write(move |writer| Ok(writer.connection().execute_batch(&statements)?));
+    done.await.unwrap();
+}
+
+/// The first column of all rows of a query.
+async fn values<T: FromSql + Send + 'static>(
+    store: &Arc<Store>,
+    query: impl Into<String>,
+) -> Vec<T> {
+    let query = query.into();
+    let read = store.read(move |_, connection| connection.values(&query, ()));
+    read.await.unwrap()
+}
+
+/// The first column of the only row of a query.
+async fn value<T: FromSql + Send + 'static>(store: &Arc<Store>, query: impl Into<String>) -> T {
+    values(store, query).await.pop().unwrap()
 }
 
 impl Store {
     /// The JSON of a part of a result; `None` if there is no such part.
-    pub(crate) async fn json_of(&self, key: i64, part: &str) -> Result<Option<Vec<u8>>> {
-        let mut connection = self.reader.acquire().await?;
-        let Some(result) = results::StoredResult::of(&mut connection, key).await? else {
-            return Ok(None);
-        };
-        let found = result.read(&mut connection, part).await?;
-        Ok(found.map(|(_, decoded)| match decoded {
-            encoding::Decoded::Json(json) => json,
-            encoding::Decoded::Fields(fields) => serde_json::to_vec(&fields).unwrap(),
-        }))
+    pub(crate) async fn json_of(self: &Arc<Self>, key: i64, part: &str) -> Result<Option<Vec<u8>>> {
+        let part = part.to_owned();
+        self.read(move |_, connection| {
+            let Some(result) = results::StoredResult::of(connection, key)? else {
+                return Ok(None);
+            };
+            let found = result.read(connection, &part)?;
+            Ok(found.map(|(_, decoded)| match decoded {
+                encoding::Decoded::Json(json) => json,
+                encoding::Decoded::Fields(fields) => serde_json::to_vec(&fields).unwrap(),
+            }))
+        })
+        .await
     }
 }
 
@@ -74,10 +102,10 @@ impl Parts {
 }
 
 /// Stores a mesh with this body.
-async fn store_mesh(store: &Store, owner: &str, info: &crate::mesh::MeshInfo, body: &[u8]) {
+async fn store_mesh(store: &Arc<Store>, owner: &str, info: &crate::mesh::MeshInfo, body: &[u8]) {
     let content = Fingerprint::of([body]);
-    let pieces: Vec<&[u8]> = body.chunks(PIECE_BYTES).collect();
-    store.write_pieces(&content, 0, &pieces).await.unwrap();
+    let pieces = body.chunks(PIECE_BYTES).map(<[u8]>::to_vec).collect();
+    store.write_pieces(&content, 0, pieces).await.unwrap();
     let inserted = store.insert_mesh(owner, info, &content).await;
     inserted.unwrap().unwrap();
 }
@@ -120,7 +148,7 @@ fn by(owner: &str, jobs: Vec<NewJob>, key: Option<&str>) -> Submission {
     }
 }
 
-/// SQLite ends a transaction by itself when the disk is full, and the driver does not notice.
+/// SQLite ends a transaction by itself when the disk is full.
 #[tokio::test]
 async fn a_full_disk_refuses_jobs_and_writing_continues_when_there_is_space() {
     let folder = tempfile::tempdir().unwrap();
@@ -170,7 +198,7 @@ async fn a_job_that_another_answers_keeps_no_piece_of_its_interrupted_attempt() 
         accepted.unwrap().claim.unwrap().job
     };
     let first = submit(0, Cache::Use).await;
-    let large = Parts::new(vec![parts::Part::plain(vec![b' '; 3 << 20])]);
+    let large = Arc::new(Parts::new(vec![parts::Part::plain(vec![b' '; 3 << 20])]));
     let written = store.write_before_end(first.key, first.attempt, &large);
     assert!(written.await.unwrap());
     store
@@ -186,7 +214,7 @@ async fn a_job_that_another_answers_keeps_no_piece_of_its_interrupted_attempt() 
         result: ResultAvailable::Final,
         warnings: vec![],
     };
-    let (parts, last) = (Parts::of_a_summary(), FinalBatch::default());
+    let (parts, last) = (Arc::new(Parts::of_a_summary()), FinalBatch::default());
     let finished = store
         .finish(second.key, second.attempt, &ending, last, Some(&parts))
         .await;
@@ -197,10 +225,7 @@ async fn a_job_that_another_answers_keeps_no_piece_of_its_interrupted_attempt() 
     // what was written of its own result is removed by whoever wrote it, and else at the next start
     assert!(store.discard_unattached().await.unwrap() > 10);
     assert_eq!(store.json_of(first.key, "fields").await.unwrap(), None);
-    let left: i64 = sqlx::query_scalar("select count(*) from content_piece")
-        .fetch_one(&store.reader)
-        .await
-        .unwrap();
+    let left: i64 = value(&store, "select count(*) from content_piece").await;
     assert_eq!(left, 2, "the problem and the result of both");
 }
 
@@ -232,29 +257,28 @@ async fn what_answers_a_job_is_checked_before_and_by_what_is_stored() {
         warnings: vec![],
     };
     let last = FinalBatch::default();
+    let parts = Arc::new(parts);
     let ended = store.finish(job.key, 1, &ending, last, Some(&parts));
     ended.await.unwrap().unwrap();
-    let numbers =
-        "select content from attachment where key = ? and name <> 'problem' order by name";
-    let numbers: Vec<i64> = sqlx::query_scalar(numbers)
-        .bind(job.key)
-        .fetch_all(&store.reader)
-        .await
-        .unwrap();
+    let numbers = format!(
+        "select content from attachment where key = {} and name <> 'problem' order by name",
+        job.key
+    );
+    let numbers: Vec<i64> = values(&store, numbers).await;
     let is_known = || numbers.iter().all(|number| store.intact.contains(*number));
     assert!(!is_known());
     // the other owner's turn is next
     store.check_result_for_next().await;
     assert!(is_known());
     assert!(store.json_of(job.key, "fields").await.is_err());
-    let missing = "delete from content_piece where content = ? and piece = 1";
-    let missing = sqlx::query(missing).bind(numbers[0]);
-    missing.execute(&store.writer).await.unwrap();
-    let mut connection = store.reader.acquire().await.unwrap();
-    let nothing = intact::Intact::default();
-    let attached = content::all(&mut connection, content::Holder::Job(job.key)).await;
-    let attached = attached.unwrap();
-    let checked = intact::check_result(&mut connection, &nothing, job.key, attached).await;
+    let fields = numbers[0];
+    let missing = format!("delete from content_piece where content = {fields} and piece = 1");
+    run(&store, missing).await;
+    let checked = store.read(move |_, connection| {
+        let attached = content::all(connection, content::Holder::Job(job.key))?;
+        intact::check_result(connection, &intact::Intact::default(), job.key, attached)
+    });
+    let checked = checked.await;
     assert!(
         matches!(checked, Err(StoreError::Damaged(_))),
         "{checked:?}"

@@ -3,8 +3,9 @@
 use super::*;
 use crate::job::{Job, JobId};
 
-const ADA: Owners<'static> = Owners::Only("ada");
-const BOB: Owners<'static> = Owners::Only("bob");
+fn only(owner: &str) -> Owners {
+    Owners::Only(owner.into())
+}
 
 struct Two {
     _folder: tempfile::TempDir,
@@ -43,7 +44,7 @@ async fn two_owners() -> Two {
 }
 
 /// Runs all waiting jobs, which succeed.
-async fn run_all(store: &Store) {
+async fn run_all(store: &Arc<Store>) {
     let ending = Ending {
         status: Status::Succeeded,
         reason: None,
@@ -52,7 +53,7 @@ async fn run_all(store: &Store) {
         warnings: vec![],
     };
     while let Some(Claim { job, .. }) = store.claim_next().await.unwrap().0 {
-        let (last, parts) = (FinalBatch::default(), Parts::of_a_summary());
+        let (last, parts) = (FinalBatch::default(), Arc::new(Parts::of_a_summary()));
         let finished = store.finish(job.key, job.attempt, &ending, last, Some(&parts));
         finished.await.unwrap().unwrap();
     }
@@ -67,18 +68,18 @@ async fn a_job_is_found_by_its_owner_and_by_a_caller_who_sees_all() {
         bob,
     } = two_owners().await;
     for (owners, sees_ada, sees_bob) in [
-        (ADA, true, false),
-        (BOB, false, true),
+        (only("ada"), true, false),
+        (only("bob"), false, true),
         (Owners::All, true, true),
     ] {
         for (job, sees) in [(&ada, sees_ada), (&bob, sees_bob)] {
-            let found = store.job(owners, job.id).await.unwrap();
+            let found = store.job(owners.clone(), job.id).await.unwrap();
             assert_eq!(
                 found.map(|job| job.id),
                 sees.then_some(job.id),
                 "{owners:?}"
             );
-            let found = store.snapshot(owners, job.id).await.unwrap();
+            let found = store.snapshot(owners.clone(), job.id).await.unwrap();
             assert_eq!(found.is_some(), sees, "{owners:?}");
         }
     }
@@ -122,8 +123,8 @@ async fn lists_counts_and_keys_contain_only_the_visible_jobs() {
         },
     ];
     for (owners, expected) in [
-        (ADA, vec![ada.key]),
-        (BOB, vec![bob.key]),
+        (only("ada"), vec![ada.key]),
+        (only("bob"), vec![bob.key]),
         (Owners::All, vec![ada.key, bob.key]),
     ] {
         for filter in &filters {
@@ -132,17 +133,23 @@ async fn lists_counts_and_keys_contain_only_the_visible_jobs() {
                     by,
                     descending: false,
                 };
-                let listed = store.jobs(owners, filter, order, None, 10).await.unwrap();
+                let listed = store
+                    .jobs(owners.clone(), filter, order, None, 10)
+                    .await
+                    .unwrap();
                 let listed: Vec<i64> = listed.iter().map(|job| job.key).collect();
                 assert_eq!(listed, expected, "{owners:?} {filter:?} {order:?}");
             }
-            let found = store.keys(owners, filter, None, bob.key, 10).await.unwrap();
+            let found = store
+                .keys(owners.clone(), filter, None, bob.key, 10)
+                .await
+                .unwrap();
             assert_eq!(
                 (found.keys, found.next),
                 (expected.clone(), None),
                 "{owners:?} {filter:?}"
             );
-            let counted = store.count(owners, filter, None).await.unwrap();
+            let counted = store.count(owners.clone(), filter, None).await.unwrap();
             assert_eq!(
                 counted[0].1 as usize,
                 expected.len(),
@@ -150,7 +157,10 @@ async fn lists_counts_and_keys_contain_only_the_visible_jobs() {
             );
         }
     }
-    let counted = store.count(ADA, &all, Some(GroupBy::Owner)).await.unwrap();
+    let counted = store
+        .count(only("ada"), &all, Some(GroupBy::Owner))
+        .await
+        .unwrap();
     assert_eq!(counted, [("ada".to_string(), 1)]);
     // a filter for another owner's jobs finds none
     let bobs = Filter {
@@ -159,15 +169,21 @@ async fn lists_counts_and_keys_contain_only_the_visible_jobs() {
     };
     assert!(
         store
-            .jobs(ADA, &bobs, Order::NEWEST_FIRST, None, 10)
+            .jobs(only("ada"), &bobs, Order::NEWEST_FIRST, None, 10)
             .await
             .unwrap()
             .is_empty()
     );
-    assert!(store.count(ADA, &bobs, None).await.unwrap().is_empty());
     assert!(
         store
-            .keys(ADA, &bobs, None, bob.key, 10)
+            .count(only("ada"), &bobs, None)
+            .await
+            .unwrap()
+            .is_empty()
+    );
+    assert!(
+        store
+            .keys(only("ada"), &bobs, None, bob.key, 10)
             .await
             .unwrap()
             .keys
@@ -175,7 +191,7 @@ async fn lists_counts_and_keys_contain_only_the_visible_jobs() {
     );
     assert_eq!(
         store
-            .keys(BOB, &bobs, None, bob.key, 10)
+            .keys(only("bob"), &bobs, None, bob.key, 10)
             .await
             .unwrap()
             .keys,
@@ -235,7 +251,7 @@ async fn an_id_of_another_owner_is_refused_without_revealing_the_job() {
         "{refused:?}"
     );
     run_all(&store).await;
-    store.delete(ADA, ada.key).await.unwrap();
+    store.delete(only("ada"), ada.key).await.unwrap();
     let refused = submit("bob").await;
     assert!(
         matches!(refused, Err(StoreError::IdConflict(id)) if id == ada.id),
@@ -262,12 +278,12 @@ async fn a_job_of_another_owner_cannot_be_changed_or_deleted() {
     };
     assert!(
         store
-            .edit(BOB, ada.id, &edit, None)
+            .edit(only("bob"), ada.id, &edit, None)
             .await
             .unwrap()
             .is_none()
     );
-    let edited = store.edit(ADA, ada.id, &edit, None).await.unwrap();
+    let edited = store.edit(only("ada"), ada.id, &edit, None).await.unwrap();
     let edited = edited.unwrap().unwrap();
     assert!(
         edited.pinned && edited.version == ada.version + 1,
@@ -281,15 +297,25 @@ async fn a_job_of_another_owner_cannot_be_changed_or_deleted() {
             .is_some()
     );
     run_all(&store).await;
-    assert_eq!(store.delete(BOB, ada.key).await.unwrap(), Deletion::Unknown);
-    assert_eq!(store.delete(ADA, ada.key).await.unwrap(), Deletion::Deleted);
+    assert_eq!(
+        store.delete(only("bob"), ada.key).await.unwrap(),
+        Deletion::Unknown
+    );
+    assert_eq!(
+        store.delete(only("ada"), ada.key).await.unwrap(),
+        Deletion::Deleted
+    );
     assert_eq!(
         store.delete(Owners::All, bob.key).await.unwrap(),
         Deletion::Deleted
     );
-    for (owners, knows) in [(ADA, true), (BOB, false), (Owners::All, true)] {
+    for (owners, knows) in [
+        (only("ada"), true),
+        (only("bob"), false),
+        (Owners::All, true),
+    ] {
         assert_eq!(
-            store.was_deleted(owners, ada.id).await.unwrap(),
+            store.was_deleted(owners.clone(), ada.id).await.unwrap(),
             knows,
             "{owners:?}"
         );
@@ -316,10 +342,10 @@ async fn a_result_answers_jobs_of_the_same_input_of_any_owner() {
     run_all(&store).await;
     let later = submit("eve").await;
     assert!(later.cached_from.is_some());
-    let bob = store.job(BOB, bob.id).await.unwrap().unwrap();
+    let bob = store.job(only("bob"), bob.id).await.unwrap().unwrap();
     assert_eq!(
         (bob.status, bob.cached_from.is_some()),
         (Status::Succeeded, true)
     );
-    assert!(store.job(BOB, ada.id).await.unwrap().is_none());
+    assert!(store.job(only("bob"), ada.id).await.unwrap().is_none());
 }

@@ -4,6 +4,7 @@ use std::{
     fs,
     os::unix::fs::{MetadataExt, PermissionsExt},
     path::PathBuf,
+    sync::atomic::{AtomicU32, Ordering::Relaxed},
 };
 
 use super::*;
@@ -22,7 +23,7 @@ async fn refused(folder: &Path) -> StoreError {
     Store::open(folder).await.unwrap_err()
 }
 
-async fn submit(store: &Store, input: &str) -> Result<Job> {
+async fn submit(store: &Arc<Store>, input: &str) -> Result<Job> {
     let accepted = store
         .submit(by("ada", vec![new(input)], None), false)
         .await?;
@@ -167,7 +168,7 @@ async fn tables_of_a_later_version_or_another_program_are_refused_untouched() {
     for statement in statements {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::open(folder.path()).await.unwrap();
-        sqlx::query(statement).execute(&store.writer).await.unwrap();
+        run(&store, statement).await;
         store.close().await;
         drop(store);
         let error = refused(folder.path()).await;
@@ -247,16 +248,14 @@ async fn on_a_full_disk_jobs_are_canceled_and_deleted_and_the_queue_paused() {
 async fn a_full_disk_releases_the_reserve() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
-    let tries = std::cell::Cell::new(0);
-    let second_time = || async {
-        tries.set(tries.get() + 1);
-        match tries.get() {
-            1 => Err(StoreError::Full),
-            _ => Ok(()),
-        }
-    };
-    store.control(second_time).await.unwrap();
-    assert_eq!(tries.get(), 2);
+    let tries = Arc::new(AtomicU32::new(0));
+    let counted = tries.clone();
+    let second_time = store.control(move |_| match counted.fetch_add(1, Relaxed) {
+        0 => Err(StoreError::Full),
+        _ => Ok(()),
+    });
+    second_time.await.unwrap();
+    assert_eq!(tries.load(Relaxed), 2);
     let left = fs::metadata(folder.path().join("signorini.reserve")).unwrap();
     assert!(left.len() < 16 << 20, "{}", left.len());
 }
@@ -279,7 +278,7 @@ async fn a_canceled_job_does_not_succeed_even_if_the_cancel_could_not_be_stored(
             result: ResultAvailable::Final,
             warnings: vec![],
         };
-        let parts = Parts::new(vec![]);
+        let parts = Arc::new(Parts::new(vec![]));
         let last = FinalBatch::default();
         let finished = store
             .finish(job.key, job.attempt, &ending, last, Some(&parts))
@@ -299,9 +298,7 @@ async fn a_clock_that_was_set_back_keeps_the_order_of_jobs() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
     let hour = 3600.0;
-    store
-        .ahead
-        .store(3_600_000_000, std::sync::atomic::Ordering::Relaxed);
+    store.ahead.store(3_600_000_000, Relaxed);
     let first = submit(&store, "1").await.unwrap();
     assert!(Time::now().seconds_until(first.created_at) > hour - 10.0);
     store.close().await;
@@ -336,9 +333,7 @@ async fn a_clock_that_was_set_back_keeps_the_events_of_a_job_in_order() {
     let job = submit(&store, "1").await.unwrap();
     // it is started an hour later; the next server finds the clock set back by that hour
     let hour = 3_600_000_000;
-    store
-        .ahead
-        .store(hour, std::sync::atomic::Ordering::Relaxed);
+    store.ahead.store(hour, Relaxed);
     store.claim_next().await.unwrap().0.unwrap();
     store.close().await;
     drop(store);

@@ -21,7 +21,7 @@ fn rows(numbers: &[usize]) -> Vec<(Time, MemberRow)> {
 }
 
 /// A sweep of two jobs, of which the first was claimed.
-async fn submitted(store: &Store) -> (Sweep, Job) {
+async fn submitted(store: &Arc<Store>) -> (Sweep, Job) {
     let id = SweepId::new();
     let job = |input: &str| NewJob {
         sweep: Some(id),
@@ -39,7 +39,8 @@ async fn submitted(store: &Store) -> (Sweep, Job) {
         ..by("ada", vec![job("1"), job("2")], None)
     };
     let accepted = store.submit(submission, true).await.unwrap();
-    let sweep = store.sweep(Owners::Only("ada"), id).await.unwrap().unwrap();
+    let ada = Owners::Only("ada".into());
+    let sweep = store.sweep(ada, id).await.unwrap().unwrap();
     (sweep, accepted.claim.unwrap().job)
 }
 
@@ -52,7 +53,7 @@ async fn a_row_is_stored_once_and_by_the_current_attempt_only() {
     assert_eq!((sweep.members.running, sweep.members.queued), (3, 1));
     let record = async |attempt, numbers: &[usize]| {
         let rows = rows(numbers);
-        store.record_members(job.key, attempt, &rows).await.unwrap()
+        store.record_members(job.key, attempt, rows).await.unwrap()
     };
     assert_eq!(record(job.attempt, &[2]).await, Some(sweep.key));
     // of another attempt; again, with another; of another job
@@ -105,7 +106,7 @@ async fn members_of_a_failed_job_have_failed_also_without_it_and_a_sweep_goes_wi
     let store = Store::open(folder.path()).await.unwrap();
     let (sweep, job) = submitted(&store).await;
     let solved = rows(&[2]);
-    let stored = store.record_members(job.key, job.attempt, &solved);
+    let stored = store.record_members(job.key, job.attempt, solved);
     stored.await.unwrap();
     let failed = Ending::failed(Reason::WorkerLost, "so");
     let fail = async |job: &Job| {
@@ -164,12 +165,10 @@ async fn a_row_that_a_disk_has_changed_is_not_served() {
     let store = Store::open(folder.path()).await.unwrap();
     let (sweep, job) = submitted(&store).await;
     let solved = rows(&[0, 2]);
-    let stored = store.record_members(job.key, job.attempt, &solved);
+    let stored = store.record_members(job.key, job.attempt, solved);
     stored.await.unwrap();
-    let change = async |statement: &'static str| {
-        sqlx::query(statement).execute(&store.writer).await.unwrap();
-    };
-    change("update sweep_member set body = replace(body, '2.0', '3.0') where number = 2").await;
+    let harm = "update sweep_member set body = replace(body, '2.0', '3.0') where number = 2";
+    run(&store, harm).await;
     let read = store.members(sweep.key, 0, 10).await;
     assert!(
         matches!(&read, Err(StoreError::Damaged(damage)) if damage.record.name.contains("member 2"))
@@ -181,9 +180,9 @@ async fn a_row_that_a_disk_has_changed_is_not_served() {
     assert!(store.member_events(sweep.key, 0, 10).await.is_err());
     let definition = "update content_piece set body = x'7b7d20'
                       where content in (select content from attachment where name = 'definition')";
-    change(definition).await;
+    run(&store, definition).await;
     assert!(store.members_task(job.key).await.is_err());
-    change("update sweep set last_seq = 7").await;
+    run(&store, "update sweep set last_seq = 7").await;
     assert!(store.sweep(Owners::All, sweep.id).await.is_err());
     store.close().await;
     let report = inspect(folder.path(), None).await.unwrap();

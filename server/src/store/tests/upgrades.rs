@@ -1,30 +1,17 @@
 //! Stores that were written by earlier versions of the program.
 
-use sqlx::{AssertSqlSafe, SqlitePool, migrate::Migrator, sqlite::SqliteConnectOptions};
+use super::{
+    connections::{Mode, open},
+    *,
+};
 
-use super::*;
-
-/// A store with the tables of these migrations and no later ones, and with the rows that these statements insert.
-async fn older_store(folder: &Path, migrations: &[&str], statements: &[&'static str]) {
-    let older = folder.join("migrations");
-    std::fs::create_dir(&older).unwrap();
-    let all = Path::new(env!("CARGO_MANIFEST_DIR")).join("../migrations");
-    for name in migrations {
-        std::fs::copy(all.join(name), older.join(name)).unwrap();
-    }
-    let options = SqliteConnectOptions::new()
-        .filename(folder.join("signorini.db"))
-        .create_if_missing(true);
-    let db = SqlitePool::connect_with(options).await.unwrap();
-    let migrator = Migrator::new(older.as_path()).await.unwrap();
-    migrator.run(&db).await.unwrap();
+/// A store with the tables up to this migration, and with the rows that these statements insert.
+fn older_store(folder: &Path, last: i64, statements: &[&str]) {
+    let database = open(&folder.join("signorini.db"), Mode::Create).unwrap();
+    migrations::run_to(&database, last).unwrap();
     for statement in statements {
-        sqlx::query(AssertSqlSafe(*statement))
-            .execute(&db)
-            .await
-            .unwrap();
+        database.execute_batch(statement).unwrap();
     }
-    db.close().await;
 }
 
 /// A job that had ended, and one that was waiting.
@@ -52,8 +39,7 @@ const BEFORE_OWNERS: [&str; 5] = [
 #[tokio::test]
 async fn a_store_from_before_the_job_api_is_upgraded_with_its_content() {
     let folder = tempfile::tempdir().unwrap();
-    let migrations = ["0001_jobs.sql", "0002_meshes.sql"];
-    older_store(folder.path(), &migrations, &BEFORE_THE_JOB_API).await;
+    older_store(folder.path(), 2, &BEFORE_THE_JOB_API);
     let store = Store::open(folder.path()).await.unwrap();
     let labeled = Filter {
         labels: vec![("a".into(), "b".into())],
@@ -74,12 +60,10 @@ async fn a_store_from_before_the_job_api_is_upgraded_with_its_content() {
         .unwrap();
     assert_eq!(found.part("fields").await.unwrap().unwrap(), b"{}");
     drop(found);
-    let mut connection = store.reader.acquire().await.unwrap();
-    let result = results::StoredResult::of(&mut connection, key).await;
-    let result = result.unwrap().unwrap();
+    let result = store.read(move |_, connection| results::StoredResult::of(connection, key));
+    let result = result.await.unwrap().unwrap();
     let (_, info) = result.fields().unwrap();
     assert_eq!((info.bytes, info.digest.len()), (2, 32));
-    drop(connection);
     // the waiting job is in the queue, and does not count as having waited too long
     assert_eq!(store.waiting(), 1);
     assert!(
@@ -103,8 +87,7 @@ async fn a_store_from_before_the_job_api_is_upgraded_with_its_content() {
 #[tokio::test]
 async fn nothing_of_an_earlier_version_is_removed_before_a_day_has_passed() {
     let folder = tempfile::tempdir().unwrap();
-    let migrations = ["0001_jobs.sql", "0002_meshes.sql"];
-    older_store(folder.path(), &migrations, &BEFORE_THE_JOB_API).await;
+    older_store(folder.path(), 2, &BEFORE_THE_JOB_API);
     Store::open(folder.path()).await.unwrap().close().await;
     // a second start makes it neither shorter nor longer
     let store = Store::open(folder.path()).await.unwrap();
@@ -126,37 +109,23 @@ async fn nothing_of_an_earlier_version_is_removed_before_a_day_has_passed() {
 #[tokio::test]
 async fn jobs_of_a_version_without_checksums_are_given_theirs_once() {
     let folder = tempfile::tempdir().unwrap();
-    let migrations = ["0001_jobs.sql", "0002_meshes.sql", "0003_job_api.sql"];
-    older_store(folder.path(), &migrations, &BEFORE_OWNERS).await;
-    std::fs::remove_dir_all(folder.path().join("migrations")).unwrap();
+    older_store(folder.path(), 3, &BEFORE_OWNERS);
     // the start dies before anything is moved to content
-    let options = SqliteConnectOptions::new().filename(folder.path().join("signorini.db"));
-    let db = SqlitePool::connect_with(options).await.unwrap();
-    migrations::migrator_to(migrations::CONTENT)
-        .run(&db)
-        .await
-        .unwrap();
+    let database = open(&folder.path().join("signorini.db"), Mode::ReadWrite).unwrap();
+    migrations::run_to(&database, migrations::CONTENT).unwrap();
     let unsealed = "select count(*) from job where checksum is null";
-    let left: i64 = sqlx::query_scalar(unsealed).fetch_one(&db).await.unwrap();
-    assert_eq!(left, 3);
-    db.close().await;
+    assert_eq!(database.value::<i64>(unsealed, ()).unwrap(), 3);
+    drop(database);
     let early = inspect(folder.path(), None).await;
     assert!(matches!(early, Err(StoreError::Schema(_))), "{early:?}");
     let store = Store::open(folder.path()).await.unwrap();
-    let sealed: Vec<i64> = sqlx::query_scalar("select checksum from job order by id")
-        .fetch_all(&store.reader)
-        .await
-        .unwrap();
+    let sealed: Vec<i64> = values(&store, "select checksum from job order by id").await;
     assert_eq!(sealed.len(), 3);
-    let harm = "update job set checksum = null where id = 2";
-    sqlx::query(harm).execute(&store.writer).await.unwrap();
+    run(&store, "update job set checksum = null where id = 2").await;
     store.close().await;
     drop(store);
     let store = Store::open(folder.path()).await.unwrap();
-    let left: i64 = sqlx::query_scalar(unsealed)
-        .fetch_one(&store.reader)
-        .await
-        .unwrap();
+    let left: i64 = value(&store, unsealed).await;
     assert_eq!(left, 1, "a later start gives none");
     store.close().await;
     let report = inspect(folder.path(), None).await.unwrap();
@@ -166,17 +135,16 @@ async fn jobs_of_a_version_without_checksums_are_given_theirs_once() {
 #[tokio::test]
 async fn a_store_from_before_owners_keeps_its_coalesced_and_its_deleted_jobs() {
     let folder = tempfile::tempdir().unwrap();
-    let migrations = ["0001_jobs.sql", "0002_meshes.sql", "0003_job_api.sql"];
-    older_store(folder.path(), &migrations, &BEFORE_OWNERS).await;
+    older_store(folder.path(), 3, &BEFORE_OWNERS);
     let store = Store::open(folder.path()).await.unwrap();
     assert_eq!(store.waiting(), 3);
-    let local = Owners::Only("local");
+    let local = || Owners::Only("local".into());
     let oldest_first = Order {
         descending: false,
         ..Order::NEWEST_FIRST
     };
     let everything = Filter::default();
-    let jobs = store.jobs(local, &everything, oldest_first, None, 10);
+    let jobs = store.jobs(local(), &everything, oldest_first, None, 10);
     let jobs: Vec<Job> = jobs.await.unwrap();
     let coalesced: Vec<Option<i64>> = jobs.iter().map(|job| job.coalesced_into).collect();
     assert_eq!(coalesced, [None, Some(1), Some(1)]);
@@ -184,14 +152,14 @@ async fn a_store_from_before_owners_keeps_its_coalesced_and_its_deleted_jobs() {
     store.request_cancel(1).await.unwrap();
     let claim = store.claim_next().await.unwrap().0.unwrap();
     assert_eq!(claim.job.id, jobs[1].id);
-    let last = store.job(local, jobs[2].id).await.unwrap().unwrap();
+    let last = store.job(local(), jobs[2].id).await.unwrap().unwrap();
     assert_eq!(last.coalesced_into, Some(jobs[1].key));
     let deleted = "job_01890a5d-ac96-774b-bcce-b302099a8056";
     let deleted = crate::job::JobId::parse(deleted).unwrap();
-    assert!(store.was_deleted(local, deleted).await.unwrap());
+    assert!(store.was_deleted(local(), deleted).await.unwrap());
     assert!(
         !store
-            .was_deleted(Owners::Only("ada"), deleted)
+            .was_deleted(Owners::Only("ada".into()), deleted)
             .await
             .unwrap()
     );
@@ -200,9 +168,7 @@ async fn a_store_from_before_owners_keeps_its_coalesced_and_its_deleted_jobs() {
 #[tokio::test]
 async fn a_store_of_an_earlier_version_is_inspected_after_its_upgrade() {
     let folder = tempfile::tempdir().unwrap();
-    let migrations = ["0001_jobs.sql", "0002_meshes.sql", "0003_job_api.sql"];
-    older_store(folder.path(), &migrations, &BEFORE_OWNERS).await;
-    std::fs::remove_dir_all(folder.path().join("migrations")).unwrap();
+    older_store(folder.path(), 3, &BEFORE_OWNERS);
     let early = inspect(folder.path(), None).await;
     assert!(matches!(early, Err(StoreError::Schema(_))), "{early:?}");
     Store::open(folder.path()).await.unwrap().close().await;
@@ -211,22 +177,8 @@ async fn a_store_of_an_earlier_version_is_inspected_after_its_upgrade() {
     assert_eq!((report.jobs, report.intact), (3, 3), "{report:?}");
 }
 
-/// Every step before that which drops models.
-const WITH_MODELS: [&str; 13] = [
-    "0001_jobs.sql",
-    "0002_meshes.sql",
-    "0003_job_api.sql",
-    "0004_owners.sql",
-    "0005_coalesced_jobs.sql",
-    "0006_digests.sql",
-    "0007_memory.sql",
-    "0008_sweeps.sql",
-    "0009_tokens.sql",
-    "0010_space.sql",
-    "0011_warnings.sql",
-    "0012_models.sql",
-    "0013_owners_lists.sql",
-];
+/// The last step before that which drops models.
+const WITH_MODELS: i64 = 13;
 
 /// A job that was deleted and whose result two others have, of which one has lost its fields; one whose result a disk has
 /// changed; one with a partial result that runs; one whose result is not complete.
@@ -256,13 +208,7 @@ const BEFORE_CONTENT: [&str; 9] = [
 #[tokio::test]
 async fn what_earlier_versions_stored_becomes_content_of_the_jobs_that_had_it() {
     let folder = tempfile::tempdir().unwrap();
-    let all = Path::new(env!("CARGO_MANIFEST_DIR")).join("../migrations");
-    let names = std::fs::read_dir(all).unwrap();
-    let names = names.map(|entry| entry.unwrap().file_name().into_string().unwrap());
-    let mut names: Vec<String> = names.filter(|name| name.as_str() < "0017").collect();
-    names.sort_unstable();
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    older_store(folder.path(), &names, &BEFORE_CONTENT).await;
+    older_store(folder.path(), migrations::CONTENT - 1, &BEFORE_CONTENT);
     let store = Store::open(folder.path()).await.unwrap();
     let part = async |key, part| {
         let read = store.json_of(key, part).await;
@@ -285,21 +231,17 @@ async fn what_earlier_versions_stored_becomes_content_of_the_jobs_that_had_it() 
     assert_eq!(store.mesh_body("sha256:m").await.unwrap().unwrap(), [1, 2]);
     let in_use = store.remove_mesh(Owners::All, "sha256:m").await.unwrap();
     assert_eq!(in_use, Removal::InUse, "by the jobs that run");
-    let mut connection = store.reader.acquire().await.unwrap();
-    let running = rows::find(&mut connection, 5).await.unwrap().unwrap();
+    let running = store.read(|_, connection| rows::find(connection, 5));
+    let running = running.await.unwrap().unwrap();
     assert_eq!(
         (running.mesh.as_deref(), running.memory_bytes),
         (Some("sha256:m"), Some(77))
     );
-    drop(connection);
     // what is shared is counted once: the problem, the summary with its index, and the fields
     let size = store.size_of_owner("local").await.unwrap();
     assert_eq!(size.mesh_bytes, 2);
     let of_content = "select sum(bytes) from content where holder in (2, 3, 4)";
-    let of_content: i64 = sqlx::query_scalar(of_content)
-        .fetch_one(&store.reader)
-        .await
-        .unwrap();
+    let of_content: i64 = value(&store, of_content).await;
     assert_eq!(size.job_bytes, of_content as u64);
     store.compare_sums().await.unwrap();
 }
@@ -318,7 +260,7 @@ const MODELS: [&str; 2] = [
 #[tokio::test]
 async fn registered_models_become_files_before_their_tables_go() {
     let folder = tempfile::tempdir().unwrap();
-    older_store(folder.path(), &WITH_MODELS, &MODELS).await;
+    older_store(folder.path(), WITH_MODELS, &MODELS);
     let store = Store::open(folder.path()).await.unwrap();
     let read = |owner: &str| {
         let name = format!("models/punch,{owner}.json");
@@ -333,12 +275,8 @@ async fn registered_models_become_files_before_their_tables_go() {
         r#"{"title":null,"inputs":[["/b"]],"outputs":[],"problem":{"b":1}}"#
     );
     assert!(read("eve").is_err(), "it was damaged");
-    let tables: i64 =
-        sqlx::query_scalar("select count(*) from sqlite_schema where name like '%model%'")
-            .fetch_one(&store.reader)
-            .await
-            .unwrap();
-    assert_eq!(tables, 0);
+    let tables = "select count(*) from sqlite_schema where name like '%model%'";
+    assert_eq!(value::<i64>(&store, tables).await, 0);
     store.close().await;
     // a store without the tables has no folder for them
     std::fs::remove_dir_all(folder.path().join("models")).unwrap();

@@ -1,5 +1,7 @@
 //! What is true of the store whatever was done to it.
 
+use std::sync::OnceLock;
+
 use super::*;
 use crate::{
     event::Payload,
@@ -36,23 +38,21 @@ pub(super) fn same(before: &[String], after: &[String], what: &str) {
 impl World {
     /// All rows of the store, as text.
     pub(super) async fn rows(&self) -> Vec<String> {
-        static QUERIES: tokio::sync::OnceCell<Vec<String>> = tokio::sync::OnceCell::const_new();
-        let queries = QUERIES.get_or_init(|| async {
-            let mut queries = vec![];
-            for table in TABLES {
+        static QUERIES: OnceLock<[String; TABLES.len()]> = OnceLock::new();
+        let rows = self.store.read(|_, connection| {
+            let query = |table| {
                 let names = "select group_concat(case name when 'body' then 'length(body)' else 'quote(' || name || ')' end,
                                                  ' || '' '' || ') from pragma_table_info(?)";
-                let columns: String = sqlx::query_scalar(names).bind(table).fetch_one(&self.store.reader).await.unwrap();
-                queries.push(format!("select '{table} ' || {columns} from {table} order by 1"));
+                let columns: String = connection.value(names, [table]).unwrap();
+                format!("select '{table} ' || {columns} from {table} order by 1")
+            };
+            let mut rows = vec![];
+            for query in QUERIES.get_or_init(|| TABLES.map(query)) {
+                rows.extend(connection.values::<String>(query, ())?);
             }
-            queries
+            Ok(rows)
         });
-        let mut rows = vec![];
-        for query in queries.await {
-            let query = sqlx::query_scalar::<_, String>(sqlx::AssertSqlSafe(query.as_str()));
-            rows.extend(query.fetch_all(&self.store.reader).await.unwrap());
-        }
-        rows
+        rows.await.unwrap()
     }
 
     /// All jobs, as they are listed.
@@ -70,11 +70,8 @@ impl World {
 
     /// The status of a job; none if it is deleted.
     pub(super) async fn status(&self, key: i64) -> Option<Status> {
-        let status: Option<String> = sqlx::query_scalar("select status from job where id = ?")
-            .bind(key)
-            .fetch_optional(&self.store.reader)
-            .await
-            .unwrap();
+        let status = format!("select status from job where id = {key}");
+        let status: Option<String> = values(&self.store, status).await.pop();
         status.map(|word| word.parse().unwrap())
     }
 
@@ -257,10 +254,7 @@ impl World {
                    id, input_hash, created_at, job_size.bytes, job_kept.bytes)
              from job_kept left join job_size using (job_id) join job on id = job_id
              where job_size.bytes is not job_kept.bytes";
-        let otherwise: Vec<String> = sqlx::query_scalar(counted)
-            .fetch_all(&self.store.reader)
-            .await
-            .unwrap();
+        let otherwise: Vec<String> = values(&self.store, counted).await;
         assert_eq!(otherwise, Vec::<String>::new());
         for orphans in [
             "select count(*) from attachment where not exists (select 1 from job where id = key)",
@@ -275,13 +269,10 @@ impl World {
                  (select count(*), coalesce(sum(bytes), 0) from job_size where job_size.owner = owner_size.owner)",
             "select count(*) from pragma_foreign_key_check",
         ] {
-            let count: i64 = sqlx::query_scalar(orphans).fetch_one(&self.store.reader).await.unwrap();
+            let count: i64 = value(&self.store, orphans).await;
             assert_eq!(count, 0, "{orphans}");
         }
-        let whole: String = sqlx::query_scalar("pragma integrity_check")
-            .fetch_one(&self.store.reader)
-            .await
-            .unwrap();
+        let whole: String = value(&self.store, "pragma integrity_check").await;
         assert_eq!(whole, "ok");
         assert_eq!(self.store.health().await.unwrap().damaged, 0);
     }

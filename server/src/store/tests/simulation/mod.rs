@@ -96,7 +96,7 @@ struct Work {
     /// A client has asked it to stop.
     canceled: bool,
     /// The result, once some of it may have been written.
-    parts: Option<Parts>,
+    parts: Option<Arc<Parts>>,
     _memory: Reservation,
 }
 
@@ -119,7 +119,8 @@ fn empty_store() -> tempfile::TempDir {
     folder
 }
 
-/// One thread does all the work, which keeps its order, and the simulated time is that of the thread.
+/// One thread does all the work but for what may block, for which it waits: this keeps the order, and the simulated time is
+/// that of the thread.
 fn runtime() -> tokio::runtime::Runtime {
     let mut runtime = tokio::runtime::Builder::new_current_thread();
     runtime.enable_all().build().unwrap()

@@ -104,13 +104,13 @@ impl World {
         let events = self.events();
         self.note(format!("{key} reports {} events", events.len()));
         let progress = self.progress();
-        let stored = self.store.append_events(key, attempt, &events, &progress);
+        let stored = self.store.append_events(key, attempt, events, &progress);
         assert!(stored.await?, "{key} does not run");
         Ok(())
     }
 
     /// A result of this job, which says what it belongs to.
-    fn parts_of(&mut self, key: i64) -> Parts {
+    fn parts_of(&mut self, key: i64) -> Arc<Parts> {
         let input = &self.jobs[&key].new.input_hash;
         let mut parts = vec![
             parts::Part::new(
@@ -122,7 +122,7 @@ impl World {
         if self.once_in(40) {
             parts.push(parts::Part::plain(vec![b' '; LARGE]));
         }
-        Parts::new(parts)
+        Arc::new(Parts::new(parts))
     }
 
     pub(super) async fn write_partial(&mut self) -> Result<()> {
@@ -194,7 +194,7 @@ impl World {
         key: i64,
         attempt: i32,
         ending: Ending,
-        parts: Option<Parts>,
+        parts: Option<Arc<Parts>>,
     ) -> Result<()> {
         self.note(format!(
             "{key} ends: {:?} {:?}, result {:?}",
@@ -257,11 +257,7 @@ impl World {
         let before = self.rows().await;
         let (store, events, progress) = (self.store.clone(), self.events(), self.progress());
         let (parts, last) = (self.parts_of(key), FinalBatch::default());
-        assert!(
-            !store
-                .append_events(key, attempt, &events, &progress)
-                .await?
-        );
+        assert!(!store.append_events(key, attempt, events, &progress).await?);
         assert!(!store.write_partial(key, attempt, &parts).await?);
         let canceled = Ending::canceled();
         let ended = store.finish(key, attempt, &canceled, last, Some(&parts));
