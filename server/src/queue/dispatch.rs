@@ -37,10 +37,9 @@ impl Queue {
     /// the same commit.
     pub async fn submit(self: &Arc<Self>, submission: Submission) -> Result<Accepted> {
         let Some(slot) = self.free_slot() else {
-            let mut accepted = self.store.submit(submission, false).await?;
+            let accepted = self.store.submit(submission, false).await?;
             self.announce(&accepted.changed);
             self.wake.notify_one();
-            self.store.try_complete(&mut accepted.jobs).await;
             return Ok(accepted);
         };
         let _guard = self.claiming.read().await;
@@ -54,7 +53,6 @@ impl Queue {
                     None => drop(slot),
                 }
                 self.wake.notify_one(); // there may be several jobs, or the slot is free again
-                self.store.try_complete(&mut accepted.jobs).await;
                 Ok(accepted)
             }
             Err(cause) => {

@@ -258,6 +258,11 @@ impl Change<'_> {
         &self.store.damages
     }
 
+    /// The newest result of this input is checked again before it answers a job.
+    pub(super) fn forget_checked(&self, input_hash: &str) {
+        self.store.intact.inputs.remove(input_hash);
+    }
+
     /// The memory that running jobs share.
     pub(super) fn budget(&self) -> &Arc<Budget> {
         self.store.budget()

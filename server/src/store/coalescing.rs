@@ -31,7 +31,7 @@ use crate::job::{Job, Reason, Status};
 /// are answered when it is their turn.
 const MOST_COALESCED: i64 = 100;
 
-pub(super) const EARLIER_RESULT: &str = "select * from job indexed by job_answer
+pub(super) const EARLIER_RESULT: &str = "select id from job indexed by job_answer
      where input_hash = ? and status = 'succeeded' and result_available = 'final' and cache <> 'off'
            and solver_version = ?
      order by id desc limit 4";
@@ -47,12 +47,11 @@ const ONLY_RUNNING: i32 = i32::MAX;
 /// The newest job of this input whose final result, found by this version of the program, may answer others.
 pub(super) fn earlier_result(change: &mut Change<'_>, input_hash: &str) -> Result<Option<Job>> {
     let version = env!("CARGO_PKG_VERSION");
-    let found = change
+    let found: Vec<i64> = change
         .sql()?
-        .rows(EARLIER_RESULT, [input_hash, version], |row| {
-            Ok(from_row(row))
-        })?;
-    for job in found {
+        .values(EARLIER_RESULT, [input_hash, version])?;
+    for key in found {
+        let job = change.read(key);
         // a damaged one answers nobody
         if let Some(job) = change.unless_damaged(job)?
             // what has lost its fields answers nobody
@@ -69,6 +68,9 @@ impl Store {
     /// Checks the result that may answer a job of this input, before the transaction that needs it, which would occupy the
     /// single writer meanwhile. What is not found intact answers nobody.
     pub(super) async fn check_earlier_result(self: &Arc<Self>, input_hash: &str) {
+        if self.intact.inputs.contains(input_hash) {
+            return;
+        }
         let hash = input_hash.to_owned();
         let _ = self
             .read(move |store, connection| check_earlier_result(store, connection, &hash))
@@ -94,14 +96,13 @@ impl Store {
 
 fn check_earlier_result(store: &Store, connection: &Connection, input_hash: &str) -> Result<()> {
     let version = env!("CARGO_PKG_VERSION");
-    let newest = connection.row(EARLIER_RESULT, [input_hash, version], |row| {
-        Ok(from_row(row))
-    })?;
-    let Some(Ok(job)) = newest else {
-        return Ok(());
-    };
-    let attached = content::all(connection, Holder::Job(job.key))?;
-    intact::check_result(connection, &store.intact, job.key, attached)
+    let newest = connection.optional_value(EARLIER_RESULT, [input_hash, version])?;
+    if let Some(key) = newest {
+        let attached = content::all(connection, Holder::Job(key))?;
+        intact::check_result(connection, &store.intact, key, attached)?;
+        store.intact.inputs.insert(input_hash.to_owned());
+    }
+    Ok(())
 }
 
 /// The job that a new one of this owner may be coalesced into. One that waits with a lower priority or for another owner's

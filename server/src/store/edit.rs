@@ -50,13 +50,8 @@ impl Store {
         versions: Option<&[i64]>,
     ) -> Result<Option<std::result::Result<Job, i64>>> {
         let (edit, versions) = (edit.clone(), versions.map(<[i64]>::to_vec));
-        let mut edited = self
-            .control(move |writer| try_to_edit(writer, &owners, id, &edit, versions.as_deref()))
-            .await?;
-        if let Some(Ok(job)) = &mut edited {
-            self.try_complete(std::slice::from_mut(job)).await;
-        }
-        Ok(edited)
+        self.control(move |writer| try_to_edit(writer, &owners, id, &edit, versions.as_deref()))
+            .await
     }
 }
 
@@ -85,7 +80,9 @@ fn try_to_edit(
     if let Some(primary) = edited.coalesced_into {
         coalescing::detach_if_ahead(&mut change, &edited, primary)?;
     }
-    let edited = change.read(key)?;
+    let mut edited = change.read(key)?;
     change.commit()?;
+    let store = writer.store;
+    store.try_to_complete(writer.connection(), std::slice::from_mut(&mut edited));
     Ok(Some(Ok(edited)))
 }

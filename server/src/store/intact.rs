@@ -1,8 +1,10 @@
 //! What was found intact: content that was read whole and found as it was written, since the store was opened.
 
 use std::{
+    borrow::Borrow,
     collections::HashSet,
-    sync::{Mutex, PoisonError},
+    hash::Hash,
+    sync::{Mutex, MutexGuard, PoisonError},
 };
 
 use rusqlite::Connection;
@@ -12,26 +14,55 @@ use super::{
     error::{Record, Result},
 };
 
-/// The numbers of such content: what answers other jobs is checked once. Numbers are never used again. The older half is
-/// forgotten when there are many.
+/// What was found so. What answers other jobs is checked once.
 #[derive(Debug, Default)]
-pub(super) struct Intact(Mutex<[HashSet<i64>; 2]>);
+pub(super) struct Intact {
+    /// Numbers of content; they are never used again.
+    pub(super) content: Recent<i64>,
+    /// Hashes of inputs of which the newest result was found intact.
+    pub(super) inputs: Recent<String>,
+}
 
-impl Intact {
+/// A set whose older half is forgotten when it has many elements.
+#[derive(Debug)]
+pub(super) struct Recent<T>(Mutex<[HashSet<T>; 2]>);
+
+impl<T> Default for Recent<T> {
+    fn default() -> Self {
+        Recent(Mutex::default())
+    }
+}
+
+impl<T: Hash + Eq> Recent<T> {
     const MOST: usize = 10_000;
 
-    pub(super) fn contains(&self, content: i64) -> bool {
-        let halves = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        halves.iter().any(|half| half.contains(&content))
+    pub(super) fn contains<Q: Hash + Eq + ?Sized>(&self, element: &Q) -> bool
+    where
+        T: Borrow<Q>,
+    {
+        self.halves().iter().any(|half| half.contains(element))
     }
 
-    pub(super) fn insert(&self, content: i64) {
-        let mut halves = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+    pub(super) fn insert(&self, element: T) {
+        let mut halves = self.halves();
         if halves[0].len() >= Self::MOST {
             halves.swap(0, 1);
             halves[0].clear();
         }
-        halves[0].insert(content);
+        halves[0].insert(element);
+    }
+
+    pub(super) fn remove<Q: Hash + Eq + ?Sized>(&self, element: &Q)
+    where
+        T: Borrow<Q>,
+    {
+        for half in &mut *self.halves() {
+            half.remove(element);
+        }
+    }
+
+    fn halves(&self) -> MutexGuard<'_, [HashSet<T>; 2]> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -56,10 +87,10 @@ pub(super) fn check_result(
 
 /// Compares content with its hash, unless it was found intact before.
 pub(super) fn check(connection: &Connection, intact: &Intact, content: &Content) -> Result<()> {
-    if !intact.contains(content.id) {
+    if !intact.content.contains(&content.id) {
         let checked = content.check(connection);
         checked.map_err(|error| error.reading(|| content.record()))?;
-        intact.insert(content.id);
+        intact.content.insert(content.id);
     }
     Ok(())
 }

@@ -59,24 +59,9 @@ impl Store {
 
     /// Fills in the queue positions, and what jobs keep that have ended, if they can be read: a request that has changed
     /// something is answered even without them.
-    pub async fn try_complete(self: &Arc<Self>, jobs: &mut [Job]) {
-        if jobs.iter().all(|job| job.status == Status::Running) {
-            return;
-        }
-        let mut completed = jobs.to_vec();
-        let completed = self.read(move |store, connection| {
-            store.complete(connection, &mut completed)?;
-            Ok(completed)
-        });
-        match completed.await {
-            Ok(completed) => {
-                for (job, completed) in jobs.iter_mut().zip(completed) {
-                    *job = completed;
-                }
-            }
-            Err(cause) => {
-                tracing::warn!(%cause, "queue positions and sizes could not be read: {cause}");
-            }
+    pub(super) fn try_to_complete(&self, connection: &Connection, jobs: &mut [Job]) {
+        if let Err(cause) = self.complete(connection, jobs) {
+            tracing::warn!(%cause, "queue positions and sizes could not be read: {cause}");
         }
     }
 

@@ -28,7 +28,7 @@ impl Store {
         self.read(move |store, connection| {
             let found = StoredResult::of(connection, key)?;
             let fields = found.as_ref().and_then(StoredResult::fields);
-            let intact = fields.filter(|(content, _)| store.intact.contains(*content));
+            let intact = fields.filter(|(content, _)| store.intact.content.contains(content));
             Ok(intact.map(|(_, info)| info.clone()))
         })
         .await
@@ -57,7 +57,7 @@ impl Store {
                 Decoded::Json(json) => serde_json::from_slice(&json)
                     .map_err(|error| Record::of_job(key, name::FIELDS).damaged(error))?,
             };
-            store.intact.insert(content);
+            store.intact.content.insert(content);
             Ok(Some((info, fields)))
         })
         .await

@@ -96,6 +96,10 @@ fn accept_together(
         }
     }
     change.commit()?;
+    for accepted in answers.iter_mut().flatten() {
+        let store = writer.store;
+        store.try_to_complete(writer.connection(), &mut accepted.jobs);
+    }
     Ok(answers)
 }
 

@@ -265,7 +265,11 @@ async fn what_answers_a_job_is_checked_before_and_by_what_is_stored() {
         job.key
     );
     let numbers: Vec<i64> = values(&store, numbers).await;
-    let is_known = || numbers.iter().all(|number| store.intact.contains(*number));
+    let is_known = || {
+        numbers
+            .iter()
+            .all(|number| store.intact.content.contains(*number))
+    };
     assert!(!is_known());
     // the other owner's turn is next
     store.check_result_for_next().await;
