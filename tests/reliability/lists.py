@@ -8,6 +8,7 @@ forwards and backwards, and from the middle. The user is named in a header, as b
 again with all of them.
 """
 
+import datetime
 import json
 import time
 import urllib.parse
@@ -46,7 +47,8 @@ def fill(server):
 
 def pages(began, ended):
     """What is asked for, by its name."""
-    middle = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime((began + ended) / 2))
+    middle = datetime.datetime.fromtimestamp((began + ended) / 2, datetime.timezone.utc)
+    middle = middle.strftime("%Y-%m-%dT%H:%M:%S.%fZ")
     return {
         "all": "",
         "the oldest first": "order_by=created_at asc",
