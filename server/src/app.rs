@@ -97,9 +97,10 @@ static LOG_FORMAT: OnceLock<LogFormat> = OnceLock::new();
 fn worker_process() -> Command {
     // it leads to the running program even after an upgrade has replaced the file
     const LINUX: &str = "/proc/self/exe";
-    let program = match Path::new(LINUX).exists() {
-        true => LINUX.into(),
-        false => env::current_exe().unwrap_or_else(|_| env!("CARGO_PKG_NAME").into()),
+    let program = if Path::new(LINUX).exists() {
+        LINUX.into()
+    } else {
+        env::current_exe().unwrap_or_else(|_| env!("CARGO_PKG_NAME").into())
     };
     let mut command = Command::new(program);
     command.arg0(env!("CARGO_PKG_NAME")).arg(WORKER); // as `ps` shows it
@@ -154,9 +155,10 @@ fn refuse_open(config: &Config, store: &Store) -> Result<(), OpenToAll> {
     let closed = config.listen.ip().to_canonical().is_loopback()
         || store.has_tokens()
         || config.trust.is_on();
-    match closed || config.allow_unauthenticated {
-        true => Ok(()),
-        false => Err(OpenToAll(config.listen)),
+    if closed || config.allow_unauthenticated {
+        Ok(())
+    } else {
+        Err(OpenToAll(config.listen))
     }
 }
 

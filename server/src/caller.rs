@@ -142,9 +142,10 @@ impl Caller {
 
     /// The owners whose jobs this caller sees.
     pub fn visible_owners(&self) -> Owners {
-        match self.is_admin() {
-            true => Owners::All,
-            false => Owners::Only(self.owner.as_str().into()),
+        if self.is_admin() {
+            Owners::All
+        } else {
+            Owners::Only(self.owner.as_str().into())
         }
     }
 }

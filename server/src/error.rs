@@ -292,9 +292,10 @@ impl fmt::Display for Quota {
             used,
             asked,
         } = self;
-        let in_parts = match asked > limit {
-            true => ": submit it in parts",
-            false => "",
+        let in_parts = if asked > limit {
+            ": submit it in parts"
+        } else {
+            ""
         };
         match of {
             QuotaOf::Queued => write!(

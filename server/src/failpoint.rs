@@ -90,7 +90,7 @@ mod points {
 
 #[cfg(test)]
 mod points {
-    use std::sync::{Mutex, PoisonError};
+    use parking_lot::Mutex;
 
     use super::{JobId, Point};
 
@@ -105,14 +105,14 @@ mod points {
     static SET: Mutex<Vec<(Point, JobId, Failing)>> = Mutex::new(vec![]);
 
     fn remove(point: Point, job: JobId) -> Option<Failing> {
-        let mut set = SET.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut set = SET.lock();
         let place = set.iter().position(|one| (one.0, one.1) == (point, job))?;
         Some(set.swap_remove(place).2)
     }
 
     /// Makes this job fail once, when it comes to this point.
     pub(crate) fn set(point: Point, job: JobId, failing: Failing) {
-        let mut set = SET.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut set = SET.lock();
         set.push((point, job, failing));
     }
 

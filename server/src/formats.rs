@@ -223,23 +223,22 @@ fn parameter(path: &str, rows: &[MemberRow]) -> Column {
         .clone()
         .flatten()
         .all(|value| is_number(value.json()));
-    let values = match numbers {
-        true => Values::Real(
+    let values = if numbers {
+        Values::Real(
             values
                 .map(|value| value.and_then(number).unwrap_or(f64::NAN))
                 .collect(),
-        ),
-        false => {
-            let text = |value: &ParameterValue| {
-                let json = value.json();
-                let string = serde_json::from_str(json)
-                    .ok()
-                    .filter(|_| json.starts_with('"'));
-                string.unwrap_or_else(|| json.to_owned())
-            };
-            let texts = values.map(|value| value.map_or_else(String::new, text).into());
-            Values::Text(texts.collect())
-        }
+        )
+    } else {
+        let text = |value: &ParameterValue| {
+            let json = value.json();
+            let string = serde_json::from_str(json)
+                .ok()
+                .filter(|_| json.starts_with('"'));
+            string.unwrap_or_else(|| json.to_owned())
+        };
+        let texts = values.map(|value| value.map_or_else(String::new, text).into());
+        Values::Text(texts.collect())
     };
     Column {
         name: path.to_owned().into(),

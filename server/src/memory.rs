@@ -3,11 +3,12 @@
 //!
 //! The next job in order is claimed when its estimate fits, and no later job before it.
 
+use parking_lot::{Mutex, MutexGuard};
 use std::{
     cell::Cell,
     ops::ControlFlow,
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
+        Arc,
         atomic::{AtomicBool, Ordering},
     },
 };
@@ -124,8 +125,7 @@ impl Budget {
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
-        // No code panics while it holds this lock.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        self.state.lock()
     }
 }
 
@@ -222,13 +222,14 @@ impl Meter {
     /// Whether the job may continue, which is about to allocate `needed` more bytes.
     pub fn check(&self, needed: u64) -> ControlFlow<Outgrown> {
         let used = self.used();
-        match used.saturating_add(needed) > self.share {
-            true => ControlFlow::Break(Outgrown {
+        if used.saturating_add(needed) > self.share {
+            ControlFlow::Break(Outgrown {
                 used,
                 needed,
                 share: self.share,
-            }),
-            false => ControlFlow::Continue(()),
+            })
+        } else {
+            ControlFlow::Continue(())
         }
     }
 

@@ -1,10 +1,7 @@
 //! Limits how many jobs each owner submits in a minute.
 
-use std::{
-    collections::HashMap,
-    sync::{Mutex, PoisonError},
-    time::Instant,
-};
+use parking_lot::Mutex;
+use std::{collections::HashMap, time::Instant};
 
 /// The largest number of owners that are remembered; beyond that those who have submitted nothing lately are forgotten.
 const MOST_OWNERS: usize = 10_000;
@@ -37,7 +34,7 @@ impl Rates {
         let Some(per_minute) = self.per_minute else {
             return;
         };
-        let mut all = self.left.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut all = self.left.lock();
         if let Some((left, _)) = all.get_mut(owner) {
             *left = (*left + jobs as f64).min(f64::from(per_minute));
         }
@@ -46,7 +43,7 @@ impl Rates {
     /// How many jobs the owner may submit at once; `None` without limit.
     pub fn left(&self, owner: &str) -> Option<u64> {
         let per_minute = self.per_minute?;
-        let all = self.left.lock().unwrap_or_else(PoisonError::into_inner);
+        let all = self.left.lock();
         let known = all.get(owner).copied();
         Some(refilled(known, per_minute, Instant::now()) as u64)
     }
@@ -55,7 +52,7 @@ impl Rates {
         let Some(per_minute) = self.per_minute else {
             return Ok(());
         };
-        let mut all = self.left.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut all = self.left.lock();
         if all.len() >= MOST_OWNERS && !all.contains_key(owner) {
             all.retain(|_, known| refilled(Some(*known), per_minute, now) < f64::from(per_minute));
         }

@@ -76,9 +76,10 @@ impl Span {
             span_context: own,
             parent_span_id: parent.span_id(),
             parent_span_is_remote: parent.is_remote(),
-            span_kind: match self.answers {
-                true => SpanKind::Server,
-                false => SpanKind::Internal,
+            span_kind: if self.answers {
+                SpanKind::Server
+            } else {
+                SpanKind::Internal
             },
             name: self.name,
             start_time: system_time(self.begun),

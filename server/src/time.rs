@@ -43,8 +43,10 @@ impl Time {
     pub(crate) fn simulated_for<T>(work: impl FnOnce() -> T) -> impl FnOnce() -> T {
         let simulated = SIMULATED.get();
         move || {
-            SIMULATED.set(simulated);
-            work()
+            let own = SIMULATED.replace(simulated);
+            let done = work();
+            SIMULATED.set(own);
+            done
         }
     }
 

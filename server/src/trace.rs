@@ -44,9 +44,10 @@ impl Trace {
                 let found =
                     TraceContextPropagator::new().extract_with_context(&Context::new(), &carrier);
                 let parent = found.span().span_context().clone();
-                match parent.is_valid() {
-                    true => Trace::part_of(&parent),
-                    false => Trace::new(),
+                if parent.is_valid() {
+                    Trace::part_of(&parent)
+                } else {
+                    Trace::new()
                 }
             }
             None => Trace::new(),

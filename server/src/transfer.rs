@@ -4,11 +4,12 @@
 //! with `overloaded` instead of waiting, since waiting requests need memory, too. Small ones have room of their own, so
 //! that a job can be read, canceled and submitted while others transfer large files.
 
+use parking_lot::Mutex;
 use std::{
     error::Error,
     fmt,
     pin::Pin,
-    sync::{Arc, Mutex, PoisonError},
+    sync::Arc,
     task::{Context, Poll, ready},
 };
 
@@ -153,7 +154,7 @@ impl Received {
 
     /// Counts more bytes.
     pub fn count(&self, bytes: usize) -> Result<(), ApiError> {
-        let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut counted = self.counted.lock();
         counted.bytes = counted.bytes.saturating_add(bytes);
         let small = counted.bytes.min(SMALL_RECEIVED);
         let large = counted.bytes - small;
@@ -163,7 +164,7 @@ impl Received {
 
     /// Returns the share, when nothing of the request is needed any more.
     pub fn release(&self) {
-        *self.counted.lock().unwrap_or_else(PoisonError::into_inner) = Counted::default();
+        *self.counted.lock() = Counted::default();
     }
 }
 
@@ -225,9 +226,12 @@ pub fn arriving(body: Body, received: Option<Received>) -> Body {
         received,
     };
     let body = TimeoutBody::new(LONGEST_PAUSE, arriving);
-    Body::new(body.map_err(|error| match error.is::<TimeoutError>() {
-        true => BodyError::from(ApiError::RequestTimeout).into(),
-        false => error,
+    Body::new(body.map_err(|error| {
+        if error.is::<TimeoutError>() {
+            BodyError::from(ApiError::RequestTimeout).into()
+        } else {
+            error
+        }
     }))
 }
 

@@ -240,9 +240,10 @@ impl ElasticBody {
     /// How many threads may work on the fields of this body: the observer is asked for a second one if that is worth
     /// it.
     pub fn threads(&self, observe: &mut Observer<'_>) -> usize {
-        match self.factor.has_large_fields() && observe(Progress::SecondThread).is_continue() {
-            true => 2,
-            false => 1,
+        if self.factor.has_large_fields() && observe(Progress::SecondThread).is_continue() {
+            2
+        } else {
+            1
         }
     }
 
@@ -436,8 +437,9 @@ impl From<Stopped> for SolveError {
 }
 
 pub(crate) fn notify(observe: &mut Observer<'_>, progress: Progress<'_>) -> Result<(), SolveError> {
-    match observe(progress).is_break() {
-        true => Err(SolveError::Stopped),
-        false => Ok(()),
+    if observe(progress).is_break() {
+        Err(SolveError::Stopped)
+    } else {
+        Ok(())
     }
 }

@@ -105,10 +105,7 @@ impl Family {
     ) -> Result<(Member, Option<End>), SolveError> {
         let controls = &problem.solver;
         let whole = controls.check_uniqueness || controls.check_increments;
-        let set = match whole {
-            true => None,
-            false => self.model.set(problem),
-        };
+        let set = if whole { None } else { self.model.set(problem) };
         let (numbers, end) = match set {
             Some(set) => {
                 set.map_err(SolveError::Invalid)?;

@@ -138,9 +138,10 @@ pub fn smoothed(x: &[f64], y: &[f64], deviation: f64) -> Vec<f64> {
     let (mut low, mut high) = (-SMOOTHEST, SMOOTHEST);
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
-        match misfit(&penalized(&rows, &rest, middle.exp2())) <= most {
-            true => low = middle,
-            false => high = middle,
+        if misfit(&penalized(&rows, &rest, middle.exp2())) <= most {
+            low = middle
+        } else {
+            high = middle
         }
     }
     let f = penalized(&rows, &rest, low.exp2());
@@ -170,9 +171,10 @@ fn parabola(x: &[f64], y: &[f64]) -> Vec<f64> {
     let level = sum(&|i| y[i]) / count;
     let part = |basis: &[f64]| {
         let norm = sum(&|i| basis[i] * basis[i]);
-        match norm > 0.0 {
-            true => sum(&|i| basis[i] * (y[i] - level)) / norm,
-            false => 0.0,
+        if norm > 0.0 {
+            sum(&|i| basis[i] * (y[i] - level)) / norm
+        } else {
+            0.0
         }
     };
     let (slope, curve) = (part(&first), part(&second));

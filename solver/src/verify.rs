@@ -108,11 +108,14 @@ impl Verification {
 
     /// The problem on the refined mesh.
     fn finer(&self, problem: &Problem, mesh: &Mesh) -> Result<Model, String> {
-        let too_many = |found: usize, most: usize, of: &str| match found > most {
-            true => Err(format!(
-                "the refined mesh (every element split in two) would have {found} elements{of}, more than {most}"
-            )),
-            false => Ok(()),
+        let too_many = |found: usize, most: usize, of: &str| {
+            if found > most {
+                Err(format!(
+                    "the refined mesh (every element split in two) would have {found} elements{of}, more than {most}"
+                ))
+            } else {
+                Ok(())
+            }
         };
         if let Some(most) = &self.most {
             too_many(4 * mesh.elements.len(), most.elements, "")?;

@@ -648,9 +648,12 @@ impl Placed<'_> {
             .first()
             .map_or([0.0; 2], |run| self.mesh.nodes[run[0][0] as usize]);
         let horizontal = t[1].abs() <= STRAIGHT;
-        let coordinate = |p: Point| match horizontal {
-            true => p[0],
-            false => dot(minus(p, start), t),
+        let coordinate = |p: Point| {
+            if horizontal {
+                p[0]
+            } else {
+                dot(minus(p, start), t)
+            }
         };
         let [low, high] = span(points.iter().map(|p| coordinate(*p)));
         let middle = coordinate(center);
@@ -676,9 +679,10 @@ impl Placed<'_> {
         let moved = ends.iter().map(|u| [dot(*u, q), dot(*u, t)]).collect();
         let reach = |p: &[Point]| span(p.iter().map(|p| dot(*p, t)));
         let ([low, high], [from, to]) = (reach(&self.outline.points), reach(&self.nodes()));
-        let obstacle = match low <= from && high >= to {
-            true => line(&self.outline.points),
-            false => polyline(self.outline.points.clone(), self.outline.joined).0,
+        let obstacle = if low <= from && high >= to {
+            line(&self.outline.points)
+        } else {
+            polyline(self.outline.points.clone(), self.outline.joined).0
         };
         Shape {
             obstacle,

@@ -44,9 +44,10 @@ pub(super) fn run(
             Some(source) => (value(&arg, matches)?, origin_of(&arg, source, lines)),
             None => (unset(&arg), String::new()),
         };
-        match origin && !origin_of.is_empty() {
-            true => writeln!(text, "{line}  # {origin_of}")?,
-            false => writeln!(text, "{line}")?,
+        if origin && !origin_of.is_empty() {
+            writeln!(text, "{line}  # {origin_of}")?
+        } else {
+            writeln!(text, "{line}")?
         }
     }
     output::print(&text)?;

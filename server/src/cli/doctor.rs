@@ -54,9 +54,10 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         let known = store::accept(data).map_err(|error| {
             StoreError::Folder(format!("cannot change {}: {error}", data.display()))
         })?;
-        let text = match known {
-            true => "the next start accepts the content of the folder\n",
-            false => "nothing was recorded about this folder: the next start accepts its content\n",
+        let text = if known {
+            "the next start accepts the content of the folder\n"
+        } else {
+            "nothing was recorded about this folder: the next start accepts its content\n"
         };
         output::print(text)?;
         return Ok(Exit::Ok);

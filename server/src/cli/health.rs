@@ -76,9 +76,10 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     let status = answer.status();
     let text = answer.text().await.with_context(unanswered)?;
     let text: String = text.chars().take(MOST_CHARS).collect();
-    match status.is_success() {
-        true => output::print(&text)?,
-        false => bail!("{url}: {status}: {}", text.trim_end()),
+    if status.is_success() {
+        output::print(&text)?
+    } else {
+        bail!("{url}: {status}: {}", text.trim_end())
     }
     Ok(Exit::Ok)
 }

@@ -61,10 +61,11 @@ fn clean(line: &str, format: LogFormat, colours: bool) -> Cow<'_, str> {
     if !text.chars().all(harmless) {
         let mut escaped = String::with_capacity(text.len());
         for character in text.chars() {
-            match harmless(character) {
-                true => escaped.push(character),
+            if harmless(character) {
+                escaped.push(character)
+            } else {
                 // as JSON has it, so that a line of JSON stays one
-                false => escaped.push_str(&format!("\\u{:04x}", u32::from(character))),
+                escaped.push_str(&format!("\\u{:04x}", u32::from(character)))
             }
         }
         text = escaped;

@@ -179,9 +179,10 @@ pub fn main() -> ExitCode {
         Command::Schema => solve::schema(),
         Command::Explain(arguments) => explain::run(&arguments),
         Command::Openapi { reference } => {
-            let text = match reference {
-                true => rest::reference(),
-                false => format!("{:#}\n", rest::openapi()),
+            let text = if reference {
+                rest::reference()
+            } else {
+                format!("{:#}\n", rest::openapi())
             };
             output::print(&text).map(|()| Exit::Ok).map_err(Into::into)
         }

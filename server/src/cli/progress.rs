@@ -60,13 +60,14 @@ impl View {
     /// Shows the present state.
     pub(super) fn state(&mut self, state: &str) {
         state.clone_into(&mut self.state);
-        let curve = match self.residuals.is_empty() {
-            true => String::new(),
-            false => format!(
+        let curve = if self.residuals.is_empty() {
+            String::new()
+        } else {
+            format!(
                 "  residual {} → {:.0e}",
                 sparkline(&self.residuals),
                 self.tolerance
-            ),
+            )
         };
         self.bar.set_message(format!("{}{curve}", self.state));
     }

@@ -102,9 +102,12 @@ pub(super) fn with_file(
         variable.is_some() && settings.iter().any(|known| known.get_env() == variable)
     };
     // the environment is checked below, together with the file
-    let bare = change(command.clone(), &|arg| match is_setting(&arg) {
-        true => arg.env(Resettable::Reset),
-        false => arg,
+    let bare = change(command.clone(), &|arg| {
+        if is_setting(&arg) {
+            arg.env(Resettable::Reset)
+        } else {
+            arg
+        }
     });
     let Ok(matches) = bare.try_get_matches_from(line) else {
         return Ok((command, Lines::new()));
@@ -129,9 +132,10 @@ pub(super) fn with_file(
         return Err(wrong);
     }
     let command = change(command, &|arg| {
-        let arg = match is_setting(&arg) && is_empty_variable(&arg) {
-            true => arg.env(Resettable::Reset),
-            false => arg,
+        let arg = if is_setting(&arg) && is_empty_variable(&arg) {
+            arg.env(Resettable::Reset)
+        } else {
+            arg
         };
         match values.get(&key(&arg)) {
             Some(Value { texts, .. }) if is_setting(&arg) => arg.default_values(texts),
@@ -164,9 +168,10 @@ pub(super) fn settings() -> Vec<Arg> {
 
 /// Changes the arguments of all commands that read a file of settings.
 fn change(command: Command, with: &dyn Fn(Arg) -> Arg) -> Command {
-    let command = match reads_file(&command) {
-        true => command.mut_args(with),
-        false => command,
+    let command = if reads_file(&command) {
+        command.mut_args(with)
+    } else {
+        command
     };
     command.mut_subcommands(|subcommand| change(subcommand, with))
 }

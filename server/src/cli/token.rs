@@ -209,12 +209,13 @@ impl TokenStore {
         let Some(url) = self.url.as_ref().filter(|url| !folder && !url.is_empty()) else {
             let folder = self.folder.path();
             if !folder.exists() {
-                match create {
-                    true => eprintln!("creating a new store in {}", folder.display()),
-                    false => bail!(StoreError::Folder(format!(
+                if create {
+                    eprintln!("creating a new store in {}", folder.display())
+                } else {
+                    bail!(StoreError::Folder(format!(
                         "there is no store in {}",
                         folder.display()
-                    ))),
+                    )))
                 }
             }
             let store = Store::open(folder).await;

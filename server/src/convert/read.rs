@@ -139,9 +139,10 @@ impl Reader {
 
 impl FromMessage<f64> for f64 {
     fn from_message(number: f64, read: &mut Reader) -> Option<f64> {
-        match number.is_finite() {
-            true => Some(number),
-            false => read.wrong(Reason::NotFinite, number, "a finite number"),
+        if number.is_finite() {
+            Some(number)
+        } else {
+            read.wrong(Reason::NotFinite, number, "a finite number")
         }
     }
 }

@@ -40,12 +40,13 @@ pub async fn router(
 async fn too_large(response: axum::response::Response) -> axum::response::Response {
     let bare = Status::from_header_map(response.headers())
         .is_some_and(|status| status.code() == Code::OutOfRange && status.details().is_empty());
-    match bare {
-        true => Status::from(ApiError::PayloadTooLarge {
+    if bare {
+        Status::from(ApiError::PayloadTooLarge {
             limit_bytes: MAX_MESSAGE_BYTES,
         })
-        .into_http(),
-        false => response,
+        .into_http()
+    } else {
+        response
     }
 }
 
@@ -63,9 +64,10 @@ async fn report_health(reporter: HealthReporter, service: Arc<Service>) {
             continue;
         }
         serving = works;
-        let status = match works {
-            true => tonic_health::ServingStatus::Serving,
-            false => tonic_health::ServingStatus::NotServing,
+        let status = if works {
+            tonic_health::ServingStatus::Serving
+        } else {
+            tonic_health::ServingStatus::NotServing
         };
         for name in ["", JobServiceServer::<Grpc>::NAME] {
             reporter.set_service_status(name, status).await;

@@ -138,15 +138,14 @@ fn answer(
     let under_way = Arc::new(activity.begin());
     async move {
         let path = address::without_prefix(request.uri().path());
-        let response = match reserved && !rest::is_probe(path) {
-            true => {
-                METRICS.refused_connections.inc();
-                rest::refuse(&request, ApiError::Overloaded)
-            }
-            false => match router.oneshot(request).await {
+        let response = if reserved && !rest::is_probe(path) {
+            METRICS.refused_connections.inc();
+            rest::refuse(&request, ApiError::Overloaded)
+        } else {
+            match router.oneshot(request).await {
                 Ok(response) => response,
                 Err(never) => match never {},
-            },
+            }
         };
         Ok(response.map(|body| Sent {
             body,

@@ -64,9 +64,10 @@ impl AsyncRead for Guarded {
         if !received.is_empty() {
             self.activity.received();
         }
-        match self.frames.received(received) {
-            true => Poll::Ready(Ok(())),
-            false => Poll::Ready(Err(io::Error::other("too many control frames"))),
+        if self.frames.received(received) {
+            Poll::Ready(Ok(()))
+        } else {
+            Poll::Ready(Err(io::Error::other("too many control frames")))
         }
     }
 }

@@ -1,9 +1,7 @@
 //! The limit on connections: when it is reached, the connection that has been idle for the longest time is closed.
 
-use std::{
-    collections::HashMap,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
-};
+use parking_lot::{Mutex, MutexGuard};
+use std::{collections::HashMap, sync::Arc};
 
 use super::activity::Activity;
 use crate::metrics::METRICS;
@@ -67,7 +65,7 @@ impl Slots {
     }
 
     fn open(&self) -> MutexGuard<'_, Open> {
-        self.open.lock().unwrap_or_else(PoisonError::into_inner)
+        self.open.lock()
     }
 }
 

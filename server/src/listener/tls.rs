@@ -1,12 +1,13 @@
 //! TLS: the certificate and its key, which can be read again while the service runs, and the handshake.
 
+use parking_lot::RwLock;
 use std::{
     fmt,
     fs::File,
     io::{self, IoSlice, Read},
     path::Path,
     pin::Pin,
-    sync::{Arc, PoisonError, RwLock},
+    sync::Arc,
     task::{Context, Poll},
     time::Duration,
 };
@@ -68,7 +69,7 @@ impl Tls {
     pub fn reload(&self) -> Result<(), BadCertificate> {
         let read = CertificateInUse::read(&self.files)?;
         read.check_time(UnixTime::now())?;
-        let mut current = self.in_use.write().unwrap_or_else(PoisonError::into_inner);
+        let mut current = self.in_use.write();
         *current = Arc::new(read);
         Ok(())
     }
@@ -90,7 +91,7 @@ impl Tls {
 
     fn in_use(&self) -> Arc<CertificateInUse> {
         let current = self.in_use.read();
-        current.unwrap_or_else(PoisonError::into_inner).clone()
+        current.clone()
     }
 
     /// The TLS handshake; an error if the client does not complete it.
@@ -190,12 +191,13 @@ fn certificates(path: &Path) -> Result<Vec<CertificateDer<'static>>, BadCertific
     let text = read(path)?;
     let found: Result<Vec<_>, _> = CertificateDer::pem_slice_iter(&text).collect();
     let found = found.map_err(|error| bad_pem(path, &error))?;
-    match found.is_empty() {
-        true => Err(BadCertificate(format!(
+    if found.is_empty() {
+        Err(BadCertificate(format!(
             "found no certificate in {}; expected PEM, with a line -----BEGIN CERTIFICATE-----",
             path.display()
-        ))),
-        false => Ok(found),
+        )))
+    } else {
+        Ok(found)
     }
 }
 

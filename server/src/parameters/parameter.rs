@@ -56,9 +56,10 @@ impl Parameter<Integers> {
     /// Checks that the number in a message's field is within bounds.
     pub fn check(&self, number: impl Into<i64>) -> Result<i64, ApiError> {
         let number = number.into();
-        match self.values.0.contains(&number) {
-            true => Ok(number),
-            false => Err(self.invalid(number)),
+        if self.values.0.contains(&number) {
+            Ok(number)
+        } else {
+            Err(self.invalid(number))
         }
     }
 }
@@ -66,9 +67,10 @@ impl Parameter<Integers> {
 impl Parameter<Seconds> {
     /// Checks that the seconds in a message's field are within bounds.
     pub fn check(&self, seconds: f64) -> Result<f64, ApiError> {
-        match self.values.0.contains(&seconds) {
-            true => Ok(seconds),
-            false => Err(self.invalid(seconds)),
+        if self.values.0.contains(&seconds) {
+            Ok(seconds)
+        } else {
+            Err(self.invalid(seconds))
         }
     }
 }

@@ -46,9 +46,10 @@ impl Queue {
                 // its worker has released it because the service stops: nothing else would end it
                 None => {
                     let ended = self.end_attempt(key, attempt, &Ending::canceled()).await?;
-                    outcome = match ended {
-                        true => CancelOutcome::Canceled(vec![]),
-                        false => CancelOutcome::AlreadyTerminal,
+                    outcome = if ended {
+                        CancelOutcome::Canceled(vec![])
+                    } else {
+                        CancelOutcome::AlreadyTerminal
                     };
                 }
             }

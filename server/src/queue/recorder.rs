@@ -139,12 +139,11 @@ async fn store_batch(
             return Err(StoreError::Full);
         }
         let stored = store.append_events(key, attempt, batch.events.clone(), progress);
-        match stored.await? {
-            true => {
-                failpoint::pass(Point::EventsStored, job.id);
-                queue.announce_events(key);
-            }
-            false => return Ok(false),
+        if stored.await? {
+            failpoint::pass(Point::EventsStored, job.id);
+            queue.announce_events(key);
+        } else {
+            return Ok(false);
         }
     }
     if batch.partial.is_some() && failpoint::fails(Point::PartialReported, job.id) {

@@ -18,9 +18,10 @@ pub(super) enum Told {
 
 /// Continues if `yes`, else breaks.
 pub(super) fn go_on_if(yes: bool) -> ControlFlow<()> {
-    match yes {
-        true => ControlFlow::Continue(()),
-        false => ControlFlow::Break(()),
+    if yes {
+        ControlFlow::Continue(())
+    } else {
+        ControlFlow::Break(())
     }
 }
 

@@ -1,8 +1,9 @@
 //! The data that all tasks of the queue share, and the state of the queue.
 
+use parking_lot::{Mutex, MutexGuard};
 use std::{
     collections::{BTreeMap, HashMap},
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::Arc,
 };
 
 use tokio::sync::{Notify, OwnedSemaphorePermit, RwLock, Semaphore, SemaphorePermit};
@@ -207,8 +208,7 @@ impl Queue {
     }
 
     fn origins(&self) -> MutexGuard<'_, BTreeMap<i64, Trace>> {
-        // No code panics while it holds this lock.
-        self.origins.lock().unwrap_or_else(PoisonError::into_inner)
+        self.origins.lock()
     }
 
     /// Records that its worker has finished with the job. If it was requeued, another worker may have it already.
@@ -229,7 +229,6 @@ impl Queue {
 
     /// Jobs that a worker of this process is solving, by key.
     pub(super) fn running(&self) -> MutexGuard<'_, HashMap<i64, Running>> {
-        // No code panics while it holds this lock; if one did, the map would still be whole.
-        self.running.lock().unwrap_or_else(PoisonError::into_inner)
+        self.running.lock()
     }
 }

@@ -1,9 +1,7 @@
 //! Notifies the watchers of a job of changes, without their content: watchers read the store, together (see `feed`).
 
-use std::{
-    collections::HashMap,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
-};
+use parking_lot::{Mutex, MutexGuard};
+use std::{collections::HashMap, sync::Arc};
 
 use tokio::sync::watch;
 
@@ -76,7 +74,7 @@ impl Watchers {
     }
 
     fn watched(&self) -> MutexGuard<'_, HashMap<i64, Arc<Watched>>> {
-        self.watched.lock().unwrap_or_else(PoisonError::into_inner)
+        self.watched.lock()
     }
 }
 

@@ -71,9 +71,10 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Ar
         memory.free_dropped();
         let Queue { store, solver, .. } = &*queue_of_solver;
         let mesh = mesh.map(|hash| stored_mesh(store, &hash)).transpose()?;
-        let members = match in_sweep {
-            true => Some(members_of(store, key)?),
-            false => None,
+        let members = if in_sweep {
+            Some(members_of(store, key)?)
+        } else {
+            None
         };
         if failpoint::fails(Point::MeshRead, id) {
             return Err(NoSolution::Internal("a test wants it".into()));

@@ -115,9 +115,10 @@ impl Coding {
             }
         }
         let (gzip, zstd) = (gzip.unwrap_or(any), zstd.unwrap_or(0.0));
-        match zstd >= gzip {
-            true => (zstd > 0.0).then_some(Coding::Zstd),
-            false => Some(Coding::Gzip),
+        if zstd >= gzip {
+            (zstd > 0.0).then_some(Coding::Zstd)
+        } else {
+            Some(Coding::Gzip)
         }
     }
 
@@ -191,9 +192,10 @@ pub(super) fn decoded<'a>(
         let window = |bytes: usize| bytes.min(coding.window_bytes());
         of_decoder.count(window(bytes + piece.len()) - window(bytes))?;
         bytes += piece.len();
-        match bytes > free + MOST_RATIO * arrived.load(Relaxed) {
-            true => Err(ApiError::EncodedTooLarge { ratio: MOST_RATIO }),
-            false => Ok(piece),
+        if bytes > free + MOST_RATIO * arrived.load(Relaxed) {
+            Err(ApiError::EncodedTooLarge { ratio: MOST_RATIO })
+        } else {
+            Ok(piece)
         }
     });
     Ok(Box::pin(pieces))

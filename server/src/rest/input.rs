@@ -69,9 +69,10 @@ impl<'a> RawInput<'a> {
                 let known: Vec<&str> = known.map(|one| one.name).collect();
                 return Err(ApiError::UnknownParameter {
                     name: name.clone(),
-                    known: match known.is_empty() {
-                        true => "none".into(),
-                        false => known.join(", "),
+                    known: if known.is_empty() {
+                        "none".into()
+                    } else {
+                        known.join(", ")
                     },
                 });
             };

@@ -103,9 +103,10 @@ pub(super) async fn update(
     id: JobId,
     meant_for: Option<Tags>,
 ) -> Result<Response, ApiError> {
-    let (edit, labels) = match is_merge_patch(&call.headers) {
-        true => merge_patch(&call.merge_patch().await?)?,
-        false => (edit(&call.json().await?)?, LabelChanges::new()),
+    let (edit, labels) = if is_merge_patch(&call.headers) {
+        merge_patch(&call.merge_patch().await?)?
+    } else {
+        (edit(&call.json().await?)?, LabelChanges::new())
     };
     let Call {
         service, caller, ..

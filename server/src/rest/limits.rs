@@ -45,9 +45,10 @@ pub(super) async fn limits(
     if !is_probe(&path) && !service.sent.has_room() {
         return refusal(grpc, &path, ApiError::Overloaded);
     }
-    let no_room = match only_reads(grpc, request.method(), &path) {
-        true => NoRoom::Refuse,
-        false => NoRoom::Wait,
+    let no_room = if only_reads(grpc, request.method(), &path) {
+        NoRoom::Refuse
+    } else {
+        NoRoom::Wait
     };
     let received = Received::new(&service.received);
     let (mut parts, body) = request.into_parts();

@@ -44,11 +44,12 @@ fn check(request: &Request, web: &Web, trust: &ProxyTrust, tls: bool) -> Result<
     let named = host_of(request)?;
     let Some(host) = forwarded::host(request, trust)?.or(named) else {
         // HTTP/1.0: no browser, which would name both
-        return match request.headers().contains_key(header::ORIGIN) {
-            true => Err(ApiError::Forbidden(
+        return if request.headers().contains_key(header::ORIGIN) {
+            Err(ApiError::Forbidden(
                 "the request names an origin and no host".into(),
-            )),
-            false => Ok(()),
+            ))
+        } else {
+            Ok(())
         };
     };
     if !is_own_host(&host, web) {

@@ -1,8 +1,9 @@
 //! Logs refused requests: at most one line for each kind every ten seconds, however many there are.
 
+use parking_lot::Mutex;
 use std::{
     collections::BTreeMap,
-    sync::{LazyLock, Mutex, PoisonError},
+    sync::LazyLock,
     time::{Duration, Instant},
 };
 
@@ -58,7 +59,7 @@ async fn tell_the_rest(kind: String) {
 
 /// The number of requests that were refused since the last line, which is reset.
 fn rest(kind: &str, now: Instant) -> u64 {
-    let mut kinds = KINDS.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut kinds = KINDS.lock();
     match kinds.get_mut(kind) {
         Some(known) if known.since > 0 => {
             known.logged = now;
@@ -70,7 +71,7 @@ fn rest(kind: &str, now: Instant) -> u64 {
 
 /// The number of requests for which a line is due.
 fn due(kind: &str, now: Instant) -> Option<u64> {
-    let mut kinds = KINDS.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut kinds = KINDS.lock();
     match kinds.get_mut(kind) {
         Some(known) => {
             known.since += 1;

@@ -83,12 +83,11 @@ pub(super) fn is_grpc(request: &Request) -> bool {
 
 /// Refuses a request before it reaches its handler: with a gRPC status, or with an error document.
 pub(super) fn refusal(grpc: bool, path: &str, error: ApiError) -> Response {
-    match grpc {
-        true => {
-            refused::note(error.code().kind().code, path);
-            tonic::Status::from(error).into_http()
-        }
-        false => with_document(error.into_response(), path),
+    if grpc {
+        refused::note(error.code().kind().code, path);
+        tonic::Status::from(error).into_http()
+    } else {
+        with_document(error.into_response(), path)
     }
 }
 

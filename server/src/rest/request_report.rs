@@ -1,8 +1,8 @@
 //! Reports every request of either protocol when its answer has ended: a line of the log, metrics, and a span.
 
+use parking_lot::Mutex;
 use std::{
     pin::Pin,
-    sync::{Mutex, PoisonError},
     task::{Context, Poll, ready},
     time::Instant,
 };
@@ -71,7 +71,7 @@ struct Budget(Mutex<Option<(Instant, u32)>>);
 
 impl Budget {
     fn is_used_up(&self, now: Instant) -> bool {
-        let mut counted = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut counted = self.0.lock();
         let second = |since: &Instant| now.saturating_duration_since(*since).as_secs() == 0;
         let (since, lines) = counted
             .take_if(|(since, _)| second(since))
@@ -146,9 +146,10 @@ impl Observed {
                 METRICS.answered(method, UNKNOWN, self.status.unwrap_or(0), took);
             }
         }
-        let wanted = match self.probe {
-            true => enabled!(target: TARGET, Level::DEBUG),
-            false => enabled!(target: TARGET, Level::INFO),
+        let wanted = if self.probe {
+            enabled!(target: TARGET, Level::DEBUG)
+        } else {
+            enabled!(target: TARGET, Level::INFO)
         };
         let stranger = self.owner.is_empty();
         if wanted && !(stranger && BUDGET.is_used_up(self.start)) {
@@ -166,10 +167,11 @@ impl Observed {
         let trace_id = Some(&trace).filter(|trace| *trace != id);
         macro_rules! tell {
             ($($fields:tt)*) => {
-                match self.probe {
-                    true => debug!(target: TARGET, $($fields)*),
-                    false => info!(target: TARGET, $($fields)*),
-                }
+                if self.probe {
+debug!(target: TARGET, $($fields)*)
+} else {
+info!(target: TARGET, $($fields)*)
+}
             };
         }
         let (method, route) = match &self.target {

@@ -44,12 +44,11 @@ pub fn router(service: Arc<Service>, grpc: Router) -> Router {
         .layer(middleware::from_fn_with_state(service, origin::own_site))
         // outermost: it sees what the client is answered
         .layer(middleware::from_fn(request_report::observe));
-    match prefix.is_empty() {
-        true => routes,
+    if prefix.is_empty() {
+        routes
+    } else {
         // outside of the routes, which are found by the rest of the path
-        false => {
-            let without = move |request| forwarded::without_prefix(request, &prefix);
-            Router::new().fallback_service(MapRequestLayer::new(without).layer(routes))
-        }
+        let without = move |request| forwarded::without_prefix(request, &prefix);
+        Router::new().fallback_service(MapRequestLayer::new(without).layer(routes))
     }
 }

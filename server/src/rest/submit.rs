@@ -69,9 +69,10 @@ pub(super) async fn retry(
     key: Option<Key>,
     wait_s: Option<u64>,
 ) -> Result<Response, ApiError> {
-    let changes = match call.has_body() {
-        true => bodies::retry(&call.json().await?)?,
-        false => Changes::default(),
+    let changes = if call.has_body() {
+        bodies::retry(&call.json().await?)?
+    } else {
+        Changes::default()
     };
     let submitted = retry::retry(&call.service, &call.caller, id, changes, key).await?;
     answer(call, submitted, wait_s, false).await

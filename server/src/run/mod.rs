@@ -170,9 +170,10 @@ pub fn run(
             Progress::SecondThread => Update::SecondThread,
             Progress::OutOfMemory { bytes } => Update::OutOfMemory { bytes },
         };
-        match non_finite {
-            true => ControlFlow::Break(()),
-            false => report(update),
+        if non_finite {
+            ControlFlow::Break(())
+        } else {
+            report(update)
         }
     });
     if non_finite {

@@ -54,9 +54,10 @@ impl Stopwatch {
     /// Records that adaptive refinement begins on a mesh with this number, or returns to the one before.
     pub(super) fn on_mesh(&mut self, number: u32) {
         let iterations = &mut self.times.iterations;
-        match number > self.mesh {
-            true => self.before = std::mem::take(iterations),
-            false => *iterations = std::mem::take(&mut self.before),
+        if number > self.mesh {
+            self.before = std::mem::take(iterations)
+        } else {
+            *iterations = std::mem::take(&mut self.before)
         }
         self.mesh = number;
     }

@@ -203,12 +203,13 @@ impl Partial {
             let _ = fs::remove_file(made.path.join(file)); // whatever is left is noticed next
         }
         let foreign = fs::read_dir(&made.path).map_err(named)?.next().is_some();
-        match foreign {
-            true => Err(refused(&format!(
+        if foreign {
+            Err(refused(&format!(
                 "{} exists, and contains more than the remains of an interrupted backup",
                 made.path.display()
-            ))),
-            false => Ok(made),
+            )))
+        } else {
+            Ok(made)
         }
     }
 
@@ -226,14 +227,15 @@ impl Partial {
     fn require_space(&self, bytes: u64) -> Result<()> {
         let found = statvfs(&self.path).map_err(|error| self.unwritable(error))?;
         let free = found.f_bavail.saturating_mul(found.f_frsize);
-        match bytes.saturating_add(SPARE_BYTES) <= free {
-            true => Ok(()),
-            false => Err(self.unwritable(format!(
+        if bytes.saturating_add(SPARE_BYTES) <= free {
+            Ok(())
+        } else {
+            Err(self.unwritable(format!(
                 "the store takes {}, and {} must stay free, but there is only {}",
                 size(bytes),
                 size(SPARE_BYTES),
                 size(free)
-            ))),
+            )))
         }
     }
 

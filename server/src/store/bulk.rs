@@ -141,9 +141,10 @@ fn discard(change: &mut Change<'_>, what: &Discard, key: i64) -> Result<bool> {
     let Some(job) = job.filter(old) else {
         return Ok(false);
     };
-    match fields_alone {
-        true => remove_fields(change, &job)?,
-        false => remove(change, &job)?,
+    if fields_alone {
+        remove_fields(change, &job)?
+    } else {
+        remove(change, &job)?
     }
     Ok(true)
 }

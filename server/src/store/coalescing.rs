@@ -182,9 +182,10 @@ pub(super) fn replace_if_outranked(change: &mut Change<'_>, primary: i64) -> Res
     let Some(first) = coalesced.first() else {
         return Ok(());
     };
-    match first.priority > change.read(primary)?.priority {
-        true => replace_primary(change, first, primary),
-        false => Ok(()),
+    if first.priority > change.read(primary)?.priority {
+        replace_primary(change, first, primary)
+    } else {
+        Ok(())
     }
 }
 
@@ -208,8 +209,8 @@ fn replace_primary(change: &mut Change<'_>, job: &Job, primary: i64) -> Result<(
 
 /// Coalesces a job into this primary.
 fn coalesce(change: &mut Change<'_>, key: i64, primary: i64) -> Result<()> {
-    let set = change.set(key, |row| row.job.coalesced_into = Some(primary));
-    set.map(drop)
+    change.set(key, |row| row.job.coalesced_into = Some(primary))?;
+    Ok(())
 }
 
 /// The priority of a coalesced job may have changed: if its primary waits with a lower one, it waits by itself.

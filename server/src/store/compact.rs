@@ -29,9 +29,10 @@ pub(super) fn enable_giving_back(connection: &Connection, folder: &Path) -> Resu
         );
         return Ok(());
     }
-    let rebuilt = match has_room(folder, bytes) {
-        true => compact(connection),
-        false => Err(StoreError::Full),
+    let rebuilt = if has_room(folder, bytes) {
+        compact(connection)
+    } else {
+        Err(StoreError::Full)
     };
     if let Err(cause) = rebuilt {
         tracing::warn!(

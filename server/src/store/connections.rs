@@ -1,11 +1,7 @@
 //! Connections to the database. Each is used by one thread at a time, which may block; whoever needs one waits for a turn.
 
-use std::{
-    fmt,
-    path::Path,
-    sync::{Arc, Mutex, PoisonError},
-    time::Duration,
-};
+use parking_lot::Mutex;
+use std::{fmt, path::Path, sync::Arc, time::Duration};
 
 use rusqlite::{Connection, OpenFlags};
 use tokio::{
@@ -16,8 +12,9 @@ use tokio::{
 
 use super::error::{Result, StoreError};
 
-/// Statements that a connection keeps prepared; the store has fewer texts of them.
-const MOST_STATEMENTS: usize = 500;
+/// Statements that a connection keeps prepared: those that are used again and again. The store has some 200 texts, and makes
+/// others of the columns that change or that a list filters by.
+const MOST_STATEMENTS: usize = 200;
 
 /// For what a database is opened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,7 +115,13 @@ impl Connections {
         let all = self.turns.acquire_many(self.count).await;
         self.turns.close();
         drop(all);
-        self.idle().clear();
+        let connections = std::mem::take(&mut *self.idle());
+        // the last one merges the write-ahead log
+        let closing = move || {
+            drop(connections);
+            Ok(())
+        };
+        let _ = blocking(closing).await; // it cannot fail
     }
 
     /// Whether they were closed.
@@ -126,9 +129,8 @@ impl Connections {
         self.turns.is_closed()
     }
 
-    fn idle(&self) -> std::sync::MutexGuard<'_, Vec<Connection>> {
-        // No code panics while it holds this lock; if one did, the list would still be whole.
-        self.idle.lock().unwrap_or_else(PoisonError::into_inner)
+    fn idle(&self) -> parking_lot::MutexGuard<'_, Vec<Connection>> {
+        self.idle.lock()
     }
 }
 

@@ -352,19 +352,23 @@ impl Content {
     }
 
     fn compare(&self, found: &Fingerprint) -> Result<()> {
-        match *found == self.fingerprint {
-            true => Ok(()),
-            false => Err(self
+        if *found == self.fingerprint {
+            Ok(())
+        } else {
+            Err(self
                 .record
                 .clone()
-                .damaged("its hash does not match its content")),
+                .damaged("its hash does not match its content"))
         }
     }
 
     /// One of its pieces, from 0; not compared with anything.
     pub(super) fn piece(&self, connection: &Connection, number: usize) -> Result<Vec<u8>> {
         let body = "select body from content_piece where content = ? and piece = ?";
-        let body = connection.optional_value(body, (self.id, number as i64))?;
+        // a text, too: only its hash tells whether it is as it was written
+        let body = connection.row(body, (self.id, number as i64), |row| {
+            Ok(row.get_ref(0)?.as_bytes()?.to_vec())
+        })?;
         body.ok_or_else(|| self.record.clone().damaged("a piece is missing"))
     }
 }

@@ -1,8 +1,9 @@
 //! What has been found damaged: told to the client that asked, once in the log, and by `/readyz`.
 
+use parking_lot::Mutex;
 use std::{
     collections::{BTreeMap, BTreeSet},
-    sync::{Arc, Mutex, OnceLock, PoisonError},
+    sync::{Arc, OnceLock},
 };
 
 use uuid::Uuid;
@@ -148,7 +149,7 @@ impl Damages {
     /// A table was found damaged, or differs from its indexes.
     pub(super) fn note_table(&self, table: Table, cause: &str) {
         {
-            let mut tables = self.tables.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut tables = self.tables.lock();
             tables.insert(table);
         }
         if let StoreError::Damaged(damage) = table.damaged(cause) {
@@ -158,7 +159,7 @@ impl Damages {
 
     /// An error if what was not found in these tables may exist nevertheless.
     pub(super) fn have_all(&self, tables: &[Table]) -> Result<()> {
-        let damaged = self.tables.lock().unwrap_or_else(PoisonError::into_inner);
+        let damaged = self.tables.lock();
         match tables.iter().find(|table| damaged.contains(table)) {
             Some(table) => Err(table.damaged("")),
             None => Ok(()),
@@ -167,7 +168,7 @@ impl Damages {
 
     /// The key of a request with this fingerprint was damaged.
     pub(super) fn suspect(&self, payload: String) {
-        let mut suspects = self.suspects.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut suspects = self.suspects.lock();
         if suspects.len() < MOST {
             suspects.insert(payload);
         }
@@ -176,15 +177,15 @@ impl Damages {
     /// An error if the key of a request with this fingerprint, which was not found, may exist nevertheless.
     pub(super) fn have_all_keys(&self, payload: &str) -> Result<()> {
         self.have_all(&[Table::Keys])?;
-        let suspects = self.suspects.lock().unwrap_or_else(PoisonError::into_inner);
-        match suspects.contains(payload) {
-            true => Err(Table::Keys.damaged("")),
-            false => Ok(()),
+        let suspects = self.suspects.lock();
+        if suspects.contains(payload) {
+            Err(Table::Keys.damaged(""))
+        } else {
+            Ok(())
         }
     }
 
-    fn found(&self) -> std::sync::MutexGuard<'_, BTreeMap<Record, (Uuid, Option<JobId>)>> {
-        // No code panics while it holds this lock; if one did, the map would still be whole.
-        self.found.lock().unwrap_or_else(PoisonError::into_inner)
+    fn found(&self) -> parking_lot::MutexGuard<'_, BTreeMap<Record, (Uuid, Option<JobId>)>> {
+        self.found.lock()
     }
 }

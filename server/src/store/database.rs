@@ -1,12 +1,13 @@
 //! The one SQLite file: its connections, and the data that is also kept in memory.
 
+use parking_lot::{Mutex, MutexGuard, RwLock};
 use std::{
     cell::Cell,
     collections::HashSet,
     ops::Deref,
     path::Path,
     sync::{
-        Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock,
+        Arc, OnceLock,
         atomic::{AtomicBool, AtomicI64},
     },
     time::{Duration, Instant},
@@ -33,7 +34,8 @@ use super::{
 };
 use crate::{memory::Budget, metrics::METRICS, token::Tokens};
 
-/// How long a query or a change waits for a connection.
+/// How long a query or a change waits for a connection; one that waits longer, behind others on a disk that hardly answers,
+/// fails, and may be tried again.
 const PATIENCE: Duration = Duration::from_secs(30);
 /// The same of a list.
 const LIST_PATIENCE: Duration = Duration::from_secs(5);
@@ -237,8 +239,7 @@ impl Store {
 
     /// The waiting jobs.
     pub(super) fn waiting_jobs(&self) -> MutexGuard<'_, WaitingJobs> {
-        // No code panics while it holds this lock; if one did, the list would still be whole.
-        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+        self.waiting.lock()
     }
 
     /// Closes every connection, and with the last one the write-ahead log. Another server may use the folder then.
@@ -326,7 +327,9 @@ impl Store {
         let (mut lease, store) = (self.writer.turn().await?, self.clone());
         blocking(move || {
             let done = store.attempt(&mut lease, work);
-            store.noting_what_cannot_be_written(&mut lease, done)
+            let done = store.noting_what_cannot_be_written(&mut lease, done);
+            drop(lease); // before the store, which may be its last user
+            done
         })
         .await
     }
@@ -344,7 +347,9 @@ impl Store {
                 store.reserve.release();
                 done = store.attempt(&mut lease, &work);
             }
-            store.noting_what_cannot_be_written(&mut lease, done)
+            let done = store.noting_what_cannot_be_written(&mut lease, done);
+            drop(lease);
+            done
         })
         .await
     }

@@ -1,9 +1,7 @@
 //! The end of a job: by its worker, by a cancel, or because it has waited too long.
 
-use std::{
-    collections::HashSet,
-    sync::{Arc, MutexGuard, PoisonError},
-};
+use parking_lot::MutexGuard;
+use std::{collections::HashSet, sync::Arc};
 
 use rusqlite::params;
 
@@ -78,8 +76,7 @@ impl Store {
 
     /// Running jobs that a client has canceled.
     pub(super) fn cancels(&self) -> MutexGuard<'_, HashSet<i64>> {
-        // No code panics while it holds this lock; if one did, the set would still be whole.
-        self.cancels.lock().unwrap_or_else(PoisonError::into_inner)
+        self.cancels.lock()
     }
 
     /// Ends jobs that have waited longer than allowed, some at a time. A job coalesced into one that runs does
@@ -146,9 +143,10 @@ fn finish(
         change.append_with_progress(key, &last.events, &last.progress)?;
     }
     let job = change.read(key)?;
-    match writer.store.is_asked_to_stop(&job) {
-        true => end(&mut change, key, &ending.after_a_request_to_stop())?,
-        false => end(&mut change, key, ending)?,
+    if writer.store.is_asked_to_stop(&job) {
+        end(&mut change, key, &ending.after_a_request_to_stop())?
+    } else {
+        end(&mut change, key, ending)?
     }
     if failpoint::fails(Point::Ended, job.id) {
         return Err(StoreError::Full);

@@ -40,8 +40,8 @@ pub enum StoreError {
     /// The job's mesh is not stored.
     #[error("the mesh is not stored")]
     UnknownMesh,
-    /// Too many lists are requested at once.
-    #[error("too many lists are being read at the same time")]
+    /// Too many others use the database at the same time.
+    #[error("the database was busy for too long")]
     Busy,
     /// The disk is full, or cannot be written: SQLite reports a quota and a limit on file sizes as errors of the disk.
     #[error("the disk is full, or cannot be written")]

@@ -99,9 +99,10 @@ pub(super) fn read(
     let dense = (0..)
         .zip(&events)
         .all(|(place, event)| event.seq - 1 - place == after);
-    match dense && events.len() as i64 == expected {
-        true => Ok(events),
-        false => Err(Record::of_job(key, "events").damaged("some are missing")),
+    if dense && events.len() as i64 == expected {
+        Ok(events)
+    } else {
+        Err(Record::of_job(key, "events").damaged("some are missing"))
     }
 }
 

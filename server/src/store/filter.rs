@@ -285,9 +285,10 @@ impl Order {
     /// Whether one place of a list comes before another.
     pub(super) fn is_before(self, one: Cursor, other: Cursor) -> bool {
         let (one, other) = ((one.micros, one.key), (other.micros, other.key));
-        match self.descending {
-            true => one > other,
-            false => one < other,
+        if self.descending {
+            one > other
+        } else {
+            one < other
         }
     }
 

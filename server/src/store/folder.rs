@@ -1,12 +1,12 @@
 //! The folder of a store: its files, who may read them, and the lock that keeps a second server out.
 
+use parking_lot::Mutex;
 use std::{
     fmt::Display,
     fs::{self, DirBuilder, File, OpenOptions, Permissions, TryLockError},
     io::{self, ErrorKind},
     os::unix::fs::{DirBuilderExt, FileExt, MetadataExt, OpenOptionsExt, PermissionsExt},
     path::{Path, PathBuf},
-    sync::{Mutex, PoisonError},
 };
 
 use super::{
@@ -125,13 +125,14 @@ impl Folder {
 
     /// An error if a restore to this folder was interrupted: its store is none, or another.
     pub(super) fn is_complete(&self) -> Result<()> {
-        match self.path.join(RESTORING).exists() {
-            false => Ok(()),
-            true => Err(StoreError::Folder(format!(
+        if self.path.join(RESTORING).exists() {
+            Err(StoreError::Folder(format!(
                 "a restore to the folder {} was not completed: run `signorini restore` again, or remove {RESTORING} to go on \
                  with what else is in it",
                 self.path.display()
-            ))),
+            )))
+        } else {
+            Ok(())
         }
     }
 
@@ -229,7 +230,7 @@ impl Identity {
     /// An error if the database or its log was removed or replaced, or cut short: what is written then is lost at the
     /// next start. Two calls of `stat`, of some microseconds.
     pub(super) fn check(&self) -> Result<()> {
-        let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut seen = self.seen.lock();
         let wrong = self.difference(&mut seen);
         if wrong != seen.wrong {
             match &wrong {
@@ -245,7 +246,7 @@ impl Identity {
 
     /// The store gives space back: the database may become as small as this (bytes), instead of what was told before.
     pub(super) fn may_shrink_to(&self, bytes: u64) {
-        let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut seen = self.seen.lock();
         seen.least = Some(bytes);
     }
 

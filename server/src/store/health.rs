@@ -6,7 +6,6 @@ use std::{
 };
 
 use rusqlite::Connection;
-use tokio::time::timeout;
 use uuid::Uuid;
 
 use crate::{error::number_of, job::Job, time::Time};
@@ -20,8 +19,6 @@ use super::{
 
 /// How often the files are looked at.
 const INTERVAL: Duration = Duration::from_secs(1);
-/// How long a connection may be in use by another.
-const PATIENCE: Duration = Duration::from_secs(30);
 
 /// How well the store works.
 #[derive(Clone, Debug, Default)]
@@ -93,16 +90,15 @@ impl Store {
     /// database gets better by a restart. False if a connection is not given back.
     pub async fn answers(self: &Arc<Self>) -> bool {
         let write = self.write(|writer| {
-            let _ = writer
-                .connection()
-                .execute_batch("begin immediate; rollback");
+            let _ = writer.begin_control(); // rolled back
             Ok(())
         });
         let read = self.read(|_, connection| {
             let _ = connection.optional_value::<i64>("select 1 from job limit 1", ());
             Ok(())
         });
-        timeout(PATIENCE, write).await.is_ok() && timeout(PATIENCE, read).await.is_ok()
+        let is_busy = |answer| matches!(answer, Err(StoreError::Busy));
+        !is_busy(write.await) && !is_busy(read.await)
     }
 
     /// An error if the disk is full but for what control needs; for what is written beside the database.

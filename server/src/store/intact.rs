@@ -1,11 +1,7 @@
 //! What was found intact: content that was read whole and found as it was written, since the store was opened.
 
-use std::{
-    borrow::Borrow,
-    collections::HashSet,
-    hash::Hash,
-    sync::{Mutex, MutexGuard, PoisonError},
-};
+use parking_lot::{Mutex, MutexGuard};
+use std::{borrow::Borrow, collections::HashSet, hash::Hash};
 
 use rusqlite::Connection;
 
@@ -62,7 +58,7 @@ impl<T: Hash + Eq> Recent<T> {
     }
 
     fn halves(&self) -> MutexGuard<'_, [HashSet<T>; 2]> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.0.lock()
     }
 }
 

@@ -150,9 +150,10 @@ fn jobs_of_key(
     };
     checksum(owner, &written, first, jobs)
         .verify(stored, || Record::named("record of a request key"))?;
-    match written.payload == key.payload {
-        true => Ok(Some(first..first.saturating_add(jobs))),
-        false => Err(StoreError::KeyReuse),
+    if written.payload == key.payload {
+        Ok(Some(first..first.saturating_add(jobs)))
+    } else {
+        Err(StoreError::KeyReuse)
     }
 }
 

@@ -192,9 +192,10 @@ impl Store {
 
 /// Where jobs are found by this filter.
 fn tables_of(filter: &Filter) -> &'static [Table] {
-    match filter.labels.is_empty() {
-        true => &[Table::Jobs],
-        false => &[Table::Jobs, Table::Labels],
+    if filter.labels.is_empty() {
+        &[Table::Jobs]
+    } else {
+        &[Table::Jobs, Table::Labels]
     }
 }
 
@@ -315,9 +316,10 @@ pub(super) fn page(
     let by = <&str>::from(order.by);
     merged(&mut query, path, by, order, limit, |query, lane| {
         // rows that are sorted are those of the table
-        let place = match path.by == order.by {
-            true => Place::of(lane, order.by),
-            false => Place::of(Lane::All, order.by),
+        let place = if path.by == order.by {
+            Place::of(lane, order.by)
+        } else {
+            Place::of(Lane::All, order.by)
         };
         from(query, lane, path.by, columns);
         if order.by == OrderBy::FinishedAt {
@@ -368,9 +370,10 @@ fn from(query: &mut Query, lane: Lane<'_>, by: OrderBy, columns: &str) {
     match lane {
         Lane::Label((key, value)) => {
             // a place in the index needs no job
-            let job = match columns.contains("job.") {
-                true => " cross join job on job.id = job_label.job_id",
-                false => "",
+            let job = if columns.contains("job.") {
+                " cross join job on job.id = job_label.job_id"
+            } else {
+                ""
             };
             query.push(format!(
                 "select {columns} from job_label{job} where job_label.key = "
@@ -496,9 +499,10 @@ fn bounds(query: &mut Query, filter: &Filter, place: Place, window: Window) {
             filter.finished_before,
         ),
     };
-    let (lower, upper) = match order.descending {
-        true => (last, after),
-        false => (after, last),
+    let (lower, upper) = if order.descending {
+        (last, after)
+    } else {
+        (after, last)
     };
     for (time, comparison, implied) in [(least, ">=", lower), (most, "<", upper)] {
         if let (Some(time), None) = (time, implied) {

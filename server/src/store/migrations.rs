@@ -1,6 +1,6 @@
 //! The tables and their history: `migrations/`, compiled in.
 
-use std::{collections::BTreeMap, path::Path, time::Instant};
+use std::{cmp::Ordering, collections::BTreeMap, path::Path, time::Instant};
 
 use rusqlite::{Connection, params};
 use sha2::{Digest, Sha384};
@@ -142,11 +142,12 @@ pub(super) fn run(database: &Connection, folder: &Path) -> Result<()> {
 /// An error if the tables are of a later version, or not of this program. Nothing is written.
 pub(super) fn check(connection: &Connection) -> Result<()> {
     if !is_listed(connection)? {
-        return match connection.value("select exists (select 1 from sqlite_schema)", ())? {
-            true => Err(StoreError::Schema(
+        return if connection.value("select exists (select 1 from sqlite_schema)", ())? {
+            Err(StoreError::Schema(
                 "the database does not belong to this program".into(),
-            )),
-            false => Ok(()),
+            ))
+        } else {
+            Ok(())
         };
     }
     let applied: Vec<(i64, Vec<u8>)> = connection.rows(
@@ -156,13 +157,7 @@ pub(super) fn check(connection: &Connection) -> Result<()> {
     )?;
     for (version, found) in applied {
         match STEPS.iter().find(|(step, ..)| *step == version) {
-            None => {
-                return Err(StoreError::Schema(format!(
-                    "the store was written by a later version of this program (its tables have step {version}, the last one known \
-                     here is {}); use that version",
-                    last_step()
-                )));
-            }
+            None => return Err(later(version)),
             Some((.., sql)) if checksum(sql) != found => {
                 return Err(StoreError::Schema(format!(
                     "the store does not belong to this program, or is damaged: step {version} of its tables is different"
@@ -174,11 +169,22 @@ pub(super) fn check(connection: &Connection) -> Result<()> {
     Ok(())
 }
 
-/// An error if the tables are of an earlier version.
+fn later(version: i64) -> StoreError {
+    StoreError::Schema(format!(
+        "the store was written by a later version of this program (its tables have step {version}, the last one known here is {}); \
+         use that version",
+        last_step()
+    ))
+}
+
+/// An error if the tables are of an earlier or a later version. One of the database if the list of steps is missing.
 pub(super) fn are_current(connection: &Connection) -> Result<()> {
-    match has_step(connection, last_step())? {
-        true => Ok(()),
-        false => Err(StoreError::Schema(
+    let last = "select coalesce(max(version), 0) from _sqlx_migrations";
+    let last: i64 = connection.value(last, ())?;
+    match last.cmp(&last_step()) {
+        Ordering::Equal => Ok(()),
+        Ordering::Greater => Err(later(last)),
+        Ordering::Less => Err(StoreError::Schema(
             "the store is of an earlier version of this program: start the service on it once to update it".into(),
         )),
     }

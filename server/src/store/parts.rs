@@ -173,10 +173,7 @@ impl Parts {
             name: part.name.clone(),
             encoding: part.encoding,
             info: part.info.clone(),
-            bytes: match part.is_fields() {
-                true => 0,
-                false => part.body.len(),
-            },
+            bytes: if part.is_fields() { 0 } else { part.body.len() },
         });
         let index = write_index(&entries.collect::<Vec<_>>());
         let in_result = parts.iter().filter(|part| !part.is_fields());

@@ -4,8 +4,7 @@
 //! starts had a wrong clock (a machine without a battery begins with an old time, until it hears of the right one). So what
 //! is removed for its age, and what expires in the queue, counts the time while the service ran, which no clock can set.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
-
+use parking_lot::{Mutex, MutexGuard};
 use serde::{Deserialize, Serialize};
 
 /// Pauses that are kept: beyond that the shortest ones are forgotten. Of a year with twenty restarts a day those are a small part
@@ -49,8 +48,7 @@ impl Pauses {
     }
 
     fn all(&self) -> MutexGuard<'_, Vec<Pause>> {
-        // No code panics while it holds this lock.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.0.lock()
     }
 }
 

@@ -60,7 +60,7 @@ impl Store {
     /// Fills in the queue positions, and what jobs keep that have ended, if they can be read: a request that has changed
     /// something is answered even without them.
     pub(super) fn try_to_complete(&self, connection: &Connection, jobs: &mut [Job]) {
-        if let Err(cause) = self.complete(connection, jobs) {
+        if let Err(cause) = self.damages.noting(self.complete(connection, jobs)) {
             tracing::warn!(%cause, "queue positions and sizes could not be read: {cause}");
         }
     }

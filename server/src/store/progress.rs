@@ -5,12 +5,13 @@
 //! place, without a flush, which would cost as much as the commit. So the file is never ahead of what is durable. After
 //! a power cut it may be behind, and then less is noticed, but nothing is refused that is whole.
 
+use parking_lot::Mutex;
 use std::{
     fs::{File, OpenOptions},
     io::{self, ErrorKind},
     os::unix::fs::{FileExt, OpenOptionsExt},
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, PoisonError},
+    sync::Arc,
 };
 
 use rusqlite::Connection;
@@ -79,13 +80,17 @@ pub(super) fn in_database(connection: &Connection) -> Result<Option<LastCommit>>
     if !connection.value::<bool>(counted, ())? {
         return Ok(None);
     }
-    connection.row("select store, commits from progress", (), |row| {
+    let last = connection.row("select store, commits from progress", (), |row| {
         Ok(LastCommit {
             store: row.get("store")?,
             commits: row.get("commits")?,
             stopped: false,
         })
-    })
+    })?;
+    match last {
+        Some(last) => Ok(Some(last)),
+        None => Err(rusqlite::Error::QueryReturnedNoRows.into()),
+    }
 }
 
 /// An error if the database is not the one that the file tells of, or has not come as far. If that cannot be known, why.
@@ -134,7 +139,7 @@ impl Progress {
 
     /// The transaction with this number is on the disk.
     pub(super) fn reached(&self, number: i64) {
-        let mut open = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut open = self.0.lock();
         if number <= open.last.commits {
             return; // a later one was faster
         }
@@ -149,7 +154,7 @@ impl Progress {
     /// The service stops, and nothing is written any more. Needs no space on the disk.
     pub(super) fn stop(&self) -> io::Result<()> {
         {
-            let mut open = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut open = self.0.lock();
             open.last.stopped = true;
             open.write()?;
         }
@@ -159,7 +164,7 @@ impl Progress {
     /// Flushes the file.
     pub(super) fn sync(&self) -> io::Result<()> {
         let file = {
-            let open = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let open = self.0.lock();
             open.file.try_clone()?
         };
         file.sync_data()

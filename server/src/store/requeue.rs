@@ -89,9 +89,10 @@ fn requeue_interrupted(writer: &Writer<'_>) -> Result<usize> {
             continue; // damaged: the service starts with the others
         };
         // the service that stopped could not store that it requeued it
-        let why = match writer.store.was_stopped {
-            true => Requeue::Drain,
-            false => Requeue::WorkerLost,
+        let why = if writer.store.was_stopped {
+            Requeue::Drain
+        } else {
+            Requeue::WorkerLost
         };
         let (stop, how) = (job.cancel_requested, "the service died with it");
         interrupt(&mut change, &job, why, stop, how)?;

@@ -52,9 +52,10 @@ impl Reserve {
 
     /// An error if the disk is full but for what control needs.
     pub(super) fn has_room(&self) -> Result<()> {
-        match self.held.load(Ordering::Acquire) {
-            true => Ok(()),
-            false => Err(StoreError::Full),
+        if self.held.load(Ordering::Acquire) {
+            Ok(())
+        } else {
+            Err(StoreError::Full)
         }
     }
 

@@ -53,9 +53,10 @@ fn write_store(backup: &Path, data: &Path, replace: bool) -> Result<Restored> {
     let last = copy(backup, &new, &manifest).inspect_err(|_| {
         let _ = fs::remove_file(&new); // nothing was moved yet
     })?;
-    let replaced = match occupied {
-        true => Some(put_aside(data).map_err(unusable)?),
-        false => None,
+    let replaced = if occupied {
+        Some(put_aside(data).map_err(unusable)?)
+    } else {
+        None
     };
     if let Some(last) = last {
         Progress::start(data, last).map_err(unusable)?;
@@ -96,9 +97,10 @@ fn read_manifest(backup: &Path) -> Result<Manifest> {
         return Err(later("its manifest has another form"));
     }
     let manifest: Manifest = serde_json::from_value(manifest).map_err(damaged)?;
-    match manifest.tables > migrations::last_step() {
-        true => Err(later(&manifest.version)),
-        false => Ok(manifest),
+    if manifest.tables > migrations::last_step() {
+        Err(later(&manifest.version))
+    } else {
+        Ok(manifest)
     }
 }
 

@@ -36,10 +36,12 @@ impl Store {
                 let pieces: Vec<Vec<u8>> = pieces.iter().map(|piece| piece.to_vec()).collect();
                 let fingerprint = content.fingerprint.clone().into_owned();
                 let written = self.write(move |writer| {
-                    if !is_current(writer.beside(), key, attempt)? {
+                    let tx = writer.begin()?;
+                    if !is_current(&tx, key, attempt)? {
                         return Ok(false);
                     }
-                    writer.write_pieces(&fingerprint, first, &pieces)?;
+                    content::write_pieces(&tx, &fingerprint, first, &pieces)?;
+                    tx.commit()?;
                     Ok(true)
                 });
                 if !written.await? {
@@ -185,9 +187,10 @@ impl StoredResult {
     /// An error if there should be fields: they were not deleted, and are not attached any more.
     pub(super) fn must_have_no_fields(&self, connection: &Connection) -> Result<()> {
         let had_some = self.find(name::FIELDS).is_some();
-        match had_some && !sizes::lost_fields(connection, self.key)? {
-            true => Err(self.record(name::FIELDS).damaged("it is missing")),
-            false => Ok(()),
+        if had_some && !sizes::lost_fields(connection, self.key)? {
+            Err(self.record(name::FIELDS).damaged("it is missing"))
+        } else {
+            Ok(())
         }
     }
 

@@ -292,12 +292,13 @@ impl Store {
                         or exists (select 1 from of_jobs where owner not in (select owner from owner_size))",
                 (),
             )?;
-            match differ {
-                false => Ok(()),
-                true => Err(Record::named("sum of what owners keep").damaged(
+            if differ {
+Err(Record::named("sum of what owners keep").damaged(
                     "it does not match their jobs, so no jobs are removed for their size; `signorini doctor --salvage` counts again",
-                )),
-            }
+                ))
+} else {
+Ok(())
+}
         })
         .await
     }

@@ -272,9 +272,10 @@ pub(super) fn event(old: Option<&Job>, new: &Job, now: Time) -> Option<(Time, Pa
 /// What a change means for the queue: the job leaves the place that it had, and takes its new one.
 pub(super) fn moves(old: Option<&Job>, new: &Job) -> Vec<Move> {
     let (before, after) = (old.and_then(taking_a_place), taking_a_place(new));
-    match before == after {
-        true => vec![],
-        false => before.map(Move::inverse).into_iter().chain(after).collect(),
+    if before == after {
+        vec![]
+    } else {
+        before.map(Move::inverse).into_iter().chain(after).collect()
     }
 }
 

@@ -1,6 +1,7 @@
 //! Reading the result of a job.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use parking_lot::Mutex;
+use std::sync::Arc;
 
 use rusqlite::Connection;
 use solver::solution::Fields;
@@ -200,8 +201,7 @@ impl Snapshot {
     ) -> Result<T> {
         let (stored, damages) = (self.stored.clone(), self.damages.clone());
         blocking(move || {
-            // if a query has panicked, what is stored is still the same
-            let mut stored = stored.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut stored = stored.lock();
             damages.noting(query(&mut stored))
         })
         .await

@@ -48,9 +48,10 @@ impl Store {
     /// Gives free pages back to the file system, as long as there are many, or all of them if the disk is full; how many were.
     pub async fn give_space_back(self: &Arc<Self>) -> Result<i64> {
         let gives_back = self.read(|_, connection| compact::gives_back(connection));
-        let given = match gives_back.await? {
-            true => self.free_pages().await?,
-            false => 0, // of an earlier version
+        let given = if gives_back.await? {
+            self.free_pages().await?
+        } else {
+            0 // of an earlier version
         };
         self.shorten_files().await?;
         Ok(given)
@@ -133,7 +134,7 @@ pub async fn compact_folder(folder: &Path) -> Result<(u64, u64)> {
     let (store, _) = connected.map_err(|error| with_advice(error, folder))?;
     let store = Arc::new(store);
     let before = store.space().await?.used;
-    // only the one that writes may be open
+    // no other connection may have read anything; the one beside the writer has not
     store.close_readers().await;
     let compacted = store.write(|writer| Ok(compact::compact(writer.connection())));
     let compacted = compacted.await;

@@ -147,10 +147,7 @@ fn accept(
     if let Some(key) = &key {
         keys::remember(change, &owner, key, &inserted)?;
     }
-    let claim = match claim {
-        true => claim::claim(change)?,
-        false => None,
-    };
+    let claim = if claim { claim::claim(change)? } else { None };
     let mut accepted = vec![];
     for key in inserted {
         accepted.push(change.read(key)?);

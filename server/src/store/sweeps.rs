@@ -564,9 +564,10 @@ fn row_of(tx: &Connection, key: i64) -> Result<Option<i64>> {
 
 /// An error if the row of a sweep is not as it was written.
 pub(super) fn intact(row: &Row<'_>, key: i64) -> Result<()> {
-    match checksum::row_is_intact(row)? {
-        true => Ok(()),
-        false => Err(record(key, "record").damaged("its checksum does not match its content")),
+    if checksum::row_is_intact(row)? {
+        Ok(())
+    } else {
+        Err(record(key, "record").damaged("its checksum does not match its content"))
     }
 }
 

@@ -1,6 +1,7 @@
 //! Tokens. All of them are also kept in memory, since every request is identified by one.
 
-use std::sync::{Arc, PoisonError, RwLockReadGuard, RwLockWriteGuard, atomic::Ordering::Relaxed};
+use parking_lot::{RwLockReadGuard, RwLockWriteGuard};
+use std::sync::{Arc, atomic::Ordering::Relaxed};
 
 use rusqlite::{Connection, Row, params};
 
@@ -73,12 +74,8 @@ impl Store {
     /// Stores a new token.
     pub async fn insert_token(self: &Arc<Self>, token: &Token, hash: SecretHash) -> Result<()> {
         let token = token.clone();
-        self.control(move |writer| {
-            write(writer, &token, hash, "insert")?;
-            writer.store.any_tokens.store(true, Relaxed);
-            Ok(())
-        })
-        .await
+        self.control(move |writer| write(writer, &token, hash, "insert"))
+            .await
     }
 
     /// Revokes a token, once and for all; `None` if there is none with this id.
@@ -96,9 +93,10 @@ impl Store {
         new: SecretHash,
         now: Time,
     ) -> Result<Option<Token>> {
-        match self.is_valid_token(id, None, now) {
-            true => self.change_token(id, move |_, hash| *hash = new).await,
-            false => Ok(None),
+        if self.is_valid_token(id, None, now) {
+            self.change_token(id, move |_, hash| *hash = new).await
+        } else {
+            Ok(None)
         }
     }
 
@@ -122,11 +120,11 @@ impl Store {
     }
 
     fn tokens_in_memory(&self) -> RwLockReadGuard<'_, Tokens> {
-        self.tokens.read().unwrap_or_else(PoisonError::into_inner)
+        self.tokens.read()
     }
 
     fn tokens_mut(&self) -> RwLockWriteGuard<'_, Tokens> {
-        self.tokens.write().unwrap_or_else(PoisonError::into_inner)
+        self.tokens.write()
     }
 }
 
@@ -153,6 +151,7 @@ fn write(writer: &Writer<'_>, token: &Token, hash: SecretHash, insert: &str) -> 
     checksum::seal(&tx, "token", "id", token.id.clone())?;
     require_tokens(&tx)?;
     tx.commit()?;
+    writer.store.any_tokens.store(true, Relaxed);
     let entry = (token.clone(), hash);
     writer.store.tokens_mut().insert(token.id.clone(), entry);
     Ok(())

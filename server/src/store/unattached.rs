@@ -6,7 +6,7 @@ use rusqlite::Connection;
 
 use super::{
     content::{self, Fingerprint},
-    database::{Store, Writer},
+    database::Store,
     error::{Record, Result},
     sql::Sql,
 };
@@ -20,8 +20,12 @@ impl Store {
         pieces: Vec<Vec<u8>>,
     ) -> Result<()> {
         let content = content.clone();
-        self.write(move |writer| writer.write_pieces(&content, first, &pieces))
-            .await
+        self.write(move |writer| {
+            let tx = writer.begin()?;
+            content::write_pieces(&tx, &content, first, &pieces)?;
+            tx.commit()
+        })
+        .await
     }
 
     /// Removes content that was written and never attached. One who stores the same content meanwhile notices that it is gone.
@@ -65,20 +69,6 @@ impl Store {
     }
 }
 
-impl Writer<'_> {
-    /// Writes pieces of content, numbered from `first`, in a transaction.
-    pub(super) fn write_pieces(
-        &self,
-        content: &Fingerprint,
-        first: usize,
-        pieces: &[Vec<u8>],
-    ) -> Result<()> {
-        let tx = self.begin()?;
-        content::write_pieces(&tx, content, first, pieces)?;
-        tx.commit()
-    }
-}
-
 /// Some content that is not attached, by the index and by the table itself: what an index lacks must not be removed.
 fn unattached(connection: &Connection) -> Result<Vec<i64>> {
     const AT_ONCE: i64 = 100;
@@ -94,9 +84,10 @@ fn unattached(connection: &Connection) -> Result<Vec<i64>> {
         "select content from attachment not indexed where content in (select value from json_each(?))",
         [serde_json::to_string(&by_index)?],
     )?;
-    match attached.is_empty() {
-        true => Ok(by_index),
-        false => Err(Record::named("index of what is attached")
-            .damaged("it lacks what the table has: nothing is removed")),
+    if attached.is_empty() {
+        Ok(by_index)
+    } else {
+        Err(Record::named("index of what is attached")
+            .damaged("it lacks what the table has: nothing is removed"))
     }
 }

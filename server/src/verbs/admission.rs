@@ -164,12 +164,13 @@ pub(super) fn may_have_priorities(
     caller: &Caller,
     mut priorities: impl Iterator<Item = i32>,
 ) -> Result<(), ApiError> {
-    match priorities.any(|priority| priority > 0) && !caller.is_admin() {
-        true => Err(ApiError::Forbidden(
+    if priorities.any(|priority| priority > 0) && !caller.is_admin() {
+        Err(ApiError::Forbidden(
             "a priority above 0 needs the scope admin: it puts a job before those of all other owners"
                 .into(),
-        )),
-        false => Ok(()),
+        ))
+    } else {
+        Ok(())
     }
 }
 

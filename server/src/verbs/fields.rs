@@ -32,7 +32,7 @@ pub struct StoredFields {
 
 /// The fields at all nodes as JSON.
 pub async fn fields(
-    service: &Service,
+    service: &Arc<Service>,
     caller: &Caller,
     id: JobId,
 ) -> Result<Found<StoredFields>, ApiError> {
@@ -60,17 +60,24 @@ pub async fn fields(
 /// Fails if the fields of a job that has ended were deleted.
 pub(super) async fn are_kept(service: &Service, job: &Job) -> Result<(), ApiError> {
     let lost = job.status.is_terminal() && service.store.lost_fields(job.key).await?;
-    match lost {
-        true => Err(ApiError::FieldsDeleted(job.id)),
-        false => Ok(()),
+    if lost {
+        Err(ApiError::FieldsDeleted(job.id))
+    } else {
+        Ok(())
     }
 }
 
-/// Loads fields once there is memory for them; `None` if there are none.
+/// Loads fields once there is memory for them; `None` if there are none. In a task of its own: what is read goes on if the
+/// client does not wait, and its memory counts until then.
 pub(super) async fn load(
-    service: &Service,
+    service: &Arc<Service>,
     key: i64,
 ) -> Result<Option<Arc<LoadedFields>>, ApiError> {
+    let service = service.clone();
+    detached(async move { try_to_load(&service, key).await }).await
+}
+
+async fn try_to_load(service: &Service, key: i64) -> Result<Option<Arc<LoadedFields>>, ApiError> {
     if let Some(loaded) = service.fields_in_memory.find(key) {
         return Ok(Some(loaded));
     }
@@ -109,12 +116,7 @@ impl StoredFields {
         try_stream! {
             let loaded = match loaded {
                 Some(loaded) => loaded,
-                None => {
-                    let service = service.clone();
-                    // in a task of its own: a client that does not read may stop this stream at any point
-                    let load = detached(async move { load(&service, key).await });
-                    load.await?.ok_or(ApiError::Deleted(id))?
-                }
+                None => load(&service, key).await?.ok_or(ApiError::Deleted(id))?,
             };
             let (mut json, mut place) = (FieldsJson::new(Shared(loaded)), 0);
             while place < end {
@@ -135,7 +137,7 @@ impl StoredFields {
 
 /// The fields in another format, in memory.
 pub async fn converted_fields(
-    service: &Service,
+    service: &Arc<Service>,
     caller: &Caller,
     id: JobId,
     format: Format,

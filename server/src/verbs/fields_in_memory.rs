@@ -1,9 +1,10 @@
 //! Fields that are held in memory while they are sent, shared by all requests for them.
 
+use parking_lot::Mutex;
 use std::{
     collections::HashMap,
     ops::Deref,
-    sync::{Arc, Mutex, PoisonError, Weak},
+    sync::{Arc, Weak},
 };
 
 use solver::solution::Fields;
@@ -25,12 +26,12 @@ pub(super) struct FieldsInMemory(Mutex<HashMap<i64, Weak<LoadedFields>>>);
 
 impl FieldsInMemory {
     pub(super) fn find(&self, key: i64) -> Option<Arc<LoadedFields>> {
-        let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let all = self.0.lock();
         all.get(&key)?.upgrade()
     }
 
     pub(super) fn insert(&self, key: i64, loaded: &Arc<LoadedFields>) {
-        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut all = self.0.lock();
         all.retain(|_, loaded| loaded.strong_count() > 0);
         all.insert(key, Arc::downgrade(loaded));
     }

@@ -23,9 +23,10 @@ pub fn describe() -> Vec<Description> {
         Description {
             location: Location::Query,
             name: field.name,
-            schema: match field.several {
-                true => json!({ "type": "array", "items": schema }),
-                false => schema,
+            schema: if field.several {
+                json!({ "type": "array", "items": schema })
+            } else {
+                schema
             },
             meaning: field.meaning,
             repeatable: field.several,
@@ -36,13 +37,14 @@ pub fn describe() -> Vec<Description> {
 
 /// Adds a value of a filter.
 pub fn set(filter: &mut Filter, field: &Field, text: &str) -> Result<(), ApiError> {
-    match (field.set)(filter, text) {
-        true => Ok(()),
-        false => Err(ApiError::BadParameter {
+    if (field.set)(filter, text) {
+        Ok(())
+    } else {
+        Err(ApiError::BadParameter {
             name: field.name,
             got: violations::quoted(text),
             expected: (field.expected)(),
-        }),
+        })
     }
 }
 
@@ -71,14 +73,15 @@ pub fn checked(filter: Filter) -> Result<Filter, ApiError> {
 
 /// Checks that a filter is not empty, so that a bulk operation is not applied to all jobs by accident.
 pub(super) fn required(filter: Filter) -> Result<Filter, ApiError> {
-    match filter.is_empty() {
-        true => Err(ApiError::MissingFilter(
+    if filter.is_empty() {
+        Err(ApiError::MissingFilter(
             describe()
                 .iter()
                 .map(|filter| filter.name)
                 .collect::<Vec<_>>()
                 .join(", "),
-        )),
-        false => Ok(filter),
+        ))
+    } else {
+        Ok(filter)
     }
 }

@@ -1,9 +1,11 @@
 //! Returns the iterations of a job, one row each.
 
+use std::sync::Arc;
+
 use super::{
     jobs,
     results::{Found, room_for},
-    service::Service,
+    service::{Service, detached},
 };
 use crate::{
     caller::Caller,
@@ -24,6 +26,17 @@ pub const MAX_POINTS: Parameter<Integers> = Parameter {
 /// The rows of the last attempt of a job, reduced to a maximum number: those of its result or, while there is none,
 /// those of its events.
 pub async fn history(
+    service: &Arc<Service>,
+    caller: &Caller,
+    id: JobId,
+    max_points: Option<i64>,
+) -> Result<Found<Vec<TimedIteration>>, ApiError> {
+    let (service, caller) = (service.clone(), caller.clone());
+    // what is read goes on if the client does not wait, and its memory counts until then
+    detached(async move { read_history(&service, &caller, id, max_points).await }).await
+}
+
+async fn read_history(
     service: &Service,
     caller: &Caller,
     id: JobId,

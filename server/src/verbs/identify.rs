@@ -95,13 +95,14 @@ pub fn identify(
     if credentials.token.is_some() {
         return Err(ApiError::Unauthenticated(UNKNOWN));
     }
-    match store.has_tokens() || trust.is_on() {
-        true => Err(ApiError::Unauthenticated(
+    if store.has_tokens() || trust.is_on() {
+        Err(ApiError::Unauthenticated(
             "this service needs a token: send it as `Authorization: Bearer TOKEN`",
-        )),
-        false => Ok(Identified {
+        ))
+    } else {
+        Ok(Identified {
             caller: Caller::local(),
             by: By::NoTokensNeeded,
-        }),
+        })
     }
 }

@@ -62,9 +62,10 @@ impl Values for Orders {
     }
 
     fn read(&self, text: &str) -> Option<Order> {
-        let whole = match text.contains(' ') {
-            true => text.to_owned(),
-            false => format!("{text} desc"),
+        let whole = if text.contains(' ') {
+            text.to_owned()
+        } else {
+            format!("{text} desc")
         };
         Orders::words().find_map(|(word, order)| (word == whole).then_some(order))
     }

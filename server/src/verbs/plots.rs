@@ -202,7 +202,7 @@ async fn snapshot(
 
 /// The fields of a job for this figure, once there is memory for them.
 async fn fields_of(
-    service: &Service,
+    service: &Arc<Service>,
     caller: &Caller,
     id: JobId,
     plot: Plot,
@@ -212,9 +212,10 @@ async fn fields_of(
         fields::are_kept(service, &job).await?;
     }
     let fields = fields::load(service, job.key).await?;
-    match plot == Plot::Deformed && fields.is_none() {
-        true => Err(results::no_result(&job)),
-        false => Ok(fields),
+    if plot == Plot::Deformed && fields.is_none() {
+        Err(results::no_result(&job))
+    } else {
+        Ok(fields)
     }
 }
 

@@ -52,9 +52,12 @@ pub async fn validate(
         stored => stored?,
     };
     let check = move || {
-        let within = |estimate: Estimate| match estimate.memory_bytes > budget_bytes {
-            true => Err(vec![too_large(&problem, &estimate, budget_bytes)]),
-            false => Ok(()),
+        let within = |estimate: Estimate| {
+            if estimate.memory_bytes > budget_bytes {
+                Err(vec![too_large(&problem, &estimate, budget_bytes)])
+            } else {
+                Ok(())
+            }
         };
         // told by the checked problem, which has all numbers; of an invalid one only by what comes before meshing
         let mut estimate = None;
@@ -162,12 +165,15 @@ pub(super) async fn admit(
     let budget_bytes = service.memory_budget_bytes;
     let stored = stored(service, caller, &problem).await?;
     let admit = move || {
-        let within = |estimate: Estimate| match estimate.memory_bytes > budget_bytes {
-            true => Err(ApiError::ProblemTooLarge {
-                estimate,
-                budget_bytes,
-            }),
-            false => Ok(estimate),
+        let within = |estimate: Estimate| {
+            if estimate.memory_bytes > budget_bytes {
+                Err(ApiError::ProblemTooLarge {
+                    estimate,
+                    budget_bytes,
+                })
+            } else {
+                Ok(estimate)
+            }
         };
         let before = estimate(&problem, stored.as_ref());
         within(before.map_err(|violation| ApiError::InvalidProblem(vec![violation]))?)?;

@@ -1,9 +1,14 @@
 //! Returns the summary of a result, and says whether there is a result.
 
+use std::sync::Arc;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-use super::{jobs, service::Service};
+use super::{
+    jobs,
+    service::{Service, detached},
+};
 use crate::{
     caller::Caller,
     error::ApiError,
@@ -85,6 +90,16 @@ pub const RESULT_AVAILABLE: &str = "result-available";
 
 /// The scalars of a job that has a result.
 pub async fn result(
+    service: &Arc<Service>,
+    caller: &Caller,
+    id: JobId,
+) -> Result<Found<JobResult>, ApiError> {
+    let (service, caller) = (service.clone(), caller.clone());
+    // what is read goes on if the client does not wait, and its memory counts until then
+    detached(async move { read_result(&service, &caller, id).await }).await
+}
+
+async fn read_result(
     service: &Service,
     caller: &Caller,
     id: JobId,
@@ -134,8 +149,9 @@ pub(super) fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, ApiError> {
 /// The error of a job without a result, or without a result yet. A job that was canceled or still runs has history
 /// and profiles, but no fields.
 pub(super) fn no_result(job: &Job) -> ApiError {
-    match job.status.is_terminal() {
-        true => ApiError::NoResult(job.status),
-        false => ApiError::ResultNotReady(job.status),
+    if job.status.is_terminal() {
+        ApiError::NoResult(job.status)
+    } else {
+        ApiError::ResultNotReady(job.status)
     }
 }

@@ -72,9 +72,10 @@ pub async fn retry(
             name,
             labels,
             // one that an administrator has raised is not inherited by others
-            priority: changes.priority.unwrap_or(match caller.is_admin() {
-                true => priority,
-                false => priority.min(0),
+            priority: changes.priority.unwrap_or(if caller.is_admin() {
+                priority
+            } else {
+                priority.min(0)
             }),
             limits: Limits {
                 timeout_s: changes.timeout_s.unwrap_or(limits.timeout_s),

@@ -230,8 +230,8 @@ impl Service {
     }
 }
 
-/// Runs a change detached from the request: a committed job must be announced even if the client disconnects
-/// before.
+/// Runs work detached from the request: a committed job must be announced even if the client disconnects before, and
+/// memory counts until what it is reserved for has ended.
 pub(super) async fn detached<T: Send + 'static>(
     work: impl Future<Output = Result<T, ApiError>> + Send + 'static,
 ) -> Result<T, ApiError> {

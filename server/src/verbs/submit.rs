@@ -83,9 +83,10 @@ pub async fn create_batch(
             reason: Reason::OutOfRange,
             got: format!("{} jobs", requests.len()),
             expected: format!("1 … {MAX_BATCH} jobs"),
-            hint: match requests.is_empty() {
-                true => "Send {\"jobs\": [{\"problem\": {…}}, …]}.".into(),
-                false => "Submit them in several batches.".into(),
+            hint: if requests.is_empty() {
+                "Send {\"jobs\": [{\"problem\": {…}}, …]}.".into()
+            } else {
+                "Submit them in several batches.".into()
             },
         }]));
     }

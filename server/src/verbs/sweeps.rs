@@ -230,10 +230,11 @@ async fn admitted(
             // it was read before
             let Ok(mut problem) = plan.whole_problem(*first, &base.mesh) else { continue };
             let title = problem.title.take();
-            let size = match problem.mesh.stored() == base.mesh.stored() {
-                true => mesh_size.as_ref(),
-                false => None,
-            };
+            let size = if problem.mesh.stored() == base.mesh.stored() {
+mesh_size.as_ref()
+} else {
+None
+};
             // an error, such as a mesh that is not stored, is told in the row of the member
             let estimate = solver::estimate(&problem, size).ok();
             if let Some(estimate) = estimate.filter(|estimate| estimate.memory_bytes > budget_bytes) {
@@ -246,10 +247,11 @@ async fn admitted(
                 found.add(violation);
                 break;
             }
-            let known = match plan.changes_mesh() {
-                true => 0,
-                false => base_bytes, // of the checked base, on the same mesh
-            };
+            let known = if plan.changes_mesh() {
+0
+} else {
+base_bytes // of the checked base, on the same mesh
+};
             let memory_bytes = estimate.map_or(base_bytes, |estimate| {
                 // beside the body stands the checked problem of the member that is solved on it
                 let beside = match group.len() {
@@ -323,9 +325,10 @@ pub async fn get(service: &Service, caller: &Caller, id: SweepId) -> Result<Swee
     let owners = caller.visible_owners();
     match service.store.sweep(owners.clone(), id).await? {
         Some(sweep) => Ok(sweep),
-        None => Err(match service.store.sweep_was_deleted(owners, id).await? {
-            true => ApiError::SweepDeleted(id),
-            false => ApiError::NotFound(format!("there is no sweep {id}")),
+        None => Err(if service.store.sweep_was_deleted(owners, id).await? {
+            ApiError::SweepDeleted(id)
+        } else {
+            ApiError::NotFound(format!("there is no sweep {id}"))
         }),
     }
 }
@@ -397,6 +400,17 @@ pub async fn rows(
 /// All members of a sweep as a table in this format, in the order of their numbers. Its memory counts for the limit on
 /// answers from before it is made until it is sent.
 pub async fn table(
+    service: &Arc<Service>,
+    caller: &Caller,
+    id: SweepId,
+    format: Format,
+) -> Result<Bytes, ApiError> {
+    let (service, caller) = (service.clone(), caller.clone());
+    // what is read goes on if the client does not wait, and its memory counts until then
+    detached(async move { make_table(&service, &caller, id, format).await }).await
+}
+
+async fn make_table(
     service: &Service,
     caller: &Caller,
     id: SweepId,
@@ -583,9 +597,10 @@ pub async fn delete(service: &Arc<Service>, caller: &Caller, id: SweepId) -> Res
     super::bulk::delete_many(service, caller, of_sweep(id)).await?;
     let service = service.clone();
     detached(async move {
-        match service.store.delete_sweep(sweep.key).await? {
-            true => Ok(()),
-            false => Err(ApiError::SweepActive(sweep.status)),
+        if service.store.delete_sweep(sweep.key).await? {
+            Ok(())
+        } else {
+            Err(ApiError::SweepActive(sweep.status))
         }
     })
     .await

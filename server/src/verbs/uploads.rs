@@ -1,9 +1,7 @@
 //! Counts uploads that are arriving, of all owners and of each, and their bytes, which are in no table yet.
 
-use std::{
-    collections::BTreeMap,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
-};
+use parking_lot::{Mutex, MutexGuard};
+use std::{collections::BTreeMap, sync::Arc};
 
 use crate::error::ApiError;
 
@@ -65,7 +63,7 @@ impl Uploads {
     }
 
     fn all(&self) -> MutexGuard<'_, BTreeMap<String, Arriving>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.0.lock()
     }
 }
 

@@ -378,9 +378,12 @@ fn by_weight(
 ) -> Added {
     let [signed, absolute, of_away, consistency, ..] = factors(quantity.name);
     let weight = quantity.factor.abs();
-    let factor = |k: usize| match away[k] {
-        true => signed + absolute + of_away + STANDING_OUT * out[k],
-        false => signed + absolute,
+    let factor = |k: usize| {
+        if away[k] {
+            signed + absolute + of_away + STANDING_OUT * out[k]
+        } else {
+            signed + absolute
+        }
     };
     let elements = errors.iter().enumerate();
     let elements = elements.map(|(k, e)| factor(k) * weight * e.abs());

@@ -140,9 +140,12 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
         }
         _ => OTHERS,
     };
-    let judged = |relative: f64| match relative <= fair {
-        true => Verdict::Fair,
-        false => Verdict::Poor,
+    let judged = |relative: f64| {
+        if relative <= fair {
+            Verdict::Fair
+        } else {
+            Verdict::Poor
+        }
     };
     let unknown = |why: String| {
         let reason = format!("The error of `{name}` at contact `{contact}` is unknown: {why}.");

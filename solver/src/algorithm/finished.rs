@@ -82,9 +82,10 @@ impl End {
         let Some((rounding, friction)) = rounding::limit(system, &self.measured, tolerance) else {
             return self;
         };
-        self.outcome = match rounding.negligible() {
-            true => Converged,
-            false => NotConverged,
+        self.outcome = if rounding.negligible() {
+            Converged
+        } else {
+            NotConverged
         };
         self.rounding = Some(rounding);
         self.cycle = None;

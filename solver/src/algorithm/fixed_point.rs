@@ -121,9 +121,10 @@ pub(super) fn run(
         }
         // what still shrinks is not rounding
         let residual = swept.measured.residuals.monolithic;
-        rounded = match residual > STEADY * residual_before {
-            true => nearer(rounded, &swept.measured, recorder.system, tolerance),
-            false => None,
+        rounded = if residual > STEADY * residual_before {
+            nearer(rounded, &swept.measured, recorder.system, tolerance)
+        } else {
+            None
         };
         residual_before = residual;
         if let Some((nearest, _)) = rounded.take_if(|(_, count)| *count >= SETTLED) {

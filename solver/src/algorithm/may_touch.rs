@@ -119,9 +119,10 @@ pub fn run_reduced(
                 ..finished
             };
         }
-        match outside.is_empty() {
-            true => region.take_whole(),
-            false => region.grow(&outside),
+        if outside.is_empty() {
+            region.take_whole()
+        } else {
+            region.grow(&outside)
         }
         if finished.outcome == Outcome::Converged {
             last = Some(finished);
@@ -184,13 +185,12 @@ fn follow_as_alone(
     let pressures = system.pressures(&system.reactions_of(&free.state, &free.elastic_force));
     let implied = system.friction_bound(&pressures);
     // without a pressure there is no friction: that is the solution
-    let own = match implied.iter().all(|tau| *tau == 0.0) {
-        true => implied,
-        false => {
-            let start = all_sticking(system, &free.state);
-            let own = follow(system, controls, &start, &mut Factors::default(), observe)?;
-            own.0.bound
-        }
+    let own = if implied.iter().all(|tau| *tau == 0.0) {
+        implied
+    } else {
+        let start = all_sticking(system, &free.state);
+        let own = follow(system, controls, &start, &mut Factors::default(), observe)?;
+        own.0.bound
     };
     let most = own
         .iter()

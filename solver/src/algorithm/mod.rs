@@ -109,9 +109,10 @@ fn away(mut recorder: Recorder<'_, '_>, slide: Slide, observe: &mut Observer<'_>
         own_r_f: None,
     };
     let answers = [answer, recorder.record(&measured, row, observe)];
-    let outcome = match answers.iter().any(ControlFlow::is_break) {
-        true => Outcome::Canceled,
-        false => Outcome::NotConverged,
+    let outcome = if answers.iter().any(ControlFlow::is_break) {
+        Outcome::Canceled
+    } else {
+        Outcome::NotConverged
     };
     Finished {
         slide: Some(slide),

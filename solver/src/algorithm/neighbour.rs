@@ -84,9 +84,10 @@ pub(super) fn follow(
         sums.for_each(|(force, elastic)| *force += elastic);
         let direction = factors.direction(&force)?;
         // whole steps may go to and fro between stick and slip
-        let part = match stalls {
-            true => least_along(system, &bound, &state.v, &direction),
-            false => 1.0,
+        let part = if stalls {
+            least_along(system, &bound, &state.v, &direction)
+        } else {
+            1.0
         };
         let from = state.v.clone();
         let moved = state.v.iter_mut().zip(&direction);

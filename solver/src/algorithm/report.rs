@@ -245,9 +245,10 @@ pub fn report(
         &body.nodal_forces(&contact_force),
         FORCE_FLOOR * system.reference_force,
     );
-    let out_of_balance = match model.section.has_split() {
-        true => OUT_OF_BALANCE_INCOMPRESSIBLE,
-        false => OUT_OF_BALANCE,
+    let out_of_balance = if model.section.has_split() {
+        OUT_OF_BALANCE_INCOMPRESSIBLE
+    } else {
+        OUT_OF_BALANCE
     };
     let outcome = match finished.outcome {
         Outcome::Converged if equilibrium > out_of_balance => Outcome::FalseConvergence,
@@ -261,10 +262,11 @@ pub fn report(
             pointer: String::new(),
             message: format!(
                 "The forces on the body do not balance: {equilibrium:.1e} of their sum remains. The stiffness is nearly singular: check supports, hinges and badly shaped elements{}.",
-                match model.section.has_split() {
-                    true => ", and Poisson's ratios closer to 0.5 than 0.49999",
-                    false => "",
-                }
+                if model.section.has_split() {
+", and Poisson's ratios closer to 0.5 than 0.49999"
+} else {
+""
+}
             ),
         });
     }

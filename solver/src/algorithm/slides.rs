@@ -42,11 +42,12 @@ impl Slide {
             Some(_) => "turn",
         };
         let words = &self.motion.words;
-        let most = match self.certain {
-            true => format!("at most {hold:?}: there is no equilibrium"),
-            false => format!(
+        let most = if self.certain {
+            format!("at most {hold:?}: there is no equilibrium")
+        } else {
+            format!(
                 "at most {hold:?} at the computed pressure; without more pressure there is no equilibrium"
-            ),
+            )
         };
         format!(
             "The loads {verb} the body with {kind}{push:?} {words}, where only friction holds it, and friction can resist {most}. Support the body against this motion, or {verb} it less."
@@ -217,9 +218,10 @@ impl Moved {
                 }
             }
         }
-        let pressed = match coefficients[1] > 0.0 {
-            true => self.pressed(system).unwrap_or(f64::INFINITY),
-            false => 0.0,
+        let pressed = if coefficients[1] > 0.0 {
+            self.pressed(system).unwrap_or(f64::INFINITY)
+        } else {
+            0.0
         };
         let most = coefficients.map(|mu| given + capped.min(cohesive + mu * pressed));
         most[1].is_finite().then_some(most)

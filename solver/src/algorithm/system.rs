@@ -325,9 +325,10 @@ impl<'a> System<'a> {
             };
             let mut add = |point: Point| {
                 self.points.push(point);
-                match observe(Progress::Pulse).is_break() {
-                    true => Err(SolveError::Stopped),
-                    false => Ok(()),
+                if observe(Progress::Pulse).is_break() {
+                    Err(SolveError::Stopped)
+                } else {
+                    Ok(())
                 }
             };
             match law.points {
@@ -347,9 +348,10 @@ impl<'a> System<'a> {
                             Some(_) => [i, i - 2, i - 1],
                         };
                         let shape = [1.0, 0.0, 0.0];
-                        let shape = match nodes[0] == nodes[1] {
-                            true => shape,
-                            false => shape_without_oblique(&self.nodes[first..], nodes, shape),
+                        let shape = if nodes[0] == nodes[1] {
+                            shape
+                        } else {
+                            shape_without_oblique(&self.nodes[first..], nodes, shape)
                         };
                         add(point(s, nodes, shape, weight))?;
                     }

@@ -106,12 +106,13 @@ pub fn warn_of_increments(step: &mut StepSolution, more: &EndForces) {
     if compared.agrees {
         return;
     }
-    let found = match compared.converged {
-        true => format!(
+    let found = if compared.converged {
+        format!(
             "more increments change the forces by {:.1} %",
             100.0 * compared.change
-        ),
-        false => "with more increments the iterations do not converge".to_owned(),
+        )
+    } else {
+        "with more increments the iterations do not converge".to_owned()
     };
     step.summary.warnings.push(Warning {
         code: WarningCode::IncrementsMatter,

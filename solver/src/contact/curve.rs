@@ -414,9 +414,10 @@ fn on_cubic(ray: &Ray, cubic: &Bezier, k: usize, rounding: f64, found: &mut Vec<
                 high = u;
             }
             let newton = u - value / change;
-            let next = match newton > low && newton < high {
-                true => newton,
-                false => 0.5 * (low + high),
+            let next = if newton > low && newton < high {
+                newton
+            } else {
+                0.5 * (low + high)
             };
             let settled = (next - u).abs() <= f64::EPSILON;
             u = next;

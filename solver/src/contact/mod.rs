@@ -163,9 +163,10 @@ impl ContactBoundary {
     /// that points at the obstacle.
     pub fn corner(&self, node: usize) -> f64 {
         let side = |edge: usize| edge_nodes(edge).map(|i| self.positions[i]);
-        match node.is_multiple_of(2) && node > 0 && node + 1 < self.nodes.len() {
-            true => smooth::corner(&side(node / 2 - 1), &side(node / 2)),
-            false => 0.0,
+        if node.is_multiple_of(2) && node > 0 && node + 1 < self.nodes.len() {
+            smooth::corner(&side(node / 2 - 1), &side(node / 2))
+        } else {
+            0.0
         }
     }
 

@@ -495,10 +495,7 @@ impl<'a> View<'a> {
         let falls = c[1] < c[0];
         let sign = if falls { -1.0 } else { 1.0 };
         c = c.map(|c| sign * c);
-        let (low, high) = match falls {
-            false => (c[0], c[1]),
-            true => (-c[1], -c[0]),
-        };
+        let (low, high) = if falls { (-c[1], -c[0]) } else { (c[0], c[1]) };
         let last = edge + 1 == self.whole.edge_count();
         let first = self
             .corners

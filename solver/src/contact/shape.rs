@@ -148,17 +148,15 @@ fn formula(obstacle: &Obstacle, c: f64, rounding: f64) -> Option<(f64, f64)> {
     let round = |radius: f64, x: f64| {
         let root = (radius * radius - x * x).max(0.0).sqrt();
         // at its flank, where its side is vertical, no point is below it: there it faces the body as if it were level
-        let slope = match root <= FLANK * radius {
-            true => 0.0,
-            false => x / root,
+        let slope = if root <= FLANK * radius {
+            0.0
+        } else {
+            x / root
         };
         (x.abs() <= radius + rounding).then_some((radius - root, slope))
     };
     // 0 at 0: the mean of both sides. A node lies at a kink only up to rounding.
-    let sign = |x: f64| match x.abs() <= rounding {
-        true => 0.0,
-        false => x.signum(),
-    };
+    let sign = |x: f64| if x.abs() <= rounding { 0.0 } else { x.signum() };
     match *obstacle {
         Obstacle::Flat { .. } => Some((0.0, 0.0)),
         Obstacle::Circle { radius, center, .. } => round(radius, c - center),

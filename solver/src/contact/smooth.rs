@@ -55,9 +55,10 @@ pub fn corner(before: &Side, after: &Side) -> f64 {
     let [a, b] = [before, after].map(SideShape::of);
     let differs = (a.length - b.length).abs() * (a.curvature - b.curvature).abs() / 6.0;
     let error = ERRORS * (a.error + b.error) + DIFFERENCES * differs + 2.0 * PRINTED;
-    match turn.abs() <= error.min(CORNER) {
-        true => 0.0,
-        false => turn,
+    if turn.abs() <= error.min(CORNER) {
+        0.0
+    } else {
+        turn
     }
 }
 
@@ -83,9 +84,10 @@ pub fn normals_beyond(mesh: &Mesh, boundary: &[Edge]) -> BTreeMap<u32, [f64; 2]>
                 continue;
             };
             let [own, beyond] = [own, &side].map(|edge| mesh.edge_nodes(edge));
-            let (before, after) = match starts {
-                true => (&own, &beyond),
-                false => (&beyond, &own),
+            let (before, after) = if starts {
+                (&own, &beyond)
+            } else {
+                (&beyond, &own)
             };
             if corner(before, after) == 0.0 {
                 let [start, end, _] = edge_normals(&beyond);
@@ -170,9 +172,12 @@ mod tests {
 
     /// Parameters from 0 to a whole turn, in equal steps or, if `uneven`, in steps that differ by half.
     fn places(count: usize, uneven: bool) -> Vec<f64> {
-        let step = |k: usize| match uneven {
-            true => 1.0 + 0.25 * ((7 * k * k + 3 * k) % 5) as f64 / 4.0,
-            false => 1.0,
+        let step = |k: usize| {
+            if uneven {
+                1.0 + 0.25 * ((7 * k * k + 3 * k) % 5) as f64 / 4.0
+            } else {
+                1.0
+            }
         };
         let whole: f64 = (0..count).map(step).sum();
         let mut found = vec![0.0];

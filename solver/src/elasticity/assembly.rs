@@ -502,11 +502,10 @@ mod tests {
         for (row, column) in (0..2).flat_map(|row| (0..6).map(move |column| (row, column))) {
             let (i, j, first) = (2 * column, 2 * row, elements.len());
             let [a, b, c, d] = [[i, j], [i + 2, j], [i + 2, j + 2], [i, j + 2]];
-            match column < 3 {
-                true => elements.push(with_midsides(&[a, b, c, d])),
-                false => {
-                    elements.extend([[a, b, c], [a, c, d]].map(|corners| with_midsides(&corners)));
-                }
+            if column < 3 {
+                elements.push(with_midsides(&[a, b, c, d]))
+            } else {
+                elements.extend([[a, b, c], [a, c, d]].map(|corners| with_midsides(&corners)));
             }
             groups[row as usize].extend(first..elements.len());
         }

@@ -25,9 +25,10 @@ pub(super) struct Station {
 impl Station {
     fn new(section: &Section, place: &Tabulated, weight: f64, nodes: &AtNodes<[f64; 2]>) -> Self {
         let m = place.map(nodes);
-        let hoop = match section.axisymmetric() {
-            true => m.shape.map(|h| h / m.x),
-            false => [0.0; 8],
+        let hoop = if section.axisymmetric() {
+            m.shape.map(|h| h / m.x)
+        } else {
+            [0.0; 8]
         };
         Station {
             shape: m.shape,

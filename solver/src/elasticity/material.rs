@@ -182,10 +182,11 @@ pub fn isotropic(analysis: &Analysis, youngs_modulus: f64, poissons_ratio: f64) 
 pub fn orthotropic(analysis: &Analysis, material: &Orthotropic) -> Option<Moduli> {
     let Orthotropic { e1, e2, nu12, g12, angle, e3, nu13, nu23 } = *material;
     let sheet = matches!(analysis, Analysis::PlaneStress { .. });
-    let (e3, nu13, nu23) = match sheet {
-        true => (0.0, 0.0, 0.0),
-        false => (e3?, nu13?, nu23?),
-    };
+    let (e3, nu13, nu23) = if sheet {
+(0.0, 0.0, 0.0)
+} else {
+(e3?, nu13?, nu23?)
+};
     let across = if sheet { 0.0 } else { 1.0 / e3 };
     let compliance = [
         [ 1.0 / e1,  -nu12 / e1, 0.0,       -nu13 / e1],

@@ -80,9 +80,10 @@ impl Violation {
 pub fn either(given: &[(&str, bool)]) -> String {
     let given = given.iter().filter(|(_, given)| *given);
     let names: Vec<String> = given.map(|(name, _)| format!("`{name}`")).collect();
-    match names.is_empty() {
-        true => "none of them".to_owned(),
-        false => names.join(" and "),
+    if names.is_empty() {
+        "none of them".to_owned()
+    } else {
+        names.join(" and ")
     }
 }
 

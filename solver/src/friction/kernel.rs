@@ -182,9 +182,12 @@ impl Averaging {
     /// chain continues.
     pub fn part_inside(&self, s: f64) -> f64 {
         let (start, end) = (self.chain.s[0], self.chain.s[self.chain.s.len() - 1]);
-        let reach = |distance: f64, mirrored: bool| match mirrored {
-            true => 1.0,
-            false => (distance / self.radius).clamp(0.0, 1.0),
+        let reach = |distance: f64, mirrored: bool| {
+            if mirrored {
+                1.0
+            } else {
+                (distance / self.radius).clamp(0.0, 1.0)
+            }
         };
         let before = reach(s - start, self.chain.mirror_start);
         let after = reach(end - s, self.chain.mirror_end);
@@ -381,9 +384,10 @@ impl Averaging {
                             self.ring_omega(y - centre, r, edge3::interpolate(&shape, &radii))
                         }
                     };
-                    let inside = match self.conserving {
-                        true => self.part_inside(y),
-                        false => 1.0,
+                    let inside = if self.conserving {
+                        self.part_inside(y)
+                    } else {
+                        1.0
                     };
                     let factor = 0.5 * length * w * omega / inside;
                     (0..3).for_each(|i| weights[i] += factor * shape[i]);
@@ -445,9 +449,12 @@ impl Averaging {
                 let most = (self.radius / period).ceil() as i64 + 1;
                 // two reflections move the chain by a period, forwards or backwards
                 let moved = |k: i64| {
-                    (0..k.abs()).fold(OWN, |distance, _| match k > 0 {
-                        true => at_start(at_end(distance)),
-                        false => at_end(at_start(distance)),
+                    (0..k.abs()).fold(OWN, |distance, _| {
+                        if k > 0 {
+                            at_start(at_end(distance))
+                        } else {
+                            at_end(at_start(distance))
+                        }
                     })
                 };
                 let shifted = (-most..=most)
@@ -472,16 +479,18 @@ impl Averaging {
         if n == 0 {
             return distance;
         }
-        let [e, middle, other] = match at_end {
-            true => [n - 1, n - 2, n - 3],
-            false => [0, 1, 2],
+        let [e, middle, other] = if at_end {
+            [n - 1, n - 2, n - 3]
+        } else {
+            [0, 1, 2]
         }
         .map(|i| x[i]);
         let along: [f64; 2] = std::array::from_fn(|i| 4.0 * middle[i] - 3.0 * e[i] - other[i]);
         let length = along[0].hypot(along[1]);
-        let t = match e[0] <= LOCAL * length {
-            true => [1.0, 0.0],
-            false => along.map(|c| c / length),
+        let t = if e[0] <= LOCAL * length {
+            [1.0, 0.0]
+        } else {
+            along.map(|c| c / length)
         };
         let [a, b, c] = distance;
         let part = 2.0 * (a * t[0] + b * t[1]);

@@ -233,9 +233,10 @@ impl General {
         let a = MatMut::from_column_major_slice_mut(&mut self.values, n, n);
         let b = MatMut::from_column_major_slice_mut(&mut x, n, columns);
         blocked::solve_lu(a, b, interrupt)?;
-        match x.iter().all(|x| x.is_finite()) {
-            true => Ok(x),
-            false => Err(Unsolved::Singular),
+        if x.iter().all(|x| x.is_finite()) {
+            Ok(x)
+        } else {
+            Err(Unsolved::Singular)
         }
     }
 }
@@ -326,9 +327,12 @@ mod tests {
     fn systems_of_any_size_are_solved_by_blocks() {
         for n in [1, 5, 64, 255, 256, 257, 300, 511, 700] {
             let exact: Vec<f64> = (0..n).map(|i| number(i, 3)).collect();
-            let entry = |i: usize, j: usize| match i == j && i.is_multiple_of(3) {
-                true => 0.0,
-                false => number(i, j),
+            let entry = |i: usize, j: usize| {
+                if i == j && i.is_multiple_of(3) {
+                    0.0
+                } else {
+                    number(i, j)
+                }
             };
             let row = |i: usize| (0..n).map(|j| entry(i, j) * exact[j]).sum();
             let b: Vec<f64> = (0..n).map(row).collect();

@@ -306,9 +306,10 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
         if off_before.min(off_after) > 0.5 - SMALLEST_SHARE {
             return None;
         }
-        let at = match off_before <= off_after {
-            true => 0.5 * (before + from),
-            false => 0.5 * (to + after),
+        let at = if off_before <= off_after {
+            0.5 * (before + from)
+        } else {
+            0.5 * (to + after)
         };
         Some(Cut {
             direction,

@@ -99,9 +99,12 @@ mod tests {
     #[test]
     fn the_reduced_system_has_the_same_solution() {
         for (n, count) in [(5, 2), (300, 130), (300, 0), (40, 40)] {
-            let entry = |i: usize, j: usize| match i == j {
-                true => n as f64,
-                false => ((7 * (i + j) + i * j) % 11) as f64 / 11.0,
+            let entry = |i: usize, j: usize| {
+                if i == j {
+                    n as f64
+                } else {
+                    ((7 * (i + j) + i * j) % 11) as f64 / 11.0
+                }
             };
             let exact: Vec<f64> = (0..n).map(|i| (i as f64).sin()).collect();
             let row = |i: usize| (0..n).map(|j| entry(i, j) * exact[j]).sum();

@@ -47,13 +47,12 @@ impl FrontMatrix<'_> {
                 self.add_to_column(to, to, &column[run.from + j..run.from + run.len], which);
                 for other in &runs[k + 1..] {
                     let entries = &column[other.from..other.from + other.len];
-                    match other.to > to {
-                        true => self.add_to_column(to, other.to, entries, which),
-                        false => {
-                            for (i, entry) in entries.iter().enumerate() {
-                                let entry = std::slice::from_ref(entry);
-                                self.add_to_column(other.to + i, to, entry, which);
-                            }
+                    if other.to > to {
+                        self.add_to_column(to, other.to, entries, which)
+                    } else {
+                        for (i, entry) in entries.iter().enumerate() {
+                            let entry = std::slice::from_ref(entry);
+                            self.add_to_column(other.to + i, to, entry, which);
                         }
                     }
                 }

@@ -346,10 +346,7 @@ impl Fronts {
                 let fronts = self.order[task.fronts.clone()].iter();
                 let fronts: Vec<&Front> = fronts.map(|n| &self.fronts[*n as usize]).collect();
                 let columns = fronts.iter().map(|front| front.own * front.height());
-                let space = match is_above {
-                    true => &mut above,
-                    false => &mut branches,
-                };
+                let space = if is_above { &mut above } else { &mut branches };
                 space.widest = columns.fold(space.widest, usize::max);
                 // all but what the last one leaves waits on stacks of the task's own
                 let Some((last, within)) = fronts.split_last() else {

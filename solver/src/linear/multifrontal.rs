@@ -211,9 +211,10 @@ impl Memory {
         let (mut left, mut values) = (left, values);
         for place in task.fronts.clone() {
             let front = &of_all.0.fronts[of_all.0.order[place] as usize];
-            let left = match place + 1 == task.fronts.end {
-                true => left.take(),
-                false => None,
+            let left = if place + 1 == task.fronts.end {
+                left.take()
+            } else {
+                None
             };
             let (own, others) = values.split_at_mut(front.len());
             values = others;
@@ -587,9 +588,10 @@ mod tests {
                 }
             };
             let refused = Factor::new(fronts, &element, threads, &mut Interrupt::new(go_on)).err();
-            let expected = match bad.is_nan() {
-                true => FactorError::NonFinite,
-                false => FactorError::NotPositiveDefinite { unknown: 7 },
+            let expected = if bad.is_nan() {
+                FactorError::NonFinite
+            } else {
+                FactorError::NotPositiveDefinite { unknown: 7 }
             };
             assert_eq!(refused, Some(expected));
         }
@@ -627,16 +629,18 @@ mod tests {
         ];
         for (of_kinds, x, y, kept) in bodies {
             let [one, two] = [1, 2].map(|threads| {
-                let mut body = match of_kinds {
-                    true => Body::of_kinds(x, y, kept),
-                    false => Body::new(x, y, kept),
+                let mut body = if of_kinds {
+                    Body::of_kinds(x, y, kept)
+                } else {
+                    Body::new(x, y, kept)
                 };
                 body.factor(threads).unwrap()
             });
             let all: usize = one.0.fronts.fronts.iter().map(Front::len).sum();
-            match of_kinds {
-                true => assert!(3 * one.0.entries() < all),
-                false => assert_eq!(one.0.entries(), all),
+            if of_kinds {
+                assert!(3 * one.0.entries() < all)
+            } else {
+                assert_eq!(one.0.entries(), all)
             }
             assert_eq!(one.1, two.1);
             assert_eq!(one.0.values, two.0.values);

@@ -53,9 +53,10 @@ pub(super) fn for_each<T: Send, W: Send, E: From<Stopped> + PartialEq + Send>(
             let run = move || {
                 let mut go_on = || {
                     let _ = ask.try_send(());
-                    match stopped.load(Relaxed) {
-                        true => ControlFlow::Break(()),
-                        false => ControlFlow::Continue(()),
+                    if stopped.load(Relaxed) {
+                        ControlFlow::Break(())
+                    } else {
+                        ControlFlow::Continue(())
                     }
                 };
                 work_on(workspace, &mut Interrupt::new(&mut go_on))
@@ -176,11 +177,12 @@ mod tests {
         let work =
             |first: &mut bool, _: usize, interrupt: &mut Interrupt<'_>| -> Result<(), Error> {
                 both.wait();
-                match first {
-                    true => Ok(()),
-                    false => loop {
+                if *first {
+                    Ok(())
+                } else {
+                    loop {
                         interrupt.ask()?;
-                    },
+                    }
                 }
             };
         let mut asked = 0;

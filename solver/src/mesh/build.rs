@@ -270,9 +270,10 @@ fn second_order(raw: &mut RawMesh) -> usize {
         // each side with the corner that has fewer of them: a set is gone through once, also with the hub of a fan
         let mut sides: HashMap<u32, Vec<(u32, u32)>> = HashMap::new();
         for (&(a, b), &mid) in new() {
-            let (few, other) = match degree[a as usize] <= degree[b as usize] {
-                true => (a, b),
-                false => (b, a),
+            let (few, other) = if degree[a as usize] <= degree[b as usize] {
+                (a, b)
+            } else {
+                (b, a)
             };
             sides.entry(few).or_default().push((other, mid));
         }

@@ -113,9 +113,12 @@ fn on_spline(nodes: &mut [[f64; 2]], run: &[Edge]) -> Result<(), OffCurve> {
     }
     let around = if closed { AROUND } else { 0 };
     // corners by their number along the curve, and beyond the ends of a closed one
-    let corner = |k: usize| match closed {
-        true => corners[(k + count * AROUND - around) % count],
-        false => corners[k],
+    let corner = |k: usize| {
+        if closed {
+            corners[(k + count * AROUND - around) % count]
+        } else {
+            corners[k]
+        }
     };
     let mut along = vec![0.0];
     let points: Vec<[f64; 2]> = (0..=count + 2 * around).map(|k| at(corner(k))).collect();

@@ -87,9 +87,10 @@ impl GradedMesh {
         while marked.contains(&true) {
             let parts = std::mem::take(&mut self.elements);
             for (part, marked) in parts.into_iter().zip(marked) {
-                match marked {
-                    true => self.divide(part),
-                    false => self.elements.push(part),
+                if marked {
+                    self.divide(part)
+                } else {
+                    self.elements.push(part)
                 }
             }
             let parts = self.elements.iter();

@@ -50,9 +50,10 @@ impl Halving {
 
     /// By how many levels a side is split more than the element.
     fn ahead(&self, side: usize) -> u32 {
-        match side % 2 == self.sides {
-            true => self.times,
-            false => 0,
+        if side % 2 == self.sides {
+            self.times
+        } else {
+            0
         }
     }
 }

@@ -36,9 +36,10 @@ impl Part {
         self.edge = *edge;
         let [start, end] = self.range;
         let [a, b, mid] = self.side;
-        match start > end {
-            true => self.of(&[b, a, mid]),
-            false => self,
+        if start > end {
+            self.of(&[b, a, mid])
+        } else {
+            self
         }
     }
 

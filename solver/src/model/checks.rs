@@ -37,9 +37,10 @@ impl Checks {
         expected: &str,
         hint: &str,
     ) -> Checked {
-        match holds {
-            true => Ok(()),
-            false => Err(self.report(pointer, Reason::OutOfRange, got, expected, hint)),
+        if holds {
+            Ok(())
+        } else {
+            Err(self.report(pointer, Reason::OutOfRange, got, expected, hint))
         }
     }
 

@@ -543,9 +543,10 @@ pub(super) fn put_nodes_at_ends<'a>(
                 .friction
                 .as_ref()
                 .is_some_and(|law| law.bound.is_some());
-            let deepest = match everywhere {
-                true => f64::INFINITY,
-                false => most * contact.indentation.abs(),
+            let deepest = if everywhere {
+                f64::INFINITY
+            } else {
+                most * contact.indentation.abs()
             };
             let ends = obstacle::ends_inside_edges(mesh, run, &contact.obstacle, deepest);
             let mut ends = ends.into_iter();

@@ -112,9 +112,10 @@ pub fn estimate(problem: &Problem, stored: Option<&MeshSize>) -> Result<Estimate
     };
     // powers of two as floats end in infinity, and nothing overflows
     let elements = 4f64.powi(times.min(1000) as i32) * elements;
-    let all = match problem.solver.verifies() {
-        true => 4.0 * elements,
-        false => elements,
+    let all = if problem.solver.verifies() {
+        4.0 * elements
+    } else {
+        elements
     };
     if all > MOST_ELEMENTS {
         let (place, found) = match times {
@@ -138,12 +139,13 @@ pub fn estimate(problem: &Problem, stored: Option<&MeshSize>) -> Result<Estimate
         ..Size::default()
     };
     let own = size.estimate(1.0);
-    Ok(match problem.solver.verifies() {
-        true => Estimate {
+    Ok(if problem.solver.verifies() {
+        Estimate {
             dofs: own.dofs,
             ..size.split().estimate(1.0)
-        },
-        false => own,
+        }
+    } else {
+        own
     })
 }
 
@@ -157,9 +159,10 @@ impl Model {
         if !problem.solver.verifies() {
             return solved;
         }
-        let halved = match adaptive {
-            true => self.largest_halved(&own),
-            false => own.split(),
+        let halved = if adaptive {
+            self.largest_halved(&own)
+        } else {
+            own.split()
         };
         let compared = Size {
             // no step is reported, nothing assessed, and no solution looked for once more
@@ -214,9 +217,10 @@ impl Model {
             + 2 * u32::from(self.depends_on_path());
         let increments: f64 = self.steps.iter().map(|s| f64::from(s.increments)).sum();
         Size {
-            nodes: match adaptive {
-                true => nodes.max(NODES * MOST_ADAPTIVE_ELEMENTS as f64),
-                false => nodes,
+            nodes: if adaptive {
+                nodes.max(NODES * MOST_ADAPTIVE_ELEMENTS as f64)
+            } else {
+                nodes
             },
             contact: 2.0 * all.nodes,
             weights: all.weights,
@@ -312,12 +316,13 @@ impl Along {
         if adaptive {
             let elements = (MOST_ADAPTIVE_CONTACT_ELEMENTS as f64).max(0.5 * s.len() as f64);
             let along = every_average(elements);
-            return match acts(contact) {
-                true => along,
-                false => Along {
+            return if acts(contact) {
+                along
+            } else {
+                Along {
                     weights: 0.0,
                     ..along
-                },
+                }
             };
         }
         let friction = contact.friction.as_ref().filter(|_| acts(contact));

@@ -149,15 +149,16 @@ impl Checks {
     }
 
     fn few_enough(&mut self, pointer: &str, count: usize, most: usize) -> Checked {
-        match count <= most {
-            true => Ok(()),
-            false => Err(self.report(
+        if count <= most {
+            Ok(())
+        } else {
+            Err(self.report(
                 pointer,
                 Reason::TooMany,
                 format!("{count} points"),
                 format!("at most {most}"),
                 "Give every second or tenth point: a mesh cannot resolve more.",
-            )),
+            ))
         }
     }
 

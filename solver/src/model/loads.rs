@@ -77,9 +77,10 @@ impl Checks {
                     self.nodes_in_order(mesh, edges, forces.len(), format!("{pointer}/nodal"))?;
                 let forces = forces.iter().map(|force| force.map(|f| f / ring));
                 let forces = nodes.into_iter().zip(forces);
-                match first {
-                    true => at_nodes.push(forces.collect()),
-                    false => found.nodal.extend(forces),
+                if first {
+                    at_nodes.push(forces.collect())
+                } else {
+                    found.nodal.extend(forces)
                 }
                 return Ok(());
             }

@@ -31,9 +31,10 @@ impl<'a> FirstSides<'a> {
                 .supports
                 .iter()
                 .any(|support| support.nodes.is_some());
-        let sides = match given && mesh.has_later_nodes() {
-            true => mesh.first_sides(),
-            false => BTreeMap::new(),
+        let sides = if given && mesh.has_later_nodes() {
+            mesh.first_sides()
+        } else {
+            BTreeMap::new()
         };
         FirstSides { mesh, sides }
     }

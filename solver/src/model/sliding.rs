@@ -55,15 +55,16 @@ impl Checks {
                 false => continue,
             };
             let [x, y] = boundary.positions[end];
-            let (what, instead) = match on_axis(end) {
-                true => (
+            let (what, instead) = if on_axis(end) {
+                (
                     "the axis",
                     "Remove the drag: a body of revolution cannot be dragged across its axis.",
-                ),
-                false => (
+                )
+            } else {
+                (
                     "a line of symmetry",
                     "Model the whole body, or remove the drag. If the support is a wall rather than a symmetry line, end the contact one edge before it.",
-                ),
+                )
             };
             self.warn(
                 WarningCode::SymmetricDrag,

@@ -60,9 +60,10 @@ impl Held {
             } => (direction, value, error),
             Held::Both([x, y]) => {
                 let known = x * along[0] + y * along[1];
-                return match (known - value).abs() <= rounding {
-                    true => Ok(self),
-                    false => Err(known),
+                return if (known - value).abs() <= rounding {
+                    Ok(self)
+                } else {
+                    Err(known)
                 };
             }
         };

@@ -145,9 +145,10 @@ impl<'a> Known<'a> {
 /// The normal stress on an edge, without a tension if none of its three nodes has one.
 fn without_overshoot(nodes: &ContactProfile, edge: usize, stress: f64) -> f64 {
     let of_nodes = &nodes.normal_stress[2 * edge..=2 * edge + 2];
-    match of_nodes.iter().all(|of_node| *of_node <= 0.0) {
-        true => stress.min(0.0),
-        false => stress,
+    if of_nodes.iter().all(|of_node| *of_node <= 0.0) {
+        stress.min(0.0)
+    } else {
+        stress
     }
 }
 

@@ -264,13 +264,15 @@ impl Canvas for Page {
             self.paint('S', paint);
             self.content
                 .set_line_width(stroke.width)
-                .set_line_cap(match stroke.round_ends {
-                    true => LineCapStyle::RoundCap,
-                    false => LineCapStyle::ButtCap,
+                .set_line_cap(if stroke.round_ends {
+                    LineCapStyle::RoundCap
+                } else {
+                    LineCapStyle::ButtCap
                 })
-                .set_line_join(match stroke.round_joins {
-                    true => LineJoinStyle::RoundJoin,
-                    false => LineJoinStyle::MiterJoin,
+                .set_line_join(if stroke.round_joins {
+                    LineJoinStyle::RoundJoin
+                } else {
+                    LineJoinStyle::MiterJoin
                 })
                 // as SVG has it
                 .set_miter_limit(4.0)

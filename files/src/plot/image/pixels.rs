@@ -92,13 +92,15 @@ impl Canvas for Pixels<'_> {
         };
         let stroke = tiny_skia::Stroke {
             width: stroke.width,
-            line_cap: match stroke.round_ends {
-                true => LineCap::Round,
-                false => LineCap::Butt,
+            line_cap: if stroke.round_ends {
+                LineCap::Round
+            } else {
+                LineCap::Butt
             },
-            line_join: match stroke.round_joins {
-                true => LineJoin::Round,
-                false => LineJoin::Miter,
+            line_join: if stroke.round_joins {
+                LineJoin::Round
+            } else {
+                LineJoin::Miter
             },
             dash: StrokeDash::new(stroke.dashes, 0.0),
             ..tiny_skia::Stroke::default()

@@ -113,10 +113,7 @@ pub(super) async fn remove(arguments: Remove) -> anyhow::Result<Exit> {
         return Ok(Exit::Invalid);
     }
     for id in arguments.ids {
-        let part = match arguments.fields {
-            true => "/fields",
-            false => "",
-        };
+        let part = if arguments.fields { "/fields" } else { "" };
         service
             .call(Method::DELETE, &format!("{}{part}", id.path()))
             .await?;

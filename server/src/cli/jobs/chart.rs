@@ -164,9 +164,10 @@ fn short(value: f64) -> String {
 
 /// A text with the escape sequence of its colour.
 fn coloured(text: &str, code: &str, in_colour: bool) -> String {
-    match in_colour {
-        true => format!("\x1b[{code}m{text}\x1b[0m"),
-        false => text.to_owned(),
+    if in_colour {
+        format!("\x1b[{code}m{text}\x1b[0m")
+    } else {
+        text.to_owned()
     }
 }
 

@@ -52,9 +52,10 @@ impl Submitted {
     pub(super) fn read(path: &Path) -> anyhow::Result<Submitted> {
         let mut bytes = Vec::new();
         let unread = || format!("cannot read {}", path.display());
-        let read = match path.as_os_str() == "-" {
-            true => std::io::stdin().read_to_end(&mut bytes).map(|_| ()),
-            false => std::fs::read(path).map(|found| bytes = found),
+        let read = if path.as_os_str() == "-" {
+            std::io::stdin().read_to_end(&mut bytes).map(|_| ())
+        } else {
+            std::fs::read(path).map(|found| bytes = found)
         };
         read.with_context(unread)?;
         let deck = path

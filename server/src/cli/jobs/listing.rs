@@ -85,9 +85,10 @@ impl Shown {
         }
         let mut cards = vec![];
         for document in found.documents() {
-            cards.push(match is_sweep(document) {
-                true => sweep_card(document),
-                false => card(&job(document)?),
+            cards.push(if is_sweep(document) {
+                sweep_card(document)
+            } else {
+                card(&job(document)?)
             });
         }
         Ok(output::print(&cards.join("\n"))?)
@@ -125,12 +126,11 @@ fn lines(documents: &[Value]) -> anyhow::Result<String> {
     ];
     let mut rows = vec![];
     for document in documents {
-        let (time, notes) = match is_sweep(document) {
-            true => (String::new(), members(document)),
-            false => {
-                let job = job(document)?;
-                (job.run_s.map_or(String::new(), seconds), notes(&job))
-            }
+        let (time, notes) = if is_sweep(document) {
+            (String::new(), members(document))
+        } else {
+            let job = job(document)?;
+            (job.run_s.map_or(String::new(), seconds), notes(&job))
         };
         let submitted = text(document, "created_at");
         rows.push([
@@ -202,9 +202,10 @@ pub(super) fn seconds(seconds: f64) -> String {
 }
 
 fn shortened(text: &str, most: usize) -> String {
-    match text.chars().count() > most {
-        true => text.chars().take(most - 1).chain(['…']).collect(),
-        false => text.to_owned(),
+    if text.chars().count() > most {
+        text.chars().take(most - 1).chain(['…']).collect()
+    } else {
+        text.to_owned()
     }
 }
 

@@ -64,9 +64,12 @@ impl Args for Filters {
         FILTERS
             .iter()
             .fold(command, |command, field| {
-                let checked = |text: &str| match (field.set)(&mut Filter::default(), text) {
-                    true => Ok(text.to_owned()),
-                    false => Err(format!("expected {}", (field.expected)())),
+                let checked = |text: &str| {
+                    if (field.set)(&mut Filter::default(), text) {
+                        Ok(text.to_owned())
+                    } else {
+                        Err(format!("expected {}", (field.expected)()))
+                    }
                 };
                 let (value, help) = match (field.several, field.name.rsplit_once('_')) {
                     (true, _) => (
@@ -83,9 +86,10 @@ impl Args for Filters {
                     .value_name(value.to_uppercase())
                     .value_parser(checked)
                     .group("filters");
-                command.arg(match field.several {
-                    true => option.action(ArgAction::Append).value_delimiter(','),
-                    false => option,
+                command.arg(if field.several {
+                    option.action(ArgAction::Append).value_delimiter(',')
+                } else {
+                    option
                 })
             })
             .group(ArgGroup::new("filters").multiple(true))
@@ -105,10 +109,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         0 => usize::MAX,
         some => some,
     };
-    let list = match arguments.sweeps {
-        true => "sweeps",
-        false => "jobs",
-    };
+    let list = if arguments.sweeps { "sweeps" } else { "jobs" };
     let (mut found, mut page): (Vec<Value>, Option<String>) = (vec![], None);
     loop {
         let mut query = Serializer::new(String::new());

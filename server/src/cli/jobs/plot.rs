@@ -174,12 +174,13 @@ fn number_of_step(result: &Value, wanted: &str) -> Option<u32> {
 /// The message that there is no such load step, with the existing ones.
 fn no_step(result: &Value, id: JobId, wanted: &str) -> String {
     let names = names_of_steps(result);
-    match names.is_empty() {
-        true => format!("{id} has no load steps; remove --step"),
-        false => format!(
+    if names.is_empty() {
+        format!("{id} has no load steps; remove --step")
+    } else {
+        format!(
             "{id} has no load step {wanted:?}; it has, by name or by number from 0: {}",
             names.join(", ")
-        ),
+        )
     }
 }
 
@@ -294,9 +295,10 @@ async fn convergence(service: &Service, id: JobId, step: Option<u32>) -> anyhow:
 
 /// Opens a file with the desktop's program for it.
 fn open(path: &Path) -> anyhow::Result<()> {
-    let program = match cfg!(target_os = "macos") {
-        true => "open",
-        false => "xdg-open",
+    let program = if cfg!(target_os = "macos") {
+        "open"
+    } else {
+        "xdg-open"
     };
     let status = Command::new(program).arg(path).status();
     let status = status.with_context(|| {

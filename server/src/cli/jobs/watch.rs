@@ -76,9 +76,10 @@ pub(super) async fn follow(service: &Service, id: Id, format: Format) -> anyhow:
             }
             (_, Id::Sweep(_)) => ended = watched.member(&event)?.or(ended),
         }
-        Ok(match done {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
+        Ok(if done {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
         })
     });
     let heard = follow::detached(id, work).await;

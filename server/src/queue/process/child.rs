@@ -89,9 +89,10 @@ fn solve_task(
         }
         let must_stop = matches!(told, Told::OutOfMemory(_));
         sent = pass_on(told, service);
-        match must_stop || sent.is_err() || stop.load(Relaxed) {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
+        if must_stop || sent.is_err() || stop.load(Relaxed) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
         }
     };
     let solving = || {

@@ -1,5 +1,6 @@
 //! The service's side of worker processes: starts them, gives them tasks, passes on their reports, kills them.
 
+use parking_lot::{Mutex, MutexGuard};
 use std::{
     io::{self, BufRead, BufReader, Read},
     ops::ControlFlow,
@@ -8,7 +9,6 @@ use std::{
         process::{CommandExt, ExitStatusExt},
     },
     process::{Child, ChildStderr, Command, ExitStatus, Stdio},
-    sync::{Mutex, MutexGuard, PoisonError},
     thread::{self, JoinHandle},
     time::{Duration, Instant},
 };
@@ -119,8 +119,7 @@ impl Processes {
     }
 
     fn idle(&self) -> MutexGuard<'_, Vec<Process>> {
-        // No code panics while it holds this lock.
-        self.idle.lock().unwrap_or_else(PoisonError::into_inner)
+        self.idle.lock()
     }
 }
 

@@ -246,9 +246,10 @@ fn every_change_of_a_problem_finds_the_body_or_not_and_has_the_result_of_its_own
                 Body::Other => assert!(!kept.body_reused, "{pointer} {value:?}"),
                 Body::Either => {}
             }
-            match kept.body_reused {
-                true => hits += 1,
-                false => misses += 1,
+            if kept.body_reused {
+                hits += 1
+            } else {
+                misses += 1
             }
             let figures = budget.body_cache();
             assert_eq!(figures.hits, u64::from(kept.body_reused), "{pointer}");
@@ -393,9 +394,10 @@ fn least_share(problem: &Value, bodies: impl Fn() -> Option<Arc<Budget>> + Sync)
     let (mut none, mut enough) = (0, 1 << 30);
     while enough - none > 64 << 10 {
         let middle = (none + enough) / 2;
-        match fits(middle) {
-            true => enough = middle,
-            false => none = middle,
+        if fits(middle) {
+            enough = middle
+        } else {
+            none = middle
         }
     }
     enough

@@ -106,9 +106,10 @@ fn problems() -> Vec<(String, Value)> {
     problems.push(("wall of 150 lines, Newton".into(), newton));
     for (contacts, steps) in [(60, 100), (20, 300), (3, 1000)] {
         for friction in [false, true] {
-            let name = match friction {
-                true => format!("{contacts} contacts with friction, {steps} steps"),
-                false => format!("{contacts} contacts, {steps} steps"),
+            let name = if friction {
+                format!("{contacts} contacts with friction, {steps} steps")
+            } else {
+                format!("{contacts} contacts, {steps} steps")
             };
             problems.push((name, row_of_contacts(contacts, steps, friction)));
         }

@@ -20,9 +20,10 @@ fn solve_with_a_step(
     let mut problem = problem.clone();
     problem.solver.accuracy = Some(AccuracyMode::Verify);
     let solution = solver::solve_on(&problem, mesh, observe)?;
-    match observe(Progress::Step(&solution)).is_break() {
-        true => Err(SolveError::Stopped),
-        false => Ok(solution),
+    if observe(Progress::Step(&solution)).is_break() {
+        Err(SolveError::Stopped)
+    } else {
+        Ok(solution)
     }
 }
 
@@ -126,9 +127,10 @@ async fn fail_at(point: Point, failing: Failing, start_later: bool) {
 #[tokio::test]
 async fn a_failure_at_any_boundary_costs_its_job_alone() {
     let cases = Point::VARIANTS.iter().flat_map(|point| {
-        let failings = match may_be_an_error(*point) {
-            true => &[Failing::Panic, Failing::Error][..],
-            false => &[Failing::Panic],
+        let failings = if may_be_an_error(*point) {
+            &[Failing::Panic, Failing::Error][..]
+        } else {
+            &[Failing::Panic]
         };
         let both = |failing| [false, true].map(|later| fail_at(*point, failing, later));
         failings.iter().copied().flat_map(both)

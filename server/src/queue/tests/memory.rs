@@ -71,9 +71,10 @@ fn solve_greedily(
     observe: &mut Observer<'_>,
 ) -> Result<Solution, SolveError> {
     let bytes = 1 << 40;
-    match observe(Progress::Needs { bytes }).is_break() {
-        true => Err(SolveError::Stopped),
-        false => Ok(fake::solution()),
+    if observe(Progress::Needs { bytes }).is_break() {
+        Err(SolveError::Stopped)
+    } else {
+        Ok(fake::solution())
     }
 }
 
@@ -103,9 +104,10 @@ fn solve_with_what_there_is(
     let mut room = |bytes| observe(Progress::Room { bytes }).is_continue();
     let asked = [room(MIB), room(1 << 40), room(MIB)];
     // no answer stops it
-    match asked == [true, false, true] && observe(Progress::Pulse).is_continue() {
-        true => Ok(fake::solution()),
-        false => Err(SolveError::Stopped),
+    if asked == [true, false, true] && observe(Progress::Pulse).is_continue() {
+        Ok(fake::solution())
+    } else {
+        Err(SolveError::Stopped)
     }
 }
 

@@ -268,7 +268,7 @@ async fn what_answers_a_job_is_checked_before_and_by_what_is_stored() {
     let is_known = || {
         numbers
             .iter()
-            .all(|number| store.intact.content.contains(*number))
+            .all(|number| store.intact.content.contains(number))
     };
     assert!(!is_known());
     // the other owner's turn is next

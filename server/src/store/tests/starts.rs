@@ -267,9 +267,10 @@ async fn a_canceled_job_does_not_succeed_even_if_the_cancel_could_not_be_stored(
     for (n, stored) in [(1, true), (2, false)] {
         submit(&store, &n.to_string()).await.unwrap();
         let job = store.claim_next().await.unwrap().0.unwrap().job;
-        match stored {
-            true => drop(store.request_cancel(job.key).await.unwrap()),
-            false => drop(store.cancels.lock().unwrap().insert(job.key)),
+        if stored {
+            store.request_cancel(job.key).await.unwrap();
+        } else {
+            store.cancels.lock().insert(job.key);
         }
         let ending = Ending {
             status: Status::Succeeded,
@@ -290,7 +291,7 @@ async fn a_canceled_job_does_not_succeed_even_if_the_cancel_could_not_be_stored(
             (Status::Canceled, ResultAvailable::Partial)
         );
     }
-    assert!(store.cancels.lock().unwrap().is_empty());
+    assert!(store.cancels.lock().is_empty());
 }
 
 #[tokio::test]
@@ -351,13 +352,14 @@ async fn a_canceled_job_is_not_requeued_even_if_the_cancel_could_not_be_stored()
     for (input, stops) in [("1", true), ("2", false)] {
         submit(&store, input).await.unwrap();
         let job = store.claim_next().await.unwrap().0.unwrap().job;
-        store.cancels.lock().unwrap().insert(job.key);
-        match stops {
-            true => drop(store.requeue_drained(job.key, 1).await.unwrap()),
-            false => drop(store.requeue_lost(job.key, 1, "killed").await.unwrap()),
+        store.cancels.lock().insert(job.key);
+        if stops {
+            store.requeue_drained(job.key, 1).await.unwrap();
+        } else {
+            store.requeue_lost(job.key, 1, "killed").await.unwrap();
         }
         let ended = store.job(Owners::All, job.id).await.unwrap().unwrap();
         assert_eq!(ended.status, Status::Canceled);
     }
-    assert!(store.cancels.lock().unwrap().is_empty());
+    assert!(store.cancels.lock().is_empty());
 }

@@ -111,9 +111,10 @@ fn step_from(
     loop {
         let renewed = factors.prepare(system, bound, &state.v, &free, observe)?;
         let direction = factors.direction(&force)?;
-        let part = match damped {
-            true => least_along(system, bound, &state.v, &direction),
-            false => 1.0,
+        let part = if damped {
+            least_along(system, bound, &state.v, &direction)
+        } else {
+            1.0
         };
         let mut next = state.clone();
         let moved = next.v.iter_mut().zip(&direction);

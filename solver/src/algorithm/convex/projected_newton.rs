@@ -94,9 +94,10 @@ fn project(system: &System<'_>, v: &mut [f64]) {
         let Dof::Free(dof) = node.normal else {
             continue;
         };
-        v[dof] = match node.bonded {
-            true => node.gap,
-            false => v[dof].min(node.gap),
+        v[dof] = if node.bonded {
+            node.gap
+        } else {
+            v[dof].min(node.gap)
         };
     }
 }

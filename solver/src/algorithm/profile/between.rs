@@ -114,9 +114,10 @@ impl PatchView<'_> {
                 false if self.touched_beside(place) => place.nearer,
                 false => continue,
             };
-            let unseen = match place.nearer > 0.0 {
-                true => penetration.min(place.nearer),
-                false => -penetration,
+            let unseen = if place.nearer > 0.0 {
+                penetration.min(place.nearer)
+            } else {
+                -penetration
             };
             if slight(unseen) {
                 continue;
@@ -272,14 +273,15 @@ impl PatchView<'_> {
             spacing,
             ..
         } = worst;
-        let message = match *penetration > 0.0 {
-            true => format!(
+        let message = if *penetration > 0.0 {
+            format!(
                 "The obstacle reaches {penetration:.3e} into the body between two nodes, at s = {s:.4}{others}: the nodes are {spacing:.3e} apart, and between them nothing resists it. Forces and peaks are not those of this obstacle. Put a grid line there, or refine the mesh until it resolves the obstacle."
-            ),
-            false => format!(
+            )
+        } else {
+            format!(
                 "The obstacle recedes by {:.3e} between two nodes that touch it, at s = {s:.4}{others}: the nodes are {spacing:.3e} apart, and the body presses there as if the obstacle were smooth. Forces and peaks are not those of this obstacle. Refine the mesh until it resolves the obstacle.",
                 -penetration
-            ),
+            )
         };
         warnings.push(Warning {
             code: WarningCode::ObstacleBetweenNodes,
@@ -312,8 +314,8 @@ impl PatchView<'_> {
             part if part < 1.0 => format!("{:.1} % of the peak", 100.0 * part),
             _ => "more than the whole peak now".to_owned(),
         };
-        let (size, growth) = match change.is_finite() {
-            true => (
+        let (size, growth) = if change.is_finite() {
+            (
                 match turn {
                     0.0 => format!("its slope changes by {change:.3e}"),
                     turn => format!("its surface turns by {:.2}°", turn.to_degrees()),
@@ -321,20 +323,22 @@ impl PatchView<'_> {
                 format!(
                     "each halving of the mesh, whose nodes are {spacing:.3e} apart there, adds about {growth:.3e}, {part}"
                 ),
-            ),
-            false => (
+            )
+        } else {
+            (
                 "it has an edge there".to_owned(),
                 format!(
                     "it grows with each halving of the mesh, whose nodes are {spacing:.3e} apart there"
                 ),
-            ),
+            )
         };
-        let (mirrored, symmetric) = match mirrored {
-            true => (
+        let (mirrored, symmetric) = if *mirrored {
+            (
                 ", where it meets its mirror image",
                 " At a line of symmetry give the points on both sides of it.",
-            ),
-            false => ("", ""),
+            )
+        } else {
+            ("", "")
         };
         let message = match turn {
             0.0 => format!(

@@ -162,9 +162,10 @@ impl PatchView<'_> {
     /// The part of the contact that the displaced obstacle does not cover, or covers in addition.
     pub(super) fn displaced_part(&self) -> f64 {
         let past_end = self.displaced_gaps().past_end;
-        match past_end > 0.0 {
-            true => (past_end / self.contact_length()).min(1.0),
-            false => 0.0,
+        if past_end > 0.0 {
+            (past_end / self.contact_length()).min(1.0)
+        } else {
+            0.0
         }
     }
 

@@ -183,9 +183,10 @@ impl PatchView<'_> {
     /// The places on an edge at which σ_t is known: the nodes, and the points where friction acts.
     fn places_of_law(&self) -> &'static [f64] {
         const WITH_GAUSS_POINTS: [f64; 5] = [-1.0, GAUSS_3[0].0, 0.0, GAUSS_3[2].0, 1.0];
-        match self.at_gauss_points() {
-            true => &WITH_GAUSS_POINTS,
-            false => &[-1.0, 0.0, 1.0],
+        if self.at_gauss_points() {
+            &WITH_GAUSS_POINTS
+        } else {
+            &[-1.0, 0.0, 1.0]
         }
     }
 
@@ -206,9 +207,10 @@ impl PatchView<'_> {
         let edges = 0..self.patch.contact.boundary.edge_count();
         let rubbed: Vec<usize> = edges.clone().filter(|&edge| self.may_rub(edge)).collect();
         // nothing is highest where all is zero
-        let edges = match rubbed.is_empty() {
-            true => edges.rev().take(1).collect(),
-            false => rubbed,
+        let edges = if rubbed.is_empty() {
+            edges.rev().take(1).collect()
+        } else {
+            rubbed
         };
         for edge in edges {
             let stress = |xi: f64| self.tangential_stress_at(edge, xi);

@@ -85,9 +85,10 @@ impl PatchView<'_> {
             found.extend(power(sides(Side::Sticks)));
         } else {
             // where the bound is the pressure's own, so is the traction a part of it; else it has a limit
-            let part = match self.averages_nothing() && pressure > 0.0 {
-                true => stress / pressure,
-                false => 0.0,
+            let part = if self.averages_nothing() && pressure > 0.0 {
+                stress / pressure
+            } else {
+                0.0
             };
             if let Some(found_here) = growth(&wedges, sides(Side::Slides(part)), contact) {
                 let by_power = found_here
@@ -146,9 +147,10 @@ impl PatchView<'_> {
         };
         let mut wedges: Vec<Wedge> = Vec::new();
         for (e, element) in model.mesh.elements.iter().enumerate() {
-            let sides: Vec<[u32; 3]> = match element.contains(&node) {
-                true => element.sides().collect(),
-                false => continue,
+            let sides: Vec<[u32; 3]> = if element.contains(&node) {
+                element.sides().collect()
+            } else {
+                continue;
             };
             let out = sides.iter().find(|side| side[0] == node);
             let back = sides.iter().find(|side| side[1] == node);
@@ -161,10 +163,11 @@ impl PatchView<'_> {
             };
             let start = angle(out, -1.0);
             let width = (angle(back, 1.0) - start).rem_euclid(TAU);
-            let start = match before {
-                true => (start + SAME_ANGLE).rem_euclid(TAU) - SAME_ANGLE,
+            let start = if before {
+                (start + SAME_ANGLE).rem_euclid(TAU) - SAME_ANGLE
+            } else {
                 // all wedges end at the side that follows the node
-                false => -((-start - SAME_ANGLE).rem_euclid(TAU) + SAME_ANGLE),
+                -((-start - SAME_ANGLE).rem_euclid(TAU) + SAME_ANGLE)
             };
             wedges.push(Wedge {
                 angles: [start, start + width],

@@ -149,9 +149,12 @@ impl<'a> PatchView<'a> {
                 forces.tangential_reactions[node] / system.nodes[node].weight
             };
             // on the axis there is no shear
-            let stress = |i: usize| match system.nodes[patch.first + i].on_axis {
-                true => 0.0,
-                false => shear(i),
+            let stress = |i: usize| {
+                if system.nodes[patch.first + i].on_axis {
+                    0.0
+                } else {
+                    shear(i)
+                }
             };
             let edges = 0..patch.contact.boundary.edge_count();
             view.tractions = Some(edges.map(|edge| edge_nodes(edge).map(stress)).collect());

@@ -91,9 +91,10 @@ const MOST_STICK_ENDS: usize = 8;
 const STEADY: f64 = 1e-6;
 
 fn limited(has_limit: bool) -> Estimable {
-    match has_limit {
-        true => Estimable::Yes,
-        false => Estimable::NoLimit,
+    if has_limit {
+        Estimable::Yes
+    } else {
+        Estimable::NoLimit
     }
 }
 

@@ -252,12 +252,13 @@ impl PatchView<'_> {
             let weight: f64 = places.iter().map(|place| place.weight).sum();
             let stress = |xi: f64| self.tangential_stress_at(edge, xi);
             let many = mean(stress);
-            let few = match self.at_gauss_points() {
-                true => GAUSS_3
+            let few = if self.at_gauss_points() {
+                GAUSS_3
                     .iter()
                     .map(|(xi, w)| 0.5 * w * stress(*xi))
-                    .sum::<f64>(),
-                false => (stress(-1.0) + 4.0 * stress(0.0) + stress(1.0)) / 6.0,
+                    .sum::<f64>()
+            } else {
+                (stress(-1.0) + 4.0 * stress(0.0) + stress(1.0)) / 6.0
             };
             differences.push(weight * (many - few));
         }

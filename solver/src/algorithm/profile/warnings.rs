@@ -99,13 +99,14 @@ impl PatchView<'_> {
             let nearer = |i: &usize| contact.push[*i][0] > 0.0;
             let nodes = (0..self.count()).filter(nearer);
             let needed = nodes.map(engages).fold(f64::INFINITY, f64::min);
-            let message = match self.missed().is_empty() {
-                true => format!(
+            let message = if self.missed().is_empty() {
+                format!(
                     "The body never touches the obstacle: the smallest gap is {smallest:.6e}. There is contact if the indentation is above {needed:.6e}."
-                ),
-                false => format!(
+                )
+            } else {
+                format!(
                     "No node touches the obstacle, although it reaches into the body between two nodes: the smallest gap at a node is {smallest:.6e}. A node touches if the indentation is above {needed:.6e}."
-                ),
+                )
             };
             warn(WarningCode::NoContact, message);
             return;
@@ -256,9 +257,10 @@ impl PatchView<'_> {
     fn is_noise(&self, friction: f64) -> bool {
         let (system, p) = (self.system, self.p);
         let pressed = system.normal_force(system.range(self.patch), &self.forces.reactions);
-        let scale = match pressed > 0.0 {
-            true => pressed,
-            false => system.reference_force,
+        let scale = if pressed > 0.0 {
+            pressed
+        } else {
+            system.reference_force
         };
         let points = system.points.iter().zip(&self.finished.bound);
         let own = points.filter(|(point, _)| point.patch == p);
@@ -308,9 +310,10 @@ impl PatchView<'_> {
         let own: Vec<f64> = own
             .map(|(point, traction)| point.weight * traction)
             .collect();
-        match self.at_gauss_points() {
-            true => own.chunks(3).map(cancels).collect(),
-            false => Vec::new(),
+        if self.at_gauss_points() {
+            own.chunks(3).map(cancels).collect()
+        } else {
+            Vec::new()
         }
     }
 

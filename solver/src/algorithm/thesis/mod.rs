@@ -116,9 +116,10 @@ pub(super) fn run(recorder: &mut Recorder<'_, '_>, observe: &mut Observer<'_>) -
         };
         (reached, friction.traction)
     });
-    let outcome = match stopped {
-        true => Outcome::Canceled,
-        false => end.outcome,
+    let outcome = if stopped {
+        Outcome::Canceled
+    } else {
+        end.outcome
     };
     (End { outcome, ..end }, tractions)
 }

@@ -181,9 +181,10 @@ impl<'a> Parts<'a> {
             parts,
             first,
             shared,
-            never: match axisymmetric {
-                true => &[[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
-                false => &[],
+            never: if axisymmetric {
+                &[[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+            } else {
+                &[]
             },
         }
     }

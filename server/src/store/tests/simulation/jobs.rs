@@ -11,9 +11,10 @@ impl World {
     }
 
     pub(super) async fn cancel(&mut self) -> Result<()> {
-        let key = match self.dice.bool() {
-            true => self.any_running().map(|(key, _)| key),
-            false => self.any_job(),
+        let key = if self.dice.bool() {
+            self.any_running().map(|(key, _)| key)
+        } else {
+            self.any_job()
         };
         let Some(key) = key else {
             return Ok(());

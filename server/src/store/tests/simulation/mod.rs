@@ -12,14 +12,12 @@ mod restarts;
 mod submissions;
 mod workers;
 
+use parking_lot::Mutex;
 use std::{
     collections::BTreeMap,
     panic::{AssertUnwindSafe, catch_unwind},
     path::PathBuf,
-    sync::{
-        Mutex, PoisonError,
-        atomic::{AtomicBool, AtomicU64, Ordering},
-    },
+    sync::atomic::{AtomicBool, AtomicU64, Ordering},
     time::{Duration, Instant},
 };
 
@@ -103,9 +101,10 @@ struct Work {
 /// Where files are fast.
 fn fast_folder() -> tempfile::TempDir {
     let memory = Path::new("/dev/shm");
-    match memory.is_dir() {
-        true => tempfile::tempdir_in(memory).unwrap(),
-        false => tempfile::tempdir().unwrap(),
+    if memory.is_dir() {
+        tempfile::tempdir_in(memory).unwrap()
+    } else {
+        tempfile::tempdir().unwrap()
     }
 }
 
@@ -157,7 +156,7 @@ impl World {
     fn note(&self, what: String) {
         let clock = (self.clock - BEGIN) as f64 / 1e6;
         let line = format!("{clock:>12.3} s  {what}");
-        let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut done = self.done.lock();
         done.push(line);
     }
 
@@ -168,9 +167,10 @@ impl World {
 
     /// One of some.
     fn one_of<T: Clone>(&mut self, some: &[T]) -> Option<T> {
-        match some.is_empty() {
-            true => None,
-            false => Some(some[self.dice.usize(0..some.len())].clone()),
+        if some.is_empty() {
+            None
+        } else {
+            Some(some[self.dice.usize(0..some.len())].clone())
         }
     }
 
@@ -191,22 +191,21 @@ impl World {
         if self.full && self.once_in(10) {
             self.free_the_disk().await;
         }
-        let before = match self.full {
-            true => {
-                match self.dice.u32(0..4) {
-                    0 | 1 => {
-                        let more = self.dice.i64(0..6);
-                        self.store.bound(more).await;
-                    }
-                    2 => {
-                        let commits = self.dice.u32(1..3);
-                        self.store.full_commits.store(commits, Ordering::Relaxed);
-                    }
-                    _ => {}
+        let before = if self.full {
+            match self.dice.u32(0..4) {
+                0 | 1 => {
+                    let more = self.dice.i64(0..6);
+                    self.store.bound(more).await;
                 }
-                Some(self.rows().await)
+                2 => {
+                    let commits = self.dice.u32(1..3);
+                    self.store.full_commits.store(commits, Ordering::Relaxed);
+                }
+                _ => {}
             }
-            false => None,
+            Some(self.rows().await)
+        } else {
+            None
         };
         let did = match self.dice.u32(0..100) {
             0..28 => self.submit().await,
@@ -302,7 +301,7 @@ fn jobs_keys_and_events_are_kept_whatever_happens() {
             }
             let done = Steps::default();
             let ran = catch_unwind(AssertUnwindSafe(|| run(seed, empty.path(), done.clone())));
-            let done = done.lock().unwrap_or_else(PoisonError::into_inner);
+            let done = done.lock();
             steps.fetch_add(done.len() as u64, Ordering::Relaxed);
             if ran.is_err() {
                 failed.store(true, Ordering::Relaxed);
@@ -336,7 +335,7 @@ fn a_seed_gives_the_same_steps_and_the_same_final_state() {
             let done = Steps::default();
             let work = || run(seed, empty.path(), done.clone());
             let rows = std::thread::scope(|scope| scope.spawn(work).join()).unwrap();
-            let done = done.lock().unwrap().clone();
+            let done = done.lock().clone();
             (done, rows)
         });
         assert_eq!(first.0, second.0);

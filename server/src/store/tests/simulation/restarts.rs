@@ -36,12 +36,11 @@ impl Written {
     fn cut(self, folder: &Path, part: f64) {
         let now = Written::in_folder(folder);
         let goes_on = now.database == self.database && now.log.starts_with(&self.log);
-        let log = match goes_on {
-            true => {
-                let more = (now.log.len() - self.log.len()) as f64 * part;
-                &now.log[..self.log.len() + more as usize]
-            }
-            false => &self.log,
+        let log = if goes_on {
+            let more = (now.log.len() - self.log.len()) as f64 * part;
+            &now.log[..self.log.len() + more as usize]
+        } else {
+            &self.log
         };
         fs::write(folder.join("signorini.db"), &self.database).unwrap();
         fs::write(folder.join("signorini.db-wal"), log).unwrap();

@@ -21,9 +21,10 @@ impl World {
         let known: Vec<JobId> = self.jobs.values().map(|job| job.id).collect();
         NewJob {
             id: Some(JobId(uuid::Uuid::from_u128(self.dice.u128(..)))),
-            labels: match self.once_in(3) {
-                true => [("study".to_owned(), input.to_string())].into(),
-                false => Default::default(),
+            labels: if self.once_in(3) {
+                [("study".to_owned(), input.to_string())].into()
+            } else {
+                Default::default()
             },
             priority: [0, 0, 0, -3, 5][self.dice.usize(0..5)],
             limits: Limits {
@@ -37,9 +38,10 @@ impl World {
                 Cache::Refresh,
                 Cache::Off,
             ][self.dice.usize(0..5)],
-            parent: match self.once_in(5) {
-                true => self.one_of(&known),
-                false => None,
+            parent: if self.once_in(5) {
+                self.one_of(&known)
+            } else {
+                None
             },
             memory_bytes: self.dice.u64(1..4) << 20,
             ..new(&input.to_string())
@@ -198,15 +200,17 @@ impl World {
             let theirs = known.owner != *owner;
             if self.is_there(*key) {
                 let same = !theirs && known.new.payload == new.payload && jobs.len() == 1;
-                return Ok(match same {
-                    true => Expected::Replay(vec![*key]),
-                    false => Expected::IdConflict,
+                return Ok(if same {
+                    Expected::Replay(vec![*key])
+                } else {
+                    Expected::IdConflict
                 });
             }
             if self.is_remembered(*key).await? {
-                return Ok(match theirs {
-                    true => Expected::IdConflict,
-                    false => Expected::Deleted,
+                return Ok(if theirs {
+                    Expected::IdConflict
+                } else {
+                    Expected::Deleted
                 });
             }
         }

@@ -219,9 +219,10 @@ impl World {
         assert!(changed.contains(&key));
         let work = self.running.remove(&key).unwrap();
         self.over.push((key, attempt));
-        let expected = match work.canceled && ending.status == Status::Succeeded {
-            true => Status::Canceled,
-            false => ending.status,
+        let expected = if work.canceled && ending.status == Status::Succeeded {
+            Status::Canceled
+        } else {
+            ending.status
         };
         assert_eq!(self.status(key).await, Some(expected));
         Ok(())
@@ -238,9 +239,10 @@ impl World {
         let work = self.running.remove(&key).unwrap();
         self.over.push((key, attempt));
         let status = self.status(key).await;
-        match work.canceled {
-            true => assert_eq!(status, Some(Status::Canceled)),
-            false => assert!(matches!(status, Some(Status::Queued | Status::Failed))),
+        if work.canceled {
+            assert_eq!(status, Some(Status::Canceled))
+        } else {
+            assert!(matches!(status, Some(Status::Queued | Status::Failed)))
         }
         Ok(())
     }
