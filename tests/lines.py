@@ -8,7 +8,8 @@ commit, too, and the difference.
 
 A line with code and a comment is code. Tests are the items under `#[cfg(test)]`, with the files of modules that are
 declared there, and everything in folders and packages named `tests`; their comments count as tests. A room is the first
-name below `src`, as in ARCHITECTURE.md; `build` is the build script of a package. Generated Rust is not in the
+name below `src`, as in ARCHITECTURE.md, or a crate that is one room; the crates of `server` stand together. `build` is
+the build script of a package. Generated Rust is not in the
 repository and not counted. Below the rooms are totals of other languages.
 """
 
@@ -32,6 +33,9 @@ TOKEN = re.compile(
     re.VERBOSE | re.DOTALL,
 )
 KINDS = ("code", "comments", "tests")
+# Crates that are one room; what only tests use.
+ONE_ROOM = ("server/app", "server/cli", "server/store", "server/fake")
+FOR_TESTS = ("server/fake/", "server/store/src/for_tests.rs")
 
 
 def files_of(commit):
@@ -182,9 +186,12 @@ def count(commit):
         package = next((package for package in reversed(packages) if path.startswith(package)), "")
         parts = path.removeprefix(package).split("/")
         room = (parts[1] if parts[0] == "src" and len(parts) > 1 else parts[0]).removesuffix(".rs")
-        if "tests" in path.split("/") or any(path.startswith(place) for place in of_tests):
+        if "tests" in path.split("/") or path.startswith(FOR_TESTS) or any(path.startswith(place) for place in of_tests):
             lines = collections.Counter(tests=sum(lines.values()))
-        rooms[package.rstrip("/") or ".", room].update(lines)
+        package = package.rstrip("/")
+        if package in ONE_ROOM:
+            room = package.rsplit("/", 1)[-1]
+        rooms[package.split("/")[0] or ".", room].update(lines)
     for path, text in texts.items():
         if language(path) not in ("Rust", "manifest"):
             others[language(path)] += sum(1 for line in text.split("\n") if line.strip())

@@ -39,6 +39,12 @@ impl Floors {
         self.0.get(&key).copied()
     }
 
+    /// Whether the page draws nothing of a crate but `lib` and `main`: all modules of its library are one room.
+    pub(crate) fn is_one_room(&self, krate: &str) -> bool {
+        let mut rooms = self.rooms(krate).into_iter();
+        rooms.all(|room| matches!(room, "lib" | "main"))
+    }
+
     /// The rooms of a crate.
     pub(crate) fn rooms(&self, krate: &str) -> BTreeSet<&str> {
         let of_it = self.0.keys().filter(|(of, _)| of == krate);

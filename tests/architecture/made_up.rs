@@ -9,11 +9,12 @@ use super::{
 const PAGE: &str = "
 ## Rooms and directions
 ```
-server   main           starts
+service  main           starts
          lib            nothing
          high           on top
-         store          below
          pb             generated
+
+store    lib            one room
 
 solver   lib            nothing
          top            on top
@@ -22,28 +23,31 @@ solver   lib            nothing
 ```
 ";
 
-/// A sound pair of crates in which some files are others.
+/// Three sound crates in which some files are others.
 fn broken(changes: &[(&str, &str)]) -> Vec<String> {
     let sound = [
-        ("server/src/main.rs", "fn main() { service::high::go() }"),
         (
-            "server/src/lib.rs",
-            "pub mod high; pub mod store; pub mod pb { pub struct Job; }",
+            "server/service/src/main.rs",
+            "fn main() { service::high::go() }",
         ),
         (
-            "server/src/high.rs",
-            "use crate::store; pub fn go() { store::look() }",
+            "server/service/src/lib.rs",
+            "pub mod high; pub mod pb { pub struct Job; }",
         ),
         (
-            "server/src/store/mod.rs",
-            "mod rows; mod list; pub use list::{look, List}; #[cfg(test)] use crate::high;",
+            "server/service/src/high.rs",
+            "pub fn go() { store::look() }",
         ),
         (
-            "server/src/store/rows.rs",
+            "server/store/src/lib.rs",
+            "mod rows; mod list; pub use list::{look, List}; #[cfg(test)] use service::high;",
+        ),
+        (
+            "server/store/src/rows.rs",
             "use solver::top::Top; use rusqlite::Row;",
         ),
         (
-            "server/src/store/list.rs",
+            "server/store/src/list.rs",
             "pub struct List; pub fn look() { super::rows::x() }",
         ),
         (
@@ -71,7 +75,7 @@ fn broken(changes: &[(&str, &str)]) -> Vec<String> {
     let sources: Sources = sources
         .map(|(file, text)| (file.to_string(), text.to_string()))
         .collect();
-    let tree = Tree::read(&sources, &[("server", "service"), ("solver", "solver")]);
+    let tree = Tree::read(&sources, &["server/service", "server/store", "solver"]);
     rules::broken(&tree, &Floors::read(PAGE).unwrap())
 }
 
@@ -114,23 +118,43 @@ fn an_import_upward_or_sideways_is_found_with_its_line() {
 fn a_higher_crate_cannot_be_used_even_by_a_path_in_code() {
     let found = broken(&[(
         "solver/src/low.rs",
-        "pub struct Low; fn f() { service::store::look() }",
+        "pub struct Low; fn f() { store::look() }",
     )]);
     assert_eq!(found.len(), 1, "{found:?}");
     assert!(
-        found[0].contains("from `low` of `solver` to `store` of `server`"),
+        found[0].contains("from `low` of `solver` to `lib` of `store`"),
         "{found:?}"
     );
 }
 
 #[test]
+fn a_crate_that_is_one_room_uses_none_above_it_and_a_name_after_two_colons_is_a_crate() {
+    let found = broken(&[("server/store/src/rows.rs", "use service::high::go;")]);
+    assert_eq!(
+        found,
+        [
+            "server/store/src/rows.rs:1: `service::high::go` leads from `lib` of `store` to `high` of `service`, which is no lower floor"
+        ]
+    );
+    let own = (
+        "server/store/src/lib.rs",
+        "mod service; mod rows; mod list; pub use list::{look, List};",
+    );
+    let found = broken(&[
+        own,
+        ("server/store/src/service.rs", "use ::service::high::go;"),
+    ]);
+    assert_eq!(found.len(), 1, "{found:?}");
+}
+
+#[test]
 fn a_circle_of_files_is_found_even_by_what_their_folder_shows() {
-    let found = broken(&[("server/src/store/rows.rs", "use super::List;")]);
+    let found = broken(&[("server/store/src/rows.rs", "use super::List;")]);
     assert_eq!(found.len(), 1, "{found:?}");
     let expected = [
-        "server/src/store/: a circle of list, rows",
-        "    server/src/store/list.rs:1: list uses rows (`super::rows::x`)",
-        "    server/src/store/rows.rs:1: rows uses list (`super::List`)",
+        "server/store/src/: a circle of list, rows",
+        "    server/store/src/list.rs:1: list uses rows (`super::rows::x`)",
+        "    server/store/src/rows.rs:1: rows uses list (`super::List`)",
     ];
     assert_eq!(found[0].lines().collect::<Vec<_>>(), expected);
 }
@@ -138,19 +162,19 @@ fn a_circle_of_files_is_found_even_by_what_their_folder_shows() {
 #[test]
 fn a_front_door_with_code_of_its_own_is_a_file_like_others() {
     let door = "mod rows; mod list; pub use list::{look, List}; pub struct Door(rows::Row);";
-    assert_eq!(broken(&[("server/src/store/mod.rs", door)]), [""; 0]);
-    let child = ("server/src/store/rows.rs", "use super::Door;");
-    let found = broken(&[("server/src/store/mod.rs", door), child]);
+    assert_eq!(broken(&[("server/store/src/lib.rs", door)]), [""; 0]);
+    let child = ("server/store/src/rows.rs", "use super::Door;");
+    let found = broken(&[("server/store/src/lib.rs", door), child]);
     assert_eq!(found.len(), 1, "{found:?}");
     assert!(
-        found[0].starts_with("server/src/store/: a circle of mod.rs, rows"),
+        found[0].starts_with("server/store/src/: a circle of mod.rs, rows"),
         "{found:?}"
     );
     // what it shows and also works with, it uses
     let door = "mod rows; mod list; pub use rows::Row; pub struct Door(Row); pub use list::look;";
-    let found = broken(&[("server/src/store/mod.rs", door), child]);
+    let found = broken(&[("server/store/src/lib.rs", door), child]);
     assert!(
-        found[0].starts_with("server/src/store/: a circle of mod.rs, rows"),
+        found[0].starts_with("server/store/src/: a circle of mod.rs, rows"),
         "{found:?}"
     );
 }
@@ -164,9 +188,9 @@ fn names_of_one_owner_are_not_visible_to_others() {
             "`faer` is for solver/src/linear/ alone",
         ),
         (
-            "server/src/high.rs",
+            "server/service/src/high.rs",
             "fn f() { rusqlite::params() }",
-            "`rusqlite` is for server/src/store/ alone",
+            "`rusqlite` is for server/store/src/ alone",
         ),
         (
             "solver/src/low.rs",
@@ -179,9 +203,9 @@ fn names_of_one_owner_are_not_visible_to_others() {
             "`std::thread` is for solver/src/linear/parallel.rs alone",
         ),
         (
-            "server/src/high.rs",
+            "server/service/src/high.rs",
             "use crate::pb::Job;",
-            "`crate::pb` is for server/src/grpc/",
+            "`crate::pb` is for server/rpc/src/",
         ),
     ] {
         let found = broken(&[(file, text)]);

@@ -58,8 +58,8 @@ fn quoted(line: &str) -> impl Iterator<Item = &str> {
 #[test]
 fn a_map_that_leads_nowhere_is_found_with_its_line() {
     let there = [
-        "server/src/store/list.rs",
-        "server/src/store/tests",
+        "server/store/src/list.rs",
+        "server/store/src/tests",
         "migrations",
     ];
     let exists = |path: &str| there.contains(&path);
@@ -78,8 +78,8 @@ fn a_map_that_leads_nowhere_is_found_with_its_line() {
 mod list;
 ";
     assert_eq!(
-        astray("server/src/store/mod.rs", map, &exists),
-        ["server/src/store/mod.rs:11: there is no `lost`"]
+        astray("server/store/src/lib.rs", map, &exists),
+        ["server/store/src/lib.rs:11: there is no `lost`"]
     );
 }
 

@@ -20,7 +20,7 @@ struct Reserved {
 #[rustfmt::skip]
 const RESERVED: &[Reserved] = &[
     Reserved { path: "faer",        within: "",       only: &["solver/src/linear/"] },
-    Reserved { path: "rusqlite",    within: "",       only: &["server/src/store/"] },
+    Reserved { path: "rusqlite",    within: "",       only: &["server/store/src/"] },
     Reserved { path: "std::time",   within: "solver/", only: &[] },
     Reserved { path: "std::thread", within: "solver/", only: &["solver/src/linear/parallel.rs"] },
     Reserved { path: "std::fs",     within: "solver/", only: &[] },
@@ -32,7 +32,7 @@ const RESERVED: &[Reserved] = &[
     Reserved { path: "crate::mesh",     within: "solver/src/friction/",   only: &[] },
     Reserved { path: "crate::contact",  within: "solver/src/elasticity/", only: &[] },
     Reserved { path: "crate::friction", within: "solver/src/elasticity/", only: &[] },
-    Reserved { path: "crate::pb",   within: "",       only: &["server/src/grpc/", "server/src/convert/", "server/src/codec.rs", "server/src/cli/demo.rs"] },
+    Reserved { path: "crate::pb",   within: "",       only: &["server/rpc/src/", "server/cli/src/demo.rs"] },
 ];
 
 /// Everything that is wrong, sorted.
@@ -51,7 +51,10 @@ pub(crate) fn broken(tree: &Tree, floors: &Floors) -> Vec<String> {
 fn unknown_rooms(tree: &Tree, floors: &Floors) -> Vec<String> {
     let mut found = Vec::new();
     for krate in floors.crates() {
-        let (built, drawn) = (tree.rooms(krate), floors.rooms(krate));
+        let (mut built, drawn) = (tree.rooms(krate), floors.rooms(krate));
+        if floors.is_one_room(krate) {
+            built.retain(|room| drawn.contains(room));
+        }
         let missing = built.difference(&drawn);
         found.extend(
             missing.map(|room| format!("ARCHITECTURE.md: `{room}` of `{krate}` is missing")),
@@ -68,15 +71,18 @@ fn upward(uses: &[Use], floors: &Floors) -> Vec<String> {
     let mut found: BTreeMap<(&str, String), &Use> = BTreeMap::new();
     for used in uses {
         let from = &used.from;
-        let own = floors.of(&from.krate, from.room());
+        let from_room = room(from, floors);
+        let own = floors.of(&from.krate, from_room);
         for to in &used.through {
-            let inside = (&to.krate, to.room()) == (&from.krate, from.room());
+            let to_room = room(to, floors);
+            let inside = (&to.krate, to_room) == (&from.krate, from_room);
             // who has no floor has been named already
-            if let (false, Some(own), Some(to_floor)) =
-                (inside, own, floors.of(&to.krate, to.room()))
+            if let (false, Some(own), Some(to_floor)) = (inside, own, floors.of(&to.krate, to_room))
                 && to_floor <= own
             {
-                let wrong = found.entry((&used.file, name_of(to))).or_insert(used);
+                let wrong = found
+                    .entry((&used.file, name_of(to, floors)))
+                    .or_insert(used);
                 if used.line < wrong.line {
                     *wrong = used;
                 }
@@ -92,14 +98,23 @@ fn upward(uses: &[Use], floors: &Floors) -> Vec<String> {
         } = used;
         format!(
             "{file}:{line}: `{written}` leads from {} to {to}, which is no lower floor",
-            name_of(from)
+            name_of(from, floors)
         )
     });
     lines.collect()
 }
 
-fn name_of(place: &Place) -> String {
-    format!("`{}` of `{}`", place.room(), place.krate)
+/// The room of a module as the page draws it.
+fn room<'a>(place: &'a Place, floors: &Floors) -> &'a str {
+    match place.room() {
+        "main" => "main",
+        _ if floors.is_one_room(&place.krate) => "lib",
+        room => room,
+    }
+}
+
+fn name_of(place: &Place, floors: &Floors) -> String {
+    format!("`{}` of `{}`", room(place, floors), place.krate)
 }
 
 /// What only some may name.
@@ -178,7 +193,7 @@ fn circular(uses: &[Use], tree: &Tree) -> Vec<String> {
                     )
                 })
                 .collect();
-            let place = [&[format!("{}/src", folder.krate)], &folder.path[..]].concat();
+            let place = [&[tree.sources(&folder.krate)], &folder.path[..]].concat();
             found.push(format!(
                 "{}/: a circle of {}{}",
                 place.join("/"),

@@ -209,6 +209,7 @@ fn import(tokens: &mut Tokens<'_>, prefix: &[String], public: bool, imports: &mu
             "as" => name = tokens.next().map(|token| token.text.to_owned()),
             "self" if !path.is_empty() => line = token.line,
             "*" => name = Some("*".to_owned()),
+            "::" if path.is_empty() => path.push(String::new()),
             "::" => {}
             "," | ";" => break,
             _ => {
@@ -235,6 +236,7 @@ fn imports_paths_and_items_are_found_and_tests_are_not() {
         "
         pub(crate) use self::a::{self, b::C as D, e::*};
         use super::f;
+        use ::x::y;
         #[cfg(test)]
         mod tests { use crate::nothing; }
         #[cfg(test)]
@@ -256,7 +258,8 @@ fn imports_paths_and_items_are_found_and_tests_are_not() {
             "a=self::a true",
             "D=self::a::b::C true",
             "*=self::a::e true",
-            "f=super::f false"
+            "f=super::f false",
+            "y=::x::y false"
         ]
     );
     assert_eq!(module.declared, ["g"]);

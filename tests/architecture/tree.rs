@@ -61,20 +61,21 @@ pub(crate) struct Use {
 pub(crate) struct Tree {
     modules: BTreeMap<Place, Module>,
     files: BTreeMap<Place, String>,
-    /// Crates by the name that others use: `service` is `server`.
-    names: BTreeMap<String, String>,
+    /// Folders of the crates, by name.
+    crates: BTreeMap<String, String>,
 }
 
 impl Tree {
-    /// Reads `folder/src` of each crate, with the name that its library has.
-    pub(crate) fn read(sources: &Sources, crates: &[(&str, &str)]) -> Tree {
+    /// Reads `folder/src` of each crate, whose library has the name of the folder.
+    pub(crate) fn read(sources: &Sources, folders: &[&str]) -> Tree {
         let mut tree = Tree::default();
-        for (folder, name) in crates {
-            tree.names.insert((*name).to_owned(), (*folder).to_owned());
+        for folder in folders {
+            let name = folder.rsplit('/').next().unwrap_or_default();
+            tree.crates.insert(name.to_owned(), (*folder).to_owned());
             for (root, path) in [("lib", vec![]), ("main", vec!["main".to_owned()])] {
                 let file = format!("{folder}/src/{root}.rs");
                 if sources.contains_key(&file) {
-                    let krate = (*folder).to_owned();
+                    let krate = name.to_owned();
                     let beside = format!("{folder}/src");
                     tree.file(sources, Place { krate, path }, file, &beside);
                 }
@@ -116,6 +117,11 @@ impl Tree {
     pub(crate) fn rooms(&self, krate: &str) -> BTreeSet<&str> {
         let of_it = self.modules.keys().filter(|place| place.krate == krate);
         of_it.map(Place::room).collect()
+    }
+
+    /// The folder of the sources of a crate.
+    pub(crate) fn sources(&self, krate: &str) -> String {
+        format!("{}/src", self.crates[krate])
     }
 
     /// Whether a module has a file of its own.
@@ -195,19 +201,26 @@ impl Tree {
             "crate" => Place::top(&place.krate),
             "self" => place.clone(),
             "super" => place.parent(),
+            // `::name` is a crate, whatever is here
+            "" => match rest.split_first() {
+                Some((krate, rest)) if self.crates.contains_key(krate) => {
+                    return self.inside(Place::top(krate), rest, through, turns);
+                }
+                _ => return Some(rest.to_vec()),
+            },
             name if self.modules.contains_key(&place.child(name)) => place.child(name),
             name => {
                 let import = module.imports.iter().find(|import| import.name == name);
                 // `use a::a` does not import itself
                 let import = import.filter(|import| !import.path.starts_with(path));
                 let import = import.or_else(|| self.behind_a_star(place, module, name));
-                return match (import, self.names.get(name)) {
+                return match (import, self.crates.get_key_value(name)) {
                     (Some(import), _) if turns < MOST_TURNS => {
                         let rest = if import.name == "*" { path } else { rest };
                         let path = [&import.path, rest].concat();
                         self.follow(place, &path, through, turns + 1)
                     }
-                    (_, Some(krate)) if *krate != place.krate || place.room() == "main" => {
+                    (_, Some((krate, _))) if *krate != place.krate || place.room() == "main" => {
                         self.inside(Place::top(krate), rest, through, turns)
                     }
                     _ if module.defined.contains(name) => None,
@@ -258,7 +271,7 @@ impl Tree {
         let is_ours = |first: &str| {
             matches!(first, "crate" | "self" | "super")
                 || self.modules.contains_key(&at.child(first))
-                || self.names.contains_key(first)
+                || self.crates.contains_key(first)
         };
         let mut stars = module.imports.iter().filter(|import| import.name == "*");
         stars.find(|star| {

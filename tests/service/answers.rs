@@ -1,8 +1,8 @@
 //! What an answer says of itself: warnings on a job, partial results, links to plots, merge patches, compression.
 
 use reqwest::{Method, StatusCode, header};
+use rpc::pb::{self, job_service_client::JobServiceClient};
 use serde_json::{Value, json};
-use service::pb::{self, job_service_client::JobServiceClient};
 use suite::{
     example_json,
     harness::{Server, answer, block},

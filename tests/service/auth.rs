@@ -6,9 +6,9 @@ use std::{
 };
 
 use reqwest::{Method, StatusCode};
+use rpc::pb::{self, job_service_client::JobServiceClient};
 use rusqlite::Connection;
 use serde_json::{Value, json};
-use service::pb::{self, job_service_client::JobServiceClient};
 use suite::{example_json, harness::Server};
 use tonic::{Code, Request, client::Grpc, codegen::http::uri::PathAndQuery, transport::Channel};
 use tonic_prost::ProstCodec;

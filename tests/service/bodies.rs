@@ -1,7 +1,7 @@
 //! Jobs on a body that an earlier job has left.
 
+use rpc::pb;
 use serde_json::{Value, json};
-use service::pb;
 use suite::{
     example_json,
     harness::{Server, answer},

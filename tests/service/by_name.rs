@@ -3,13 +3,14 @@
 
 use std::collections::BTreeSet;
 
+use base::time::Time;
 use prost::Message;
 use prost_reflect::{
     DescriptorPool, DynamicMessage, EnumDescriptor, FieldDescriptor, Kind, MapKey,
     MessageDescriptor, ReflectMessage, Value,
 };
+use rpc::pb;
 use serde_json::{Map, Value as Json, json};
-use service::{pb, time::Time};
 
 /// A message of the contract.
 pub(crate) fn descriptor(name: &str) -> MessageDescriptor {

@@ -1,7 +1,7 @@
 //! Answers from earlier results, and jobs that share one solution.
 
+use rpc::pb;
 use serde_json::{Value, json};
-use service::pb;
 use suite::{
     example, example_json,
     harness::{Server, block},

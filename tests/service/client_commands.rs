@@ -68,7 +68,7 @@ fn ids(text: &str) -> Vec<String> {
 
 fn examples(file: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../examples")
+        .join("../../examples")
         .join(file)
 }
 

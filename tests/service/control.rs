@@ -1,8 +1,8 @@
 //! Control of jobs and of the queue: retry, edit, delete, bulk operations, pause.
 
 use reqwest::{Method, StatusCode};
+use rpc::pb;
 use serde_json::{Value, json};
-use service::pb;
 use suite::{
     example_json,
     harness::{Server, answer, block, large},

@@ -2,13 +2,14 @@
 //! The messages are made from the contract alone, with a different value in every field: two fields of the same
 //! type that are interchanged are found, and new fields are included automatically.
 
+use base::{event::Event, job::Job, mesh::MeshInfo, run};
 use prost::Message;
 use prost_reflect::{
     DynamicMessage, EnumDescriptor, FieldDescriptor, Kind, MapKey, MessageDescriptor, Value,
 };
+use rpc::{convert, pb};
 use serde::de::DeserializeOwned;
 use serde_json::{Value as Json, json};
-use service::{convert, event::Event, job::Job, mesh::MeshInfo, pb, run};
 use solver::{
     error::Violation,
     problem::Problem,

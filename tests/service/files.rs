@@ -2,7 +2,7 @@
 
 use base64::{Engine, engine::general_purpose::STANDARD};
 use reqwest::StatusCode;
-use service::pb;
+use rpc::pb;
 use sha2::{Digest, Sha256};
 use suite::harness::block;
 use tonic::Code;

@@ -1,8 +1,8 @@
 //! Calls of `signorini.v1.JobService`, health and reflection.
 
 use reqwest::StatusCode;
+use rpc::pb::{self, job_service_client::JobServiceClient};
 use serde_json::{Value, json};
-use service::pb::{self, job_service_client::JobServiceClient};
 use suite::{
     example, example_json,
     harness::{Server, answer, large},

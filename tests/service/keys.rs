@@ -1,8 +1,8 @@
 //! Repeated requests: idempotency keys, and ids chosen by the client.
 
 use reqwest::StatusCode;
+use rpc::pb;
 use serde_json::{Value, json};
-use service::pb;
 use suite::{example, example_json, harness::answer};
 use tonic::Code;
 

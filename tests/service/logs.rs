@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use reqwest::StatusCode;
+use rpc::pb::{self, job_service_client::JobServiceClient};
 use serde_json::{Value, json};
-use service::pb::{self, job_service_client::JobServiceClient};
 use suite::{example_json, harness::Server};
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},

@@ -1,8 +1,8 @@
 //! Stored meshes: uploaded once, over either protocol, and referred to by jobs.
 
 use reqwest::StatusCode;
+use rpc::pb;
 use serde_json::{Value, json};
-use service::pb;
 use suite::{
     harness::{Server, answer},
     pressed,
@@ -12,7 +12,7 @@ use tonic::Code;
 use crate::{SIGNORINI, by_name, grpc::connect, server};
 
 pub(crate) fn file(name: &str) -> Vec<u8> {
-    let path = format!("{}/../tests/data/{name}", env!("CARGO_MANIFEST_DIR"));
+    let path = format!("{}/../../tests/data/{name}", env!("CARGO_MANIFEST_DIR"));
     std::fs::read(&path).unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 

@@ -2,8 +2,8 @@
 
 use std::process::Command;
 
+use rpc::pb;
 use serde_json::{Value, json};
-use service::pb;
 use suite::{
     example, example_json,
     harness::{Server, soon},

@@ -1,8 +1,8 @@
 //! Results of a job: /result, /history, /profiles/{boundary}, /fields.
 
 use reqwest::StatusCode;
+use rpc::pb;
 use serde_json::{Value, json};
-use service::pb;
 use suite::{
     example_json,
     harness::{Server, block, large},

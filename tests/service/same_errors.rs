@@ -1,8 +1,8 @@
 //! Both protocols reject the same requests, with the same code, the same message and the same list of violations.
 
 use reqwest::Method;
+use rpc::pb;
 use serde_json::{Value, json};
-use service::pb;
 use suite::{example, example_json, harness::soon};
 use tonic::{Response, Status};
 use tonic_types::StatusExt;

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use futures_util::{StreamExt, stream::FuturesUnordered};
 use reqwest::StatusCode;
+use rpc::pb::{self, job_service_client::JobServiceClient};
 use serde_json::{Value, json};
-use service::pb::{self, job_service_client::JobServiceClient};
 use suite::{
     example_json,
     harness::{Server, soon},

@@ -45,7 +45,7 @@ fn a_converged_problem_is_summarized_and_exits_with_0() {
 fn files_of_other_systems_are_solved() {
     let folder = tempfile::tempdir().unwrap();
     let path = format!(
-        "{}/../tests/data/abaqus/ring-cpe8.inp",
+        "{}/../../tests/data/abaqus/ring-cpe8.inp",
         env!("CARGO_MANIFEST_DIR")
     );
     let deck = std::fs::read_to_string(path).unwrap();
@@ -203,7 +203,10 @@ fn the_help_lists_every_exit_code() {
         "{warning}"
     );
     assert!(help(&["explain"]).contains("mesh_too_coarse_for_radius"));
-    let sweep = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/sweeps/sheet.json");
+    let sweep = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../examples/sweeps/sheet.json"
+    );
     let sweep = Command::new(SIGNORINI)
         .args(["solve", sweep])
         .output()

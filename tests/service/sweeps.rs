@@ -3,8 +3,8 @@
 use std::{collections::BTreeSet, process::Command};
 
 use reqwest::{Method, StatusCode};
+use rpc::pb;
 use serde_json::{Value, json};
-use service::pb;
 use suite::{
     example, example_json,
     harness::{Server, answer, block},
@@ -783,7 +783,7 @@ fn the_command_solves_a_sweep_without_a_server() {
 /// The command and the service give the same table, and the examples are sweeps.
 #[tokio::test]
 async fn the_examples_are_solved() {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/sweeps");
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/sweeps");
     let table = |name: &str| {
         let file = format!("{folder}/{name}.json");
         let output = Command::new(SIGNORINI)

@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+use rpc::pb;
 use serde_json::{Value, json};
-use service::pb;
 use suite::{
     example_json,
     harness::{Server, block},

@@ -3,8 +3,8 @@
 use std::time::{Duration, Instant};
 
 use reqwest::StatusCode;
+use rpc::pb;
 use serde_json::{Value, json};
-use service::pb;
 use suite::{
     example, example_json,
     harness::{Server, answer},

@@ -87,7 +87,7 @@ async fn a_stream_from_beyond_the_last_event_ends_with_the_job() {
     let id = server.submit(&example_json("sheet")).await; // waits behind it
     let mut by_rest = server.events(&id, 1_000_000).await;
     let mut grpc = crate::grpc::connect(&server).await;
-    let request = service::pb::WatchJobRequest {
+    let request = rpc::pb::WatchJobRequest {
         id: id.clone(),
         after_seq: 1_000_000,
     };

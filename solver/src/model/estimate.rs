@@ -261,7 +261,7 @@ impl Size {
     }
 
     /// The cost for this size. The constants of memory are compared with measurements by
-    /// `server/src/queue/tests/estimates.rs`, those of time by `tests/bench/estimates.py`.
+    /// `server/service/src/queue/tests/estimates.rs`, those of time by `tests/bench/estimates.py`.
     fn estimate(&self, margin: f64) -> Estimate {
         let dofs = 2.0 * self.nodes;
         let contact = self.contact;

@@ -1,0 +1,292 @@
+//! The running service: opens the store, requeues the jobs that a crash interrupted, starts the queue, listens,
+//! and stops in reverse order.
+
+use std::{
+    env,
+    net::SocketAddr,
+    os::unix::process::CommandExt,
+    path::Path,
+    process::Command,
+    sync::{Arc, OnceLock},
+    time::Duration,
+};
+
+use anyhow::Context;
+use base::{
+    address,
+    memory::Budget,
+    text::{number_of, size},
+};
+use futures_util::future::BoxFuture;
+use rpc::grpc;
+use service::{
+    config::{Config, Isolation, LogFormat},
+    queue::{self, Processes, Queue, Solver},
+    spans::{self, Exporting},
+    verbs::Service,
+};
+use store::{Retention, Store, StoreError};
+use tokio::{
+    task::JoinHandle,
+    time::{Instant, timeout_at},
+};
+use tokio_util::sync::CancellationToken;
+use tonic_health::server::HealthReporter;
+use tracing::{info, warn};
+use web::{
+    listener::{self, Listener, Tls},
+    rest,
+};
+
+/// The running service, which listens on its address.
+#[derive(Debug)]
+pub struct App {
+    address: SocketAddr,
+    store: Arc<Store>,
+    queue: Arc<Queue>,
+    health: HealthReporter,
+    /// Closes the listener, then the connections one by one.
+    closing: CancellationToken,
+    server: JoinHandle<()>,
+    grace: Duration,
+    tls: Option<Arc<Tls>>,
+    /// Sends spans, if that is configured.
+    exporting: Option<Exporting>,
+}
+
+/// Tells whether the service is alive.
+#[derive(Clone, Debug)]
+pub struct Pulse {
+    store: Arc<Store>,
+    queue: Arc<Queue>,
+}
+
+impl Pulse {
+    /// Returns when the store has answered; false if it will not answer.
+    pub async fn store_answers(&self) -> bool {
+        self.store.answers().await
+    }
+
+    /// What the service is doing, in a few words.
+    pub fn status(&self) -> String {
+        let queue::State {
+            paused,
+            queued,
+            running,
+            ..
+        } = self.queue.state();
+        let paused = if paused { ", the queue is paused" } else { "" };
+        format!(
+            "{} running, {queued} waiting{paused}",
+            number_of(running, "job")
+        )
+    }
+}
+
+/// The time that the store has to close, even if there is no grace.
+const LEAST_FOR_STORE: Duration = Duration::from_millis(500);
+
+/// The service cannot listen at this address.
+#[derive(Clone, Copy, Debug, thiserror::Error)]
+#[error("cannot listen on {0}")]
+pub struct CannotListen(SocketAddr);
+
+/// The argument of the program that makes it a worker process.
+pub const WORKER: &str = "worker";
+
+/// The format of this process's log, and of the logs of its worker processes, which go to the same place.
+static LOG_FORMAT: OnceLock<LogFormat> = OnceLock::new();
+
+/// The command that starts this program as a worker process.
+fn worker_process() -> Command {
+    // it leads to the running program even after an upgrade has replaced the file
+    const LINUX: &str = "/proc/self/exe";
+    let program = if Path::new(LINUX).exists() {
+        LINUX.into()
+    } else {
+        env::current_exe().unwrap_or_else(|_| env!("CARGO_PKG_NAME").into())
+    };
+    let mut command = Command::new(program);
+    command.arg0(env!("CARGO_PKG_NAME")).arg(WORKER); // as `ps` shows it
+    if let Some(format) = LOG_FORMAT.get() {
+        command.env("SIGNORINI_LOG_FORMAT", format.to_string());
+    }
+    command
+}
+
+/// Requeues the jobs, and removes the uploads, that were interrupted when the service last ended. Jobs that cannot be
+/// requeued yet are requeued by the queue later.
+async fn clean_up(store: &Arc<Store>) -> store::Result<()> {
+    store.requeue_interrupted().await?;
+    let pieces = match store.discard_unattached().await {
+        Err(StoreError::Damaged(_)) => 0, // the log has it; nothing was removed
+        pieces => pieces?,
+    };
+    if pieces > 0 {
+        info!(
+            pieces,
+            "{pieces} pieces of meshes and results were removed, which were being written when the service ended"
+        );
+    }
+    Ok(())
+}
+
+/// How long jobs are kept, and how many; 0 means no limit.
+fn retention(config: &Config) -> Retention {
+    let limits = &config.retention;
+    let seconds = |days: f64| (days > 0.0).then_some(days * 86_400.0);
+    let count = |count: u64| (count > 0).then_some(count);
+    Retention {
+        age_s: seconds(limits.retain_days),
+        fields_age_s: seconds(limits.retain_fields_days),
+        jobs: count(limits.retain_jobs),
+        bytes: count(limits.retain_bytes),
+        jobs_of_owner: count(limits.retain_jobs_per_owner),
+        bytes_of_owner: count(limits.retain_bytes_per_owner),
+    }
+}
+
+/// The service would be reachable from other machines without any authentication.
+#[derive(Clone, Copy, Debug, thiserror::Error)]
+#[error(
+    "{0} can be reached from other machines, and there is no token: anyone who reaches it could do everything. Create a token \
+     first (`signorini token create --help`), or name a proxy that identifies users (--trusted-proxy), or listen on \
+     127.0.0.1; --allow-unauthenticated starts it anyway"
+)]
+pub struct OpenToAll(SocketAddr);
+
+fn refuse_open(config: &Config, store: &Store) -> Result<(), OpenToAll> {
+    let closed = config.listen.ip().to_canonical().is_loopback()
+        || store.has_tokens()
+        || config.trust.is_on();
+    if closed || config.allow_unauthenticated {
+        Ok(())
+    } else {
+        Err(OpenToAll(config.listen))
+    }
+}
+
+impl App {
+    /// Starts all parts. When this returns, the service answers at its address.
+    pub fn start(config: &Config) -> BoxFuture<'_, anyhow::Result<App>> {
+        Box::pin(App::started(config))
+    }
+
+    async fn started(config: &Config) -> anyhow::Result<App> {
+        address::set_prefix(&config.web.path_prefix);
+        let tls = config.tls.files()?.map(Tls::read).transpose()?;
+        let store = Store::open(&config.store.data).await?;
+        // Before the listener opens: no client sees a job as running that no worker solves.
+        match clean_up(&store).await {
+            Ok(()) => {}
+            Err(StoreError::Full) => warn!(
+                "the disk is full: interrupted jobs are requeued as soon as that can be written"
+            ),
+            Err(error) => return Err(store::with_advice(error, &config.store.data).into()),
+        }
+        let (bytes, of_bodies) = (config.memory.bytes(), config.body_cache_bytes());
+        store.set_budget(Budget::new(bytes, config.workers, of_bodies));
+        if let Some(most) = config.max_running_per_owner {
+            store.set_most_running_of_owner(most.into());
+        }
+        let _ = LOG_FORMAT.set(config.telemetry.log_format); // there is one service in a process, but in tests
+        let solver = match config.isolation {
+            Isolation::Thread => Solver::Threads(solver::solve_on),
+            Isolation::Process => Solver::Processes(Processes::new(worker_process)),
+        };
+        refuse_open(config, &store)?;
+        let exporting = match &config.telemetry.otlp_endpoint {
+            Some(endpoint) => Some(spans::start(endpoint).context("spans cannot be sent")?),
+            None => None,
+        };
+        let queue = Queue::new(store.clone(), solver, config.workers);
+        let service = Arc::new(Service::new(config, store.clone(), queue.clone()));
+        let (grpc, health) = grpc::router(service.clone()).await?;
+        let router = rest::router(service, grpc);
+
+        let most = listener::most_connections(config.max_connections);
+        let listener = Listener::bind(config.listen, most, tls.clone())
+            .with_context(|| CannotListen(config.listen))?;
+        let address = listener.address()?;
+        let closing = CancellationToken::new();
+        let server = tokio::spawn(listener.serve(router, closing.clone()));
+        queue.start();
+        tokio::spawn(store::keep_within(
+            Arc::downgrade(&store),
+            retention(config),
+        ));
+        let (version, data) = (env!("CARGO_PKG_VERSION"), config.store.data.display());
+        let (isolation, budget) = (config.isolation, size(config.memory.bytes()));
+        let workers = number_of(config.workers.into(), "worker");
+        info!(
+            %address, version, %data, workers = config.workers, %isolation, budget,
+            "listening on {address}: version {version}, store in {data}, {workers}, isolation {isolation}, {budget} of \
+             memory for jobs"
+        );
+        if config.allow_unauthenticated && !store.has_tokens() && !config.trust.is_on() {
+            warn!(%address, "anyone who can reach {address} can do everything: there is no token");
+        }
+        Ok(App {
+            address,
+            store,
+            queue,
+            health,
+            closing,
+            server,
+            grace: Duration::from_secs(config.grace_s),
+            tls,
+            exporting,
+        })
+    }
+
+    /// A handle that tells whether the service is alive.
+    pub fn pulse(&self) -> Pulse {
+        Pulse {
+            store: self.store.clone(),
+            queue: self.queue.clone(),
+        }
+    }
+
+    /// The address of the service.
+    pub fn url(&self) -> String {
+        let scheme = if self.tls.is_some() { "https" } else { "http" };
+        format!("{scheme}://{}", self.address)
+    }
+
+    /// The certificate of the service, if it uses TLS.
+    pub fn tls(&self) -> Option<Arc<Tls>> {
+        self.tls.clone()
+    }
+
+    /// Stops in the order that loses nothing: starts no more jobs, requeues the running ones, ends the streams,
+    /// answers open requests, closes the store. Solvers may still run on their threads when this returns; their
+    /// results are dropped.
+    pub fn stop(self) -> BoxFuture<'static, ()> {
+        Box::pin(self.end())
+    }
+
+    async fn end(self) {
+        let end = Instant::now() + self.grace;
+        grpc::report_draining(&self.health).await;
+        self.queue.drain().await;
+        self.closing.cancel();
+        match timeout_at(end, self.server).await {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => warn!(%error, "the listener ended with an error: {error}"),
+            Err(_) => warn!("connections still open after the grace time are closed"),
+        }
+        // The recorder of an unresponsive solver may hold a statement; what it writes no longer counts. A disk may take long to
+        // flush what is copied from the log: nobody waits for the rest of the grace time.
+        let end = end.max(Instant::now() + LEAST_FOR_STORE);
+        if timeout_at(end, self.store.close()).await.is_err() {
+            warn!(
+                "the store did not close in time: everything that was acknowledged is in it, but its next start takes this for a \
+                 crash"
+            );
+        }
+        if let Some(exporting) = self.exporting {
+            exporting.stop().await;
+        }
+        info!("stopped");
+    }
+}

@@ -1,0 +1,519 @@
+//! The fingerprints of a problem (`input_hash`) and of a result (`digest`) are the SHA-256 of canonical JSON (RFC
+//! 8785), so that any client in any language can check them. The fingerprint of a body is used within one process only.
+
+mod number;
+
+use std::io::{self, Write};
+
+use number::{ROOM, Recent};
+use serde::Serialize;
+use serde_json::json;
+use sha2::{Digest, Sha256};
+use solver::body::Source;
+use solver::element::Element;
+use solver::model::Model;
+use solver::problem::{InlineMesh, MeshInput, MeshSource, Problem};
+use solver::solution::{Fields, GaussFields, Solution};
+
+use crate::bodies::Key;
+
+/// The fingerprint of a problem with its defaults filled in. The title is for people and not included. Units are
+/// included: problems are stored once per fingerprint, and figures show their units.
+pub fn input_hash(problem: &Problem) -> serde_json::Result<String> {
+    let mut hash = Hash::new();
+    hash.problem(problem)?;
+    Ok(hash.finish())
+}
+
+/// The fingerprint of anything that has a canonical form.
+pub fn of_json(value: &impl Serialize) -> serde_json::Result<String> {
+    let mut hash = Hash::new();
+    hash.json(value)?;
+    Ok(hash.finish())
+}
+
+/// The fingerprint of everything that a model's body is made from. It uses a binary form, not JSON: it never leaves
+/// this process, and the canonical writer would hold a large mesh as text.
+pub fn of_body(model: &Model) -> postcard::Result<Key> {
+    let hash = postcard::to_io(&Source::of(model), Hash::new())?;
+    Ok(hash.sha256().finalize().into())
+}
+
+/// Fingerprint of a result: equal digests mean equal bits. Times, the program's version and the statements about
+/// accuracy are not included. All numbers must be finite: others have no canonical form. `go_on` is called before every
+/// row and load step; `None` if it returns false.
+pub fn digest(
+    solution: &Solution,
+    input_hash: &str,
+    go_on: &mut dyn FnMut() -> bool,
+) -> serde_json::Result<Option<String>> {
+    let mut summary = serde_json::to_value(&solution.summary)?;
+    summary["input_hash"] = json!(input_hash);
+    if let Some(summary) = summary.as_object_mut() {
+        summary.remove("accuracy");
+    }
+    // The outermost object and the fields are written by hand, their keys in canonical order: the canonical writer
+    // holds every object it is inside of in memory, and fields can be large.
+    let mut hash = Hash::new();
+    hash.text_of(r#"{"fields":"#);
+    hash.fields(&solution.fields)?;
+    hash.text_of(r#","history":"#);
+    if !hash.array(&solution.history, go_on)? {
+        return Ok(None);
+    }
+    hash.text_of(r#","profiles":"#).json(&solution.profiles)?;
+    hash.text_of(r#","steps":"#);
+    if !hash.array(&solution.steps, go_on)? {
+        return Ok(None);
+    }
+    hash.text_of(r#","summary":"#).json(&summary)?;
+    hash.text_of("}");
+    Ok(Some(hash.finish()))
+}
+
+/// A finished hash as text.
+pub fn sha256_text(hash: Sha256) -> String {
+    format!("sha256:{}", hex(&hash.finalize()))
+}
+
+/// Two lower-case hexadecimal digits for each byte.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// The number of bytes that are hashed at once.
+const AT_ONCE: usize = 1 << 14;
+
+/// A writer of canonical JSON that computes its SHA-256.
+struct Hash {
+    sha256: Sha256,
+    /// The text that is not hashed yet: the first `length` bytes.
+    text: Box<[u8; AT_ONCE]>,
+    length: usize,
+    recent: Recent,
+}
+
+impl Hash {
+    fn new() -> Self {
+        Hash {
+            sha256: Sha256::new(),
+            text: Box::new([0; AT_ONCE]),
+            length: 0,
+            recent: Recent::new(),
+        }
+    }
+
+    fn text_of(&mut self, text: &str) -> &mut Self {
+        self.bytes(text.as_bytes());
+        self
+    }
+
+    fn bytes(&mut self, bytes: &[u8]) {
+        self.make_room(bytes.len());
+        match self.text[self.length..].get_mut(..bytes.len()) {
+            Some(room) => {
+                room.copy_from_slice(bytes);
+                self.length += bytes.len();
+            }
+            None => self.sha256.update(bytes),
+        }
+    }
+
+    #[inline]
+    fn byte(&mut self, byte: u8) {
+        self.make_room(1);
+        self.text[self.length] = byte;
+        self.length += 1;
+    }
+
+    /// Makes room for this many more bytes, by hashing those before them.
+    #[inline]
+    fn make_room(&mut self, bytes: usize) {
+        if self.length + bytes > AT_ONCE {
+            self.sha256.update(&self.text[..self.length]);
+            self.length = 0;
+        }
+    }
+
+    fn json(&mut self, value: &impl Serialize) -> serde_json::Result<()> {
+        serde_json_canonicalizer::to_writer(value, self)
+    }
+
+    /// Writes an array, one value after another; false if `go_on` returns false before one.
+    fn array(
+        &mut self,
+        values: &[impl Serialize],
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> serde_json::Result<bool> {
+        self.text_of("[");
+        for (number, value) in values.iter().enumerate() {
+            if !go_on() {
+                return Ok(false);
+            }
+            self.text_of(if number == 0 { "" } else { "," })
+                .json(value)?;
+        }
+        self.text_of("]");
+        Ok(true)
+    }
+
+    /// Writes a problem without its title. Its mesh is written by hand, like fields.
+    fn problem(&mut self, problem: &Problem) -> serde_json::Result<()> {
+        // all of them by name, here and below, so that a new one is not forgotten
+        let Problem {
+            analysis,
+            contacts,
+            loads,
+            materials,
+            mesh,
+            quadrature,
+            solver,
+            steps,
+            supports,
+            title: _,
+            units,
+        } = problem;
+        self.text_of(r#"{"analysis":"#).json(analysis)?;
+        self.text_of(r#","contacts":"#).json(contacts)?;
+        self.text_of(r#","loads":"#).json(loads)?;
+        self.text_of(r#","materials":"#).json(materials)?;
+        self.text_of(r#","mesh":"#);
+        self.mesh(mesh)?;
+        self.text_of(r#","quadrature":"#).json(quadrature)?;
+        self.text_of(r#","solver":"#).json(solver)?;
+        self.text_of(r#","steps":"#).json(steps)?;
+        self.text_of(r#","supports":"#).json(supports)?;
+        if let Some(units) = units {
+            self.text_of(r#","units":"#).json(units)?;
+        }
+        self.text_of("}");
+        Ok(())
+    }
+
+    fn mesh(&mut self, mesh: &MeshInput) -> serde_json::Result<()> {
+        let MeshInput {
+            boundaries: parts,
+            curves,
+            groups: ranges,
+            refine,
+            source,
+        } = mesh;
+        let MeshSource::Inline(inline) = source else {
+            return self.json(mesh);
+        };
+        self.text_of("{");
+        if !parts.is_empty() {
+            self.text_of(r#""boundaries":"#).json(parts)?;
+            self.text_of(",");
+        }
+        if !curves.is_empty() {
+            self.text_of(r#""curves":"#).json(curves)?;
+            self.text_of(",");
+        }
+        if !ranges.is_empty() {
+            self.text_of(r#""groups":"#).json(ranges)?;
+            self.text_of(",");
+        }
+        let InlineMesh {
+            boundaries,
+            elements,
+            groups,
+            node_sets,
+            nodes,
+        } = inline;
+        self.text_of(r#""inline":{"boundaries":"#)
+            .json(boundaries)?;
+        self.text_of(r#","elements":"#);
+        self.elements(elements);
+        if !groups.is_empty() {
+            self.text_of(r#","groups":"#).json(groups)?;
+        }
+        if !node_sets.is_empty() {
+            self.text_of(r#","node_sets":"#).json(node_sets)?;
+        }
+        self.text_of(r#","nodes":"#);
+        are_finite(nodes.as_flattened())?;
+        self.list(nodes, |hash, place| {
+            hash.list(place, Self::coordinate);
+        });
+        self.text_of(r#"},"refine":"#).json(refine)?;
+        self.text_of("}");
+        Ok(())
+    }
+
+    fn fields(&mut self, fields: &Fields) -> serde_json::Result<()> {
+        // all of them by name, so that a new one is not forgotten here
+        let Fields {
+            contact_state,
+            element_error,
+            elements,
+            gauss,
+            stress_xx,
+            stress_xy,
+            stress_yy,
+            stress_zz,
+            ux,
+            uy,
+            x,
+            y,
+        } = fields;
+        self.text_of(r#"{"contact_state":"#);
+        self.list(contact_state, |hash, state| {
+            hash.coordinate(&f64::from(*state));
+        });
+        self.column(r#","element_error":"#, element_error)?;
+        self.text_of(r#","elements":"#);
+        self.elements(elements);
+        let GaussFields {
+            order,
+            stress_xx: at_points_xx,
+            stress_xy: at_points_xy,
+            stress_yy: at_points_yy,
+            stress_zz: at_points_zz,
+            x: points_x,
+            y: points_y,
+        } = gauss;
+        self.text_of(r#","gauss":{"order":"#).json(order)?;
+        self.column(r#","stress_xx":"#, at_points_xx)?;
+        self.column(r#","stress_xy":"#, at_points_xy)?;
+        self.column(r#","stress_yy":"#, at_points_yy)?;
+        self.column(r#","stress_zz":"#, at_points_zz)?;
+        self.coordinates(r#","x":"#, points_x)?;
+        self.coordinates(r#","y":"#, points_y)?;
+        self.column(r#"},"stress_xx":"#, stress_xx)?;
+        self.column(r#","stress_xy":"#, stress_xy)?;
+        self.column(r#","stress_yy":"#, stress_yy)?;
+        self.column(r#","stress_zz":"#, stress_zz)?;
+        self.column(r#","ux":"#, ux)?;
+        self.column(r#","uy":"#, uy)?;
+        self.coordinates(r#","x":"#, x)?;
+        self.coordinates(r#","y":"#, y)?;
+        self.text_of("}");
+        Ok(())
+    }
+
+    /// Writes a key and its list of numbers in canonical form.
+    fn column(&mut self, key: &str, numbers: &[f64]) -> serde_json::Result<()> {
+        are_finite(numbers)?;
+        self.text_of(key);
+        self.list(numbers, |hash, value| {
+            hash.number(|_, room| number::write(*value, room));
+        });
+        Ok(())
+    }
+
+    /// Writes a key and its list of numbers that repeat often.
+    fn coordinates(&mut self, key: &str, numbers: &[f64]) -> serde_json::Result<()> {
+        are_finite(numbers)?;
+        self.text_of(key);
+        self.list(numbers, Self::coordinate);
+        Ok(())
+    }
+
+    #[inline]
+    fn coordinate(&mut self, value: &f64) {
+        self.number(|recent, room| recent.write(*value, room));
+    }
+
+    fn elements(&mut self, elements: &[Element]) {
+        self.list(elements, |hash, element| {
+            hash.list(element, |hash, node| {
+                hash.number(|_, room| number::write_whole(*node, room));
+            });
+        });
+    }
+
+    /// Writes a number by `write`.
+    #[inline]
+    fn number(&mut self, write: impl FnOnce(&mut Recent, &mut [u8; ROOM]) -> usize) {
+        self.make_room(ROOM);
+        if let Some(room) = self.text[self.length..].first_chunk_mut() {
+            self.length += write(&mut self.recent, room);
+        }
+    }
+
+    #[inline]
+    fn list<T>(&mut self, items: &[T], write: impl Fn(&mut Self, &T)) {
+        self.byte(b'[');
+        for (k, item) in items.iter().enumerate() {
+            if k > 0 {
+                self.byte(b',');
+            }
+            write(self, item);
+        }
+        self.byte(b']');
+    }
+
+    fn finish(self) -> String {
+        sha256_text(self.sha256())
+    }
+
+    fn sha256(mut self) -> Sha256 {
+        self.sha256.update(&self.text[..self.length]);
+        self.sha256
+    }
+}
+
+/// Fails unless all numbers are finite: others have no canonical form.
+fn are_finite(numbers: &[f64]) -> serde_json::Result<()> {
+    match numbers.iter().find(|value| !value.is_finite()) {
+        Some(value) => {
+            let message = format!("{value} has no canonical form");
+            Err(serde::ser::Error::custom(message))
+        }
+        None => Ok(()),
+    }
+}
+
+impl Write for Hash {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.bytes(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn digest_of(solution: &Solution, input_hash: &str) -> serde_json::Result<String> {
+        Ok(digest(solution, input_hash, &mut || true)?.unwrap())
+    }
+    use std::collections::BTreeMap;
+
+    use solver::{
+        problem::{BoundaryPart, Curve, CurveKind, Elasticity, ElementRange},
+        solution::StepSolution,
+    };
+
+    #[test]
+    fn a_title_does_not_change_the_input() {
+        let problem = fake::problem();
+        let titled = Problem {
+            title: Some("other".into()),
+            ..problem.clone()
+        };
+        assert_eq!(input_hash(&problem).unwrap(), input_hash(&titled).unwrap());
+        let mut other = problem.clone();
+        other.materials[0].elasticity = Elasticity::Isotropic {
+            youngs_modulus: 1001.0,
+            poissons_ratio: 0.3,
+        };
+        assert_ne!(input_hash(&problem).unwrap(), input_hash(&other).unwrap());
+        let named = Problem {
+            units: Some(solver::problem::Units::default()),
+            ..problem.clone()
+        };
+        assert_ne!(input_hash(&problem).unwrap(), input_hash(&named).unwrap());
+    }
+
+    #[test]
+    fn the_last_bit_of_a_field_changes_a_digest() {
+        let solution = fake::solution();
+        let mut other = solution.clone();
+        other.fields.ux[0] = f64::from_bits(other.fields.ux[0].to_bits() + 1);
+        assert_ne!(
+            digest_of(&solution, "h").unwrap(),
+            digest_of(&other, "h").unwrap()
+        );
+        assert_ne!(
+            digest_of(&solution, "h").unwrap(),
+            digest_of(&solution, "i").unwrap()
+        );
+    }
+
+    #[test]
+    fn a_number_without_a_canonical_form_has_no_digest() {
+        let mut solution = fake::solution();
+        solution.fields.uy[0] = f64::NAN;
+        assert!(digest_of(&solution, "h").is_err());
+    }
+
+    #[test]
+    fn a_digest_is_the_hash_of_one_canonical_document() {
+        let mut solution = fake::solution();
+        solution.steps.push(StepSolution {
+            name: "indent".into(),
+            summary: solution.summary.clone(),
+            history: solution.history.clone(),
+            profiles: solution.profiles.clone(),
+            node_profiles: solution.node_profiles.clone(),
+            friction_profiles: solution.friction_profiles.clone(),
+        });
+        solution.fields.elements = vec![
+            Element::Quad([0, 1, 2, 3, 4, 5, 6, 4_294_967_295]),
+            Element::Triangle([10, 9, 8, 7, 6, 5]),
+        ];
+        // more numbers than are hashed at once, of every form that a number can have
+        let forms = [
+            0.0,
+            -0.0,
+            1.0,
+            -2.5,
+            1e21,
+            1e-7,
+            123456.789,
+            5e-324,
+            f64::MAX,
+            0.1 + 0.2,
+        ];
+        let numbers = (0..3000).map(|k| forms[k % forms.len()] / (1 + k / 7) as f64);
+        solution.fields.gauss.stress_xy = numbers.collect();
+        let mut document = serde_json::to_value(&solution).unwrap();
+        document["summary"]["input_hash"] = json!("h");
+        document["summary"]
+            .as_object_mut()
+            .unwrap()
+            .remove("accuracy");
+        let mut whole = Hash::new();
+        whole.json(&document).unwrap();
+        assert_eq!(digest_of(&solution, "h").unwrap(), whole.finish());
+    }
+
+    #[test]
+    fn an_input_hash_is_the_hash_of_one_canonical_problem() {
+        let mut problem = fake::problem();
+        let canonical = |problem: &Problem| {
+            let untitled = Problem {
+                title: None,
+                ..problem.clone()
+            };
+            of_json(&untitled).unwrap()
+        };
+        assert_eq!(input_hash(&problem).unwrap(), canonical(&problem));
+        problem.title = Some("of people".into());
+        problem.units = Some(solver::problem::Units::default());
+        let mut inline = InlineMesh {
+            nodes: (0..3000).map(|k| [0.1 * f64::from(k), -1e-7]).collect(),
+            elements: vec![Element::Quad([7; 8]), Element::Triangle([3; 6])],
+            boundaries: BTreeMap::from([("é\n\"".into(), vec![[0, 1, 2]])]),
+            groups: BTreeMap::new(),
+            node_sets: BTreeMap::new(),
+        };
+        for named in [false, true] {
+            problem.mesh = MeshInput::new(MeshSource::Inline(inline.clone()));
+            if named {
+                let (part, range) = (BoundaryPart::default(), ElementRange::default());
+                problem.mesh.boundaries.insert("part".into(), part);
+                problem.mesh.groups.insert("range".into(), range);
+                let curve = Curve {
+                    kind: CurveKind::Circle,
+                    center: Some([0.0, 1.0]),
+                    radius: Some(4.0),
+                };
+                problem.mesh.curves.insert("part".into(), curve);
+            }
+            assert_eq!(input_hash(&problem).unwrap(), canonical(&problem));
+            inline.groups.insert("group".into(), vec![0, 1]);
+            inline.node_sets.insert("set".into(), vec![2]);
+        }
+        inline.nodes[1][1] = f64::INFINITY;
+        problem.mesh = MeshInput::new(MeshSource::Inline(inline));
+        assert!(input_hash(&problem).is_err());
+    }
+}

@@ -1,0 +1,142 @@
+//! The events of a job, as its watchers receive them.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use solver::solution::{Iteration, Phase, Warning};
+use strum::IntoStaticStr;
+
+use crate::{
+    job::{Job, Status},
+    time::Time,
+};
+
+/// One event of a job. `seq` counts from 1 without gaps, across attempts and restarts.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Event {
+    /// The number of the event.
+    pub seq: i64,
+    /// The attempt it belongs to; 0 before the first.
+    pub attempt: i32,
+    /// The time of the event.
+    pub t: Time,
+    /// The content of the event.
+    #[serde(flatten)]
+    pub payload: Payload,
+}
+
+/// The content of an event.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema, IntoStaticStr)]
+#[serde(tag = "type", rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum Payload {
+    /// The status of the job has changed, but the job has not ended.
+    Status {
+        /// The new status.
+        status: Status,
+        /// The reason why the job was requeued.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        reason: Option<String>,
+    },
+    /// A phase of the solution has begun.
+    Stage {
+        /// The phase.
+        stage: Phase,
+    },
+    /// Adaptive refinement has begun to solve on a mesh, or returned to the one before. Iterations are reported once
+    /// the mesh is known to be the last.
+    Mesh {
+        /// The number of the mesh, from 1.
+        number: u32,
+        /// The number of its elements.
+        elements: u64,
+        /// The largest relative error on the mesh before; absent for the first mesh, and where it is unknown.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        error: Option<f64>,
+    },
+    /// An iteration.
+    Iteration(TimedIteration),
+    /// A warning about the problem or its solution.
+    Warning(Warning),
+    /// The job has ended. A job has exactly one such event, and it is the last.
+    Done {
+        /// The job in its final state.
+        job: Box<Job>,
+    },
+}
+
+/// A row of the history, and the time at which it was computed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(rename = "Iteration")]
+pub struct TimedIteration {
+    /// The row.
+    #[serde(flatten)]
+    pub row: Iteration,
+    /// Seconds from the start of the solver to the end of this iteration.
+    pub wall_s: f64,
+}
+
+impl Payload {
+    /// The value of `type`.
+    pub fn kind(&self) -> &'static str {
+        self.into()
+    }
+
+    /// A change of status.
+    pub fn status(status: Status) -> Self {
+        Payload::Status {
+            status,
+            reason: None,
+        }
+    }
+
+    /// The event that a job was requeued, with the reason.
+    pub fn requeued(reason: Requeue) -> Self {
+        Payload::Status {
+            status: Status::Queued,
+            reason: Some(<&str>::from(reason).into()),
+        }
+    }
+}
+
+/// Why a running job is requeued.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
+pub enum Requeue {
+    /// The process died while it ran.
+    WorkerLost,
+    /// The service stopped.
+    Drain,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_kind_of_an_event_is_its_type_in_json() {
+        for payload in [
+            Payload::requeued(Requeue::Drain),
+            Payload::Stage {
+                stage: Phase::Factor,
+            },
+            Payload::Mesh {
+                number: 2,
+                elements: 1200,
+                error: Some(0.04),
+            },
+            Payload::Iteration(TimedIteration {
+                row: fake::iteration(1),
+                wall_s: 0.5,
+            }),
+        ] {
+            let json = serde_json::to_value(&payload).unwrap_or_default();
+            assert_eq!(json["type"], payload.kind());
+        }
+    }
+
+    #[test]
+    fn a_lost_worker_has_the_same_name_as_event_and_as_failure() {
+        let (lost, failed) = (Requeue::WorkerLost, crate::job::Reason::WorkerLost);
+        assert_eq!(<&str>::from(lost), <&str>::from(failed));
+    }
+}

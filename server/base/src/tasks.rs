@@ -1,0 +1,67 @@
+//! Work on other threads and in tasks of their own.
+//!
+//! An async or generic function is compiled in the crate that calls it, and what tokio adds to a task is long: with work
+//! of any type in one box it is compiled once.
+
+use std::{pin::Pin, sync::Arc};
+
+use parking_lot::Mutex;
+use tokio::task::{JoinError, JoinHandle};
+
+/// The result of work, once it has ended.
+struct Slot<T>(Arc<Mutex<Option<T>>>);
+
+impl<T> Slot<T> {
+    fn new() -> Slot<T> {
+        Slot(Arc::default())
+    }
+
+    fn another(&self) -> Slot<T> {
+        Slot(self.0.clone())
+    }
+
+    fn fill(&self, result: T) {
+        *self.0.lock() = Some(result);
+    }
+
+    fn take(&self) -> T {
+        let result = self.0.lock().take();
+        result.unwrap_or_else(|| unreachable!("the work has ended without a panic"))
+    }
+}
+
+/// Runs work that may block, on a thread for that; also if nobody waits for it any more.
+///
+/// # Errors
+///
+/// The work has panicked, or tokio stops.
+pub async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<T, JoinError> {
+    let slot = Slot::new();
+    let result = slot.another();
+    on_a_thread(Box::new(move || slot.fill(work()))).await?;
+    Ok(result.take())
+}
+
+/// Runs a task that also ends if nobody waits for it any more.
+///
+/// # Errors
+///
+/// The task has panicked, or tokio stops.
+pub async fn detached<T: Send + 'static>(
+    work: impl Future<Output = T> + Send + 'static,
+) -> Result<T, JoinError> {
+    let slot = Slot::new();
+    let result = slot.another();
+    in_a_task(Box::pin(async move { slot.fill(work.await) })).await?;
+    Ok(result.take())
+}
+
+fn on_a_thread(work: Box<dyn FnOnce() + Send>) -> JoinHandle<()> {
+    tokio::task::spawn_blocking(work)
+}
+
+fn in_a_task(work: Pin<Box<dyn Future<Output = ()> + Send>>) -> JoinHandle<()> {
+    tokio::spawn(work)
+}

@@ -1,0 +1,87 @@
+//! The command `signorini explain CODE`: the meaning of the code of an error or of a warning, and what to do about it.
+
+use base::catalog::{Code, Kind, WarningKind, warning};
+use clap::Args;
+use solver::solution::WarningCode;
+use strum::VariantArray;
+
+use super::{exit::Exit, output};
+
+/// The number of letters of the longest code.
+const WIDTH: usize = 28;
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  signorini explain not_converged\n  signorini explain queue-full"
+)]
+pub(super) struct Arguments {
+    /// A code: the `code` or `type` of an error, the `reason` of a job, or the `code` of a warning; without it, all are
+    /// listed
+    code: Option<String>,
+}
+
+pub(super) fn run(Arguments { code }: &Arguments) -> anyhow::Result<Exit> {
+    let Some(code) = code else {
+        let line = |code: &Code| {
+            let Kind { code, title, .. } = code.kind();
+            format!("{code:<WIDTH$} {title}\n")
+        };
+        let errors: String = Code::VARIANTS.iter().map(line).collect();
+        let line = |code: &WarningCode| {
+            let WarningKind { code, title, .. } = warning(*code);
+            format!("{code:<WIDTH$} {title}\n")
+        };
+        let warnings: String = WarningCode::VARIANTS.iter().map(line).collect();
+        output::print(&format!(
+            "{errors}\nCodes of warnings: the result is available, but read the warning first.\n\n{warnings}"
+        ))?;
+        return Ok(Exit::Ok);
+    };
+    // a job's reason is the code with underscores; the type of an error is the address of its page
+    let word = code.rsplit('/').next().unwrap_or_default();
+    let Ok(found) = word.replace('_', "-").parse::<Code>() else {
+        let Ok(found) = word.replace('-', "_").parse::<WarningCode>() else {
+            eprintln!(
+                "signorini: there is no code {code:?}; `signorini explain` lists all of them"
+            );
+            return Ok(Exit::Invalid);
+        };
+        let WarningKind {
+            code,
+            title,
+            explanation,
+        } = warning(found);
+        output::print(&format!("{title} ({code}, a warning)\n\n{explanation}\n"))?;
+        return Ok(Exit::Ok);
+    };
+    let kind = found.kind();
+    let facts: String = kind
+        .facts()
+        .iter()
+        .map(|fact| format!("{fact}\n"))
+        .collect();
+    let Kind {
+        title,
+        code,
+        explanation,
+        ..
+    } = kind;
+    output::print(&format!("{title} ({code})\n{facts}\n{explanation}\n"))?;
+    Ok(Exit::Ok)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_warning_has_a_meaning() {
+        let all = WarningCode::VARIANTS.iter().map(|code| warning(*code));
+        let without: Vec<_> = all.filter(|kind| kind.title.len() < 10).collect();
+        assert!(without.is_empty(), "{without:?}");
+        let known = WarningCode::VARIANTS.iter().map(|code| code.as_str().len());
+        let errors = Code::VARIANTS.iter().map(|code| code.kind().code.len());
+        let longest = known.chain(errors).max();
+        assert_eq!(longest, Some(WIDTH));
+    }
+}

@@ -1,0 +1,241 @@
+//! Follows a job or a sweep to its end, also while the service is restarted.
+
+use std::{ops::ControlFlow, time::Duration};
+
+use anyhow::{Context, bail};
+use base::job::{Job, Reason, Status};
+use eventsource_stream::Eventsource;
+use futures_util::StreamExt;
+use reqwest::{Method, StatusCode, header};
+use serde_json::Value;
+use tokio::time::{Instant, sleep, sleep_until, timeout_at};
+
+use super::{
+    super::{
+        exit::Exit,
+        service::{CallError, Service, misunderstood},
+    },
+    id::Id,
+};
+
+/// How long a service that was reached before is tried again, with growing pauses.
+const PATIENCE: Duration = Duration::from_secs(300);
+const FIRST_PAUSE: Duration = Duration::from_millis(250);
+const LONGEST_PAUSE: Duration = Duration::from_secs(5);
+/// The longest time of one waiting request, in seconds, within the limit of the service: a proxy may cut a connection
+/// that is silent for a minute.
+const WAIT_S: f64 = 30.0;
+
+/// How much later an answer that is due at the end of the time to wait may come.
+const GRACE: Duration = Duration::from_secs(5);
+
+/// A time in which the service cannot be reached.
+struct Outage {
+    /// Whether the service has answered before, or a connection to it was open.
+    known: bool,
+    since: Option<Instant>,
+    pause: Duration,
+    /// The end of the time to wait.
+    deadline: Option<Instant>,
+}
+
+impl Outage {
+    fn until(deadline: Option<Instant>) -> Outage {
+        Outage {
+            known: false,
+            since: None,
+            pause: FIRST_PAUSE,
+            deadline,
+        }
+    }
+
+    fn over(&mut self) {
+        *self = Outage {
+            known: true,
+            ..Outage::until(self.deadline)
+        };
+    }
+
+    /// Waits before the next attempt, at most until the deadline; or gives up, if the error is permanent or the service
+    /// was never reached.
+    async fn bear(&mut self, error: anyhow::Error) -> anyhow::Result<()> {
+        let passing = match error.downcast_ref() {
+            Some(CallError::Unreachable { connected, .. }) => {
+                self.known |= connected;
+                self.known
+            }
+            Some(CallError::Refused(refusal)) => refusal.may_pass(),
+            None => false,
+        };
+        let now = Instant::now();
+        let since = *self.since.get_or_insert(now);
+        let last = since + PATIENCE;
+        if !passing || now > last {
+            return Err(error);
+        }
+        let end = self.deadline.map_or(last, |deadline| deadline.min(last));
+        if since == now {
+            let left = end.saturating_duration_since(now).as_secs_f64().ceil();
+            eprintln!("signorini: {error}; trying again for {left} s");
+        }
+        sleep_until((now + self.pause).min(end)).await;
+        self.pause = (self.pause * 2).min(LONGEST_PAUSE);
+        Ok(())
+    }
+}
+
+/// The result of waiting.
+pub(super) enum Waited {
+    /// The job or sweep has ended.
+    Ended(Value),
+    /// The time to wait is over; the last answer of the service, if there was one.
+    TimedOut(Option<Value>),
+}
+
+/// Waits until the job or sweep has ended, or until the deadline.
+pub(super) async fn wait(
+    service: &Service,
+    id: Id,
+    deadline: Option<Instant>,
+) -> anyhow::Result<Waited> {
+    let (mut outage, mut last) = (Outage::until(deadline), None);
+    loop {
+        let asked = Instant::now();
+        let left = deadline.map(|end| end.saturating_duration_since(asked).as_secs_f64());
+        let wait = left.map_or(WAIT_S, |left| left.min(WAIT_S));
+        let until = match id {
+            Id::Job(_) => "&until=terminal",
+            Id::Sweep(_) => "",
+        };
+        let path = format!("{}?wait={wait:.3}{until}", id.path());
+        let answer = async {
+            let answer = service.send(service.request(Method::GET, &path)).await?;
+            service.document::<Value>(answer).await
+        };
+        let answer = match deadline {
+            None => answer.await,
+            Some(end) => match timeout_at(end + GRACE, answer).await {
+                Ok(answer) => answer,
+                Err(_) => return Ok(Waited::TimedOut(last)),
+            },
+        };
+        match answer {
+            Ok(document) => {
+                let Some(status) = status_of(&document) else {
+                    bail!(
+                        "the answer to {path} has no status: is this the address of a signorini service?"
+                    );
+                };
+                if status.is_terminal() {
+                    return Ok(Waited::Ended(document));
+                }
+                outage.over();
+                last = Some(document);
+                // a service that stops answers at once, and would be asked again without a pause
+                let pause = asked + FIRST_PAUSE;
+                sleep_until(deadline.map_or(pause, |end| end.min(pause))).await;
+            }
+            Err(error) => outage.bear(error).await?,
+        }
+        if deadline.is_some_and(|end| Instant::now() >= end) {
+            return Ok(Waited::TimedOut(last));
+        }
+    }
+}
+
+/// The status of a job or a sweep.
+fn status_of(document: &Value) -> Option<Status> {
+    document["status"].as_str()?.parse().ok()
+}
+
+/// Passes on all events, each once, until there are no more.
+pub(super) async fn events(
+    service: &Service,
+    id: Id,
+    mut heard: impl FnMut(Value) -> anyhow::Result<ControlFlow<()>>,
+) -> anyhow::Result<()> {
+    let (mut outage, mut last) = (Outage::until(None), 0);
+    loop {
+        let path = format!("{}/events?after_seq={last}", id.path());
+        let request = service.request(Method::GET, &path);
+        let request = request.header(header::ACCEPT, "text/event-stream");
+        let answer = match service.send(request).await {
+            Ok(answer) if answer.status() == StatusCode::NO_CONTENT => return Ok(()),
+            Ok(answer) => answer,
+            Err(error) => {
+                outage.bear(error).await?;
+                continue;
+            }
+        };
+        let kind = answer.headers().get(header::CONTENT_TYPE);
+        if !kind.is_some_and(|kind| kind.as_bytes().starts_with(b"text/event-stream")) {
+            bail!(
+                "the answer to {path} is no stream of events: is this the address of a signorini service?"
+            );
+        }
+        outage.over();
+        let mut events = answer.bytes_stream().eventsource();
+        // a stream that breaks off is taken up again behind the last event that arrived
+        while let Some(Ok(event)) = events.next().await {
+            let event: Value =
+                serde_json::from_str(&event.data).with_context(|| misunderstood("the event"))?;
+            let Some(seq) = event["seq"].as_i64() else {
+                bail!("an event has no number: {event}");
+            };
+            if seq <= last {
+                continue;
+            }
+            last = seq;
+            if heard(event)?.is_break() {
+                return Ok(());
+            }
+        }
+        sleep(FIRST_PAUSE).await;
+    }
+}
+
+/// The exit code of a command that waited for the end of a job.
+pub(super) fn exit_of(job: &Job) -> Exit {
+    match (job.status, job.reason) {
+        (Status::Canceled, _) => Exit::Canceled,
+        (
+            Status::Failed,
+            Some(Reason::NotConverged | Reason::ContactCycling | Reason::FalseConvergence),
+        ) => Exit::NotConverged,
+        (Status::Failed, _) => Exit::Failed,
+        (Status::Succeeded | Status::Queued | Status::Running, _) => Exit::Ok,
+    }
+}
+
+/// The exit code of a command that waited for the end of this job or sweep.
+pub(super) fn exit_of_document(id: Id, document: &Value) -> anyhow::Result<Exit> {
+    if let Id::Job(_) = id {
+        return Ok(exit_of(&super::listing::job(document)?));
+    }
+    Ok(exit_of_sweep(document))
+}
+
+/// The exit code of a command that waited for the end of a sweep.
+pub(super) fn exit_of_sweep(document: &Value) -> Exit {
+    let failed = document["members"]["failed"].as_u64().unwrap_or_default();
+    match status_of(document) {
+        Some(Status::Canceled) => Exit::Canceled,
+        Some(Status::Failed) => Exit::Failed,
+        _ if failed > 0 => Exit::NotConverged,
+        _ => Exit::Ok,
+    }
+}
+
+/// Ends the process at Ctrl-C, as the signal itself would, and says that the job or sweep continues.
+pub(super) async fn detached<T>(
+    id: Id,
+    work: impl Future<Output = anyhow::Result<T>>,
+) -> anyhow::Result<T> {
+    tokio::select! {
+        done = work => done,
+        _ = tokio::signal::ctrl_c() => {
+            eprintln!("\n{id} continues; `signorini watch {id}` follows it again, `signorini cancel {id}` ends it");
+            std::process::exit(130)
+        }
+    }
+}

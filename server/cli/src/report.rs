@@ -1,0 +1,343 @@
+//! Results as text: a line for each iteration, a summary, a table of stresses.
+
+use std::fmt::Write;
+
+use base::run::{Document, Summary};
+use solver::solution::{
+    Accuracy, ContactProfile, ContactSummary, ErrorMethod, EstimatedQuantity, Iteration, NodeState,
+    Outcome, Peak, Phase, QuantityName,
+};
+
+use super::table::harmless;
+
+/// The largest number of reasons of a verdict that are shown.
+const MOST_REASONS: usize = 5;
+
+/// The text for a phase that begins.
+pub(super) fn phase(phase: Phase) -> &'static str {
+    match phase {
+        Phase::Verify => "verify: solving once more on the refined mesh",
+        phase => phase.as_str(),
+    }
+}
+
+/// The text for the present mesh of adaptive refinement.
+pub(super) fn mesh(number: u32, elements: u64, error: Option<f64>) -> String {
+    let before = error.map_or(String::new(), |error| {
+        format!("; largest error before {:.2} %", 100.0 * error)
+    });
+    format!("mesh {number}: {elements} elements{before}")
+}
+
+/// One row of the history on one line.
+pub(super) fn iteration(row: &Iteration) -> String {
+    let mut line = format!(
+        "{:>4}  {:<12}  residual {:8.2e}  friction {:8.2e}  contact {:>3} (+{} -{})",
+        row.k,
+        row.stage.as_str(),
+        row.residual,
+        row.friction_residual,
+        row.contact.active,
+        row.contact.entered,
+        row.contact.left
+    );
+    if let Some(q) = row.contraction {
+        let _ = write!(line, "  q {q:.3}");
+    }
+    if row.step + row.increment > 0 {
+        // as `?step=` and `--step` count them
+        let _ = write!(line, "  step {}", row.step);
+    }
+    if row.increment > 0 {
+        let _ = write!(line, ", increment {}", row.increment + 1);
+    }
+    line
+}
+
+/// Facts, one on each line after its name.
+pub(super) fn lines(facts: impl Iterator<Item = (impl std::fmt::Display, String)>) -> String {
+    facts
+        .map(|(name, value)| format!("{name:<20}{}\n", harmless(&value)))
+        .collect()
+}
+
+/// The text of a document: its summary with a title.
+pub(super) fn document(title: Option<&str>, document: &Document) -> String {
+    let steps = document.steps.iter();
+    let steps = steps.map(|step| (step.name.as_str(), &step.summary));
+    result(title, &document.summary, steps)
+}
+
+/// How reliable a result is, for readers of its files: verdict and warnings.
+pub(super) fn trust(document: &Document) -> String {
+    let solution = &document.summary.solution;
+    let verdict = solution.accuracy.iter().map(|accuracy| {
+        let reason = accuracy.reasons.first().map(|reason| format!(": {reason}"));
+        let verdict = accuracy.verdict.in_words();
+        (
+            "accuracy",
+            format!("{verdict}{}", reason.unwrap_or_default()),
+        )
+    });
+    let warnings = solution.warnings.iter().map(|warning| {
+        let text = format!("{}: {}", warning.pointer, warning.message);
+        ("warning", text)
+    });
+    lines(verdict.chain(warnings))
+}
+
+/// The text of a summary, and of those of its load steps by their names.
+pub(super) fn result<'a>(
+    title: Option<&str>,
+    summary: &Summary,
+    steps: impl Iterator<Item = (&'a str, &'a solver::solution::Summary)>,
+) -> String {
+    let s = &summary.solution;
+    let ended = match s.outcome {
+        Outcome::Converged => "converged",
+        Outcome::NotConverged => "NOT CONVERGED",
+        Outcome::ContactCycling => "NOT CONVERGED: the iteration repeats in a cycle",
+        Outcome::FalseConvergence => {
+            "NOT CONVERGED: the iteration converged to a state that is not a solution; see the residuals"
+        }
+        Outcome::Canceled => "CANCELED",
+    };
+    let mut text = String::new();
+    let mut line = |name: &str, value: String| {
+        let _ = writeln!(text, "{name:<20}{value}");
+    };
+    if let Some(title) = title {
+        line("title", title.into());
+    }
+    if let Some(accuracy) = &s.accuracy {
+        let verdict = accuracy.verdict.in_words();
+        let verified = match accuracy.verified {
+            Some(true) => "; compared with the refined mesh",
+            _ => "",
+        };
+        line("accuracy", format!("{verdict}{verified}"));
+        for reason in accuracy.reasons.iter().take(MOST_REASONS) {
+            line("", reason.clone());
+        }
+        if let more @ 1.. = accuracy.reasons.len().saturating_sub(MOST_REASONS) {
+            line("", format!("and {more} more, in summary.accuracy.reasons"));
+        }
+        verified_lines(accuracy, &mut line);
+    }
+    let seconds: f64 = summary.timings.values().sum();
+    line(
+        "outcome",
+        format!("{ended} after {} iterations, {seconds:.3} s", s.iterations),
+    );
+    line(
+        "unknowns",
+        format!(
+            "{}, {} of them on contact boundaries",
+            s.dofs, s.contact_dofs
+        ),
+    );
+    for (words, value, name) in [
+        ("normal force", s.normal_force, QuantityName::NormalForce),
+        (
+            "tangential force",
+            s.tangential_force,
+            QuantityName::TangentialForce,
+        ),
+        (
+            "friction force",
+            s.friction_force,
+            QuantityName::FrictionForce,
+        ),
+    ] {
+        let stated = stated(s.accuracy.as_ref(), name, None);
+        line(words, number(value) + &stated);
+    }
+    line(
+        "residuals",
+        format!(
+            "kkt {:.1e}, friction {:.1e}, monolithic {:.1e}, force balance {:.1e}",
+            s.residuals.kkt, s.residuals.friction, s.residuals.monolithic, s.residuals.equilibrium
+        ),
+    );
+    for mesh in &s.refinements {
+        let change = mesh
+            .change
+            .map_or(String::new(), |change| format!(", changed by {change:.1e}"));
+        let error = mesh.error.map_or(String::new(), |error| {
+            format!(", largest error {:.2} %", 100.0 * error)
+        });
+        line(
+            "  mesh",
+            format!(
+                "{:>6} elements: normal force {}, tangential force {}, peak σ_t {}{change}{error}",
+                mesh.elements,
+                number(mesh.normal_force),
+                number(mesh.tangential_force),
+                number(mesh.peak_tangential_stress)
+            ),
+        );
+    }
+    for (name, step) in steps {
+        line(
+            &format!("step {name:?}"),
+            format!(
+                "normal force {}, tangential force {}, {} iterations",
+                number(step.normal_force),
+                number(step.tangential_force),
+                step.iterations
+            ),
+        );
+    }
+    if let Some(second) = &s.uniqueness {
+        let found = match (second.converged, second.agrees) {
+            (false, _) => "unknown: from the bonded state the method does not converge".to_string(),
+            (true, true) => {
+                "yes: from the bonded state the solver finds the same solution".to_string()
+            }
+            (true, false) => format!(
+                "NOT UNIQUE: from the bonded state the solver finds a normal force of {}",
+                number(second.normal_force)
+            ),
+        };
+        line("unique", found);
+    }
+    for (name, contact) in &s.contacts {
+        contact_lines(name, contact, s.accuracy.as_ref(), &mut line);
+    }
+    for warning in &s.warnings {
+        line(
+            "warning",
+            format!("{}: {}", warning.pointer, warning.message),
+        );
+    }
+    line("digest", summary.digest.clone());
+    text
+}
+
+/// Prints a line for each quantity that was compared with the refined mesh.
+fn verified_lines(accuracy: &Accuracy, line: &mut impl FnMut(&str, String)) {
+    for q in &accuracy.quantities {
+        let (Some(finer), Some(difference)) = (q.finer, q.difference) else {
+            continue;
+        };
+        let order = q
+            .order
+            .map_or(String::new(), |order| format!(", order {order:.1}"));
+        let error = match (q.error, q.method) {
+            (Some(error), _) => format!("stated error {error:.1e}"),
+            (None, ErrorMethod::NoLimit) => "without a limit".to_owned(),
+            (None, ErrorMethod::TooMany) => "no stated error".to_owned(),
+            (None, _) => "error unknown".to_owned(),
+        };
+        line(
+            "  verified",
+            format!(
+                "{} at {:?}: {}, on the refined mesh {}, difference {difference:.1e}{order}; {error}",
+                <&str>::from(q.quantity),
+                q.contact,
+                number(q.value),
+                number(finer),
+            ),
+        );
+    }
+}
+
+/// A number with six digits, without an exponent where that is readable.
+pub(super) fn number(value: f64) -> String {
+    if value == 0.0 {
+        "0".to_string()
+    } else if (1e-3..1e7).contains(&value.abs()) {
+        let before_point = value.abs().log10().floor().max(0.0) as usize + 1;
+        format!("{value:.*}", 7_usize.saturating_sub(before_point))
+    } else {
+        format!("{value:.6e}")
+    }
+}
+
+fn contact_lines(
+    name: &str,
+    contact: &ContactSummary,
+    accuracy: Option<&Accuracy>,
+    line: &mut impl FnMut(&str, String),
+) {
+    let ranges = |ranges: &[[f64; 2]]| {
+        let ranges: Vec<String> = ranges
+            .iter()
+            .map(|[start, end]| format!("{start:.4} … {end:.4}"))
+            .collect();
+        if ranges.is_empty() {
+            "nowhere".to_string()
+        } else {
+            ranges.join(", ")
+        }
+    };
+    let peak = |peak: &Peak| format!("{} at s = {:.4}", number(peak.value), peak.s);
+    line(&format!("contact {name:?}"), String::new());
+    line("  touches, s", ranges(&contact.contact));
+    line("  sticks, s", ranges(&contact.stick));
+    if let Some(value) = &contact.peak_normal_stress {
+        let stated = stated(accuracy, QuantityName::PeakNormalStress, Some(name));
+        line("  peak σ_n", peak(value) + &stated);
+    }
+    if let Some(value) = &contact.peak_tangential_stress {
+        let stated = stated(accuracy, QuantityName::PeakTangentialStress, Some(name));
+        line("  peak σ_t", peak(value) + &stated);
+    }
+}
+
+/// The error of a quantity of a contact, or of its sum over all contacts, as a text after the value; empty if errors
+/// were not assessed.
+fn stated(accuracy: Option<&Accuracy>, name: QuantityName, contact: Option<&str>) -> String {
+    let all = accuracy.iter().flat_map(|accuracy| &accuracy.quantities);
+    let of_contact = |q: &EstimatedQuantity| contact.is_none_or(|contact| contact == q.contact);
+    let own = all.filter(|q| q.quantity == name && of_contact(q));
+    let own: Vec<&EstimatedQuantity> = own.collect();
+    if own.is_empty() {
+        return String::new();
+    }
+    if own.iter().any(|q| q.method == ErrorMethod::NoLimit) {
+        return ", but it grows without limit on finer meshes".to_owned();
+    }
+    let errors: Option<Vec<f64>> = own.iter().map(|q| q.error).collect();
+    match errors.map(|errors| errors.iter().sum::<f64>()) {
+        Some(0.0) => String::new(),
+        Some(error) => format!(" ± {error:.1e}"),
+        None => ", error unknown".to_owned(),
+    }
+}
+
+/// The lines about one contact.
+pub(super) fn contact(name: &str, contact: &ContactSummary, accuracy: Option<&Accuracy>) -> String {
+    let mut text = String::new();
+    contact_lines(name, contact, accuracy, &mut |name, value| {
+        let _ = writeln!(text, "{name:<20}{value}");
+    });
+    text
+}
+
+/// The stresses along a contact boundary as a table.
+pub(super) fn profile(profile: &ContactProfile) -> String {
+    let p = profile;
+    let mut text = format!(
+        "{:>10} {:>14} {:>14} {:>14}  state\n",
+        "s", "σ_n", "σ_t", "bound"
+    );
+    let columns =
+        p.s.iter()
+            .zip(&p.normal_stress)
+            .zip(&p.tangential_stress)
+            .zip(&p.friction_bound)
+            .zip(&p.state);
+    for ((((s, normal), tangential), bound), state) in columns {
+        let state = match state {
+            NodeState::Open => "open",
+            NodeState::Stick => "stick",
+            NodeState::Slip => "slip",
+        };
+        let _ = writeln!(
+            text,
+            "{s:>10.4} {normal:>14.5} {tangential:>14.5} {bound:>14.5}  {state}"
+        );
+    }
+    text
+}

@@ -1,0 +1,426 @@
+//! The command `signorini solve FILE`, which runs the same code as a worker of the service.
+
+use std::{
+    fs::File,
+    io::{BufReader, Read, Seek},
+    ops::ControlFlow,
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+use anyhow::Context;
+use base::{
+    digest,
+    mesh::MeshInfo,
+    run::{self, Update},
+};
+use clap::Args;
+use files::ReadError;
+use service::{config::MemoryBudget, error::ApiError};
+use sha2::{Digest, Sha256};
+use solver::{
+    error::{Reason, SolveError, Violation},
+    mesh::Mesh,
+    problem::Problem,
+    solution::{Observer, Warning},
+};
+
+use super::{
+    exit::Exit,
+    output::{self, Output},
+    progress::{To, View},
+    report,
+};
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  signorini solve examples/rectangular_punch.json\n  signorini solve punch.json -o punch.csv -o punch.svg -o punch.vtu"
+)]
+pub(super) struct Arguments {
+    /// The problem: a JSON file, or an Abaqus or CalculiX deck (.inp)
+    file: PathBuf,
+
+    #[arg(short, long, value_name = "OUT", help = output::help())]
+    output: Vec<PathBuf>,
+
+    /// The file of the mesh that the problem names by its hash (mesh.stored), as it was uploaded. `signorini solve`
+    /// with the mesh file itself prints that hash
+    #[arg(long, value_name = "FILE")]
+    mesh: Option<PathBuf>,
+
+    #[command(flatten)]
+    look: output::Look,
+
+    #[command(flatten)]
+    memory: MemoryBudget,
+
+    #[command(flatten)]
+    threads: Threads,
+}
+
+/// The option for the number of processors that a large problem may use. The result is the same, bit for bit.
+#[derive(Clone, Copy, Debug, Args)]
+pub(super) struct Threads {
+    /// Threads for a large problem: 1, or 2 where there are two processors [default: 2]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=2))]
+    threads: Option<u8>,
+}
+
+impl Threads {
+    /// Whether a second thread may be used.
+    pub(super) fn second(self) -> ControlFlow<()> {
+        let processors = || std::thread::available_parallelism().map_or(1, usize::from);
+        match self.threads.map_or_else(processors, usize::from) {
+            1 => ControlFlow::Break(()),
+            _ => ControlFlow::Continue(()),
+        }
+    }
+}
+
+pub(super) fn run(
+    Arguments {
+        file,
+        output,
+        mesh,
+        look,
+        memory,
+        threads,
+    }: &Arguments,
+) -> anyhow::Result<Exit> {
+    let start = Instant::now();
+    let (problem, told) = match read(file) {
+        Ok(Given::Problem(problem, warnings)) => (*problem, warnings),
+        Ok(Given::Mesh) => return only_a_mesh(file),
+        Err(ReadError::Invalid(violations)) => {
+            let exit = invalid(file, &violations);
+            let of_sweep = |violation: &Violation| {
+                violation.reason == Reason::UnknownName
+                    && ["/base", "/axes", "/points"].contains(&violation.pointer.as_str())
+            };
+            if violations.iter().any(of_sweep) {
+                eprintln!("This seems to be a sweep: solve it with `signorini sweep`.");
+            }
+            return Ok(exit);
+        }
+        Err(ReadError::Io(error)) => {
+            return Err(error).with_context(|| format!("cannot read {}", file.display()));
+        }
+    };
+    let parse_s = start.elapsed().as_secs_f64();
+    let contacts = problem.contacts.iter();
+    let contacts: Vec<&str> = contacts.map(|contact| contact.boundary.as_str()).collect();
+    let asked = output.iter().map(|path| Output::parse(path, &contacts));
+    let outputs = match asked.collect::<Result<Vec<_>, _>>() {
+        Ok(outputs) => outputs,
+        Err(problem) => {
+            eprintln!("{problem}");
+            return Ok(Exit::Invalid);
+        }
+    };
+    let (size, stored) = match stored_mesh(&problem, mesh.as_deref()) {
+        Ok(None) => (None, None),
+        Ok(Some((info, mesh))) => (Some(info.size()), Some(mesh)),
+        Err(Unusable::Reason(reason)) => {
+            eprintln!("signorini: {}: {reason}", file.display());
+            return Ok(Exit::Invalid);
+        }
+        Err(Unusable::Read(ReadError::Invalid(violations))) => {
+            return Ok(invalid(mesh.as_deref().unwrap_or(file), &violations));
+        }
+        Err(Unusable::Read(ReadError::Io(error))) => {
+            let mesh = mesh.as_deref().unwrap_or(file);
+            return Err(error).with_context(|| format!("cannot read {}", mesh.display()));
+        }
+    };
+    let budget_bytes = memory.bytes();
+    let estimate = match solver::estimate(&problem, size.as_ref()) {
+        Ok(estimate) => estimate,
+        Err(violation) => return Ok(invalid(file, &[violation])),
+    };
+    if estimate.memory_bytes > budget_bytes {
+        let too_large = ApiError::ProblemTooLarge {
+            estimate,
+            budget_bytes,
+        };
+        eprintln!("{}: {too_large}", file.display());
+        return Ok(Exit::Invalid);
+    }
+    let solve = |observe: &mut Observer<'_>| {
+        let mut external = files::external_mesh(&problem, stored.clone());
+        if let Some(Ok(external)) = &mut external {
+            external.warnings.extend(told.iter().cloned());
+        }
+        solver::solve_on(&problem, external, observe)
+    };
+    let mut view = View::new(To::Error);
+    let solved = run::run(&problem, parse_s, solve, &mut |update| {
+        let told = match update {
+            Update::SecondThread => return threads.second(),
+            Update::Phase(phase) => view.phase(phase),
+            Update::Mesh {
+                number,
+                elements,
+                error,
+            } => view.line(&report::mesh(number, elements, error)),
+            Update::Iteration(timed) => view.iteration(&timed.row),
+            Update::Warning(warning) => view.warning(warning),
+            // Ctrl-C ends the process
+            Update::Step(_)
+            | Update::Pulse
+            | Update::Needs { .. }
+            | Update::Room { .. }
+            | Update::OutOfMemory { .. } => Ok(()),
+        };
+        // who no longer reads what is told still wants the result
+        let _ = told;
+        ControlFlow::Continue(())
+    });
+    view.end();
+    let document = match solved {
+        Ok(document) => document,
+        Err(SolveError::Invalid(violations)) => return Ok(invalid(file, &violations)),
+        Err(error) => return Err(error.into()),
+    };
+    let title = problem.title.as_deref();
+    // what cannot be drawn must not cost the other files of a long solution
+    let written = outputs
+        .iter()
+        .map(|output| output.write((&problem, stored.as_ref()), *look, &document));
+    let failed: Vec<anyhow::Error> = written.filter_map(Result::err).collect();
+    for error in failed.iter().skip(1) {
+        eprintln!("signorini: {error:#}");
+    }
+    if let Some(first) = failed.into_iter().next() {
+        return Err(first);
+    }
+    if outputs.is_empty() {
+        output::print(&report::document(title, &document))?;
+    } else {
+        // what the files are read for must not hide how far they can be trusted
+        eprint!("{}", report::trust(&document));
+    }
+    Ok(if document.summary.solution.converged {
+        Exit::Ok
+    } else {
+        Exit::NotConverged
+    })
+}
+
+/// Why a file is not the mesh that a problem names.
+enum Unusable {
+    Reason(String),
+    Read(ReadError),
+}
+
+impl From<std::io::Error> for Unusable {
+    fn from(error: std::io::Error) -> Self {
+        Unusable::Read(ReadError::Io(error))
+    }
+}
+
+/// The mesh that a problem names by the hash of its file, from that file; `None` if it names none.
+fn stored_mesh(
+    problem: &Problem,
+    file: Option<&Path>,
+) -> Result<Option<(MeshInfo, Mesh)>, Unusable> {
+    let (named, file) = match (problem.mesh.stored(), file) {
+        (Some(named), Some(file)) => (named, file),
+        (None, None) => return Ok(None),
+        (Some(_), None) => {
+            return Err(Unusable::Reason(
+                "the problem names its mesh by a hash (mesh.stored): give its file with --mesh FILE, or submit the problem to a service \
+                 that has the mesh: signorini submit"
+                    .into(),
+            ));
+        }
+        (None, Some(_)) => {
+            return Err(Unusable::Reason(
+                "the problem has a mesh of its own; --mesh is for one that names its mesh by a hash (mesh.stored)"
+                    .into(),
+            ));
+        }
+    };
+    let mut opened = File::open(file)?;
+    let (found, bytes) = hashed(&mut opened)?;
+    if found != named {
+        return Err(Unusable::Reason(format!(
+            "--mesh {}: this file has the hash {found}, but the problem names {named}",
+            file.display()
+        )));
+    }
+    // the bytes that were hashed, whatever has that name by now
+    opened.rewind()?;
+    let reader = BufReader::new(opened);
+    let (format, mesh, warnings) = files::read_mesh(reader).map_err(Unusable::Read)?;
+    let info = MeshInfo::new(found, bytes, (format, &mesh, warnings));
+    Ok(Some((info, mesh)))
+}
+
+/// The hash of the rest of a file, and its number of bytes.
+fn hashed(opened: &mut File) -> std::io::Result<(String, u64)> {
+    let mut hash = Sha256::new();
+    let (mut piece, mut bytes) = (vec![0; 1 << 16], 0);
+    loop {
+        match opened.read(&mut piece)? {
+            0 => return Ok((digest::sha256_text(hash), bytes)),
+            read => {
+                hash.update(&piece[..read]);
+                bytes += read as u64;
+            }
+        }
+    }
+}
+
+/// The content of a file.
+enum Given {
+    /// A problem, and warnings about deviations from its deck.
+    Problem(Box<Problem>, Vec<Warning>),
+    /// A mesh of Gmsh, or a deck without a step.
+    Mesh,
+}
+
+/// Prints what a mesh contains, and how a problem refers to it.
+fn only_a_mesh(file: &Path) -> anyhow::Result<Exit> {
+    let cannot = || format!("cannot read {}", file.display());
+    let mut opened = File::open(file).with_context(cannot)?;
+    let (hash, _) = hashed(&mut opened).with_context(cannot)?;
+    opened.rewind().with_context(cannot)?;
+    let mesh = match files::read_mesh(BufReader::new(opened)) {
+        Ok((_, mesh, _)) => mesh,
+        Err(ReadError::Invalid(violations)) => return Ok(invalid(file, &violations)),
+        Err(ReadError::Io(error)) => return Err(error).with_context(cannot),
+    };
+    let names = |what: &str, names: Vec<&String>| match names.len() {
+        0 => format!("no {what}"),
+        count => {
+            let first: Vec<String> = names
+                .iter()
+                .take(20)
+                .map(|name| format!("`{name:.60}`"))
+                .collect();
+            let more = if count > 20 { ", …" } else { "" };
+            format!("{what} {}{more}", first.join(", "))
+        }
+    };
+    let name = file.display();
+    eprintln!(
+        "{name} is a mesh, not a problem: {} nodes, {} elements, {}, {}, {}.",
+        mesh.nodes.len(),
+        mesh.elements.len(),
+        names("boundaries", mesh.boundaries.keys().collect()),
+        names("groups", mesh.groups.keys().collect()),
+        names("node sets", mesh.node_sets.keys().collect()),
+    );
+    eprintln!(
+        "  Write a problem as JSON with \"mesh\": {{\"stored\": \"{hash}\"}}, materials, supports and contacts, and solve it with \
+         `signorini solve problem.json --mesh {name}`."
+    );
+    Ok(Exit::Invalid)
+}
+
+/// Reads a file, depending on its extension. For a JSON file with a mesh, only the mesh is held in memory, not its
+/// text.
+fn read(file: &Path) -> Result<Given, ReadError> {
+    let mut opened = File::open(file).map_err(ReadError::Io)?;
+    let is = |wanted: &str| {
+        let ending = file.extension();
+        ending.is_some_and(|ending| ending.eq_ignore_ascii_case(wanted))
+    };
+    if is("msh") {
+        return Ok(Given::Mesh);
+    }
+    let problem = |problem, warnings| Given::Problem(Box::new(problem), warnings);
+    if !is("inp") {
+        return files::read(opened).map(|read| problem(read, Vec::new()));
+    }
+    let mut bytes = Vec::new();
+    let read = opened.read_to_end(&mut bytes);
+    read.map_err(ReadError::Io)?;
+    let text = files::text(bytes);
+    if !files::abaqus::has_step(&text) {
+        return Ok(Given::Mesh);
+    }
+    let (read, warnings) =
+        files::abaqus::problem_with_warnings(&text).map_err(ReadError::Invalid)?;
+    if read.contacts.is_empty() {
+        eprintln!(
+            "{}: a deck without contact, solved as an elastic problem. Contact with a rigid surface is a *CONTACT PAIR, or `contacts` \
+             in a problem as JSON with this deck as its mesh.",
+            file.display()
+        );
+    }
+    Ok(problem(read, warnings))
+}
+
+/// The command `signorini schema`.
+pub(super) fn schema() -> anyhow::Result<Exit> {
+    output::print(&format!("{:#}\n", files::schema()))?;
+    Ok(Exit::Ok)
+}
+
+pub(super) fn invalid(file: &Path, violations: &[Violation]) -> Exit {
+    let many = if violations.len() == 1 {
+        "violation"
+    } else {
+        "violations"
+    };
+    eprintln!("{}: {} {many}", file.display(), violations.len());
+    for violation in violations {
+        match violation.line() {
+            Some(_) => eprintln!("{}", violation.in_file(file.display())),
+            None => eprintln!("  {violation}"),
+        }
+    }
+    Exit::Invalid
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::fmt::Write;
+
+    use solver::problem::MeshSource;
+
+    use base::digest;
+
+    /// A large inline mesh is read and hashed in the memory of its columns, which grow by doubling, and of a few pieces
+    /// of the text.
+    #[test]
+    fn a_large_inline_mesh_is_read_and_hashed_in_the_memory_of_its_columns() {
+        const PIECES: i64 = 512 << 10;
+        let (nodes, elements) = (90_000, 30_000);
+        let mut text = serde_json::to_string(&fake::problem()).unwrap();
+        let grid = text.find("{\"grid\"").unwrap();
+        let end = grid + text[grid..].find("]}").unwrap() + 2;
+        let mut mesh = "{\"inline\": {\"nodes\": [".to_owned();
+        for node in 0..nodes {
+            let comma = if node > 0 { ",\n" } else { "" };
+            let (x, y) = (0.1 * f64::from(node), -1e-3 * f64::from(node));
+            write!(mesh, "{comma}[{x}, {y}]").unwrap();
+        }
+        mesh += "], \"elements\": [";
+        for element in 0..elements {
+            let comma = if element > 0 { "," } else { "" };
+            let nodes: [u32; 8] = std::array::from_fn(|k| 3 * element + k as u32 % 3);
+            write!(mesh, "{comma}{nodes:?}").unwrap();
+        }
+        mesh += "], \"boundaries\": {}}";
+        text.replace_range(grid..end, &mesh);
+        assert!(text.len() > 3 << 20);
+
+        let columns = i64::from(nodes) * 16 + i64::from(elements) * 36;
+        let before = allocator::held();
+        allocator::forget_highest();
+        let problem = files::read(text.as_bytes()).unwrap();
+        let (held, highest) = (allocator::held() - before, allocator::highest() - before);
+        assert!(held <= columns + PIECES, "{held} of {columns}");
+        assert!(highest <= 2 * columns + PIECES, "{highest} of {columns}");
+        assert!(matches!(&problem.mesh.source, MeshSource::Inline(mesh)
+            if mesh.nodes.len() == nodes as usize && mesh.elements.len() == elements as usize));
+
+        allocator::forget_highest();
+        digest::input_hash(&problem).unwrap();
+        let highest = allocator::highest() - before - held;
+        assert!(highest <= PIECES, "{highest}");
+    }
+}

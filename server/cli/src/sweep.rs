@@ -1,0 +1,279 @@
+//! The command `signorini sweep FILE`: solves all members of a sweep, by the same code as a worker of the service.
+
+use std::{
+    borrow::Cow,
+    ops::ControlFlow,
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+use anyhow::Context;
+use base::{
+    job::Status,
+    run::members::{Members, Step},
+    sweep::MemberRow,
+};
+use clap::Args;
+use files::{
+    body::{Body, Embedded},
+    sweep::{Axis, Mode, Points, Sweep, Variation, groups},
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, de::IgnoredAny};
+use serde_json::{Value, value::RawValue};
+use service::{
+    config::MemoryBudget,
+    error::ApiError,
+    formats::{self, Format},
+};
+use solver::{
+    error::{Reason, Violation},
+    solution::Progress,
+};
+
+use super::{
+    exit::Exit,
+    output,
+    solve::{Threads, invalid},
+};
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  signorini sweep examples/sweeps/stick_width.json -o study.csv\n\nIt is solved on this machine, without a service; `signorini submit` accepts the same file."
+)]
+pub(super) struct Arguments {
+    /// The sweep: a JSON file as for POST /v1/sweeps; `base` may also be the path of a problem, relative to that file's
+    /// folder
+    file: PathBuf,
+
+    /// Write the table to this file, in the format of its extension: .json, .csv, .jsonl, .arrow or .npz; - writes JSON to
+    /// standard output. Without it the table is printed as CSV
+    #[arg(short, long, value_name = "OUT")]
+    output: Option<PathBuf>,
+
+    #[command(flatten)]
+    memory: MemoryBudget,
+
+    #[command(flatten)]
+    threads: Threads,
+}
+
+/// A file with a sweep. What is for the service only is not used.
+#[derive(Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+struct Definition {
+    #[serde(rename = "base")]
+    _base: Embedded,
+    #[serde(default)]
+    axes: Option<Vec<Axis>>,
+    #[serde(default)]
+    mode: Option<Mode>,
+    #[serde(default)]
+    #[schemars(with = "Option<Points>")]
+    points: Option<Vec<Box<RawValue>>>,
+    #[serde(default, rename = "name")]
+    #[schemars(with = "Value")]
+    _name: IgnoredAny,
+    #[serde(default, rename = "labels")]
+    #[schemars(with = "Value")]
+    _labels: IgnoredAny,
+    #[serde(default, rename = "priority")]
+    #[schemars(with = "Value")]
+    _priority: IgnoredAny,
+    #[serde(default, rename = "limits")]
+    #[schemars(with = "Value")]
+    _limits: IgnoredAny,
+}
+
+/// How often progress is printed.
+const PAUSE: Duration = Duration::from_millis(500);
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
+    let Arguments {
+        file,
+        output,
+        memory,
+        threads,
+    } = arguments;
+    let text =
+        std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
+    let text = text.strip_prefix(files::BYTE_ORDER_MARK).unwrap_or(&text);
+    let format = match output.as_deref().map(format_of).transpose() {
+        Ok(format) => format,
+        Err(problem) => {
+            eprintln!("{problem}");
+            return Ok(Exit::Invalid);
+        }
+    };
+    let sweep = match read(file, text)? {
+        Ok(sweep) => sweep,
+        Err(violations) => return Ok(invalid(file, &violations)),
+    };
+    let groups = match groups(&sweep) {
+        Ok(groups) => groups,
+        Err(violations) => return Ok(invalid(file, &violations)),
+    };
+    let Sweep { base, plan } = &sweep;
+    let budget_bytes = memory.bytes();
+    for group in &groups {
+        let Some(Ok(first)) = group
+            .first()
+            .map(|first| plan.whole_problem(*first, &base.mesh))
+        else {
+            continue; // they were read before
+        };
+        match solver::estimate(&first, None) {
+            Ok(estimate) if estimate.memory_bytes > budget_bytes => {
+                let too_large = ApiError::ProblemTooLarge {
+                    estimate,
+                    budget_bytes,
+                };
+                eprintln!("{}: member {}: {too_large}", file.display(), group[0]);
+                return Ok(Exit::Invalid);
+            }
+            // what else is wrong with a member is told in its row
+            Ok(_) | Err(_) => {}
+        }
+    }
+    let count = plan.count();
+    let (mut rows, mut told) = (Vec::with_capacity(count), Instant::now());
+    for group in &groups {
+        let external = |problem: &_| files::external_mesh(problem, None);
+        let mut members = Members::new(plan, group, &base.mesh, &external, &solver::prepare, None);
+        let solved = members.solve(group, &mut |step| {
+            match step {
+                Step::Row(row) => {
+                    rows.push(*row);
+                    if told.elapsed() >= PAUSE || rows.len() == count {
+                        eprintln!("{} of {count} members", rows.len());
+                        told = Instant::now();
+                    }
+                }
+                Step::Progress(Progress::SecondThread) => return threads.second(),
+                Step::Progress(_) => {}
+            }
+            ControlFlow::Continue(())
+        });
+        solved?;
+    }
+    rows.sort_unstable_by_key(|row: &MemberRow| row.number);
+    for row in &mut rows {
+        row.with_values(plan);
+    }
+    let written =
+        |format| formats::members(plan.paths(), &rows, format).map_err(anyhow::Error::msg);
+    match (output, format) {
+        (Some(path), Some(format)) if path.as_os_str() != "-" => {
+            let bytes = written(format)?;
+            output::replace(path, |out| Ok(out.write_all(&bytes)?))
+                .with_context(|| format!("cannot write {}", path.display()))?;
+        }
+        (_, format) => {
+            let bytes = written(format.unwrap_or(Format::Csv))?;
+            output::print(&String::from_utf8_lossy(&bytes))?;
+        }
+    }
+    let failed = rows.iter().filter(|row| row.status != Status::Succeeded);
+    let failed: Vec<&MemberRow> = failed.collect();
+    for row in failed.iter().take(10) {
+        let reason = row.reason.map_or("", <&str>::from);
+        let first = row.violations.first().map(|v| format!(": {v}"));
+        eprintln!(
+            "member {}: {reason}{}",
+            row.number,
+            first.unwrap_or_default()
+        );
+    }
+    Ok(match failed.len() {
+        0 => Exit::Ok,
+        count => {
+            eprintln!("{count} of {} members failed", rows.len());
+            Exit::NotConverged
+        }
+    })
+}
+
+/// The format of a table by the name of its file; the error says why there is none.
+pub(super) fn format_of(path: &Path) -> Result<Format, String> {
+    if path.as_os_str() == "-" {
+        return Ok(Format::Json);
+    }
+    let error = |problem: String| format!("-o {}: {problem}", path.display());
+    let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
+    let named = |format: &&Format| {
+        ending
+            .as_deref()
+            .is_some_and(|ending| ending == format.name())
+    };
+    let format = Format::OF_TABLES.iter().find(named).copied();
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty());
+    match (format, folder) {
+        (Some(_), Some(folder)) if !folder.is_dir() => {
+            Err(error(format!("there is no folder {}", folder.display())))
+        }
+        (Some(format), _) => Ok(format),
+        (None, _) => Err(error(format!(
+            "the file must have one of the extensions {}, or be - for JSON on standard output",
+            Format::endings(Format::OF_TABLES)
+        ))),
+    }
+}
+
+/// The base of a sweep in this file, if it names a file instead of being a problem.
+pub(super) fn base_from_file(file: &Path, base: &str) -> anyhow::Result<Option<Box<RawValue>>> {
+    if !base.starts_with('"') {
+        return Ok(None);
+    }
+    let unread = |found: String| ApiError::InvalidProblem(malformed("/base", found));
+    let named: Cow<'_, str> =
+        serde_json::from_str(base).map_err(|_| unread("a text that cannot be read".into()))?;
+    let path = file.parent().unwrap_or(Path::new("")).join(&*named);
+    let text = std::fs::read_to_string(&path)
+        .with_context(|| format!("cannot read the base {}", path.display()))?;
+    let text = text.strip_prefix(files::BYTE_ORDER_MARK).unwrap_or(&text);
+    let base = RawValue::from_string(text.to_owned()).map_err(|error| unread(error.to_string()))?;
+    Ok(Some(base))
+}
+
+fn malformed(pointer: &str, found: String) -> Vec<Violation> {
+    vec![Violation::new(
+        pointer,
+        Reason::Malformed,
+        found,
+        "an object of base, axes or points, and mode",
+        "Check the text there; examples are in examples/sweeps.",
+    )]
+}
+
+/// Reads a sweep from a file's text; the error says why the file of its base cannot be read.
+fn read(file: &Path, text: &str) -> anyhow::Result<Result<Sweep, Vec<Violation>>> {
+    static BODY: Body<Definition> = Body::new();
+    let mut content = match BODY.read(text) {
+        Ok(content) => content,
+        Err(error) => return Ok(Err(malformed("", error))),
+    };
+    let from_file = match content.problems.first() {
+        Some((_, base)) => base_from_file(file, base),
+        None => Ok(None),
+    };
+    let from_file = match from_file {
+        Ok(base) => base,
+        Err(error) => match error.downcast() {
+            Ok(ApiError::InvalidProblem(violations)) => return Ok(Err(violations)),
+            Ok(other) => return Err(other.into()),
+            Err(other) => return Err(other),
+        },
+    };
+    let variation = content.fields.take().map(|fields| Variation {
+        axes: fields.axes,
+        mode: fields.mode,
+        points: fields.points,
+    });
+    let mut content = content.with(variation);
+    if let (Some(base), Some((_, text))) = (&from_file, content.problems.first_mut()) {
+        *text = base.get();
+    }
+    Ok(files::sweep::of_body(content))
+}

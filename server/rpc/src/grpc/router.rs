@@ -1,0 +1,91 @@
+//! The routes of gRPC: the service, its health, its reflection.
+
+use std::{sync::Arc, time::Duration};
+
+use axum::{Router, middleware::map_response};
+use futures_util::future::BoxFuture;
+use service::{
+    error::ApiError,
+    verbs::{MAX_MESSAGE_BYTES, Service},
+};
+use tonic::{Code, Status, server::NamedService, service::Routes};
+use tonic_health::server::HealthReporter;
+
+use super::service::Grpc;
+use crate::pb::{self, job_service_server::JobServiceServer};
+
+/// The gRPC routes, which share a port with REST, and the handle that sets the reported health.
+pub fn router(
+    service: Arc<Service>,
+) -> BoxFuture<'static, Result<(Router, HealthReporter), tonic_reflection::server::Error>> {
+    Box::pin(routes(service))
+}
+
+async fn routes(
+    service: Arc<Service>,
+) -> Result<(Router, HealthReporter), tonic_reflection::server::Error> {
+    let reflection = || {
+        tonic_reflection::server::Builder::configure()
+            .register_encoded_file_descriptor_set(pb::DESCRIPTORS)
+            .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+    };
+    let (reporter, health) = tonic_health::server::health_reporter();
+    reporter.set_serving::<JobServiceServer<Grpc>>().await;
+    tokio::spawn(report_health(reporter.clone(), service.clone()));
+    let jobs =
+        JobServiceServer::new(Grpc::new(service)).max_decoding_message_size(MAX_MESSAGE_BYTES);
+    let routes = Routes::new(jobs)
+        .add_service(health)
+        .add_service(reflection().build_v1()?)
+        .add_service(reflection().build_v1alpha()?);
+    let router = routes.into_axum_router();
+    Ok((router.layer(map_response(too_large)), reporter))
+}
+
+/// Adds the details that every error has to tonic's refusal of a message over the limit, which tonic gives without
+/// details before the message reaches a method.
+async fn too_large(response: axum::response::Response) -> axum::response::Response {
+    let bare = Status::from_header_map(response.headers())
+        .is_some_and(|status| status.code() == Code::OutOfRange && status.details().is_empty());
+    if bare {
+        Status::from(ApiError::PayloadTooLarge {
+            limit_bytes: MAX_MESSAGE_BYTES,
+        })
+        .into_http()
+    } else {
+        response
+    }
+}
+
+/// Reports the health of the store, until the service stops.
+async fn report_health(reporter: HealthReporter, service: Arc<Service>) {
+    const INTERVAL: Duration = Duration::from_secs(1);
+    let mut serving = true;
+    loop {
+        tokio::select! {
+            () = tokio::time::sleep(INTERVAL) => {}
+            () = service.queue.stopping().cancelled() => return,
+        }
+        let works = service.health().await.is_ok();
+        if works == serving || service.queue.stopping().is_cancelled() {
+            continue;
+        }
+        serving = works;
+        let status = if works {
+            tonic_health::ServingStatus::Serving
+        } else {
+            tonic_health::ServingStatus::NotServing
+        };
+        for name in ["", JobServiceServer::<Grpc>::NAME] {
+            reporter.set_service_status(name, status).await;
+        }
+    }
+}
+
+/// Reports NOT_SERVING, before the listener closes.
+pub async fn report_draining(reporter: &HealthReporter) {
+    reporter.set_not_serving::<JobServiceServer<Grpc>>().await;
+    reporter
+        .set_service_status("", tonic_health::ServingStatus::NotServing)
+        .await;
+}

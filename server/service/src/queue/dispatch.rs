@@ -1,0 +1,200 @@
+//! Starts jobs whenever a worker is free and a job waits; runs periodic tasks.
+
+use std::{sync::Arc, time::Duration};
+
+use base::{
+    failpoint::{self, Point},
+    time::Time,
+};
+use store::{Accepted, Claim, RepeatedError, Result, Submission};
+use tokio::sync::OwnedSemaphorePermit;
+use tracing::error;
+
+use super::{
+    running::Running,
+    state::{Queue, Slot, Solver},
+    worker,
+};
+
+/// How often the time limits of waiting jobs are checked.
+const CHECK_INTERVAL: Duration = Duration::from_secs(1);
+
+/// The pause after a panic, so that a task that panics at once does not occupy a processor.
+const PAUSE_AFTER_PANIC: Duration = Duration::from_millis(100);
+
+impl Queue {
+    /// Starts the workers. They run until the service stops.
+    pub fn start(self: &Arc<Self>) {
+        if let Solver::Processes(processes) = &self.solver {
+            processes.prepare(self.workers);
+        }
+        self.slots.add_permits(usize::from(self.workers));
+        tokio::spawn(keep_running(self.clone(), Queue::dispatch));
+        tokio::spawn(keep_running(self.clone(), Queue::run_periodic_tasks));
+    }
+
+    /// Accepts jobs. They are stored on the disk when this returns; a free worker is given the next job of the queue in
+    /// the same commit.
+    pub async fn submit(self: &Arc<Self>, submission: Submission) -> Result<Accepted> {
+        let Some(slot) = self.free_slot() else {
+            let accepted = self.store.submit(submission, false).await?;
+            self.announce(&accepted.changed);
+            self.wake.notify_one();
+            return Ok(accepted);
+        };
+        let _guard = self.claiming.read().await;
+        let claim = !self.stopping.is_cancelled() && !self.store.is_paused();
+        let submitted = self.store.submit(submission, claim).await;
+        match submitted {
+            Ok(mut accepted) => {
+                self.announce(&accepted.changed);
+                match accepted.claim.take() {
+                    Some(claim) => self.start_worker(claim, slot),
+                    None => drop(slot),
+                }
+                self.wake.notify_one(); // there may be several jobs, or the slot is free again
+                Ok(accepted)
+            }
+            Err(cause) => {
+                drop(slot);
+                self.wake.notify_one();
+                Err(cause)
+            }
+        }
+    }
+
+    /// Claims a job whenever a slot is free and a job waits, until the service stops.
+    async fn dispatch(self: Arc<Self>) {
+        let mut starting = RepeatedError::new("no job can be started");
+        loop {
+            // a notification from here on is kept for the wait below, so that none is missed
+            while self.store.waiting() > 0
+                && let Some(slot) = self.free_slot()
+            {
+                match starting.note(self.claim(slot).await) {
+                    Some(true) => {}
+                    Some(false) => break,
+                    None => tokio::time::sleep(CHECK_INTERVAL).await, // the disk may be full for a while
+                }
+            }
+            tokio::select! {
+                () = self.wake.notified() => {}
+                () = self.stopping.cancelled() => return,
+            }
+        }
+    }
+
+    /// An idle worker, unless no job may start now.
+    fn free_slot(&self) -> Option<OwnedSemaphorePermit> {
+        if self.store.is_paused() || self.stopping.is_cancelled() {
+            return None;
+        }
+        self.slots.clone().try_acquire_owned().ok()
+    }
+
+    /// Claims the next job for a worker; false if no job was ready.
+    async fn claim(self: &Arc<Self>, slot: OwnedSemaphorePermit) -> Result<bool> {
+        let _guard = self.claiming.read().await;
+        if self.stopping.is_cancelled() || self.store.is_paused() {
+            return Ok(false);
+        }
+        let (claim, changed) = self.store.claim_next().await?;
+        self.announce(&changed);
+        match claim {
+            Some(claim) => self.start_worker(claim, slot),
+            None if changed.is_empty() => return Ok(false),
+            None => {} // some were answered from results; there may be more
+        }
+        Ok(true)
+    }
+
+    /// Gives a claimed job to a worker. Call this while `claiming` is held.
+    fn start_worker(self: &Arc<Self>, claim: Claim, slot: OwnedSemaphorePermit) {
+        failpoint::pass(Point::Given, claim.job.id);
+        let running = Running {
+            id: claim.job.id,
+            attempt: claim.job.attempt,
+            stop: Arc::default(),
+        };
+        self.running().insert(claim.job.key, running.clone());
+        let queue = self.clone();
+        let slot = Arc::new(Slot {
+            permit: Some(slot),
+            queue: self.clone(),
+        });
+        tokio::spawn(async move { worker::run_attempt(&queue, claim, running, slot).await });
+    }
+
+    /// Jobs that run according to the store, but that no worker has.
+    async fn lost(&self) -> Result<Vec<(i64, i32)>> {
+        let mut running = self.store.running().await?;
+        let ours = self.running();
+        running.retain(|(key, _)| !ours.contains_key(key));
+        Ok(running)
+    }
+
+    /// Requeues jobs that have no worker: because the task that should have given them to one has panicked, or because
+    /// the disk was full when the last service ended and when this one started.
+    async fn requeue_lost(&self) -> Result<()> {
+        if self.lost().await?.is_empty() {
+            return Ok(()); // nearly always
+        }
+        let _guard = self.claiming.write().await; // no claim is under way
+        if self.stopping.is_cancelled() {
+            return Ok(()); // they are requeued by that
+        }
+        for (key, attempt) in self.lost().await? {
+            let how = "it was left without a worker";
+            let changed = match self.store.requeue_lost(key, attempt, how).await {
+                Ok(changed) => changed,
+                Err(cause) if cause.is_lasting(key) => continue, // logged, once; `doctor` names it
+                Err(cause) => return Err(cause),
+            };
+            error!(
+                job.key = key,
+                attempt, "a job was left without a worker: it was requeued, or has ended"
+            );
+            self.announce(&changed);
+            self.wake.notify_one();
+        }
+        Ok(())
+    }
+
+    /// Ends jobs that have waited too long, requeues lost jobs, and removes the ids of jobs deleted long ago, until the
+    /// service stops.
+    async fn run_periodic_tasks(self: Arc<Self>) {
+        let mut expiring = RepeatedError::new("jobs that waited too long could not be ended");
+        let mut requeuing = RepeatedError::new("lost jobs could not be requeued");
+        let mut forgetting = RepeatedError::new("ids of deleted jobs could not be removed");
+        loop {
+            match expiring.note(self.store.expire_queued(Time::now()).await) {
+                Some(changed) if !changed.is_empty() => {
+                    self.announce(&changed);
+                    self.wake.notify_one();
+                    continue; // there may be more
+                }
+                Some(_) | None => {}
+            }
+            requeuing.note(self.requeue_lost().await);
+            forgetting.note(self.store.forget_deleted(Time::now()).await);
+            tokio::select! {
+                () = tokio::time::sleep(CHECK_INTERVAL) => {}
+                () = self.stopping.cancelled() => return,
+            }
+        }
+    }
+}
+
+/// Runs a task of the queue until it ends, and again after each panic.
+async fn keep_running<F>(queue: Arc<Queue>, task: fn(Arc<Queue>) -> F)
+where
+    F: Future<Output = ()> + Send + 'static,
+{
+    while let Err(panic) = tokio::spawn(task(queue.clone())).await {
+        if panic.is_cancelled() {
+            return; // with the whole runtime
+        }
+        error!(%panic, "a task of the queue has panicked and is started again: {panic}");
+        tokio::time::sleep(PAUSE_AFTER_PANIC).await;
+    }
+}

@@ -1,0 +1,248 @@
+//! Decides how a job ends, from the result of its solver.
+
+use std::any::Any;
+
+use base::{
+    job::{Failure, Job, Reason, ResultAvailable, Status, without_solution},
+    memory::Outgrown,
+    run::Document,
+    text::size,
+};
+use serde::{Deserialize, Serialize};
+use solver::{
+    error::{SolveError, shortened},
+    solution::{Outcome, Warning, WarningCode},
+};
+use store::{Ending, Parts};
+use tracing::{debug, error};
+use uuid::Uuid;
+
+use super::running::StopReason;
+
+/// A solution ready to be stored.
+pub(super) struct Solved {
+    pub(super) ending: Ending,
+    /// Whether the requested verification is missing.
+    pub(super) unverified: bool,
+    pub(super) iterations: usize,
+    pub(super) parts: Parts,
+}
+
+/// Why there is no solution.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) enum NoSolution {
+    /// The solver was asked to stop before it had a state to return.
+    Stopped,
+    /// The job fails, with this detail.
+    Failed(Reason, String),
+    /// An error of the service, not of the client.
+    Internal(String),
+    /// The process that solved it died: the reason in words.
+    Lost(String),
+}
+
+impl From<SolveError> for NoSolution {
+    fn from(error: SolveError) -> Self {
+        let detail = error.to_string();
+        match error {
+            SolveError::Stopped => NoSolution::Stopped,
+            SolveError::SingularSystem { .. } | SolveError::Unheld { .. } => {
+                NoSolution::Failed(Reason::SingularSystem, detail)
+            }
+            SolveError::NonFinite { .. } => NoSolution::Failed(Reason::NonFinite, detail),
+            SolveError::ResourceExhausted { .. } => {
+                NoSolution::Failed(Reason::ResourceExhausted, detail)
+            }
+            // it was checked before it was accepted
+            SolveError::Invalid(_) | SolveError::OtherBody => NoSolution::Internal(detail),
+        }
+    }
+}
+
+/// The largest number of warnings of a job, and of characters of their messages: jobs are read in lists of a thousand.
+const MOST_WARNINGS: usize = 5;
+const LONGEST_WARNING: usize = 400;
+
+/// The worst warnings, the worst first.
+fn worst(warnings: &[Warning]) -> Vec<Warning> {
+    let mut found: Vec<&Warning> = warnings.iter().collect();
+    found.sort_by_key(|warning| gravity(warning.code)); // stable: else in their order
+    let short = |warning: &Warning| Warning {
+        message: shortened(&warning.message, LONGEST_WARNING),
+        pointer: shortened(&warning.pointer, LONGEST_WARNING),
+        ..*warning
+    };
+    found.into_iter().take(MOST_WARNINGS).map(short).collect()
+}
+
+/// The severity of a warning. 0: the numbers are not those of the intended problem; 1: some are not, or may not be; 2:
+/// good to know.
+fn gravity(code: WarningCode) -> u8 {
+    use WarningCode::*;
+    match code {
+        NotConverged | FalseConvergence | ContactCycling | NoContact | SlidesAway
+        | OutOfBalance | NotUnique => 0,
+        LargeStrain
+        | LargeDisplacement
+        | LargeSlip
+        | CoincidentNodes
+        | ContactReachesObstacleEnd
+        | FrictionLostAtEnd
+        | ObstacleBetweenNodes
+        | DirectionIsLinear
+        | SymmetricDrag
+        | RadialDrag
+        | BoundBeyondContact
+        | RefinementUnfinished
+        | IncrementsMatter
+        | UniquenessUnknown
+        | RoundingLimitsResidual
+        | MeshTooCoarseForContact
+        | MeshTooCoarseForRadius => 1,
+        LinesInside | SupportsOverlap | CentreNodesDropped | ElementsReversed
+        | RaisedToSecondOrder | RigidElementsLeftOut | DeckDiffers | StripCutsPolyline
+        | ObstacleCutsEdge | SmoothingFlattens | ContactTurns | KinkInContact
+        | MaterialJunction | RadiusExceedsContact | CohesionJumps | OscillatingStick
+        | SlowContraction => 2,
+    }
+}
+
+/// The end of a job that follows from the outcome of its solution.
+pub(super) fn ending_of_solution(document: &Document) -> Ending {
+    let (summary, partial) = (&document.summary.solution, ResultAvailable::Partial);
+    let failed = |reason| {
+        let detail = without_solution(summary.outcome, summary.iterations, &summary.residuals);
+        let detail = format!("{detail}; the last state and the history are kept");
+        Ending {
+            result: partial,
+            warnings: worst(&summary.warnings),
+            ..Ending::failed(reason, detail)
+        }
+    };
+    match summary.outcome {
+        Outcome::Converged => Ending {
+            status: Status::Succeeded,
+            reason: None,
+            failure: None,
+            result: ResultAvailable::Final,
+            warnings: worst(&summary.warnings),
+        },
+        Outcome::NotConverged => failed(Reason::NotConverged),
+        Outcome::ContactCycling => failed(Reason::ContactCycling),
+        Outcome::FalseConvergence => failed(Reason::FalseConvergence),
+        Outcome::Canceled => Ending {
+            result: partial,
+            ..Ending::canceled()
+        },
+    }
+}
+
+/// The end of a job that follows from the result of its solver, with the result to be stored.
+pub(super) fn ending_of_attempt(
+    job: &Job,
+    solved: Result<Solved, NoSolution>,
+    stopped: Option<StopReason>,
+) -> (Ending, Option<Parts>) {
+    let no_solution = match solved {
+        Ok(Solved {
+            ending,
+            unverified,
+            iterations,
+            parts,
+        }) => {
+            // a verification that fails is told in the result; one that is stopped leaves the job unfinished
+            let unfinished = unverified && stopped.is_some();
+            let ending = match ending.status {
+                Status::Canceled => Ending {
+                    result: ending.result,
+                    ..stopped_for(job, stopped)
+                },
+                Status::Succeeded if unfinished => Ending {
+                    result: ResultAvailable::Partial,
+                    ..stopped_for(job, stopped)
+                },
+                _ => ending,
+            };
+            debug!(job.id = %job.id, iterations, "job {}: its solver returned after {iterations} iterations", job.id);
+            return (ending, Some(parts));
+        }
+        Err(no_solution) => no_solution,
+    };
+    let ending = match no_solution {
+        NoSolution::Stopped => stopped_for(job, stopped),
+        NoSolution::Failed(reason, detail) => Ending::failed(reason, detail),
+        // (the worker requeues a job whose process was lost)
+        NoSolution::Internal(cause) | NoSolution::Lost(cause) => internal(job, &cause),
+    };
+    (ending, None)
+}
+
+/// The end of a job whose solver was asked to stop, depending on the reason.
+fn stopped_for(job: &Job, reason: Option<StopReason>) -> Ending {
+    match reason {
+        Some(StopReason::OutOfTime) => timed_out(job),
+        Some(StopReason::OutOfMemory(outgrown)) => out_of_memory(&outgrown),
+        Some(StopReason::Unwanted) | None => Ending::canceled(),
+    }
+}
+
+/// The failure of a job that needs more memory than its share, without a result.
+fn out_of_memory(
+    Outgrown {
+        used,
+        needed,
+        share,
+    }: &Outgrown,
+) -> Ending {
+    let detail = format!(
+        "the job used {} and needed {} more, but its share is {}: use a coarser mesh, above all along the contacts, or \
+         fewer load steps",
+        size(*used),
+        size(*needed),
+        size(*share)
+    );
+    Ending::failed(Reason::ResourceExhausted, detail)
+}
+
+/// The failure of a job with this share (bytes) whose process was refused this many more bytes by the system.
+pub(super) fn refused_memory(bytes: u64, share: u64) -> NoSolution {
+    let detail = format!(
+        "the job has used its share of {} of the memory and was refused {} more: use a coarser mesh, fewer contacts or fewer \
+         load steps",
+        size(share),
+        size(bytes)
+    );
+    NoSolution::Failed(Reason::ResourceExhausted, detail)
+}
+
+/// The failure of a job at its time limit, without a result.
+pub(super) fn timed_out(job: &Job) -> Ending {
+    let detail = format!(
+        "the job was stopped after {} s; see limits.timeout_s",
+        job.limits.timeout_s
+    );
+    Ending::failed(Reason::TimedOut, detail)
+}
+
+/// Logs the cause under an incident number, and tells the client only that number.
+pub(super) fn internal(job: &Job, cause: &dyn std::fmt::Display) -> Ending {
+    let incident = Uuid::now_v7();
+    error!(job.id = %job.id, %incident, %cause, "job {} failed, incident {incident}: {cause}", job.id);
+    let detail = format!("an unexpected error, logged as incident {incident}");
+    let failure = Failure::new(Reason::Internal, detail);
+    Ending {
+        failure: Some(failure),
+        ..Ending::failed(Reason::Internal, "")
+    }
+}
+
+/// The message of a panic of `who`.
+pub(super) fn panicked(who: &str, panic: &(dyn Any + Send)) -> String {
+    let text = |panic: &(dyn Any + Send)| {
+        panic
+            .downcast_ref::<String>()
+            .cloned()
+            .or_else(|| panic.downcast_ref::<&str>().map(|text| text.to_string()))
+    };
+    format!("{who} panicked: {}", text(panic).unwrap_or_default())
+}

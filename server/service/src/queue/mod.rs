@@ -1,0 +1,70 @@
+//! The queue: its tasks, and what wakes each of them.
+//!
+//! `workers` slots each hold one job at a time. The dispatcher claims the next job of the store whenever a slot is
+//! free; a submit that finds one free does that in its own transaction, and starts the claimed job in that slot. Each
+//! claim is solved on a blocking thread, or in a process that such a thread feeds (`process`). For each running solver
+//! a recorder task commits its events in batches and then announces that there are new ones; watchers read them from
+//! the store, together. No event travels through a channel to a watcher, so none is repeated, missed, or undone by a
+//! crash.
+//!
+//! The solver calls an observer at each phase and iteration, and repeatedly within long factorisations. The observer
+//! answers *stop* when the job was canceled, has reached its time limit, or needs more memory than its share: the
+//! solver announces large matrices before it makes them. On a later mesh of adaptive refinement the solver only asks
+//! whether there is room, and returns the result of the mesh before if there is none. After each load step but the last
+//! the observer receives the results so far, which are served while the job runs and kept if it does not finish.
+//!
+//! A write to the store that fails is repeated until it succeeds, unless the job's own record is damaged.
+//!
+//! A panic costs one job at most: a panic of a worker's task ends its job, tasks of the queue are restarted, and a job
+//! without a worker is requeued (`base::failpoint` lists the places where this is tested).
+//!
+//! A job may be ended by its worker, by a cancel, by a time limit, or requeued when the service stops. Several of them
+//! may happen at the same time: the store accepts the first, since it checks in the same transaction that the attempt
+//! is still the current one.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | starting jobs when a slot is free; periodic tasks | `dispatch` |
+//! | one job: its worker, its solution on a blocking thread or in a process, its end | `worker`, `solving`, `process`, `ending` |
+//! | messages of a solver | `report` |
+//! | events committed in batches | `recorder` |
+//! | stopping solvers | `cancel`, `running` |
+//! | watchers: woken, and served from one reading of the store | `watchers`, `feed` |
+//! | metrics and spans of an attempt | `phases` |
+//! | failed writes, repeated | `backoff` |
+//! | data that the tasks share; whether a second thread is free | `state` |
+//! | a failure at every stage of a job | `tests/failpoints.rs` |
+
+// In order of use: no file uses one below it.
+mod backoff;
+mod feed;
+mod running;
+mod watchers;
+
+mod phases;
+mod report;
+
+mod ending;
+mod solving;
+
+mod process;
+
+mod state;
+
+mod recorder;
+mod worker;
+
+mod cancel;
+mod dispatch;
+
+#[cfg(test)]
+mod tests;
+
+pub use self::{
+    feed::News,
+    process::{Processes, run_worker_process},
+    state::{Queue, Solver, State},
+    watchers::Subscription,
+};

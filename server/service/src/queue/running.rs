@@ -1,0 +1,34 @@
+//! The handle on a running solver.
+
+use std::sync::{Arc, OnceLock};
+
+use base::{job::JobId, memory::Outgrown};
+
+/// The handle on a running solver.
+#[derive(Clone, Debug)]
+pub(super) struct Running {
+    /// The job's id, for the log.
+    pub(super) id: JobId,
+    /// The number of the attempt.
+    pub(super) attempt: i32,
+    /// Set to ask the solver to stop; it checks this in every iteration.
+    pub(super) stop: Arc<OnceLock<StopReason>>,
+}
+
+impl Running {
+    /// Asks the solver to stop. The first reason is kept.
+    pub(super) fn stop(&self, reason: StopReason) {
+        let _ = self.stop.set(reason); // fails if a reason is set already, which is kept
+    }
+}
+
+/// Why a solver should stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum StopReason {
+    /// The job has reached its time limit.
+    OutOfTime,
+    /// The job needs more memory than its share.
+    OutOfMemory(Outgrown),
+    /// The result is not needed: the job was canceled or requeued.
+    Unwanted,
+}

@@ -1,0 +1,191 @@
+//! Tests of the queue with substitutes for the solver, which fail in ways that the real one rarely does.
+#![allow(clippy::unwrap_used)]
+
+mod attempts;
+mod bodies;
+mod coalescing;
+mod estimates;
+mod failpoints;
+mod memory;
+mod order;
+mod processes;
+mod submits;
+
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use base::{
+    caller::Owners,
+    digest,
+    event::{Event, Payload},
+    job::{Cache, Job, JobId, Limits, Reason, ResultAvailable, Status, Waiting},
+    memory::Budget,
+    run::Solve,
+    time::Time,
+};
+use solver::{
+    error::SolveError,
+    mesh::External,
+    problem::Problem,
+    solution::{Observer, Outcome, Progress, Solution},
+};
+use store::{
+    Accepted, CancelOutcome, Edit, Ending, Filter, FinalBatch, GroupBy, NewJob, Order, Parts,
+    QueueLimits, RequestKey, Store, StoreError, Submission,
+};
+
+use super::{cancel::CANCEL_GRACE, running::StopReason, *};
+
+/// The owner of the jobs.
+const OWNER: &str = "ada";
+
+struct Rig {
+    store: Arc<Store>,
+    queue: Arc<Queue>,
+    folder: tempfile::TempDir,
+}
+
+async fn rig(solve: Solve) -> Rig {
+    rig_of(solve, 1).await
+}
+
+async fn rig_of(solve: Solve, workers: u16) -> Rig {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let queue = Queue::new(store.clone(), Solver::Threads(solve), workers);
+    Rig {
+        store,
+        queue,
+        folder,
+    }
+}
+
+/// A job that no other job shares a result with.
+fn new(priority: i32) -> NewJob {
+    let problem = fake::problem();
+    NewJob {
+        id: None,
+        name: None,
+        labels: Default::default(),
+        priority,
+        limits: Limits::default(),
+        cache: Cache::Off,
+        parent: None,
+        sweep: None,
+        title: problem.title.clone(),
+        input_hash: digest::input_hash(&problem).unwrap(),
+        problem: serde_json::to_string(&problem).unwrap(),
+        mesh: None,
+        memory_bytes: 1 << 20,
+        payload: "payload".into(),
+    }
+}
+
+impl Rig {
+    async fn submit(&self) -> Job {
+        self.submit_as(new(0)).await
+    }
+
+    async fn submit_as(&self, new: NewJob) -> Job {
+        let submission = Submission {
+            owner: OWNER.into(),
+            jobs: vec![new],
+            sweep: None,
+            key: None,
+            limits: QueueLimits {
+                queued: 10,
+                queued_of_owner: None,
+            },
+        };
+        let accepted = self.queue.submit(submission).await.unwrap();
+        accepted.jobs.into_iter().next().unwrap()
+    }
+
+    /// Waits until the job's solver has reported something.
+    async fn until_at_work(&self, job: &Job) {
+        self.until(job, |event| matches!(event.payload, Payload::Iteration(_)))
+            .await;
+    }
+
+    async fn set_priority(&self, job: &Job, priority: i32) -> Job {
+        let edit = Edit {
+            priority: Some(priority),
+            ..Edit::default()
+        };
+        let edited = self
+            .store
+            .edit(Owners::All, job.id, &edit, None)
+            .await
+            .unwrap();
+        edited.unwrap().unwrap()
+    }
+
+    /// Ends an attempt by hand.
+    async fn finish(&self, job: &Job, attempt: i32) -> Option<Vec<i64>> {
+        let last = FinalBatch::default();
+        let ending = Ending::canceled();
+        let finished = self.store.finish(job.key, attempt, &ending, last, None);
+        finished.await.unwrap()
+    }
+
+    async fn until(&self, job: &Job, done: impl Fn(&Event) -> bool) -> Vec<Event> {
+        let mut subscription = self.queue.subscribe(job.key);
+        loop {
+            let events = self.store.events_after(job.key, 0, 100_000).await.unwrap();
+            if events.iter().any(&done) {
+                return events;
+            }
+            subscription.changed().await;
+        }
+    }
+
+    async fn until_done(&self, job: &Job) -> Job {
+        let events = self
+            .until(job, |event| matches!(event.payload, Payload::Done { .. }))
+            .await;
+        assert!(
+            events
+                .iter()
+                .map(|event| event.seq)
+                .eq(1..=events.len() as i64),
+            "seq is dense from 1"
+        );
+        match events.into_iter().next_back().unwrap().payload {
+            // the keys in the store are no part of the event
+            Payload::Done { job: done } => Job {
+                key: job.key,
+                memory_bytes: job.memory_bytes,
+                cache: job.cache,
+                ..*done
+            },
+            other => unreachable!("{other:?} after done"),
+        }
+    }
+}
+
+/// A job with the same input as others of this kind, which may be answered with their result.
+fn same() -> NewJob {
+    NewJob {
+        cache: Cache::Use,
+        ..new(0)
+    }
+}
+
+fn submission(jobs: Vec<NewJob>, key: Option<&str>) -> Submission {
+    let key = key.map(|key| RequestKey {
+        key: key.into(),
+        payload: jobs[0].payload.clone(),
+    });
+    Submission {
+        owner: OWNER.into(),
+        jobs,
+        sweep: None,
+        key,
+        limits: QueueLimits {
+            queued: 1000,
+            queued_of_owner: None,
+        },
+    }
+}

@@ -1,0 +1,264 @@
+//! A worker: solves a claimed job, and ends it.
+
+use std::{ops::ControlFlow, sync::Arc, time::Duration};
+
+use base::{
+    event::Payload,
+    failpoint::{self, Point},
+    job::{Job, JobId, Status},
+};
+use store::{Claim, Ending, FinalBatch, Parts, StoreError};
+use tokio::sync::mpsc;
+use tokio_util::task::AbortOnDropHandle;
+use tracing::{error, info, warn};
+
+use super::{
+    backoff::Backoff,
+    ending::{NoSolution, ending_of_attempt, internal, panicked, timed_out},
+    process::Task,
+    recorder,
+    report::{Report, Told, go_on_if},
+    running::{Running, StopReason},
+    solving::{members_of, read_mesh, solve_task, stored_mesh},
+    state::{Queue, Slot, Solver},
+};
+
+/// The largest number of reports of a solver that are not recorded yet; after that the solver waits.
+const MOST_UNRECORDED: usize = 256;
+
+/// How long the solver of a job that has reached its time limit may take to return its last state (see `Limits`).
+const TIMEOUT_GRACE: Duration = Duration::from_secs(2);
+
+/// One attempt to solve a job, from claim to end. A panic costs this job alone.
+pub(super) async fn run_attempt(
+    queue: &Arc<Queue>,
+    claim: Claim,
+    running: Running,
+    slot: Arc<Slot>,
+) {
+    let job = claim.job.clone();
+    let attempt = try_attempt(queue.clone(), claim, running.clone(), slot.clone());
+    let attempt = tokio::spawn(attempt);
+    if let Err(panic) = attempt.await
+        && let Ok(panic) = panic.try_into_panic()
+    {
+        running.stop(StopReason::Unwanted); // the solver may not have noticed yet
+        let ending = internal(&job, &panicked("the worker", &*panic));
+        end_with_retries(queue, &job, ending, FinalBatch::default(), None).await;
+        queue.announce(&[job.key]); // if it had ended before
+    }
+    queue.release(&job);
+}
+
+async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Arc<Slot>) {
+    let Claim {
+        job,
+        problem,
+        mesh,
+        memory,
+    } = claim;
+    info!(job.id = %job.id, job.attempt, "job {} started", job.id);
+    let (queue, id) = (&queue, job.id);
+    failpoint::pass(Point::Begun, id);
+    let (sender, reports) = mpsc::channel(MOST_UNRECORDED);
+    let stop = running.clone();
+    let queue_of_solver = queue.clone();
+    let (key, in_sweep) = (job.key, job.sweep.is_some());
+    let solving = tokio::task::spawn_blocking(move || {
+        // given back when the solver has returned, or panicked, in this order: another job may have them then
+        let _slot = slot;
+        let mut memory = memory;
+        memory.free_dropped();
+        let Queue { store, solver, .. } = &*queue_of_solver;
+        let mesh = mesh.map(|hash| stored_mesh(store, &hash)).transpose()?;
+        let members = if in_sweep {
+            Some(members_of(store, key)?)
+        } else {
+            None
+        };
+        if failpoint::fails(Point::MeshRead, id) {
+            return Err(NoSolution::Internal("a test wants it".into()));
+        }
+        let queue = &*queue_of_solver;
+        let tell = |told| {
+            pass_failpoint(&told, id);
+            if matches!(told, Told::SecondThread) {
+                return go_on_if(queue.has_spare_processor());
+            }
+            // an error means that the recorder has ended: the result is not needed
+            let recording = match told {
+                Told::Report(report) => sender.blocking_send(report).is_ok(),
+                Told::OutOfMemory(outgrown) => {
+                    stop.stop(StopReason::OutOfMemory(outgrown));
+                    true
+                }
+                Told::Nothing | Told::SecondThread => true,
+            };
+            if recording && stop.stop.get().is_none() {
+                ControlFlow::Continue(())
+            } else {
+                ControlFlow::Break(())
+            }
+        };
+        match solver {
+            Solver::Threads(solve) => {
+                let mesh = mesh.as_deref().map(read_mesh).transpose()?;
+                let allowance = memory.allowance();
+                solve_task(&problem, mesh, members.as_ref(), *solve, allowance, tell)
+            }
+            Solver::Processes(processes) => {
+                let task = Task {
+                    problem,
+                    members,
+                    mesh,
+                    share: memory.share(),
+                    second_thread: queue.has_spare_processor(),
+                };
+                processes.solve(task, tell)
+            }
+        }
+    });
+    let timer = tokio::spawn(time_out(queue.clone(), job.clone(), running.clone()));
+    let timer = AbortOnDropHandle::new(timer);
+    let (last, phases) = recorder::record(queue, &job, &running, reports).await;
+    let solved = solving.await.unwrap_or_else(|panic| {
+        let panic = panic
+            .try_into_panic()
+            .map(|panic| panicked("the solver", &*panic));
+        let cause = panic.unwrap_or_else(|_| "the solver's thread was lost".into());
+        Err(NoSolution::Internal(cause))
+    });
+    drop(timer);
+    let origin = queue.origin(job.key);
+    if let Err(NoSolution::Lost(how)) = &solved {
+        phases.tell_spans(&job, origin.as_ref(), None);
+        requeue_with_retries(queue, &job, how).await;
+    } else {
+        let (ending, parts) = ending_of_attempt(&job, solved, running.stop.get().copied());
+        // when the service stops, it is requeued then or at the next start, and not canceled
+        let requeued = ending.status == Status::Canceled && queue.stopping.is_cancelled();
+        phases.tell_spans(&job, origin.as_ref(), (!requeued).then_some(&ending));
+        queue.forget_origin(job.key);
+        if !requeued {
+            end_with_retries(queue, &job, ending, last, parts).await;
+        }
+    }
+    failpoint::pass(Point::Done, id);
+}
+
+/// Passes the failpoints at which a solver sends a message.
+fn pass_failpoint(told: &Told, id: JobId) {
+    let point = match told {
+        Told::Report(Report::OneLevel) => Some(Point::Parsed),
+        Told::Report(Report::Event(_, Payload::Stage { stage })) => Point::beginning_of(*stage),
+        _ => None,
+    };
+    if let Some(point) = point {
+        failpoint::pass(point, id);
+    }
+}
+
+/// Requeues a job whose process died, or ends it if that was its last attempt; retried until it succeeds.
+async fn requeue_with_retries(queue: &Queue, job: &Job, how: &str) {
+    warn!(job.id = %job.id, job.attempt, "the process that solved job {} died: {how}", job.id);
+    let mut backoff = Backoff::default();
+    loop {
+        match queue.store.requeue_lost(job.key, job.attempt, how).await {
+            Ok(changed) => return queue.announce(&changed),
+            Err(cause) if backoff.gives_up(job.id, job.key, &cause) => return,
+            Err(cause) => {
+                warn!(job.id = %job.id, %cause, "job {} could not be requeued yet: {cause}", job.id);
+            }
+        }
+        if !backoff.wait(&queue.stopping).await {
+            return;
+        }
+    }
+}
+
+/// Stops a job at its time limit, and ends it by force if its solver does not stop.
+async fn time_out(queue: Arc<Queue>, job: Job, running: Running) {
+    tokio::time::sleep(Duration::from_secs_f64(job.limits.timeout_s)).await;
+    running.stop(StopReason::OutOfTime);
+    tokio::time::sleep(TIMEOUT_GRACE).await;
+    // in its own task: a solver that returns now stops this timer, but not a commit that has begun
+    tokio::spawn(async move {
+        let ending = timed_out(&job);
+        match queue.end_attempt(job.key, running.attempt, &ending).await {
+            Ok(true) => warn!(
+                job.id = %job.id,
+                "job {} was ended at its time limit, but its solver has not stopped yet", job.id
+            ),
+            Ok(false) => {}
+            Err(cause) => {
+                error!(job.id = %job.id, %cause, "job {} could not be ended: {cause}", job.id);
+            }
+        }
+    });
+}
+
+/// Stores the result, then the end. It is retried until it succeeds, since the disk may be full temporarily and a job
+/// must not stay running. If the service stops in the meantime, its next start requeues the job.
+async fn end_with_retries(
+    queue: &Queue,
+    job: &Job,
+    ending: Ending,
+    last: FinalBatch,
+    parts: Option<Parts>,
+) {
+    let parts = parts.map(Arc::new);
+    let mut backoff = Backoff::default();
+    let stored = loop {
+        let cause = match try_to_end(queue, job, &ending, &last, parts.as_ref()).await {
+            Ok(stored) => break stored,
+            Err(cause) => cause,
+        };
+        if backoff.gives_up(job.id, job.key, &cause) {
+            return;
+        }
+        warn!(job.id = %job.id, %cause, "job {} could not be ended yet: {cause}", job.id);
+        if !backoff.wait(&queue.stopping).await {
+            return;
+        }
+    };
+    // another one has ended it meanwhile
+    if !stored
+        && let Some(parts) = parts
+        && let Err(cause) = queue.store.discard_parts(&parts).await
+    {
+        warn!(%cause, "what was written of the result of job {} stays until the next start: {cause}", job.id);
+    }
+}
+
+/// Stores the result and the end of an attempt; false when it is no longer the current one.
+async fn try_to_end(
+    queue: &Queue,
+    job: &Job,
+    ending: &Ending,
+    last: &FinalBatch,
+    parts: Option<&Arc<Parts>>,
+) -> store::Result<bool> {
+    let (key, attempt) = (job.key, job.attempt);
+    if failpoint::fails(Point::Solved, job.id) {
+        return Err(StoreError::Full);
+    }
+    let current = match parts {
+        Some(parts) => queue.store.write_before_end(key, attempt, parts).await?,
+        None => true,
+    };
+    if !current {
+        return Ok(false);
+    }
+    if failpoint::fails(Point::AlmostStored, job.id) {
+        return Err(StoreError::Full);
+    }
+    let changed = queue
+        .store
+        .finish(key, attempt, ending, last.clone(), parts);
+    let Some(changed) = changed.await? else {
+        return Ok(false);
+    };
+    failpoint::pass(Point::Unannounced, job.id);
+    queue.announce(&changed);
+    Ok(true)
+}

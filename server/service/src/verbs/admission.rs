@@ -1,0 +1,300 @@
+//! Admits a job that was read: it is fingerprinted, checked in depth, and stored in the queue.
+
+use base::{
+    caller::Caller,
+    digest,
+    job::{Job, JobId, Limits},
+    metrics::METRICS,
+};
+use solver::{
+    error::{Findings, Reason, Violation},
+    problem::Problem,
+};
+use store::{Accepted, NewJob, NewSweep, QueueLimits, RequestKey, StoreError, Submission};
+use tracing::info;
+
+use super::{
+    envelope::{Envelope, JobRequest},
+    meshes,
+    problems::{self, Admitted},
+    service::Service,
+};
+use crate::{
+    error::{ApiError, Quota, QuotaOf},
+    spans,
+};
+
+/// A job that was read, but not yet checked in depth.
+pub(super) struct Prepared {
+    envelope: Envelope,
+    /// The problem with its fingerprint, or its violations.
+    problem: Result<(Problem, String), Vec<Violation>>,
+    violations: Findings,
+    pub(super) id: Option<JobId>,
+    /// The fingerprint of everything that was submitted. Empty if the problem cannot be read: the job is then refused
+    /// before fingerprints are compared.
+    pub(super) payload: String,
+}
+
+/// Computes the fingerprints of a job and of its problem once, since that of a large mesh takes half a second.
+pub(super) async fn prepare(
+    service: &Service,
+    JobRequest { envelope, problem }: JobRequest,
+    id: Option<JobId>,
+) -> Result<Prepared, ApiError> {
+    let violations = envelope.violations();
+    service
+        .work(move || {
+            let mut payload = String::new();
+            let problem = match problem {
+                Ok(problem) => {
+                    let input_hash = digest::input_hash(&problem).map_err(ApiError::internal)?;
+                    let submitted = (&envelope, &problem.title, &input_hash, id);
+                    payload = digest::of_json(&submitted).map_err(ApiError::internal)?;
+                    Ok((problem, input_hash))
+                }
+                Err(violations) => Err(violations),
+            };
+            Ok(Prepared {
+                envelope,
+                problem,
+                violations,
+                id,
+                payload,
+            })
+        })
+        .await?
+}
+
+/// The jobs of a key that this caller used before, for the same request.
+pub(super) async fn replayed(
+    service: &Service,
+    caller: &Caller,
+    key: Option<&RequestKey>,
+) -> Result<Option<Vec<Job>>, ApiError> {
+    match key {
+        Some(key) if !key.payload.is_empty() => {
+            Ok(service.store.replay(caller.owner(), key).await?)
+        }
+        _ => Ok(None),
+    }
+}
+
+/// How many times its time limit a job may be estimated to take: a solvable job must not be refused, and a fast machine
+/// takes a third of the estimate or less (`tests/bench/estimates.py`).
+const MOST_OVER: f64 = 10.0;
+
+/// The violation of a job whose estimated time (seconds) is so long that it would only reach its time limit.
+pub(super) fn time_violation(run_s: Option<f64>, limits: &Limits) -> Option<Violation> {
+    let run_s = run_s?;
+    (run_s > MOST_OVER * limits.timeout_s).then(|| {
+        Violation::new(
+            "/limits/timeout_s",
+            Reason::OutOfRange,
+            format!("{} s", limits.timeout_s),
+            format!("at least {:.0} s: the job is estimated to take {run_s:.0} s", run_s / MOST_OVER),
+            "Raise it to the estimated time, or use a coarser mesh, less refinement or fewer increments.",
+        )
+    })
+}
+
+/// Checks a job in depth.
+pub(super) async fn admit(
+    service: &Service,
+    caller: &Caller,
+    prepared: Prepared,
+) -> Result<NewJob, ApiError> {
+    let Prepared {
+        envelope,
+        problem,
+        mut violations,
+        id,
+        payload,
+    } = prepared;
+    let admitted = match problem {
+        Ok((problem, input_hash)) => match problems::admit(service, caller, problem).await {
+            Err(ApiError::InvalidProblem(more)) => Err(more),
+            admitted => Ok((admitted?, input_hash)),
+        },
+        Err(more) => Err(more),
+    };
+    match admitted {
+        Ok(admitted) => {
+            violations.extend(time_violation(admitted.0.run_s, &envelope.limits));
+            let admitted = violations.into_result(admitted);
+            let (admitted, input_hash) = admitted.map_err(ApiError::InvalidProblem)?;
+            let Admitted {
+                title,
+                json,
+                mesh,
+                memory_bytes,
+                run_s: _,
+            } = admitted;
+            let Envelope {
+                name,
+                labels,
+                priority,
+                limits,
+                cache,
+            } = envelope;
+            Ok(NewJob {
+                id,
+                name,
+                labels,
+                priority,
+                limits,
+                cache,
+                parent: None,
+                sweep: None,
+                title,
+                input_hash,
+                problem: json,
+                mesh,
+                memory_bytes,
+                payload,
+            })
+        }
+        Err(more) => {
+            violations.extend(more);
+            Err(ApiError::InvalidProblem(violations.into_violations()))
+        }
+    }
+}
+
+/// Refuses priorities above 0, which put a job before those of all other owners, unless the caller is an administrator.
+pub(super) fn may_have_priorities(
+    caller: &Caller,
+    mut priorities: impl Iterator<Item = i32>,
+) -> Result<(), ApiError> {
+    if priorities.any(|priority| priority > 0) && !caller.is_admin() {
+        Err(ApiError::Forbidden(
+            "a priority above 0 needs the scope admin: it puts a job before those of all other owners"
+                .into(),
+        ))
+    } else {
+        Ok(())
+    }
+}
+
+/// Refuses a caller whose limits do not permit this many more jobs, before they are meshed and checked, which takes
+/// processor time from others. The limit of queued jobs is not checked here, since a job with an earlier result does
+/// not wait.
+pub(super) async fn has_share(
+    service: &Service,
+    caller: &Caller,
+    asked: usize,
+) -> Result<(), ApiError> {
+    service.may_keep_more(caller.owner()).await?;
+    let left = service.rates().and_then(|rates| rates.left(caller.owner()));
+    match left {
+        Some(left) if left < asked as u64 => Err(too_often(service, caller, left, asked as u64)),
+        _ => Ok(()),
+    }
+}
+
+/// The error of a caller who has submitted too many jobs in this minute.
+fn too_often(service: &Service, caller: &Caller, left: u64, asked: u64) -> ApiError {
+    let per_minute = service.rates().and_then(|rates| rates.per_minute);
+    let limit = u64::from(per_minute.unwrap_or_default());
+    ApiError::QuotaExceeded(Quota {
+        owner: caller.owner().to_owned(),
+        of: QuotaOf::Submissions,
+        limit,
+        used: limit.saturating_sub(left),
+        asked,
+    })
+}
+
+/// Stores jobs in the queue, all or none; the caller is their owner.
+pub(super) async fn enqueue(
+    service: &Service,
+    caller: &Caller,
+    jobs: Vec<NewJob>,
+    key: Option<RequestKey>,
+) -> Result<Accepted, ApiError> {
+    enqueue_sweep(service, caller, jobs, None, key).await
+}
+
+/// Stores the jobs of a sweep in the queue with the sweep, all or none.
+pub(super) async fn enqueue_sweep(
+    service: &Service,
+    caller: &Caller,
+    jobs: Vec<NewJob>,
+    sweep: Option<NewSweep>,
+    key: Option<RequestKey>,
+) -> Result<Accepted, ApiError> {
+    may_have_priorities(caller, jobs.iter().map(|job| job.priority))?;
+    let limit = service.max_queued;
+    let asked = jobs.len() as u64;
+    service.may_keep_more(caller.owner()).await?;
+    if let Some(rates) = service.rates()
+        && let Err(left) = rates.take(caller.owner(), asked)
+    {
+        return Err(too_often(service, caller, left, asked));
+    }
+    let most_of_owner = service.max_queued_of_owner();
+    let hash = jobs.iter().find_map(|job| job.mesh.clone());
+    let submission = Submission {
+        owner: caller.owner().to_owned(),
+        jobs,
+        sweep,
+        key,
+        limits: QueueLimits {
+            queued: limit,
+            queued_of_owner: most_of_owner,
+        },
+    };
+    let accepted = service.queue.submit(submission).await;
+    if !accepted.as_ref().is_ok_and(|accepted| !accepted.replayed)
+        && let Some(rates) = service.rates()
+    {
+        rates.give_back(caller.owner(), asked);
+    }
+    let accepted = accepted.map_err(|error| match error {
+        StoreError::QueueFull => ApiError::QueueFull {
+            limit,
+            paused: service.store.is_paused(),
+        },
+        StoreError::OwnerQueueFull => ApiError::QuotaExceeded(Quota {
+            owner: caller.owner().to_owned(),
+            of: QuotaOf::Queued,
+            limit: most_of_owner.unwrap_or(limit).into(),
+            used: service.store.load_of(caller.owner()).0 as u64,
+            asked,
+        }),
+        // it was stored when the problem was checked, and has been deleted since
+        StoreError::UnknownMesh => {
+            ApiError::InvalidProblem(vec![meshes::missing(&hash.unwrap_or_default())])
+        }
+        other => other.into(),
+    })?;
+    if !accepted.replayed {
+        for job in &accepted.jobs {
+            METRICS.job_accepted(match (&job.cached_from, job.coalesced_into) {
+                (Some(_), _) => "earlier_result",
+                (None, Some(_)) => "running_job",
+                (None, None) => "solver",
+            });
+        }
+        if let Some(trace) = caller.trace().filter(|_| spans::are_wanted()) {
+            service.queue.remember_origin(&accepted.jobs, trace);
+        }
+    }
+    if !accepted.replayed {
+        log(&accepted.jobs, caller);
+    }
+    Ok(accepted)
+}
+
+/// Logs jobs that were accepted.
+fn log(jobs: &[Job], caller: &Caller) {
+    let (owner, request_id) = (caller.owner(), caller.request_id());
+    if let Some(id) = jobs.iter().find_map(|job| job.sweep) {
+        let jobs = jobs.len();
+        info!(sweep.id = %id, jobs, owner, request_id, "sweep {id} of {owner} accepted: {jobs} jobs");
+        return;
+    }
+    for job in jobs {
+        info!(job.id = %job.id, job.input_hash, owner, request_id, "job {} of {owner} accepted", job.id);
+    }
+}

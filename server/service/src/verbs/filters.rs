@@ -1,0 +1,88 @@
+//! The filters of jobs, for lists, counts and bulk operations: those of `store::FILTERS`, and labels.
+
+use base::values::Text;
+use serde_json::json;
+use store::{FILTERS, Field, Filter};
+
+use crate::{
+    error::ApiError,
+    parameters::{Description, Location, Parameter},
+    violations,
+};
+
+/// The filter by label: `label.{key}` is a name for each key.
+pub const LABEL: Parameter<Text> = Parameter {
+    name: "label.{key}",
+    meaning: "label.KEY=VALUE: only jobs with this label; several may be given",
+    values: Text,
+};
+
+/// The descriptions of all filters.
+pub fn describe() -> Vec<Description> {
+    let described = FILTERS.iter().map(|field| {
+        let schema = (field.schema)();
+        Description {
+            location: Location::Query,
+            name: field.name,
+            schema: if field.several {
+                json!({ "type": "array", "items": schema })
+            } else {
+                schema
+            },
+            meaning: field.meaning,
+            repeatable: field.several,
+        }
+    });
+    described.chain([labels()]).collect()
+}
+
+/// Adds a value of a filter.
+pub fn set(filter: &mut Filter, field: &Field, text: &str) -> Result<(), ApiError> {
+    if (field.set)(filter, text) {
+        Ok(())
+    } else {
+        Err(ApiError::BadParameter {
+            name: field.name,
+            got: violations::quoted(text),
+            expected: (field.expected)(),
+        })
+    }
+}
+
+/// The description of labels for OpenAPI: members of an object, each of which is a parameter (style form, exploded: the
+/// default). Their values have no type: in a query all are text.
+fn labels() -> Description {
+    let keys = json!({ "^label\\.": {} });
+    Description {
+        schema: json!({ "type": "object", "patternProperties": keys, "additionalProperties": false }),
+        ..LABEL.describe_several()
+    }
+}
+
+/// Checks a filter against its limits; removes duplicate statuses and labels.
+pub fn checked(filter: Filter) -> Result<Filter, ApiError> {
+    let filter = filter.tidied();
+    if filter.labels.len() > Filter::MOST_LABELS {
+        return Err(ApiError::BadParameter {
+            name: "labels",
+            got: format!("{} labels", filter.labels.len()),
+            expected: format!("at most {} labels", Filter::MOST_LABELS),
+        });
+    }
+    Ok(filter)
+}
+
+/// Checks that a filter is not empty, so that a bulk operation is not applied to all jobs by accident.
+pub(super) fn required(filter: Filter) -> Result<Filter, ApiError> {
+    if filter.is_empty() {
+        Err(ApiError::MissingFilter(
+            describe()
+                .iter()
+                .map(|filter| filter.name)
+                .collect::<Vec<_>>()
+                .join(", "),
+        ))
+    } else {
+        Ok(filter)
+    }
+}

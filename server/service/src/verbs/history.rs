@@ -1,0 +1,167 @@
+//! Returns the iterations of a job, one row each.
+
+use std::sync::Arc;
+
+use base::{
+    caller::Caller,
+    event::{Payload, TimedIteration},
+    job::{JobId, ResultAvailable},
+    values::Integers,
+};
+use futures_util::future::BoxFuture;
+use store::Snapshot;
+
+use super::{
+    jobs,
+    results::{Found, room_for},
+    service::{Service, detached},
+};
+use crate::{error::ApiError, parameters::Parameter};
+
+/// The maximum number of rows; the first and the last one are always included.
+pub const MAX_POINTS: Parameter<Integers> = Parameter {
+    name: "max_points",
+    meaning: "Maximum number of rows; the first and the last are included",
+    values: Integers(2..=i64::MAX),
+};
+
+/// The rows of the last attempt of a job, reduced to a maximum number: those of its result or, while there is none,
+/// those of its events.
+pub fn history<'a>(
+    service: &'a Arc<Service>,
+    caller: &'a Caller,
+    id: JobId,
+    max_points: Option<i64>,
+) -> BoxFuture<'a, Result<Found<Vec<TimedIteration>>, ApiError>> {
+    Box::pin(async move {
+        let (service, caller) = (service.clone(), caller.clone());
+        // what is read goes on if the client does not wait, and its memory counts until then
+        detached(async move { read_history(&service, &caller, id, max_points).await }).await
+    })
+}
+
+async fn read_history(
+    service: &Service,
+    caller: &Caller,
+    id: JobId,
+    max_points: Option<i64>,
+) -> Result<Found<Vec<TimedIteration>>, ApiError> {
+    let share = room_for(service, caller, id, &["history"]).await?;
+    let load = async {
+        let mut found = jobs::snapshot(service, caller, id).await?;
+        let available = found.job.result_available;
+        let content = StoredHistory::load(&mut found).await?;
+        Ok(Found {
+            available,
+            content,
+            share,
+        })
+    };
+    let read = |found: Found<StoredHistory>| {
+        let Found {
+            available,
+            content,
+            share,
+        } = found;
+        let content = content.read()?;
+        Ok::<_, ApiError>(Found {
+            available,
+            content,
+            share,
+        })
+    };
+    let mut rows = service.work_on(load, read).await??;
+    if let Some(most) = max_points {
+        downsample(
+            &mut rows.content,
+            usize::try_from(most).unwrap_or(usize::MAX),
+        );
+    }
+    Ok(rows)
+}
+
+/// The stored form of a history.
+pub(super) enum StoredHistory {
+    /// A history that is stored with the result.
+    Whole(Vec<u8>),
+    /// Rows that are stored one by one, as events.
+    Events(Vec<String>),
+}
+
+impl StoredHistory {
+    pub(super) async fn load(found: &mut Snapshot) -> Result<StoredHistory, ApiError> {
+        let job = &found.job;
+        // a partial result ends with the last finished load step; the events go on
+        if job.status.is_terminal() && job.result_available == ResultAvailable::Final {
+            let whole = found.part("history").await?;
+            if let Some(whole) = whole {
+                return Ok(StoredHistory::Whole(whole));
+            }
+        }
+        Ok(StoredHistory::Events(found.iterations().await?))
+    }
+
+    pub(super) fn read(self) -> Result<Vec<TimedIteration>, ApiError> {
+        let rows = match self {
+            StoredHistory::Whole(bytes) => serde_json::from_slice(&bytes),
+            StoredHistory::Events(lines) => lines.iter().map(|line| row(line)).collect(),
+        };
+        rows.map_err(ApiError::internal)
+    }
+}
+
+fn row(line: &str) -> serde_json::Result<TimedIteration> {
+    match serde_json::from_str(line)? {
+        Payload::Iteration(row) => Ok(row),
+        other => Err(serde::de::Error::custom(format!(
+            "{} in place of an iteration",
+            other.kind()
+        ))),
+    }
+}
+
+/// Keeps at most `most` rows (2 or more), evenly distributed, including the first and the last.
+fn downsample(rows: &mut Vec<TimedIteration>, most: usize) {
+    let count = rows.len();
+    if count <= most || most < 2 {
+        return;
+    }
+    // the n-th row that is kept; strictly increasing, since most ≤ count
+    let kept = |n: usize| (n * (count - 1) + (most - 1) / 2) / (most - 1);
+    let (mut place, mut next) = (0, 0);
+    rows.retain(|_| {
+        let keep = place == kept(next);
+        place += 1;
+        next += usize::from(keep);
+        keep
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_reduced_history_has_its_ends_and_at_most_the_requested_number_of_rows() {
+        for count in 0..40 {
+            for most in 2..45 {
+                let all: Vec<u32> = (1..=count).collect();
+                let mut rows: Vec<_> = all.iter().map(|k| fake::timed(*k)).collect();
+                downsample(&mut rows, most);
+                let kept: Vec<u32> = rows.iter().map(|timed| timed.row.k).collect();
+                assert_eq!(kept.len(), most.min(all.len()), "{count} {most}");
+                assert_eq!((kept.first(), kept.last()), (all.first(), all.last()));
+                assert!(kept.is_sorted());
+            }
+        }
+    }
+
+    #[test]
+    fn the_event_of_an_iteration_contains_its_row() {
+        let event = Payload::Iteration(fake::timed(3));
+        let line = serde_json::to_string(&event).unwrap();
+        assert_eq!(row(&line).unwrap(), fake::timed(3));
+        assert!(row(r#"{"type":"stage","stage":"mesh"}"#).is_err());
+    }
+}

@@ -1,0 +1,77 @@
+//! The operations of the service, called verbs, each defined once for both protocols; `rest` and `grpc` only translate.
+//! A verb takes the service, the caller, and then the arguments of the request. The parameters of requests are defined
+//! next to their verb.
+//!
+//! A verb returns its future in a box. An async function is compiled in every crate that calls it: each protocol would
+//! compile all verbs, with what they use of the store.
+//!
+//! # Where to look
+//!
+//! | subject | where |
+//! |---|---|
+//! | the service that all verbs receive: its limits and pools | `service` |
+//! | submitting jobs | `submit`, `envelope`, `key` |
+//! | retrying a job | `retry` |
+//! | admission, with shares of owners | `admission` |
+//! | checking a problem without storing it | `problems` |
+//! | one job | `jobs` |
+//! | lists, their filters and pages | `lists`, `filters`, `page` |
+//! | many jobs at once | `bulk` |
+//! | watching a job | `watch` |
+//! | sweeps | `sweeps` |
+//! | results: summary, iterations, profiles, fields, figures | `results`, `history`, `profiles`, `fields` with `fields_in_memory`, `plots` |
+//! | meshes and their uploads | `meshes`, `uploads` |
+//! | identifying the caller | `identify` |
+//! | tokens | `tokens` |
+//! | the queue | `queue` |
+//! | version, limits and shares | `info` |
+//! | metrics | `metrics` |
+
+// The service, which every verb receives.
+mod service;
+
+// Parts of requests: a job and what comes beside its problem, a key, filters, pages.
+pub mod envelope;
+pub mod filters;
+pub mod key;
+pub mod page;
+
+// Meshes and problems; how a job is admitted.
+pub mod meshes;
+pub mod problems;
+
+mod admission;
+mod uploads;
+
+// Jobs.
+pub mod bulk;
+pub mod jobs;
+pub mod lists;
+pub mod retry;
+pub mod submit;
+pub mod watch;
+
+// Sweeps, which are solved by jobs.
+pub mod sweeps;
+
+// Results.
+pub mod fields;
+mod fields_in_memory;
+pub mod history;
+pub mod plots;
+pub mod profiles;
+pub mod results;
+
+// Who makes a request; tokens.
+pub mod identify;
+pub mod tokens;
+
+// The service itself.
+pub mod info;
+pub mod metrics;
+pub mod queue;
+
+pub use service::{MAX_MESSAGE_BYTES, Service};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,227 @@
+//! Checks a problem before it becomes a job.
+
+use base::{
+    caller::Caller,
+    digest,
+    mesh::MeshInfo,
+    text::{count, size},
+};
+use futures_util::future::BoxFuture;
+use schemars::JsonSchema;
+use serde::Serialize;
+use solver::{
+    Checked, Estimate,
+    error::{Reason, Violation},
+    mesh::Mesh,
+    problem::{Load, Problem, Refine},
+    solution::Warning,
+};
+
+use super::{meshes, service::Service};
+use crate::{
+    error::ApiError,
+    violations::{PROBLEM, prefixed},
+};
+
+/// The result of checking a problem.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct Validation {
+    /// Whether the problem would be accepted as a job with a time limit not far below the estimate.
+    pub valid: bool,
+    /// All violations of the problem.
+    pub violations: Vec<Violation>,
+    /// The warnings to consider before relying on its result.
+    pub warnings: Vec<Warning>,
+    /// The estimated cost of the problem, also of an invalid one; absent if the problem or its stored mesh cannot be read.
+    pub estimate: Option<Estimate>,
+    /// The fingerprint of the problem; absent if `estimate` is absent.
+    pub input_hash: Option<String>,
+}
+
+/// Checks a problem and stores nothing. An invalid problem is not an error here: its violations are the answer.
+pub fn validate<'a>(
+    service: &'a Service,
+    caller: &'a Caller,
+    problem: Result<Problem, Vec<Violation>>,
+) -> BoxFuture<'a, Result<Validation, ApiError>> {
+    Box::pin(async move {
+        let problem = match problem {
+            Ok(problem) => problem,
+            Err(violations) => return Ok(Validation::unread(violations)),
+        };
+        let budget_bytes = service.memory_budget_bytes;
+        let stored = match stored(service, caller, &problem).await {
+            Err(ApiError::InvalidProblem(violations)) => {
+                return Ok(Validation::unread(violations));
+            }
+            stored => stored?,
+        };
+        let check = move || {
+            let within = |estimate: Estimate| {
+                if estimate.memory_bytes > budget_bytes {
+                    Err(vec![too_large(&problem, &estimate, budget_bytes)])
+                } else {
+                    Ok(())
+                }
+            };
+            // told by the checked problem, which has all numbers; of an invalid one only by what comes before meshing
+            let mut estimate = None;
+            let checked = || {
+                let before = self::estimate(&problem, stored.as_ref()).map_err(|v| vec![v])?;
+                estimate = Some(before);
+                within(before)?;
+                let checked = check(&problem, stored)?;
+                estimate = Some(checked.estimate);
+                within(checked.estimate)?;
+                Ok(checked.warnings)
+            };
+            let (warnings, violations) = match checked() {
+                Ok(warnings) => (warnings, vec![]),
+                Err(violations) => (vec![], violations),
+            };
+            let at = |warning: Warning| Warning {
+                pointer: format!("{PROBLEM}{}", warning.pointer),
+                ..warning
+            };
+            Validation {
+                valid: violations.is_empty(),
+                violations,
+                warnings: warnings.into_iter().map(at).collect(),
+                estimate,
+                input_hash: digest::input_hash(&problem).ok(),
+            }
+        };
+        service.work(check).await
+    })
+}
+
+impl Validation {
+    fn unread(violations: Vec<Violation>) -> Validation {
+        Validation {
+            valid: false,
+            violations,
+            warnings: vec![],
+            estimate: None,
+            input_hash: None,
+        }
+    }
+}
+
+/// The violation of a problem that exceeds the memory budget.
+fn too_large(problem: &Problem, estimate: &Estimate, budget_bytes: u64) -> Violation {
+    let pointer = match problem.mesh.refine {
+        Refine::Times(0) => format!("{PROBLEM}/mesh"),
+        Refine::Times(_) | Refine::Adaptive(_) => format!("{PROBLEM}/mesh/refine"),
+    };
+    too_large_at(pointer, estimate, budget_bytes)
+}
+
+/// The violation of a problem that exceeds the memory budget, at this place of a request.
+pub(super) fn too_large_at(pointer: String, estimate: &Estimate, budget_bytes: u64) -> Violation {
+    let (unknowns, memory) = (count(estimate.dofs), size(estimate.memory_bytes));
+    Violation {
+        pointer,
+        reason: Reason::TooLarge,
+        got: format!("{unknowns} unknowns, which need about {memory}"),
+        expected: format!("at most {} of memory", size(budget_bytes)),
+        hint: "Use a coarser mesh or less refinement, or ask the operator for a larger budget."
+            .into(),
+    }
+}
+
+/// The time (seconds) that a problem is estimated to take, if that is a real estimate: for adaptive refinement it is
+/// only the time of the largest allowed mesh, which few problems need, so that there is none.
+pub(super) fn expected_run_s(problem: &Problem, run_s: f64) -> Option<f64> {
+    (!matches!(problem.mesh.refine, Refine::Adaptive(_))).then_some(run_s)
+}
+
+/// A problem that was found valid, as it is stored.
+#[derive(Debug)]
+pub(super) struct Admitted {
+    /// The title, which becomes that of the job.
+    pub title: Option<String>,
+    /// The rest as JSON.
+    pub json: String,
+    /// The stored mesh that it refers to.
+    pub mesh: Option<String>,
+    /// The estimated memory (bytes).
+    pub memory_bytes: u64,
+    /// The estimated time (seconds), if there is a real estimate.
+    pub run_s: Option<f64>,
+}
+
+/// The stored mesh that a problem refers to, if it does.
+async fn stored(
+    service: &Service,
+    caller: &Caller,
+    problem: &Problem,
+) -> Result<Option<(MeshInfo, Mesh)>, ApiError> {
+    match problem.mesh.stored() {
+        Some(hash) => Ok(Some(meshes::load(service, caller, hash).await?)),
+        None => Ok(None),
+    }
+}
+
+/// Admits a problem that is valid and within the memory budget.
+pub(super) async fn admit(
+    service: &Service,
+    caller: &Caller,
+    mut problem: Problem,
+) -> Result<Admitted, ApiError> {
+    let budget_bytes = service.memory_budget_bytes;
+    let stored = stored(service, caller, &problem).await?;
+    let admit = move || {
+        let within = |estimate: Estimate| {
+            if estimate.memory_bytes > budget_bytes {
+                Err(ApiError::ProblemTooLarge {
+                    estimate,
+                    budget_bytes,
+                })
+            } else {
+                Ok(estimate)
+            }
+        };
+        let before = estimate(&problem, stored.as_ref());
+        within(before.map_err(|violation| ApiError::InvalidProblem(vec![violation]))?)?;
+        let checked = check(&problem, stored).map_err(ApiError::InvalidProblem)?;
+        let Estimate {
+            memory_bytes,
+            run_s,
+            ..
+        } = within(checked.estimate)?;
+        let title = problem.title.take();
+        let json = serde_json::to_string(&problem).map_err(ApiError::internal)?;
+        Ok(Admitted {
+            title,
+            json,
+            mesh: problem.mesh.stored().map(str::to_owned),
+            memory_bytes,
+            run_s: expected_run_s(&problem, run_s),
+        })
+    };
+    service.work(admit).await?
+}
+
+/// Estimates the memory before meshing, since the mesh itself may need too much.
+fn estimate(problem: &Problem, stored: Option<&(MeshInfo, Mesh)>) -> Result<Estimate, Violation> {
+    let size = stored.map(|(info, _)| info.size());
+    let within = |violation| prefixed(PROBLEM, vec![violation]).remove(0);
+    solver::estimate(problem, size.as_ref()).map_err(within)
+}
+
+fn check(problem: &Problem, stored: Option<(MeshInfo, Mesh)>) -> Result<Checked, Vec<Violation>> {
+    let by_set = |load: &Load| matches!(load, Load::Force(..));
+    let lacks = |(info, mesh): &(MeshInfo, Mesh)| info.lacks_added_midsides(mesh);
+    if stored.as_ref().is_some_and(lacks) && problem.loads.iter().any(by_set) {
+        let violation = Violation::new(
+            "/mesh/stored",
+            Reason::UnknownMesh,
+            "a mesh stored by an earlier version, with added midsides in its sets of nodes",
+            "a mesh whose sets have only the nodes of its file, for a force on each of them",
+            "Delete the mesh, and upload its file again.",
+        );
+        return Err(prefixed(PROBLEM, vec![violation]));
+    }
+    let external = files::external_mesh(problem, stored.map(|(_, mesh)| mesh));
+    solver::check(problem, external).map_err(|violations| prefixed(PROBLEM, violations))
+}

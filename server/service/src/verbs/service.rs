@@ -1,0 +1,307 @@
+//! The service, which every verb receives.
+
+use std::{path::PathBuf, sync::Arc, time::Duration};
+
+use base::tasks;
+use store::{Health, Store, StoreError};
+use tokio::{sync::Semaphore, time::timeout};
+use tracing::error;
+use uuid::Uuid;
+
+use super::{
+    fields_in_memory::FieldsInMemory,
+    uploads::{Upload, Uploads},
+};
+use crate::{
+    config::{Config, Isolation, ProxyTrust, Web},
+    error::{ApiError, Quota, QuotaOf},
+    queue::Queue,
+    rates::Rates,
+    transfer::Limit,
+};
+
+/// How long a probe waits for the store.
+const HEALTH_PATIENCE: Duration = Duration::from_secs(2);
+
+/// Largest message over gRPC in either direction, as the contract promises.
+pub const MAX_MESSAGE_BYTES: usize = 1 << 20;
+
+/// The service, which every verb receives.
+#[derive(Debug)]
+pub struct Service {
+    /// The durable data.
+    pub store: Arc<Store>,
+    /// The queue, which runs the jobs.
+    pub queue: Arc<Queue>,
+    /// Limits how many problems are checked and results converted at the same time, since each takes a core.
+    checks: Arc<Semaphore>,
+    /// Maximum number of waiting jobs; further ones are refused.
+    pub(super) max_queued: u32,
+    /// Maximum number of waiting jobs of one owner.
+    max_queued_per_owner: u32,
+    /// Maximum number of running jobs of one owner.
+    pub(super) max_running_per_owner: Option<u16>,
+    /// Maximum number of bytes that one owner may store.
+    max_bytes_per_owner: Option<u64>,
+    /// Limits how many jobs each owner submits.
+    rates: Rates,
+    /// Memory that one job may need, by the estimate.
+    pub(super) memory_budget_bytes: u64,
+    pub(super) isolation: Isolation,
+    /// Largest body of a request over REST.
+    pub max_body_bytes: usize,
+    /// Largest mesh file.
+    pub max_mesh_bytes: usize,
+    /// Bytes of bodies in memory, over all requests.
+    pub received: Limit,
+    /// Bytes of answers in memory, over all requests.
+    pub sent: Limit,
+    /// Fields that are being sent.
+    pub(super) fields_in_memory: FieldsInMemory,
+    /// The proxies that identify users.
+    pub trust: ProxyTrust,
+    /// The hosts and origins that requests from browsers may name.
+    pub web: Web,
+    /// Whether the service itself uses TLS.
+    pub tls: bool,
+    /// The folder for uploads until they are read.
+    pub(super) data: PathBuf,
+    /// The uploads that are arriving.
+    uploads: Arc<Uploads>,
+}
+
+/// The stored bytes of an owner, and their limit.
+#[derive(Debug)]
+pub(super) struct Room {
+    owner: String,
+    /// The limit; `None` without limit.
+    limit: Option<u64>,
+    used: u64,
+}
+
+impl Room {
+    /// Fails if the limit is reached, or does not permit these additional bytes.
+    pub(super) fn holds(&self, more: u64) -> Result<(), ApiError> {
+        match self.limit {
+            Some(limit) if self.used >= limit || self.used.saturating_add(more) > limit => {
+                Err(self.refusal(limit, more))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Fails if these bytes alone exceed the limit.
+    pub(super) fn would_hold(&self, bytes: u64) -> Result<(), ApiError> {
+        match self.limit {
+            Some(limit) if bytes > limit => Err(self.refusal(limit, bytes)),
+            _ => Ok(()),
+        }
+    }
+
+    fn refusal(&self, limit: u64, asked: u64) -> ApiError {
+        ApiError::QuotaExceeded(Quota {
+            owner: self.owner.clone(),
+            of: QuotaOf::StoredBytes,
+            limit,
+            used: self.used,
+            asked,
+        })
+    }
+}
+
+impl Service {
+    /// A service on this store and queue.
+    pub fn new(config: &Config, store: Arc<Store>, queue: Arc<Queue>) -> Service {
+        Service {
+            store,
+            queue,
+            checks: Arc::new(Semaphore::new(2)),
+            max_queued: config.max_queued,
+            max_queued_per_owner: config.max_queued_per_owner,
+            max_running_per_owner: config.max_running_per_owner,
+            max_bytes_per_owner: config.max_bytes_per_owner,
+            rates: Rates::new(config.max_submissions_per_owner_per_minute),
+            memory_budget_bytes: config.memory.bytes(),
+            isolation: config.isolation,
+            max_body_bytes: config.max_body_bytes,
+            max_mesh_bytes: config.max_mesh_bytes,
+            received: Limit::new(config.max_received_bytes),
+            sent: Limit::new(config.max_sent_bytes),
+            fields_in_memory: FieldsInMemory::default(),
+            trust: config.trust.clone(),
+            web: config.web.clone(),
+            tls: config.tls.is_on(),
+            data: config.store.data.clone(),
+            uploads: Arc::default(),
+        }
+    }
+
+    /// How many jobs of one owner may wait; `None`: no separate limit, because a service without authentication has
+    /// only one owner.
+    pub(super) fn max_queued_of_owner(&self) -> Option<u32> {
+        self.is_shared().then_some(self.max_queued_per_owner)
+    }
+
+    /// Whether the service distinguishes owners.
+    fn is_shared(&self) -> bool {
+        self.store.has_tokens() || self.trust.is_on()
+    }
+
+    /// How many bytes one owner may store.
+    pub(super) fn max_bytes_of_owner(&self) -> Option<u64> {
+        self.max_bytes_per_owner.filter(|_| self.is_shared())
+    }
+
+    /// The limit of jobs that each owner may submit.
+    pub(super) fn rates(&self) -> Option<&Rates> {
+        Some(&self.rates).filter(|rates| rates.per_minute.is_some() && self.is_shared())
+    }
+
+    /// The stored bytes of an owner, including the problems of their waiting jobs.
+    pub(super) async fn bytes_of(&self, owner: &str) -> Result<u64, ApiError> {
+        let kept = self.store.size_of_owner(owner).await?.bytes();
+        Ok(kept.saturating_add(self.store.waiting_bytes_of(owner).await?))
+    }
+
+    /// Fails if the owner has reached the limit of stored bytes.
+    pub(super) async fn may_keep_more(&self, owner: &str) -> Result<(), ApiError> {
+        self.room_of(owner).await?.holds(0)
+    }
+
+    /// The stored bytes of an owner, and their limit.
+    pub(super) async fn room_of(&self, owner: &str) -> Result<Room, ApiError> {
+        let limit = self.max_bytes_of_owner();
+        let used = match limit {
+            Some(_) => self.bytes_of(owner).await?,
+            None => 0,
+        };
+        let owner = owner.to_owned();
+        Ok(Room { owner, limit, used })
+    }
+
+    /// Counts an upload that begins.
+    pub(super) fn begin_upload(&self, owner: &str) -> Result<Upload, ApiError> {
+        self.uploads.begin(owner, self.is_shared())
+    }
+
+    /// Fails once the service is about to stop.
+    pub fn accepting(&self) -> Result<(), ApiError> {
+        if self.queue.stopping().is_cancelled() {
+            Err(ApiError::Draining)
+        } else {
+            Ok(())
+        }
+    }
+
+    /// The health of the service; an error if it accepts no jobs, or cannot read existing ones.
+    pub async fn health(&self) -> Result<Health, ApiError> {
+        self.accepting()?;
+        let health = timeout(HEALTH_PATIENCE, self.store.health()).await;
+        match health.map_err(|_| ApiError::internal("the store does not answer"))? {
+            // not a record of a job, but the database around them
+            Err(StoreError::Damaged(_)) => Err(ApiError::StorageLost),
+            health => Ok(health?),
+        }
+    }
+
+    /// Runs work whose duration depends on the client's input (reading, meshing, hashing a problem) on a blocking
+    /// thread, a few at a time: the async threads stay free for other requests. The permit belongs to the work, not
+    /// to the request: a client that disconnects does not free it before the work is done.
+    pub async fn work<T: Send + 'static>(
+        &self,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, ApiError> {
+        self.work_on(async { Ok(()) }, |()| work()).await
+    }
+
+    /// Runs work on data that are loaded first, once there is a permit, so that waiting requests use no memory.
+    pub async fn work_on<L: Send + 'static, T: Send + 'static>(
+        &self,
+        load: impl Future<Output = Result<L, ApiError>>,
+        work: impl FnOnce(L) -> T + Send + 'static,
+    ) -> Result<T, ApiError> {
+        let permit = self.checks.clone().acquire_owned().await;
+        let permit = permit.map_err(ApiError::internal)?;
+        let loaded = load.await?;
+        let working = tasks::blocking(move || {
+            let _permit = permit;
+            work(loaded)
+        });
+        working.await.map_err(ApiError::internal)
+    }
+}
+
+/// Runs work detached from the request: a committed job must be announced even if the client disconnects before, and
+/// memory counts until what it is reserved for has ended.
+pub(super) async fn detached<T: Send + 'static>(
+    work: impl Future<Output = Result<T, ApiError>> + Send + 'static,
+) -> Result<T, ApiError> {
+    tasks::detached(work)
+        .await
+        .unwrap_or_else(|panic| Err(ApiError::internal(panic)))
+}
+
+impl From<StoreError> for ApiError {
+    fn from(error: StoreError) -> Self {
+        match error {
+            StoreError::Full => ApiError::StorageFull,
+            StoreError::Busy => ApiError::RateLimited,
+            StoreError::KeyReuse => ApiError::KeyReuse,
+            StoreError::IdConflict(id) => ApiError::IdConflict(id),
+            StoreError::Deleted(id) => ApiError::Deleted(id),
+            StoreError::Replaced(_) | StoreError::Broken(_) => ApiError::StorageLost,
+            StoreError::Damaged(damage) => {
+                // most of it was logged by the store, once
+                let incident = damage.incident.unwrap_or_else(|| {
+                    let incident = Uuid::now_v7();
+                    error!(%incident, cause = damage.cause, "incident {incident}: {damage}: {}", damage.cause);
+                    incident
+                });
+                ApiError::CorruptData {
+                    what: damage.to_string(),
+                    incident,
+                }
+            }
+            other => ApiError::internal(other),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::{sync::mpsc, time::Duration};
+
+    use crate::verbs::tests::service;
+
+    /// Work leaves the async threads free: this test has one thread, which blocking work would stop for ever.
+    #[tokio::test]
+    async fn work_leaves_the_async_threads_free() {
+        let folder = tempfile::tempdir().unwrap();
+        let service = service(folder.path()).await;
+        let (send, received) = mpsc::channel();
+        let work = service.work(move || received.recv_timeout(Duration::from_secs(10)));
+        let (worked, sent) = tokio::join!(work, async { send.send(7) });
+        sent.unwrap();
+        assert_eq!(worked.unwrap(), Ok(7));
+    }
+
+    #[tokio::test]
+    async fn a_client_that_disconnects_frees_no_permit_before_the_work_is_done() {
+        let folder = tempfile::tempdir().unwrap();
+        let service = service(folder.path()).await;
+        let (send, received) = mpsc::channel::<()>();
+        let (start, started) = tokio::sync::oneshot::channel();
+        let work = service.work(move || {
+            let _ = start.send(());
+            received.recv()
+        });
+        tokio::select! {
+            _ = work => unreachable!("it waits for a message"),
+            _ = started => {} // the request is dropped
+        }
+        assert_eq!(service.checks.available_permits(), 1);
+        drop(send);
+        service.checks.acquire_many(2).await.unwrap().forget();
+    }
+}

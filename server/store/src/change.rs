@@ -1,0 +1,438 @@
+//! One transaction of the single writer, and its effects once it is committed.
+//!
+//! A job is changed by [`Change::update`] and in no other way: a function of its row, from which everything else follows. The
+//! row is written whole, with its checksum, before the next statement of the transaction or its commit; its version is
+//! counted, its events are appended, its move in the queue, its watchers and its line in the log are kept for after the commit.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    mem,
+    sync::Arc,
+};
+
+use base::{
+    event::Payload,
+    job::{Job, JobId, Progress, Status},
+    memory::Budget,
+    metrics::METRICS,
+    time::Time,
+};
+use rusqlite::Connection;
+use tracing::info;
+
+use super::{
+    checksum::Value,
+    content::{self, Holder, name},
+    damage::Damages,
+    database::{Store, Writer, Writing},
+    error::{Result, StoreError},
+    events, intact,
+    rows::{self, JobRow},
+    rules::{self, Ended},
+    sql::Sql,
+    waiting::{Move, Owner},
+};
+
+/// Rows that a transaction keeps in memory. Some change all jobs that wait.
+const MOST_ROWS: usize = 256;
+
+/// An open transaction.
+pub(super) struct Change<'a> {
+    writer: &'a Writer<'a>,
+    store: &'a Store,
+    tx: Writing<'a>,
+    /// Rows of jobs as this transaction has changed them, by their keys.
+    rows: BTreeMap<i64, Cached>,
+    /// Those of them that are not written yet.
+    unwritten: BTreeSet<i64>,
+    /// The key of the next job, once one was inserted.
+    next_key: Option<i64>,
+    moves: Vec<Move>,
+    /// How many more jobs of each owner wait by these moves.
+    more: BTreeMap<Owner, isize>,
+    /// Jobs that have changed, for their watchers.
+    changed: Vec<i64>,
+    /// What the log will tell of jobs that end or are deleted.
+    log_lines: Vec<(JobId, LogLine)>,
+}
+
+/// A row of a job.
+struct Cached {
+    row: JobRow,
+    /// Its values in the database.
+    stored: Vec<Value>,
+}
+
+/// What the log tells of a job.
+enum LogLine {
+    Ended(Ended),
+    Deleted,
+}
+
+/// A point in a transaction to which it can be rolled back.
+#[derive(Clone, Copy)]
+pub(super) struct Savepoint {
+    moves: usize,
+    changed: usize,
+    log_lines: usize,
+}
+
+impl Writer<'_> {
+    /// Begins a transaction that may change jobs. No other one begins before its moves are applied, so that moves are applied
+    /// in the order of commits.
+    pub(super) fn change(&self) -> Result<Change<'_>> {
+        self.store.reserve.has_room()?;
+        self.control_change()
+    }
+
+    /// The same for what must work even if the disk is full.
+    pub(super) fn control_change(&self) -> Result<Change<'_>> {
+        Ok(Change {
+            writer: self,
+            store: self.store,
+            tx: self.begin_control()?,
+            rows: BTreeMap::new(),
+            unwritten: BTreeSet::new(),
+            next_key: None,
+            moves: vec![],
+            more: BTreeMap::new(),
+            changed: vec![],
+            log_lines: vec![],
+        })
+    }
+}
+
+/// Jobs, read and changed.
+impl Change<'_> {
+    /// The job with this key, as this transaction has left it, if it exists.
+    pub(super) fn find(&mut self, key: i64) -> Result<Option<Job>> {
+        let found = self.cached(key)?;
+        Ok(found.map(|cached| cached.row.job.clone()))
+    }
+
+    /// The same of a job that must exist.
+    pub(super) fn read(&mut self, key: i64) -> Result<Job> {
+        self.find(key)?.ok_or_else(|| rows::missing(key))
+    }
+
+    /// Whether this attempt of the job is the current one, and running.
+    pub(super) fn is_current(&mut self, key: i64, attempt: i32) -> Result<bool> {
+        let found = self.cached(key)?.map(|cached| &cached.row.job);
+        Ok(found.is_some_and(|job| job.status == Status::Running && job.attempt == attempt))
+    }
+
+    /// Accepts a job; `new` makes its row from its key, which is returned.
+    pub(super) fn insert(&mut self, new: impl FnOnce(i64) -> JobRow) -> Result<i64> {
+        let key = match self.next_key {
+            Some(key) => key,
+            None => rows::next_key(&self.tx)?,
+        };
+        self.next_key = Some(key + 1);
+        let mut row = new(key);
+        let event = rules::event(None, &row.job, self.now());
+        row.last_seq = event.iter().len() as i64;
+        self.move_job(rules::moves(None, &row.job));
+        let stored = rows::insert(&self.tx, &row)?;
+        let (first, attempt) = (1, row.job.attempt);
+        events::insert(&self.tx, key, first, attempt, event.as_slice())?;
+        self.keep(key, Cached { row, stored })?;
+        Ok(key)
+    }
+
+    /// Changes a job, which must exist, by this step. All that follows from the change follows here. Returns the job as it
+    /// is now.
+    pub(super) fn update(
+        &mut self,
+        key: i64,
+        step: impl FnOnce(&mut JobRow) -> Result<()>,
+    ) -> Result<Job> {
+        let now = self.now();
+        let cached = self.cached(key)?;
+        let cached = cached.ok_or_else(|| rows::missing(key))?;
+        let mut new = cached.row.clone();
+        step(&mut new)?;
+        if new == cached.row {
+            return Ok(new.job);
+        }
+        new.job.version += i64::from(rules::is_new_version(&cached.row.job, &new.job));
+        new.derive();
+        let job = new.job.clone();
+        let old = mem::replace(&mut cached.row, new).job;
+        self.unwritten.insert(key);
+        self.move_job(rules::moves(Some(&old), &job));
+        if old.status != job.status {
+            self.changed.push(key);
+        }
+        if let Some(ended) = rules::ended(&old, &job) {
+            self.log_lines.push((job.id, LogLine::Ended(ended)));
+        }
+        if let Some(event) = rules::event(Some(&old), &job, now) {
+            self.append(key, &[event])?;
+        }
+        Ok(job)
+    }
+
+    /// The same by a step that no status forbids.
+    pub(super) fn set(&mut self, key: i64, step: impl FnOnce(&mut JobRow)) -> Result<Job> {
+        let step = |row: &mut JobRow| {
+            step(row);
+            Ok(())
+        };
+        self.update(key, step)
+    }
+
+    /// Appends events to those of a job, which must exist.
+    pub(super) fn append(&mut self, key: i64, events: &[(Time, Payload)]) -> Result<()> {
+        let cached = self.cached(key)?;
+        let row = &mut cached.ok_or_else(|| rows::missing(key))?.row;
+        let (first, attempt) = (row.last_seq + 1, row.job.attempt);
+        row.last_seq += events.len() as i64;
+        self.unwritten.insert(key);
+        events::insert(&self.tx, key, first, attempt, events)
+    }
+
+    /// Appends events of the current attempt, with the progress after them.
+    pub(super) fn append_with_progress(
+        &mut self,
+        key: i64,
+        events: &[(Time, Payload)],
+        progress: &Progress,
+    ) -> Result<()> {
+        let events = self.store.events_by_our_clock(events);
+        self.append(key, &events)?;
+        let progress = Some(progress.clone());
+        self.set(key, |row| row.job.progress = progress)?;
+        Ok(())
+    }
+
+    /// Deletes a job that has ended, with what only this job has.
+    pub(super) fn delete(&mut self, job: &Job) -> Result<()> {
+        let now = self.now();
+        rows::delete(self.sql()?, job, now)?;
+        self.rows.remove(&job.key);
+        self.changed.push(job.key);
+        self.log_lines.push((job.id, LogLine::Deleted));
+        Ok(())
+    }
+
+    /// The row with this key, if it exists.
+    fn cached(&mut self, key: i64) -> Result<Option<&mut Cached>> {
+        if !self.rows.contains_key(&key) {
+            let Some((row, stored)) = rows::find_row(&self.tx, key)? else {
+                return Ok(None);
+            };
+            self.keep(key, Cached { row, stored })?;
+        }
+        Ok(self.rows.get_mut(&key))
+    }
+
+    fn keep(&mut self, key: i64, cached: Cached) -> Result<()> {
+        if self.rows.len() >= MOST_ROWS {
+            self.write_rows()?;
+            self.rows.clear();
+        }
+        self.rows.insert(key, cached);
+        Ok(())
+    }
+
+    /// Writes the rows that have changed.
+    fn write_rows(&mut self) -> Result<()> {
+        for key in mem::take(&mut self.unwritten) {
+            if let Some(Cached { row, stored }) = self.rows.get_mut(&key) {
+                *stored = rows::update(&self.tx, stored, row)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Change<'_> {
+    /// The connection, for statements: they find all jobs as they are now.
+    pub(super) fn sql(&mut self) -> Result<&Connection> {
+        self.write_rows()?;
+        Ok(&self.tx)
+    }
+
+    /// What was found damaged.
+    pub(super) fn damages(&self) -> &Damages {
+        &self.store.damages
+    }
+
+    /// The newest result of this input is checked again before it answers a job.
+    pub(super) fn forget_checked(&self, input_hash: &str) {
+        self.store.intact.inputs.remove(input_hash);
+    }
+
+    /// The memory that running jobs share.
+    pub(super) fn budget(&self) -> &Arc<Budget> {
+        self.store.budget()
+    }
+
+    /// An owner has a turn, once this is committed.
+    pub(super) fn take_turn(&mut self, turn: Move) {
+        self.moves.push(turn);
+    }
+
+    fn move_job(&mut self, moves: Vec<Move>) {
+        moves.iter().for_each(|change| self.count(change, 1));
+        self.moves.extend(moves);
+    }
+
+    /// Counts a move, or takes it back: looking at all moves for every job of a large submission would take minutes.
+    fn count(&mut self, change: &Move, sign: isize) {
+        let (owner, more) = match change {
+            Move::Enter(place) => (&place.owner, 1),
+            Move::Attach(owner) => (owner, 1),
+            Move::Leave(place) => (&place.owner, -1),
+            Move::Detach(owner) => (owner, -1),
+            Move::Start(_) | Move::Stop(_) | Move::Turn { .. } => return,
+        };
+        *self.more.entry(owner.clone()).or_default() += sign * more;
+    }
+
+    /// What was read, unless it is damaged, which is noted.
+    pub(super) fn unless_damaged<T>(&self, read: Result<T>) -> Result<Option<T>> {
+        match self.store.damages.noting(read) {
+            Ok(read) => Ok(Some(read)),
+            Err(StoreError::Damaged(_)) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// What was read of this job, unless a record of it is damaged, which is noted. If it is the database, it is an error:
+    /// the change may be half done.
+    pub(super) fn unless_damage_of<T>(&self, key: i64, read: Result<T>) -> Result<Option<T>> {
+        match read {
+            Err(error) if !error.is_damage_of(key) => Err(error),
+            read => self.unless_damaged(read),
+        }
+    }
+
+    /// The problem of a job. It is read beside the transaction first: a page that cannot be read would end that.
+    pub(super) fn problem(&mut self, job: &Job) -> Result<String> {
+        let holder = Holder::Job(job.key);
+        match content::try_to_read_text(self.writer.beside(), holder, name::PROBLEM) {
+            // this transaction may have written it, or mended it
+            Err(error) if error.is_damage_of(job.key) => {
+                content::read_text(&self.tx, holder, name::PROBLEM)
+            }
+            read => read.map_err(|error| error.reading(|| holder.record(name::PROBLEM))),
+        }
+    }
+
+    /// Whether the result of a job that has ended is as it was written; checked once, and beside the transaction, as above.
+    pub(super) fn has_intact_result(&mut self, job: &Job) -> Result<bool> {
+        // this transaction may have attached it
+        let attached = content::all(self.sql()?, Holder::Job(job.key));
+        let checked = attached.and_then(|attached| {
+            let beside = self.writer.beside();
+            intact::check_result(beside, &self.store.intact, job.key, attached)
+        });
+        Ok(self.unless_damaged(checked)?.is_some())
+    }
+
+    /// This moment, by the clock of the store.
+    pub(super) fn now(&self) -> Time {
+        self.store.now()
+    }
+
+    /// Jobs that have changed since a savepoint.
+    pub(super) fn changed_since(&self, savepoint: Savepoint) -> Vec<i64> {
+        self.changed
+            .get(savepoint.changed..)
+            .unwrap_or_default()
+            .to_vec()
+    }
+
+    /// How many jobs of this owner wait, with the changes of this transaction.
+    pub(super) fn waiting_of(&self, owner: &str) -> usize {
+        let more = self.more.get(owner).copied().unwrap_or_default();
+        let waiting = self.store.waiting_jobs().len_of(owner);
+        waiting.saturating_add_signed(more)
+    }
+
+    /// The next job that waits, with the changes of this transaction, and its owner's turn.
+    pub(super) fn next(&self, damaged: &BTreeSet<i64>) -> Option<(i64, Move)> {
+        let most_running = self.store.most_running_of_owner();
+        let mut waiting = self.store.waiting_jobs();
+        waiting.with(&self.moves, |waiting| waiting.next(damaged, most_running))
+    }
+
+    /// How many jobs wait, with the changes of this transaction.
+    pub(super) fn waiting(&self) -> usize {
+        let more: isize = self.more.values().sum();
+        self.store.waiting_jobs().len().saturating_add_signed(more)
+    }
+
+    /// Sets a point to roll back to. There is one at a time: it is released or rolled back to before the next is set.
+    pub(super) fn savepoint(&mut self) -> Result<Savepoint> {
+        self.sql()?.run("savepoint submission", ())?;
+        Ok(Savepoint {
+            moves: self.moves.len(),
+            changed: self.changed.len(),
+            log_lines: self.log_lines.len(),
+        })
+    }
+
+    /// Keeps the changes since the savepoint.
+    pub(super) fn release(&mut self) -> Result<()> {
+        self.sql()?.run("release submission", ())?;
+        Ok(())
+    }
+
+    /// Undoes the changes since this savepoint.
+    pub(super) fn roll_back_to(&mut self, savepoint: Savepoint) -> Result<()> {
+        self.rows.clear();
+        self.unwritten.clear();
+        self.next_key = None;
+        self.sql()?.run("rollback to submission", ())?;
+        self.release()?;
+        for change in self.moves.split_off(savepoint.moves) {
+            self.count(&change, -1);
+        }
+        self.changed.truncate(savepoint.changed);
+        self.log_lines.truncate(savepoint.log_lines);
+        Ok(())
+    }
+
+    /// Commits: the changes are on the disk when this returns, and only then applied to the jobs in memory. Returns the
+    /// jobs that have changed.
+    pub(super) fn commit(mut self) -> Result<Vec<i64>> {
+        self.write_rows()?;
+        self.tx.commit()?;
+        let mut waiting = self.store.waiting_jobs();
+        for change in self.moves {
+            waiting.apply(change);
+        }
+        drop(waiting);
+        self.log_lines.iter().for_each(|(id, line)| line.log(*id));
+        Ok(self.changed)
+    }
+}
+
+impl LogLine {
+    fn log(&self, job: JobId) {
+        match self {
+            LogLine::Deleted => info!(job.id = %job, "job {job} was deleted"),
+            LogLine::Ended(Ended {
+                owner,
+                times_s,
+                status,
+                reason,
+                detail,
+            }) => {
+                let (status, reason): (&'static str, _) =
+                    ((*status).into(), reason.map(<&'static str>::from));
+                let words = [
+                    Some(status),
+                    reason,
+                    Some(&**detail).filter(|detail| !detail.is_empty()),
+                ];
+                let words: Vec<&str> = words.into_iter().flatten().collect();
+                METRICS.job_ended(status, reason, *times_s);
+                let (wait_s, run_s) = times_s.unzip();
+                info!(job.id = %job, owner, job.status = status, job.reason = reason, wait_s, run_s, "job {job} has ended: {}", words.join(": "));
+            }
+        }
+    }
+}

@@ -1,0 +1,247 @@
+//! Coalescing: jobs of the same input are solved once.
+//!
+//! A job is answered by the result of an earlier job, or coalesced into a job that waits or runs, its *primary*.
+//! A coalesced job is not solved itself: it waits until its primary has ended, and ends with the same result. If
+//! the end concerns the primary alone (if it was canceled, for example), the first of the jobs coalesced into it
+//! takes its place.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
+
+use base::job::{Job, Reason, Status};
+use rusqlite::Connection;
+
+use super::{
+    change::Change,
+    content::{self, Holder},
+    database::Store,
+    end_job::end_job,
+    error::Result,
+    intact, results,
+    rows::{JobRow, from_row},
+    rules::Ending,
+    sizes,
+    sql::Sql,
+    submission::NewJob,
+};
+
+/// Most jobs that are coalesced into one: they end in one transaction with it. Further ones wait for a worker, and
+/// are answered when it is their turn.
+const MOST_COALESCED: i64 = 100;
+
+pub(super) const EARLIER_RESULT: &str = "select id from job indexed by job_answer
+     where input_hash = ? and status = 'succeeded' and result_available = 'final' and cache <> 'off'
+           and solver_version = ?
+     order by id desc limit 4";
+
+pub(super) const PRIMARY: &str = "select id from job indexed by job_under_way
+     where input_hash = ? and status in ('queued', 'running') and coalesced_into is null and cache <> 'off'
+           and cancel_requested = 0 and (status = 'running' or (priority >= ? and owner = ?))
+     order by id limit 1";
+
+/// A priority above that of any job: as the lowest priority of a waiting primary it excludes all but running ones.
+const ONLY_RUNNING: i32 = i32::MAX;
+
+/// The newest job of this input whose final result, found by this version of the program, may answer others.
+pub(super) fn earlier_result(change: &mut Change<'_>, input_hash: &str) -> Result<Option<Job>> {
+    let version = env!("CARGO_PKG_VERSION");
+    let found: Vec<i64> = change
+        .sql()?
+        .values(EARLIER_RESULT, [input_hash, version])?;
+    for key in found {
+        let job = change.read(key);
+        // a damaged one answers nobody
+        if let Some(job) = change.unless_damaged(job)?
+            // what has lost its fields answers nobody
+            && !sizes::lost_fields(change.sql()?, job.key)?
+            && change.has_intact_result(&job)?
+        {
+            return Ok(Some(job));
+        }
+    }
+    Ok(None)
+}
+
+impl Store {
+    /// Checks the result that may answer a job of this input, before the transaction that needs it, which would occupy the
+    /// single writer meanwhile. What is not found intact answers nobody.
+    pub(super) async fn check_earlier_result(self: &Arc<Self>, input_hash: &str) {
+        if self.intact.inputs.contains(input_hash) {
+            return;
+        }
+        let hash = input_hash.to_owned();
+        let _ = self
+            .read(move |store, connection| check_earlier_result(store, connection, &hash))
+            .await;
+    }
+
+    /// The same for the job that is probably claimed next.
+    pub(super) async fn check_result_for_next(self: &Arc<Self>) {
+        let most_running = self.most_running_of_owner();
+        let next = self.waiting_jobs().next(&BTreeSet::new(), most_running);
+        let Some((key, _)) = next else { return };
+        let _ = self
+            .read(move |store, connection| {
+                let hash = "select input_hash from job where id = ? and cache = 'use'";
+                match connection.optional_value::<String>(hash, [key]) {
+                    Ok(Some(hash)) => check_earlier_result(store, connection, &hash),
+                    Ok(None) | Err(_) => Ok(()),
+                }
+            })
+            .await;
+    }
+}
+
+fn check_earlier_result(store: &Store, connection: &Connection, input_hash: &str) -> Result<()> {
+    let version = env!("CARGO_PKG_VERSION");
+    let newest = connection.optional_value(EARLIER_RESULT, [input_hash, version])?;
+    if let Some(key) = newest {
+        let attached = content::all(connection, Holder::Job(key))?;
+        intact::check_result(connection, &store.intact, key, attached)?;
+        store.intact.inputs.insert(input_hash.to_owned());
+    }
+    Ok(())
+}
+
+/// The job that a new one of this owner may be coalesced into. One that waits with a lower priority or for another owner's
+/// turn, or that is about to be canceled, would delay the new one.
+pub(super) fn primary_for(
+    change: &mut Change<'_>,
+    owner: &str,
+    new: &NewJob,
+) -> Result<Option<i64>> {
+    let same = (&new.input_hash, new.priority, owner);
+    let primary = change.sql()?.optional_value(PRIMARY, same)?;
+    Ok(match primary {
+        Some(primary) if count_coalesced(change, primary)? < MOST_COALESCED => Some(primary),
+        _ => None,
+    })
+}
+
+fn count_coalesced(change: &mut Change<'_>, primary: i64) -> Result<i64> {
+    let count = "select count(*) from job where coalesced_into = ?";
+    change.sql()?.value(count, [primary])
+}
+
+/// Coalesces a job whose turn it is into one that runs on the same input, and with it those coalesced into it;
+/// false if there is none, or if they were too many. Two such jobs arise where the later one had a higher priority.
+pub(super) fn coalesce_into_running(change: &mut Change<'_>, job: &Job) -> Result<bool> {
+    let same = (&job.input_hash, ONLY_RUNNING, &job.owner);
+    let primary = change.sql()?.optional_value(PRIMARY, same)?;
+    let Some(primary) = primary else {
+        return Ok(false);
+    };
+    let (there, more) = (
+        count_coalesced(change, primary)?,
+        count_coalesced(change, job.key)?,
+    );
+    if there + more >= MOST_COALESCED {
+        return Ok(false);
+    }
+    let coalesced = coalesced_jobs(change, job.key)?;
+    for job in coalesced.iter().chain([job]) {
+        coalesce(change, job.key, primary)?;
+    }
+    Ok(true)
+}
+
+/// The jobs coalesced into this one, in the order in which they would be started, but for damaged ones.
+pub(super) fn coalesced_jobs(change: &mut Change<'_>, primary: i64) -> Result<Vec<Job>> {
+    let coalesced = "select * from job where coalesced_into = ? order by priority desc, id";
+    let found = change
+        .sql()?
+        .rows(coalesced, [primary], |row| Ok(from_row(row)))?;
+    let mut jobs = vec![];
+    for job in found {
+        jobs.extend(change.unless_damaged(job)?);
+    }
+    Ok(jobs)
+}
+
+/// Ends the jobs coalesced into one that has ended in the same way, or puts the first of them in its place.
+pub(super) fn end_coalesced(change: &mut Change<'_>, primary: i64) -> Result<()> {
+    let coalesced = coalesced_jobs(change, primary)?;
+    let Some(first) = coalesced.first() else {
+        return Ok(());
+    };
+    let primary = change.read(primary)?;
+    if !is_shared(primary.status, primary.reason) {
+        return replace_primary(change, first, primary.key);
+    }
+    for job in &coalesced {
+        answer(change, job.key, &primary)?;
+    }
+    Ok(())
+}
+
+/// A primary waits: if a job coalesced into it has a higher priority, that job takes its place.
+pub(super) fn replace_if_outranked(change: &mut Change<'_>, primary: i64) -> Result<()> {
+    let coalesced = coalesced_jobs(change, primary)?;
+    let Some(first) = coalesced.first() else {
+        return Ok(());
+    };
+    if first.priority > change.read(primary)?.priority {
+        replace_primary(change, first, primary)
+    } else {
+        Ok(())
+    }
+}
+
+/// Lets a job wait for a worker in place of its primary, and the first of every other owner in their own turn, each with the
+/// other jobs of that primary and of the same owner coalesced into it.
+fn replace_primary(change: &mut Change<'_>, job: &Job, primary: i64) -> Result<()> {
+    change.set(job.key, JobRow::waits_by_itself)?;
+    let others = coalesced_jobs(change, primary)?;
+    let mut first_of = BTreeMap::from([(job.owner.clone(), job.key)]);
+    for other in &others {
+        match first_of.get(&other.owner) {
+            Some(first) => coalesce(change, other.key, *first)?,
+            None => {
+                first_of.insert(other.owner.clone(), other.key);
+                change.set(other.key, JobRow::waits_by_itself)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Coalesces a job into this primary.
+fn coalesce(change: &mut Change<'_>, key: i64, primary: i64) -> Result<()> {
+    change.set(key, |row| row.job.coalesced_into = Some(primary))?;
+    Ok(())
+}
+
+/// The priority of a coalesced job may have changed: if its primary waits with a lower one, it waits by itself.
+pub(super) fn detach_if_ahead(change: &mut Change<'_>, job: &Job, primary: i64) -> Result<()> {
+    let primary = change.read(primary)?;
+    if primary.status == Status::Queued && primary.priority < job.priority {
+        change.set(job.key, JobRow::waits_by_itself)?;
+    }
+    Ok(())
+}
+
+/// Whether the end of a job is also that of the jobs coalesced into it.
+fn is_shared(status: Status, reason: Option<Reason>) -> bool {
+    match status {
+        Status::Succeeded => true,
+        // a job that has killed the process several times is not tried again for each of them
+        Status::Failed => reason
+            .is_some_and(|reason| reason.belongs_to_the_problem() || reason == Reason::WorkerLost),
+        Status::Queued | Status::Running | Status::Canceled => false,
+    }
+}
+
+/// Starts a queued job and ends it at once, with the result of another one of the same input.
+pub(super) fn answer(change: &mut Change<'_>, key: i64, source: &Job) -> Result<()> {
+    let now = change.now();
+    let job = change.update(key, |row| row.start_with_answer(source, now))?;
+    let tx = change.sql()?;
+    if job.attempt > 1 {
+        // that of finished load steps of an earlier attempt
+        results::remove(tx, key)?;
+    }
+    results::share(tx, source.key, key)?;
+    end_job(change, key, &Ending::like(source))
+}

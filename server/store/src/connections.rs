@@ -1,0 +1,173 @@
+//! Connections to the database. Each is used by one thread at a time, which may block; whoever needs one waits for a turn.
+
+use parking_lot::Mutex;
+use std::{fmt, path::Path, sync::Arc, time::Duration};
+
+use base::tasks;
+use futures_util::future::BoxFuture;
+use rusqlite::{Connection, OpenFlags};
+use tokio::{
+    sync::{OwnedSemaphorePermit, Semaphore},
+    time::timeout,
+};
+
+use super::error::{Result, StoreError};
+
+/// Statements that a connection keeps prepared: those that are used again and again. The store has some 200 texts, and makes
+/// others of the columns that change or that a list filters by.
+const MOST_STATEMENTS: usize = 200;
+
+/// For what a database is opened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Mode {
+    /// To read it.
+    Read,
+    /// To read and write it.
+    ReadWrite,
+    /// The same; it is created if it does not exist.
+    #[cfg(test)]
+    Create,
+}
+
+/// Opens the database in this file.
+pub(super) fn open(file: &Path, mode: Mode) -> Result<Connection> {
+    let flags = match mode {
+        Mode::Read => OpenFlags::SQLITE_OPEN_READ_ONLY,
+        Mode::ReadWrite => OpenFlags::SQLITE_OPEN_READ_WRITE,
+        #[cfg(test)]
+        Mode::Create => OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE,
+    };
+    // one thread uses it at a time
+    let connection = Connection::open_with_flags(file, flags | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;
+    connection.busy_timeout(Duration::from_secs(5))?;
+    connection.set_prepared_statement_cache_capacity(MOST_STATEMENTS);
+    connection.execute_batch("pragma foreign_keys = on")?;
+    Ok(connection)
+}
+
+/// Runs what may block.
+pub(super) async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> Result<T> + Send + 'static,
+) -> Result<T> {
+    let span = tracing::Span::current();
+    #[cfg(test)]
+    let work = base::time::Time::simulated_for(work);
+    let done = tasks::blocking(move || span.in_scope(work)).await;
+    done.unwrap_or_else(|error| match error.try_into_panic() {
+        Ok(panic) => std::panic::resume_unwind(panic),
+        Err(_) => Err(closed()),
+    })
+}
+
+/// The error that a store is used that was closed.
+pub(super) fn closed() -> StoreError {
+    StoreError::Folder("the store is closed".into())
+}
+
+/// Some connections of one kind.
+pub(super) struct Connections {
+    count: u32,
+    patience: Duration,
+    turns: Arc<Semaphore>,
+    idle: Mutex<Vec<Connection>>,
+    open: Box<dyn Fn() -> Result<Connection> + Send + Sync>,
+}
+
+impl Connections {
+    /// So many connections, opened by `open`, for which others wait so long.
+    pub(super) fn new(
+        count: u32,
+        patience: Duration,
+        open: impl Fn() -> Result<Connection> + Send + Sync + 'static,
+    ) -> Result<Arc<Connections>> {
+        let idle = (0..count).map(|_| open()).collect::<Result<_>>()?;
+        Ok(Arc::new(Connections {
+            count,
+            patience,
+            turns: Arc::new(Semaphore::new(count as usize)),
+            idle: Mutex::new(idle),
+            open: Box::new(open),
+        }))
+    }
+
+    /// Waits for a connection; an error if that takes too long, as it does on a disk that does not answer.
+    pub(super) fn turn(self: &Arc<Self>) -> BoxFuture<'_, Result<Lease>> {
+        Box::pin(async {
+            let turn = timeout(self.patience, self.turns.clone().acquire_owned()).await;
+            let turn = turn.map_err(|_| StoreError::Busy)?.map_err(|_| closed())?;
+            Ok(self.lease(turn))
+        })
+    }
+
+    /// A connection, if one is free.
+    pub(super) fn free(self: &Arc<Self>) -> Option<Lease> {
+        let turn = self.turns.clone().try_acquire_owned().ok()?;
+        Some(self.lease(turn))
+    }
+
+    fn lease(self: &Arc<Self>, turn: OwnedSemaphorePermit) -> Lease {
+        Lease {
+            connection: self.idle().pop(),
+            of: self.clone(),
+            _turn: turn,
+        }
+    }
+
+    /// Closes the connections, once nobody uses one.
+    pub(super) async fn close(&self) {
+        let all = self.turns.acquire_many(self.count).await;
+        self.turns.close();
+        drop(all);
+        let connections = std::mem::take(&mut *self.idle());
+        // the last one merges the write-ahead log
+        let closing = move || {
+            drop(connections);
+            Ok(())
+        };
+        let _ = blocking(closing).await; // it cannot fail
+    }
+
+    /// Whether they were closed.
+    pub(super) fn is_closed(&self) -> bool {
+        self.turns.is_closed()
+    }
+
+    fn idle(&self) -> parking_lot::MutexGuard<'_, Vec<Connection>> {
+        self.idle.lock()
+    }
+}
+
+impl fmt::Debug for Connections {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Connections({})", self.count)
+    }
+}
+
+/// A connection in use; others may have it when this is dropped.
+pub(super) struct Lease {
+    /// None if it is to be opened anew.
+    connection: Option<Connection>,
+    of: Arc<Connections>,
+    _turn: OwnedSemaphorePermit,
+}
+
+impl Lease {
+    /// The connection.
+    pub(super) fn get(&mut self) -> Result<&Connection> {
+        match &mut self.connection {
+            Some(connection) => Ok(connection),
+            none => Ok(none.insert((self.of.open)()?)),
+        }
+    }
+
+    /// It is opened anew when it is needed next.
+    pub(super) fn discard(&mut self) {
+        self.connection = None;
+    }
+}
+
+impl Drop for Lease {
+    fn drop(&mut self) {
+        self.of.idle().extend(self.connection.take());
+    }
+}

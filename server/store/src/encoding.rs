@@ -1,0 +1,227 @@
+//! How the pieces of a part of a result hold it: deflated, or as columns.
+
+use std::io::{self, BufWriter, Read, Write};
+
+use files::{columns, fields_json::FieldsJson};
+use flate2::{Compression, read::DeflateDecoder, write::DeflateEncoder};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use solver::solution::Fields;
+
+/// Size and hash of the JSON of a part.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PartInfo {
+    /// Its size.
+    pub bytes: u64,
+    /// Its SHA-256.
+    pub digest: Vec<u8>,
+}
+
+/// How the pieces of a part hold it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) enum Encoding {
+    /// Its JSON, as versions before this one stored it.
+    Plain,
+    /// Its JSON, deflated.
+    Deflated,
+    /// The columns of fields.
+    Columns,
+}
+
+/// The content of a part.
+#[derive(Debug)]
+pub(super) enum Decoded {
+    /// Its JSON.
+    Json(Vec<u8>),
+    /// Fields.
+    Fields(Box<Fields>),
+}
+
+/// The content of a part that was stored so, and size and hash of its JSON. `Err`: what is wrong with the bytes.
+pub(super) fn decoded(
+    stored: Vec<u8>,
+    encoding: Encoding,
+    expected: &PartInfo,
+) -> std::result::Result<(PartInfo, Decoded), String> {
+    let json = match encoding {
+        Encoding::Plain => stored,
+        Encoding::Deflated => {
+            let mut json = Vec::new();
+            // one more byte than there should be shows that there are more
+            let mut inflated = DeflateDecoder::new(&*stored).take(expected.bytes.saturating_add(1));
+            let read = inflated.read_to_end(&mut json);
+            read.map_err(|error| error.to_string())?;
+            json
+        }
+        Encoding::Columns => {
+            let json_bytes = usize::try_from(expected.bytes).unwrap_or(usize::MAX);
+            let fields = columns::decode(&stored, json_bytes)?;
+            let info = info_of_fields(&fields).map_err(|error| error.to_string())?;
+            return Ok((info, Decoded::Fields(Box::new(fields))));
+        }
+    };
+    Ok((info_of_json(&json), Decoded::Json(json)))
+}
+
+/// The memory that a part of fields takes at most while it is read, in bytes: what is stored, which begins with `first`, and what is
+/// made from it. `Err`: what is wrong with the bytes.
+pub(super) fn memory_to_read(
+    first: &[u8],
+    stored_bytes: usize,
+    encoding: Encoding,
+    json_bytes: usize,
+) -> std::result::Result<usize, String> {
+    let made = match encoding {
+        // a number has eight bytes, and four in its JSON at least; lists grow by doubling
+        Encoding::Plain => json_bytes.saturating_mul(4),
+        Encoding::Deflated => json_bytes.saturating_mul(6),
+        Encoding::Columns => columns::memory_to_decode(first)?,
+    };
+    Ok(stored_bytes.saturating_add(made))
+}
+
+/// The hash of the bytes that are stored.
+pub(super) fn digest(stored: &[u8]) -> Vec<u8> {
+    Sha256::digest(stored).to_vec()
+}
+
+/// Size and hash of a JSON.
+pub(super) fn info_of_json(json: &[u8]) -> PartInfo {
+    PartInfo {
+        bytes: json.len() as u64,
+        digest: digest(json),
+    }
+}
+
+/// Size and hash of the JSON of fields, which is never in memory as a whole.
+pub(super) fn info_of_fields(fields: &Fields) -> serde_json::Result<PartInfo> {
+    let (mut bytes, mut hash, mut json) = (0, Sha256::new(), FieldsJson::new(fields));
+    while let Some(piece) = json.piece()? {
+        bytes += piece.len() as u64;
+        hash.update(&piece);
+    }
+    Ok(PartInfo {
+        bytes,
+        digest: hash.finalize().to_vec(),
+    })
+}
+
+/// What is written as JSON: counted, hashed and deflated, and never in memory as a whole.
+pub(super) fn deflated_json(value: &impl Serialize) -> serde_json::Result<(PartInfo, Vec<u8>)> {
+    struct Sink {
+        bytes: u64,
+        hash: Sha256,
+        deflate: DeflateEncoder<Vec<u8>>,
+    }
+    impl Write for Sink {
+        fn write(&mut self, text: &[u8]) -> io::Result<usize> {
+            self.bytes += text.len() as u64;
+            self.hash.update(text);
+            self.deflate.write_all(text)?;
+            Ok(text.len())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+    let sink = Sink {
+        bytes: 0,
+        hash: Sha256::new(),
+        deflate: deflate(),
+    };
+    // numbers and names come one by one
+    let mut sink = BufWriter::with_capacity(AT_ONCE, sink);
+    serde_json::to_writer(&mut sink, value)?;
+    let sink = sink
+        .into_inner()
+        .map_err(|error| serde_json::Error::io(error.into_error()))?;
+    let info = PartInfo {
+        bytes: sink.bytes,
+        digest: sink.hash.finalize().to_vec(),
+    };
+    let mut body = sink.deflate.finish().map_err(serde_json::Error::io)?;
+    body.shrink_to_fit();
+    Ok((info, body))
+}
+
+/// Bytes of JSON that are hashed and deflated at a time.
+const AT_ONCE: usize = 16 << 10;
+
+fn deflate() -> DeflateEncoder<Vec<u8>> {
+    DeflateEncoder::new(Vec::new(), Compression::new(6))
+}
+
+/// A text deflated. Level 6 is the usual one: 9 takes several times as long for a few per cent.
+pub(super) fn deflated(text: &[u8]) -> Vec<u8> {
+    let mut deflate = deflate();
+    // writing to memory does not fail
+    let _ = deflate.write_all(text);
+    deflate.finish().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use allocator::{forget_highest, held, highest};
+    use files::columns::Law;
+    use solver::{element::Element, solution::GaussFields};
+
+    use super::*;
+    use crate::parts::Part;
+
+    /// A body without load: every number has eight bytes, and four in its JSON.
+    fn at_rest() -> Fields {
+        let (elements, nodes, points) = (10_000, 40_000, 90_000);
+        let zeros = |count: usize| vec![0.0; count];
+        Fields {
+            x: zeros(nodes),
+            y: zeros(nodes),
+            ux: zeros(nodes),
+            uy: zeros(nodes),
+            stress_xx: zeros(nodes),
+            stress_yy: zeros(nodes),
+            stress_xy: zeros(nodes),
+            stress_zz: zeros(nodes),
+            contact_state: vec![0; nodes],
+            elements: vec![Element::Quad([0, 1, 2, 3, 4, 5, 6, 7]); elements],
+            element_error: zeros(elements),
+            gauss: GaussFields {
+                order: 3,
+                x: zeros(points),
+                y: zeros(points),
+                stress_xx: zeros(points),
+                stress_yy: zeros(points),
+                stress_xy: zeros(points),
+                stress_zz: zeros(points),
+            },
+        }
+    }
+
+    #[test]
+    fn fields_are_read_within_the_memory_that_is_reserved_for_it() {
+        let fields = at_rest();
+        let json = serde_json::to_vec(&fields).unwrap();
+        let columns = Part::of_fields(&fields, &Law::default()).unwrap();
+        let info = columns.info.clone();
+        for (stored, encoding) in [
+            (columns.body, Encoding::Columns),
+            (deflated(&json), Encoding::Deflated),
+            (json, Encoding::Plain),
+        ] {
+            let size = info.bytes as usize;
+            let most = memory_to_read(&stored, stored.len(), encoding, size).unwrap();
+            let before = held() - stored.capacity() as i64;
+            forget_highest();
+            let read = match decoded(stored, encoding, &info).unwrap().1 {
+                Decoded::Fields(fields) => *fields,
+                Decoded::Json(json) => serde_json::from_slice(&json).unwrap(),
+            };
+            let took = (highest() - before) as usize;
+            assert!(took <= most, "{encoding:?}: {took} of {most} bytes");
+            let own = files::fields::memory(&read);
+            assert!((size / 2..most).contains(&own), "{encoding:?}: {own} bytes");
+            assert_eq!(read, fields);
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! The events of each job: appended, and read from any point on.
+
+use std::sync::Arc;
+
+use base::{
+    event::{Event, Payload},
+    job::Progress,
+    time::Time,
+};
+use rusqlite::{Connection, Row, params};
+
+use super::{
+    checksum::Checksum,
+    database::Store,
+    error::{Record, Result, StoreError},
+    sql::{Sql, text},
+};
+
+/// The last events of an attempt, stored together with its end.
+#[derive(Clone, Debug, Default)]
+pub struct FinalBatch {
+    /// Events not yet stored.
+    pub events: Vec<(Time, Payload)>,
+    /// The progress after them.
+    pub progress: Progress,
+}
+
+impl Store {
+    /// Appends events of an attempt, with the progress after them; false when the attempt is no longer the current
+    /// one.
+    pub async fn append_events(
+        self: &Arc<Self>,
+        key: i64,
+        attempt: i32,
+        payloads: Vec<(Time, Payload)>,
+        progress: &Progress,
+    ) -> Result<bool> {
+        let progress = progress.clone();
+        self.write(move |writer| {
+            let mut change = writer.change()?;
+            if !change.is_current(key, attempt)? {
+                return Ok(false);
+            }
+            change.append_with_progress(key, &payloads, &progress)?;
+            change.commit()?;
+            Ok(true)
+        })
+        .await
+    }
+
+    /// At most `limit` events after number `after`, in order.
+    pub async fn events_after(
+        self: &Arc<Self>,
+        key: i64,
+        after: i64,
+        limit: i64,
+    ) -> Result<Vec<Event>> {
+        self.read(move |_, connection| read(connection, key, after, limit))
+            .await
+    }
+}
+
+/// The iterations of one attempt of a job, each as the JSON of its event, in order.
+pub(super) fn iterations(connection: &Connection, key: i64, attempt: i32) -> Result<Vec<String>> {
+    connection.rows(
+        "select seq, attempt, t, type, body, checksum from event
+         where job_id = ? and attempt = ? and type = 'iteration' order by seq",
+        (key, attempt),
+        |row| Ok(checked(key, row)?.1.to_owned()),
+    )
+}
+
+/// At most `limit` events after number `after`, in order; an error if one is damaged or missing.
+pub(super) fn read(
+    connection: &Connection,
+    key: i64,
+    after: i64,
+    limit: i64,
+) -> Result<Vec<Event>> {
+    // one statement sees one state: the events, and after them the number of the last one
+    let rows = connection.rows(
+        "select * from (select seq, attempt, t, type, body, checksum from event
+                        where job_id = ?1 and seq > ?2 order by seq limit ?3)
+         union all select last_seq, 0, 0, '', '', null from job where id = ?1",
+        [key, after, limit],
+        |row| Ok((row.get::<_, i64>("seq")?, event(key, row))),
+    );
+    let mut rows = rows.map_err(|error| error.reading(|| Record::of_job(key, "events")))?;
+    // the row after them is no event
+    let Some((last, _)) = rows.pop() else {
+        return Ok(vec![]); // the job was deleted
+    };
+    let events: Vec<Event> = rows
+        .into_iter()
+        .map(|(_, event)| event)
+        .collect::<Result<_>>()?;
+    // they are numbered without a gap
+    let expected = last.saturating_sub(after).clamp(0, limit);
+    let dense = (0..)
+        .zip(&events)
+        .all(|(place, event)| event.seq - 1 - place == after);
+    if dense && events.len() as i64 == expected {
+        Ok(events)
+    } else {
+        Err(Record::of_job(key, "events").damaged("some are missing"))
+    }
+}
+
+/// A row of the table as an event, if it is as it was written.
+fn event(key: i64, row: &Row<'_>) -> Result<Event> {
+    let (seq, body) = checked(key, row)?;
+    Ok(Event {
+        seq,
+        attempt: row.get("attempt")?,
+        t: Time::from_micros(row.get("t")?),
+        payload: serde_json::from_str(body).map_err(|error| record(key, seq).damaged(error))?,
+    })
+}
+
+/// The time of an event (µs), if its row is as it was written.
+pub(super) fn intact_time(row: &Row<'_>) -> Option<i64> {
+    checked(row.get("job_id").ok()?, row).ok()?;
+    row.get("t").ok()
+}
+
+/// The number of an event and its body, if the row is as it was written.
+fn checked<'r>(key: i64, row: &'r Row<'_>) -> Result<(i64, &'r str)> {
+    let read = || {
+        let (seq, body) = (row.get("seq")?, text(row, "body")?);
+        let (attempt, t, kind) = (row.get("attempt")?, row.get("t")?, text(row, "type")?);
+        checksum(key, seq, attempt, t, kind, body)
+            .verify(row.get("checksum")?, || record(key, seq))?;
+        Ok((seq, body))
+    };
+    read().map_err(|error: StoreError| error.reading(|| Record::of_job(key, "events")))
+}
+
+fn checksum(key: i64, seq: i64, attempt: i32, t: i64, kind: &str, body: &str) -> Checksum {
+    let row = Checksum::new().int(key).int(seq).int(attempt.into());
+    row.int(t).text(kind).text(body)
+}
+
+fn record(key: i64, seq: i64) -> Record {
+    Record::of_job(key, format!("event {seq}"))
+}
+
+/// Inserts events of an attempt; `first`: the number of the first of them.
+pub(super) fn insert(
+    tx: &Connection,
+    key: i64,
+    first: i64,
+    attempt: i32,
+    payloads: &[(Time, Payload)],
+) -> Result<()> {
+    for (seq, (t, payload)) in (first..).zip(payloads) {
+        let (t, kind, body) = (t.micros(), payload.kind(), serde_json::to_string(payload)?);
+        let checksum = checksum(key, seq, attempt, t, kind, &body).stored();
+        tx.run(
+            "insert into event (job_id, seq, attempt, t, type, body, checksum) values (?, ?, ?, ?, ?, ?, ?)",
+            params![key, seq, attempt, t, kind, body, checksum],
+        )?;
+    }
+    Ok(())
+}

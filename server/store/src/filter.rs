@@ -1,0 +1,298 @@
+//! Which jobs a list contains, and in what order. A filter is defined here, in `job_filters`; REST, gRPC, the command
+//! line and the documentation follow.
+
+use base::{
+    caller::Owners,
+    job::{Status, SweepId},
+    time::Time,
+    values::{Text, Times, Values, Words},
+};
+use rusqlite::types::Value;
+use serde_json::json;
+use strum::{EnumString, IntoStaticStr, VariantArray};
+
+/// All filters but that by label, which is a name for each key. A line: the field of [`Filter`], its type, the name in
+/// requests (that of the field in the proto), the column with the comparison, the index that lists the jobs of
+/// a value in order of arrival, if there is one, and the meaning. `$use` is a macro that receives the lines.
+#[macro_export]
+macro_rules! job_filters {
+    ($use:ident) => {
+        $use! {
+            statuses: Vec<Status>, status, "status" "=", Some("job_by_status"),
+                "Only jobs with this status; several may be given";
+            owner: Option<String>, owner, "owner" "=", Some("job_by_owner"), "Only jobs of this owner";
+            name: Option<String>, name, "name" "=", Some("job_by_name"), "Only jobs with this name";
+            input_hash: Option<String>, input_hash, "input_hash" "=", Some("job_by_input"),
+                "Only jobs with this input";
+            sweep: Option<SweepId>, sweep, "sweep" "=", Some("job_by_sweep"), "Only jobs of this sweep";
+            created_after: Option<Time>, created_after, "created_at" ">=", None,
+                "Only jobs accepted at this time or later";
+            created_before: Option<Time>, created_before, "created_at" "<", None,
+                "Only jobs accepted earlier";
+            finished_after: Option<Time>, finished_after, "finished_at" ">=", None,
+                "Only jobs that ended at this time or later";
+            finished_before: Option<Time>, finished_before, "finished_at" "<", None,
+                "Only jobs that ended earlier";
+        }
+    };
+}
+
+macro_rules! define {
+    ($($field:ident: $type:ty, $name:ident, $column:literal $comparison:literal, $index:expr, $meaning:literal;)*) => {
+        /// Conditions on jobs; absent ones match every job.
+        #[derive(Clone, Debug, Default, PartialEq)]
+        pub struct Filter {
+            $(#[doc = $meaning] pub $field: $type,)*
+            /// With all of these labels.
+            pub labels: Vec<(String, String)>,
+        }
+
+        /// The filters but that by label.
+        pub const FILTERS: &[Field] = &[$(Field {
+            name: stringify!($name),
+            meaning: $meaning,
+            several: <$type as Criterion>::SEVERAL,
+            schema: || <$type as Criterion>::Value::allowed().schema(),
+            expected: || <$type as Criterion>::Value::allowed().expected(),
+            set: |filter, text| filter.$field.set(text),
+            column: $column,
+            comparison: $comparison,
+            index: $index,
+            values: |filter| filter.$field.stored(),
+        }),*];
+    };
+}
+job_filters!(define);
+
+/// A filter: how it is described and read, and what it means.
+#[derive(Clone, Copy, Debug)]
+pub struct Field {
+    /// Its name in requests.
+    pub name: &'static str,
+    /// What it does: one line, without a full stop.
+    pub meaning: &'static str,
+    /// Several values may be given: those of any of them match.
+    pub several: bool,
+    /// The JSON Schema of a value.
+    pub schema: fn() -> serde_json::Value,
+    /// The possible values in words.
+    pub expected: fn() -> String,
+    /// Adds a value from its text; false if it is not one.
+    pub set: fn(&mut Filter, &str) -> bool,
+    pub(super) column: &'static str,
+    pub(super) comparison: &'static str,
+    pub(super) index: Option<&'static str>,
+    /// The values that are asked for, as they are stored.
+    pub(super) values: fn(&Filter) -> Vec<Value>,
+}
+
+/// The ids of sweeps.
+#[derive(Clone, Copy, Debug)]
+pub struct SweepIds;
+
+impl Values for SweepIds {
+    type Value = SweepId;
+
+    fn schema(&self) -> serde_json::Value {
+        json!({ "$ref": "#/components/schemas/SweepId" })
+    }
+
+    fn expected(&self) -> String {
+        "sweep_ and a UUID in lower case".into()
+    }
+
+    fn read(&self, text: &str) -> Option<SweepId> {
+        SweepId::parse(text)
+    }
+}
+
+/// A value of a filter.
+trait Asked: Sized {
+    fn allowed() -> impl Values<Value = Self>;
+
+    fn stored(&self) -> Value;
+}
+
+impl Asked for Status {
+    fn allowed() -> impl Values<Value = Self> {
+        Words::all()
+    }
+
+    fn stored(&self) -> Value {
+        Value::Text(<&str>::from(*self).to_owned())
+    }
+}
+
+impl Asked for String {
+    fn allowed() -> impl Values<Value = Self> {
+        Text
+    }
+
+    fn stored(&self) -> Value {
+        Value::Text(self.clone())
+    }
+}
+
+impl Asked for SweepId {
+    fn allowed() -> impl Values<Value = Self> {
+        SweepIds
+    }
+
+    fn stored(&self) -> Value {
+        Value::Text(self.0.to_string())
+    }
+}
+
+impl Asked for Time {
+    fn allowed() -> impl Values<Value = Self> {
+        Times
+    }
+
+    fn stored(&self) -> Value {
+        Value::Integer(self.micros())
+    }
+}
+
+/// The values of a filter: one, or several.
+trait Criterion {
+    type Value: Asked;
+    const SEVERAL: bool;
+
+    fn add(&mut self, value: Self::Value);
+
+    fn values(&self) -> &[Self::Value];
+
+    fn set(&mut self, text: &str) -> bool {
+        let value = Self::Value::allowed().read(text);
+        value.map(|value| self.add(value)).is_some()
+    }
+
+    fn stored(&self) -> Vec<Value> {
+        self.values().iter().map(Asked::stored).collect()
+    }
+}
+
+impl<T: Asked> Criterion for Option<T> {
+    type Value = T;
+    const SEVERAL: bool = false;
+
+    fn add(&mut self, value: T) {
+        *self = Some(value);
+    }
+
+    fn values(&self) -> &[T] {
+        self.as_slice()
+    }
+}
+
+impl<T: Asked> Criterion for Vec<T> {
+    type Value = T;
+    const SEVERAL: bool = true;
+
+    fn add(&mut self, value: T) {
+        self.push(value);
+    }
+
+    fn values(&self) -> &[T] {
+        self
+    }
+}
+
+impl Filter {
+    /// Most labels in one filter.
+    pub const MOST_LABELS: usize = 64;
+
+    /// The same filter with each status and label once.
+    pub fn tidied(mut self) -> Self {
+        self.statuses
+            .sort_unstable_by_key(|status| <&str>::from(*status));
+        self.statuses.dedup();
+        self.labels.sort_unstable();
+        self.labels.dedup();
+        self
+    }
+
+    /// The same filter restricted to these owners; `None` if it requests the jobs of another.
+    pub(super) fn among(&self, owners: &Owners) -> Option<Self> {
+        let mut filter = self.clone();
+        if let Owners::Only(owner) = owners {
+            let asked = filter.owner.get_or_insert_with(|| owner.to_string());
+            if **asked != **owner {
+                return None;
+            }
+        }
+        Some(filter)
+    }
+
+    /// It matches every job.
+    pub fn is_empty(&self) -> bool {
+        *self == Filter::default()
+    }
+}
+
+/// The order of a list; jobs of equal times are in order of arrival.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Order {
+    /// The time to sort by.
+    pub by: OrderBy,
+    /// Latest first.
+    pub descending: bool,
+}
+
+/// The time that orders a list; its name is that of the column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, EnumString, VariantArray)]
+#[strum(serialize_all = "snake_case")]
+pub enum OrderBy {
+    /// When they were accepted.
+    CreatedAt,
+    /// When they ended; jobs that have not are left out.
+    FinishedAt,
+}
+
+/// The last job of a page, after which the next one begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cursor {
+    /// Its time in the list's order, in microseconds.
+    pub micros: i64,
+    /// Its key.
+    pub key: i64,
+}
+
+/// What jobs are grouped by; its name is that of the column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, EnumString, VariantArray)]
+#[strum(serialize_all = "snake_case")]
+pub enum GroupBy {
+    /// Their status.
+    Status,
+    /// Their owner.
+    Owner,
+}
+
+impl Order {
+    /// Newest first.
+    pub const NEWEST_FIRST: Order = Order {
+        by: OrderBy::CreatedAt,
+        descending: true,
+    };
+
+    /// In order of arrival.
+    pub const OLDEST_FIRST: Order = Order {
+        by: OrderBy::CreatedAt,
+        descending: false,
+    };
+
+    /// Whether one place of a list comes before another.
+    pub(super) fn is_before(self, one: Cursor, other: Cursor) -> bool {
+        let (one, other) = ((one.micros, one.key), (other.micros, other.key));
+        if self.descending {
+            one > other
+        } else {
+            one < other
+        }
+    }
+
+    /// `desc` or `asc`.
+    pub fn direction(self) -> &'static str {
+        if self.descending { "desc" } else { "asc" }
+    }
+}

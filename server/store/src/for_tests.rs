@@ -1,0 +1,91 @@
+//! What tests of the crates above have to know of a store, or to do to it. The program uses nothing of this, and so nothing
+//! of it is in the program.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use std::{fs, os::unix::fs::FileExt, path::Path, sync::Arc};
+
+use crate::{
+    connections::{Mode, open},
+    database::Store,
+    encoding,
+    error::Result,
+    parts::{self, Part, Parts},
+    results,
+    sql::Sql,
+};
+
+impl Store {
+    /// Changes the record of a job, as a disk may.
+    pub async fn damage_job(self: &Arc<Self>, key: i64) {
+        let statement = "update job set priority = 0.0 + 1 where rowid = ?";
+        let damaged = self.write(move |writer| writer.connection().run(statement, [key]));
+        damaged.await.unwrap();
+    }
+
+    /// Overwrites the first page of a table, as a disk may; nobody has the store open.
+    pub async fn erase_table(folder: &Path, table: &str) {
+        let database = folder.join("signorini.db");
+        let connection = open(&database, Mode::ReadWrite).unwrap();
+        let place =
+            "select rootpage - 1, page_size from sqlite_schema, pragma_page_size where name = ?";
+        let place = connection.row(place, [table], |row| Ok((row.get(0)?, row.get(1)?)));
+        let (page, bytes): (i64, i64) = place.unwrap().unwrap();
+        drop(connection);
+        let file = fs::File::options().write(true).open(database).unwrap();
+        file.write_all_at(&vec![0; bytes as usize], (page * bytes) as u64)
+            .unwrap();
+    }
+
+    /// Makes the disk full after this number of further pages, until a write fails: the connection is then replaced.
+    pub async fn bound(self: &Arc<Self>, more: i64) {
+        let bounded = self.write(move |writer| {
+            let connection = writer.connection();
+            let pages: i64 = connection.value("pragma page_count", ())?;
+            let limit = format!("pragma max_page_count = {}", pages + more);
+            Ok(connection.execute_batch(&limit)?)
+        });
+        bounded.await.unwrap();
+    }
+
+    /// Whether no write has failed yet.
+    pub async fn is_bound(self: &Arc<Self>) -> bool {
+        let pages = self.write(|writer| {
+            let pages = "pragma max_page_count";
+            writer.connection().value::<i64>(pages, ())
+        });
+        pages.await.unwrap() < 1_000_000
+    }
+
+    /// The JSON of a part of a result; `None` if there is no such part.
+    pub async fn json_of(self: &Arc<Self>, key: i64, part: &str) -> Result<Option<Vec<u8>>> {
+        let part = part.to_owned();
+        self.read(move |_, connection| {
+            let Some(result) = results::StoredResult::of(connection, key)? else {
+                return Ok(None);
+            };
+            let found = result.read(connection, &part)?;
+            Ok(found.map(|(_, decoded)| match decoded {
+                encoding::Decoded::Json(json) => json,
+                encoding::Decoded::Fields(fields) => serde_json::to_vec(&fields).unwrap(),
+            }))
+        })
+        .await
+    }
+}
+
+impl Parts {
+    /// Those of a result that is nothing but a summary.
+    pub fn of_a_summary() -> Parts {
+        Parts::new(vec![parts::Part::new("summary".into(), b"{}")])
+    }
+}
+
+impl Part {
+    /// Its JSON, for tests.
+    pub fn json(self) -> Vec<u8> {
+        match encoding::decoded(self.body, self.encoding, &self.info) {
+            Ok((_, encoding::Decoded::Json(json))) => json,
+            other => panic!("{other:?}"),
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! The ids of deleted jobs and sweeps are remembered for a while, and with them the keys of the requests that submitted them.
+
+use std::sync::Arc;
+
+use base::time::Time;
+use rusqlite::params;
+
+use super::{database::Store, delete::PAUSE, error::Result, keys, sql::Sql, sweeps};
+
+/// How long the id of a deleted job is answered with *deleted*; then it is unknown.
+const REMEMBERED_S: f64 = 7.0 * 86_400.0;
+
+/// How many of them are remembered, some 160 bytes each: what is removed as fast as it is solved does not fill the disk.
+pub(super) const MOST_REMEMBERED: u32 = 100_000;
+/// Ids that are forgotten in one transaction, with their request keys: some milliseconds of the single writer.
+const FORGOTTEN_AT_ONCE: u32 = 250;
+
+impl Store {
+    /// Removes the ids of jobs and sweeps that were deleted long ago.
+    pub async fn forget_deleted(self: &Arc<Self>, now: Time) -> Result<()> {
+        let before = self.cutoff(self.by_our_clock(now), REMEMBERED_S).micros();
+        self.forget_up_to(before - 1).await?;
+        let some = "select exists (select 1 from deleted_sweep where deleted_at < ?)";
+        let some = self.read(move |_, connection| connection.value::<bool>(some, [before]));
+        if !some.await? {
+            return Ok(());
+        }
+        self.control(move |writer| {
+            let tx = writer.begin_control()?;
+            sweeps::forget_deleted(&tx, before)?;
+            tx.commit()
+        })
+        .await
+    }
+
+    /// Removes the oldest ids of deleted jobs beyond so many.
+    pub(super) async fn forget_beyond(self: &Arc<Self>, most: u32) -> Result<()> {
+        let newest = self.read(move |_, connection| connection.optional_value(BEYOND, [most]));
+        match newest.await? {
+            Some(newest) => self.forget_up_to(newest).await,
+            None => Ok(()),
+        }
+    }
+
+    /// Removes the ids of jobs that were deleted until then, some at a time.
+    async fn forget_up_to(self: &Arc<Self>, last: i64) -> Result<()> {
+        let some = "select exists (select 1 from deleted_job where deleted_at <= ?)";
+        while self
+            .read(move |_, connection| connection.value::<bool>(some, [last]))
+            .await?
+        {
+            let forget = self.control(move |writer| {
+                let tx = writer.begin_control()?;
+                let gone: Vec<i64> = tx.values(
+                    "delete from deleted_job where uuid in (select uuid from deleted_job indexed by deleted_job_by_time
+                     where deleted_at <= ? order by deleted_at limit ?) returning id",
+                    params![last, FORGOTTEN_AT_ONCE],
+                )?;
+                for job in gone {
+                    keys::forget(&tx, job)?;
+                }
+                tx.commit()
+            });
+            forget.await?;
+            tokio::time::sleep(PAUSE).await;
+        }
+        Ok(())
+    }
+}
+
+pub(super) const BEYOND: &str = "select deleted_at from deleted_job indexed by deleted_job_by_time order by deleted_at desc limit 1 offset ?";

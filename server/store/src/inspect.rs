@@ -1,0 +1,382 @@
+//! Checking a store that no server has open, and copying what is intact to a new one.
+//!
+//! It reads as the service does, one job after the other by its number, so that damage in one place does not hide what
+//! lies elsewhere. Nothing is written to the store that is inspected.
+
+use std::{collections::BTreeSet, path::Path};
+
+use base::{
+    event::Payload,
+    job::{Job, ResultAvailable},
+};
+use rusqlite::{Connection, Row};
+
+use super::{
+    connections::{Mode, blocking, open},
+    content::{self, Holder, name},
+    database::{Writer, Writing, compare_with_the_past},
+    error::{Record, Result, StoreError},
+    events,
+    folder::{DATABASE, Folder, unusable},
+    keys, meshes, migrations,
+    progress::{self, Known},
+    results::StoredResult,
+    rows::find,
+    salvage::{StoredRow, copy_content, copy_job, copy_the_rest, new_store},
+    sql::Sql,
+    sweeps, tokens,
+};
+
+/// What an inspection has found.
+#[derive(Debug, Default)]
+pub struct Report {
+    /// Each damage, or what is missing: where, and how that was seen.
+    pub findings: Vec<String>,
+    /// Jobs of which at least a trace was found.
+    pub jobs: u64,
+    /// Those that are intact, with their problem, events and result.
+    pub intact: u64,
+    /// The tables cannot be read: there may be more jobs.
+    pub incomplete: bool,
+}
+
+/// Jobs that are written to the new store in one transaction.
+const JOBS_PER_COMMIT: u64 = 100;
+/// Every number up to this is looked for, whether or not a list has it. Beyond it only those that are listed: to look for
+/// all takes minutes, and the highest may have been read from a damaged record.
+const MOST_NUMBERS: i64 = 10_000_000;
+/// Events that are read at once.
+const EVENTS_PER_READ: i64 = 1000;
+
+/// Checks everything in the store of this folder; with `new`, which must be empty or missing, copies what is intact.
+pub async fn inspect(folder: &Path, new: Option<&Path>) -> Result<Report> {
+    let folder = folder.to_owned();
+    let (_locked, report, folder) = blocking(move || {
+        // to lock it would create it
+        match folder.join(DATABASE).try_exists() {
+            Ok(true) => {}
+            Ok(false) => return Err(unusable(&folder, absent(&folder))),
+            Err(error) => return Err(unusable(&folder, error)),
+        }
+        let locked = Folder::lock(&folder)?;
+        Ok((locked, Report::begin(&folder)?, folder))
+    })
+    .await?;
+    let report = match new {
+        Some(new) => {
+            let target = new_store(new).await?;
+            let copied = target.write(move |writer| report.complete(&folder, Some(writer)));
+            let report = copied.await?;
+            target.close().await;
+            report
+        }
+        None => blocking(move || report.complete(&folder, None)).await?,
+    };
+    Ok(report)
+}
+
+/// Checks the database of a backup that is being made, which has no log. If its tables are of an earlier version, only
+/// whether it can be read: what they contain is not known here.
+pub(super) fn check_copy(folder: &Path) -> Result<Vec<String>> {
+    let copy = open(&folder.join(DATABASE), Mode::Read)?;
+    let mut report = Report::default();
+    match migrations::are_current(&copy) {
+        Ok(()) => report.inspect(&copy, None)?,
+        Err(StoreError::Schema(_)) => report.check_pages(&copy),
+        Err(error) => return Err(error),
+    }
+    Ok(report.findings)
+}
+
+/// Why there is nothing to inspect.
+pub(super) fn absent(folder: &Path) -> String {
+    match progress::read(folder) {
+        Ok(Known::Missing) => format!("it contains no {DATABASE}"),
+        _ => format!(
+            "there is no {DATABASE} in it, although there was one: put it back, or restore it from a backup"
+        ),
+    }
+}
+
+impl Report {
+    /// What the comparison with the past says.
+    fn begin(folder: &Path) -> Result<Report> {
+        let mut report = Report::default();
+        let known = progress::read(folder)?;
+        match compare_with_the_past(folder, &known, &folder.join(DATABASE)) {
+            Ok(doubt) => report.findings.extend(doubt),
+            Err(StoreError::Folder(why)) => {
+                let advice = "to read a database, SQLite writes beside it: copy the folder to where that is allowed, and \
+                              check the copy";
+                return Err(unusable(folder, format!("{why}; {advice}")));
+            }
+            Err(error) => report.finding("database", &error),
+        }
+        Ok(report)
+    }
+
+    /// The same with what the store in this folder contains.
+    fn complete(mut self, folder: &Path, target: Option<&Writer<'_>>) -> Result<Report> {
+        match open(&folder.join(DATABASE), Mode::Read) {
+            Ok(source) => {
+                // damage to the list of steps is found below, as damage
+                if let Err(error @ StoreError::Schema(_)) = migrations::are_current(&source) {
+                    return Err(error);
+                }
+                self.inspect(&source, target)?;
+            }
+            Err(error) => self.finding("database", &error),
+        }
+        Ok(self)
+    }
+
+    fn finding(&mut self, what: &str, error: &StoreError) {
+        let text = match error {
+            StoreError::Damaged(damage) if damage.record.name == what => damage.cause.clone(),
+            StoreError::Damaged(damage) => format!("{}: {}", damage.record.name, damage.cause),
+            other => other.to_string(),
+        };
+        let finding = format!("{what}: {text}");
+        // what made the comparison with the past fail may be met again
+        if !self.findings.contains(&finding) {
+            self.findings.push(finding);
+        }
+    }
+
+    /// Checks one table after the other; an error only if the new store cannot be written.
+    fn inspect(&mut self, source: &Connection, target: Option<&Writer<'_>>) -> Result<()> {
+        let tables = source.rows("select name from sqlite_schema", (), |_| Ok(()));
+        if let Err(error) = tables {
+            // every table would tell the same
+            self.incomplete = true;
+            self.finding("database", &error);
+            return Ok(());
+        }
+        self.check_pages(source);
+        let mut last = last_key(source);
+        let listed = keys_after(source, MOST_NUMBERS).unwrap_or_else(|error| {
+            self.finding("jobs", &error);
+            self.incomplete = true;
+            vec![]
+        });
+        let mut writing: Option<Writing<'_>> = None;
+        for key in (1..=last).chain(listed) {
+            let Some(job) = self.check_job(source, key) else {
+                continue;
+            };
+            last = last.max(key);
+            let Some(target) = target else { continue };
+            let tx = match writing.take() {
+                Some(tx) => tx,
+                None => target.begin()?,
+            };
+            copy_job(source, &tx, &job)?;
+            match self.intact % JOBS_PER_COMMIT {
+                0 => tx.commit()?,
+                _ => writing = Some(tx),
+            }
+        }
+        if let Some(tx) = writing {
+            tx.commit()?;
+        }
+        let mut lost = BTreeSet::new();
+        for (table, check) in TABLES {
+            if !self.check_table(source, target, table, check)? {
+                lost.insert(table);
+            }
+        }
+        if let Some(target) = target
+            && lost
+                .iter()
+                .any(|table| matches!(*table, "token" | "setting"))
+        {
+            // it may have been the last one: the new store lets nobody in without a token
+            let tx = target.begin()?;
+            tokens::require_tokens(&tx)?;
+            tx.commit()?;
+        }
+        match target {
+            Some(target) => copy_the_rest(source, target, last),
+            None => Ok(()),
+        }
+    }
+
+    /// Checks the tables and indexes as such.
+    fn check_pages(&mut self, source: &Connection) {
+        match source.values::<String>("pragma integrity_check(20)", ()) {
+            Ok(lines) => {
+                let lines = lines.iter().filter(|line| *line != "ok");
+                self.findings
+                    .extend(lines.map(|line| format!("database: {line}")));
+            }
+            Err(error) => self.finding("database", &error),
+        }
+    }
+
+    /// Reads everything of a job; returns it if it is intact.
+    fn check_job(&mut self, source: &Connection, key: i64) -> Option<Job> {
+        let job = match find(source, key) {
+            Ok(Some(job)) => job,
+            Ok(None) => {
+                if has_events(source, key) && !was_deleted(source, key) {
+                    self.jobs += 1;
+                    self.findings
+                        .push(format!("job number {key}: record: it is missing"));
+                }
+                return None;
+            }
+            Err(error) => {
+                self.jobs += 1;
+                self.finding(&format!("{} (number {key})", name(source, key)), &error);
+                return None;
+            }
+        };
+        self.jobs += 1;
+        match check_parts(source, &job) {
+            Ok(()) => {
+                self.intact += 1;
+                Some(job)
+            }
+            Err(error) => {
+                self.finding(&job.id.to_string(), &error);
+                None
+            }
+        }
+    }
+
+    /// Checks the rows of a table, one after the other, and copies those that are intact, a mesh with its body; whether all are.
+    fn check_table(
+        &mut self,
+        source: &Connection,
+        target: Option<&Writer<'_>>,
+        table: &'static str,
+        check: Check,
+    ) -> Result<bool> {
+        let checked = |row: &Row<'_>| check(source, row).and_then(|()| StoredRow::read(row));
+        let statement = format!("select * from {table}");
+        let rows = match source.rows(&statement, (), |row| Ok(checked(row))) {
+            Ok(rows) => rows,
+            Err(error) => {
+                self.finding(table, &error);
+                return Ok(false);
+            }
+        };
+        let mut whole = true;
+        let tx = target.map(Writer::begin).transpose()?;
+        for row in rows {
+            let row = match row {
+                Ok(row) => row,
+                Err(error) => {
+                    self.finding(table, &error);
+                    whole = false;
+                    continue;
+                }
+            };
+            let Some(tx) = &tx else { continue };
+            row.insert(tx, table)?;
+            if let ("mesh", Some(key)) = (table, row.id()) {
+                copy_content(source, tx, Holder::Mesh(key))?;
+            }
+        }
+        if let Some(tx) = tx {
+            tx.commit()?;
+        }
+        Ok(whole)
+    }
+}
+
+/// What is wrong with a row.
+type Check = fn(&Connection, &Row<'_>) -> Result<()>;
+
+/// What is no part of a job: tables that are checked and copied row by row, in this order.
+const TABLES: [(&str, Check); 9] = [
+    ("mesh", check_mesh),
+    // one whose owner cannot be read becomes an administrator's
+    ("mesh_owner", |_, _| Ok(())),
+    ("request_key", |_, row| keys::check(row)),
+    ("sweep", |_, row| sweeps::intact(row, row.get("id")?)),
+    ("sweep_member", |_, row| sweeps::check_member(row)),
+    ("deleted_sweep", |_, _| Ok(())),
+    ("deleted_job", |_, _| Ok(())),
+    ("token", |_, row| tokens::read(row).map(drop)),
+    ("setting", |_, _| Ok(())),
+];
+
+/// An error if a mesh is damaged, or its body is missing or damaged.
+fn check_mesh(source: &Connection, row: &Row<'_>) -> Result<()> {
+    meshes::described(row)?;
+    let hash: String = row.get("hash")?;
+    meshes::read_body(source, &hash).map(drop)
+}
+
+/// The numbers of jobs after this one of which there is a trace, in order.
+fn keys_after(source: &Connection, key: i64) -> Result<Vec<i64>> {
+    source.values(
+        "select id from job where id > ?1 union select distinct job_id from event where job_id > ?1 order by 1",
+        [key],
+    )
+}
+
+/// The highest number of a job up to [`MOST_NUMBERS`] that is found anywhere.
+fn last_key(source: &Connection) -> i64 {
+    let mut last = 0;
+    for statement in [
+        "select seq from sqlite_sequence where name = 'job' and seq <= ?",
+        "select max(id) from job where id <= ?",
+        "select max(job_id) from event where job_id <= ?",
+    ] {
+        let found = source.optional_value::<Option<i64>>(statement, [MOST_NUMBERS]);
+        last = last.max(found.ok().flatten().flatten().unwrap_or(0));
+    }
+    last
+}
+
+fn exists(source: &Connection, statement: &str, key: i64) -> bool {
+    let found = source.row(statement, [key], |_| Ok(()));
+    found.is_ok_and(|row| row.is_some())
+}
+
+fn has_events(source: &Connection, key: i64) -> bool {
+    exists(source, "select 1 from event where job_id = ? limit 1", key)
+}
+
+fn was_deleted(source: &Connection, key: i64) -> bool {
+    exists(source, "select 1 from deleted_job where id = ?", key)
+}
+
+/// The public id of a job with a damaged row, as far as it can be read.
+fn name(source: &Connection, key: i64) -> String {
+    match source.optional_value::<String>("select uuid from job where id = ?", [key]) {
+        Ok(Some(uuid)) => format!("job_{uuid}"),
+        _ => "job".into(),
+    }
+}
+
+/// An error if the problem, an event or a part of the result of a job is missing or damaged.
+fn check_parts(source: &Connection, job: &Job) -> Result<()> {
+    let has = Holder::Job(job.key);
+    content::read_text(source, has, name::PROBLEM)?;
+    if job.sweep.is_some() {
+        content::read_text(source, has, name::DEFINITION)?;
+    }
+    let (mut after, mut ended) = (0, false);
+    loop {
+        let events = events::read(source, job.key, after, EVENTS_PER_READ)?;
+        let Some(last) = events.last() else { break };
+        ended = matches!(last.payload, Payload::Done { .. });
+        after = last.seq;
+    }
+    if ended != job.status.is_terminal() {
+        return Err(
+            Record::of_job(job.key, "events").damaged("the last event is not the end of the job")
+        );
+    }
+    match job.result_available {
+        ResultAvailable::None => Ok(()),
+        ResultAvailable::Partial | ResultAvailable::Final => {
+            let missing = || Record::of_job(job.key, "result").damaged("it is missing");
+            let result = StoredResult::of(source, job.key)?;
+            result.ok_or_else(missing)?.check(source)
+        }
+    }
+}

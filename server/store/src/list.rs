@@ -1,0 +1,526 @@
+//! Lists of jobs: pages, counts, keys.
+//!
+//! A filter has an index with the jobs of each value in order of arrival, and there is one of all jobs in order of
+//! arrival and one in order of their ends. A page is read along one of them, and the other filters are checked row by
+//! row, for at most [`MOST_CHECKED`] rows: then the page is short, and the next one goes on behind the last row that was
+//! checked. Of several indexes the one is taken that gets furthest in so many rows; their lengths need not be known.
+
+use std::sync::Arc;
+
+use base::{caller::Owners, job::Job};
+use rusqlite::{Connection, types::Value};
+
+use super::{
+    damage::Table,
+    database::Store,
+    entries::{Entries, bytes_of},
+    error::Result,
+    filter::{Cursor, FILTERS, Field, Filter, GroupBy, Order, OrderBy},
+    rows::from_row,
+    sql::{Query, Sql},
+};
+
+/// Rows that are checked for a page; few in tests, so that pages are short.
+const MOST_CHECKED: i64 = if cfg!(test) { 8 } else { 2000 };
+/// Labels by whose index a list may be read.
+const MOST_LABEL_PATHS: usize = 4;
+
+/// A part of an index: the rows of one value.
+#[derive(Clone, Copy)]
+enum Lane<'a> {
+    /// Of a label.
+    Label(&'a (String, String)),
+    /// Of a value of a column.
+    Value(&'static str, &'static Field, &'a Value),
+    /// All jobs, or all that have ended.
+    All,
+}
+
+/// How the rows of a list are found: the lanes of one index, merged, and the time that orders each.
+pub(super) struct Path<'a> {
+    lanes: Vec<Lane<'a>>,
+    by: OrderBy,
+}
+
+/// The part of a path that is read for a page.
+#[derive(Clone, Copy)]
+pub(super) struct Window {
+    /// Behind this row.
+    pub(super) after: Option<Cursor>,
+    /// Up to this one; none: to the end.
+    pub(super) last: Option<Cursor>,
+    pub(super) order: Order,
+}
+
+/// Keys of jobs, in order of arrival.
+#[derive(Debug)]
+pub struct Keys {
+    /// The keys.
+    pub keys: Vec<i64>,
+    /// Where the next ones begin; none after the last.
+    pub next: Option<Cursor>,
+}
+
+impl Path<'_> {
+    /// The path of all jobs.
+    fn whole(by: OrderBy) -> Self {
+        let lanes = vec![Lane::All];
+        Path { lanes, by }
+    }
+
+    /// The order in which its rows are for a list of that order.
+    pub(super) fn order(&self, list: Order) -> Order {
+        Order {
+            by: self.by,
+            ..list
+        }
+    }
+}
+
+impl Store {
+    /// At most `limit` jobs of a list, after `cursor`, from as many pages as that takes.
+    #[cfg(test)]
+    pub async fn jobs(
+        self: &Arc<Self>,
+        owners: Owners,
+        filter: &Filter,
+        order: Order,
+        mut cursor: Option<Cursor>,
+        limit: i64,
+    ) -> Result<Vec<Job>> {
+        let mut all = vec![];
+        loop {
+            let rest = limit - all.len() as i64;
+            let found = self.some_jobs(owners.clone(), filter, order, cursor, rest);
+            let found = found.await?;
+            all.extend(found.items);
+            cursor = found.checked_to;
+            if cursor.is_none() || all.len() as i64 >= limit {
+                return Ok(all);
+            }
+        }
+    }
+
+    /// At most `limit` jobs of a list, after `cursor`; fewer if their labels are large or many rows had to be checked.
+    pub async fn some_jobs(
+        self: &Arc<Self>,
+        owners: Owners,
+        filter: &Filter,
+        order: Order,
+        cursor: Option<Cursor>,
+        limit: i64,
+    ) -> Result<Entries<Job>> {
+        let Some(filter) = filter.among(&owners) else {
+            return Ok(Entries::default());
+        };
+        self.read_list(move |store, connection| {
+            let values = values_of(&filter);
+            let (path, window) = choose(connection, &filter, &values, order, cursor)?;
+            let query = page("job.*", &filter, &path, window, i64::MAX, limit);
+            let mut jobs = Entries::default();
+            jobs.checked_to = window.last;
+            let mut statement = connection.prepare_cached(query.sql())?;
+            let mut rows = statement.query(query.values())?;
+            while let Some(row) = rows.next()? {
+                let job = from_row(row)?;
+                let bytes = bytes_of(&job.labels);
+                if jobs.add(job, bytes).is_break() {
+                    break;
+                }
+            }
+            store.complete(connection, &mut jobs.items)?;
+            store.damages.have_all(tables_of(&filter))?;
+            Ok(jobs)
+        })
+        .await
+    }
+
+    /// How many jobs there are, by group if requested; the groups are sorted by name.
+    pub async fn count(
+        self: &Arc<Self>,
+        owners: Owners,
+        filter: &Filter,
+        group_by: Option<GroupBy>,
+    ) -> Result<Vec<(String, i64)>> {
+        let Some(filter) = filter.among(&owners) else {
+            return Ok(vec![]);
+        };
+        self.read_list(move |store, connection| {
+            let query = counted(&filter, group_by);
+            let groups = connection.rows(query.sql(), query.values(), |row| Ok(row.try_into()?))?;
+            store.damages.have_all(tables_of(&filter))?;
+            Ok(groups)
+        })
+        .await
+    }
+
+    /// The keys of at most `limit` jobs, in order of arrival, after a place in that order and up to a key.
+    pub async fn keys(
+        self: &Arc<Self>,
+        owners: Owners,
+        filter: &Filter,
+        after: Option<Cursor>,
+        up_to: i64,
+        limit: i64,
+    ) -> Result<Keys> {
+        let Some(filter) = filter.among(&owners) else {
+            let (keys, next) = (vec![], None);
+            return Ok(Keys { keys, next });
+        };
+        self.read_list(move |store, connection| {
+            let values = values_of(&filter);
+            let order = Order::OLDEST_FIRST;
+            let (path, window) = choose(connection, &filter, &values, order, after)?;
+            let columns = "job.id, job.created_at";
+            let query = page(columns, &filter, &path, window, up_to, limit);
+            let places: Vec<(i64, i64)> =
+                connection.rows(query.sql(), query.values(), |row| Ok(row.try_into()?))?;
+            store.damages.have_all(tables_of(&filter))?;
+            let next = match places.last() {
+                Some((key, micros)) if places.len() as i64 == limit => Some(Cursor {
+                    micros: *micros,
+                    key: *key,
+                }),
+                _ => window.last,
+            };
+            let keys = places.into_iter().map(|(key, _)| key).collect();
+            Ok(Keys { keys, next })
+        })
+        .await
+    }
+}
+
+/// Where jobs are found by this filter.
+fn tables_of(filter: &Filter) -> &'static [Table] {
+    if filter.labels.is_empty() {
+        &[Table::Jobs]
+    } else {
+        &[Table::Jobs, Table::Labels]
+    }
+}
+
+/// The filters that are given, each with its values.
+pub(super) fn values_of(filter: &Filter) -> Vec<(&'static Field, Vec<Value>)> {
+    let each = FILTERS.iter().map(|field| (field, (field.values)(filter)));
+    each.filter(|(_, values)| !values.is_empty()).collect()
+}
+
+/// All ways to find the jobs of a list. The last one finds all jobs in the order of the list.
+pub(super) fn paths<'a>(
+    filter: &'a Filter,
+    values: &'a [(&'static Field, Vec<Value>)],
+    order: Order,
+) -> Vec<Path<'a>> {
+    let mut paths = vec![];
+    let mut add = |by, lanes| paths.push(Path { lanes, by });
+    for label in filter.labels.iter().take(MOST_LABEL_PATHS) {
+        add(OrderBy::CreatedAt, vec![Lane::Label(label)]);
+    }
+    for (field, values) in values {
+        if let Some(index) = field.index {
+            let lane = |value| Lane::Value(index, field, value);
+            add(OrderBy::CreatedAt, values.iter().map(lane).collect());
+        }
+    }
+    let other = match order.by {
+        OrderBy::CreatedAt => OrderBy::FinishedAt,
+        OrderBy::FinishedAt => OrderBy::CreatedAt,
+    };
+    if values
+        .iter()
+        .any(|(field, _)| field.column == <&str>::from(other))
+    {
+        paths.push(Path::whole(other));
+    }
+    paths.push(Path::whole(order.by));
+    paths
+}
+
+/// The path of a page and its part. One in the order of the list is read as far as the limit permits; one in another
+/// order only if that is to its end, since its rows are sorted.
+fn choose<'a>(
+    connection: &Connection,
+    filter: &'a Filter,
+    values: &'a [(&'static Field, Vec<Value>)],
+    order: Order,
+    after: Option<Cursor>,
+) -> Result<(Path<'a>, Window)> {
+    // each row is looked up in the index of each label
+    let most = (MOST_CHECKED / filter.labels.len().max(1) as i64).max(2);
+    let end = Window {
+        after,
+        last: None,
+        order,
+    };
+    let mut furthest = (Path::whole(order.by), end);
+    for path in paths(filter, values, order) {
+        let ordered = path.by == order.by;
+        let begin = after.filter(|_| ordered);
+        let query = reach(filter, &path, path.order(order), begin, most);
+        let reached = connection.row(query.sql(), query.values(), |row| {
+            let (micros, key) = row.try_into()?;
+            Ok(Cursor { micros, key })
+        })?;
+        let Some(reached) = reached else {
+            return Ok((path, end));
+        };
+        if ordered
+            && furthest
+                .1
+                .last
+                .is_none_or(|best| order.is_before(best, reached))
+        {
+            let last = Some(reached);
+            furthest = (path, Window { last, ..end });
+        }
+    }
+    Ok(furthest)
+}
+
+/// The place of the row of a path that is `most` rows behind another place; none if it ends before.
+pub(super) fn reach(
+    filter: &Filter,
+    path: &Path<'_>,
+    order: Order,
+    after: Option<Cursor>,
+    most: i64,
+) -> Query {
+    let mut query = Query::default();
+    let window = Window {
+        after,
+        last: None,
+        order,
+    };
+    merged(&mut query, path, "micros", order, most, |query, lane| {
+        let place = Place::of(lane, path.by);
+        let Place { at, id } = place;
+        from(query, lane, path.by, &format!("{at} as micros, {id} as id"));
+        bounds(query, filter, place, window);
+        query.push(ordered(at, id, order));
+    });
+    query.push(" limit 1 offset ").push_value(most - 1);
+    query
+}
+
+/// At most `limit` jobs of a path, in order, with keys up to `up_to`.
+pub(super) fn page(
+    columns: &str,
+    filter: &Filter,
+    path: &Path<'_>,
+    window: Window,
+    up_to: i64,
+    limit: i64,
+) -> Query {
+    let mut query = Query::default();
+    let order = window.order;
+    let by = <&str>::from(order.by);
+    merged(&mut query, path, by, order, limit, |query, lane| {
+        // rows that are sorted are those of the table
+        let place = if path.by == order.by {
+            Place::of(lane, order.by)
+        } else {
+            Place::of(Lane::All, order.by)
+        };
+        from(query, lane, path.by, columns);
+        if order.by == OrderBy::FinishedAt {
+            query.push(" and job.finished_at is not null");
+        }
+        if up_to < i64::MAX {
+            query.push(" and job.id <= ").push_value(up_to);
+        }
+        conditions(query, filter, Some(lane), order.by);
+        bounds(query, filter, place, window);
+        query.push(ordered(place.at, place.id, order));
+    });
+    query.push(" limit ").push_value(limit);
+    query
+}
+
+/// The lanes of a path, each with at most `most` rows, merged in order.
+fn merged<'a>(
+    query: &mut Query,
+    path: &Path<'a>,
+    by: &str,
+    order: Order,
+    most: i64,
+    lane: impl Fn(&mut Query, Lane<'a>),
+) {
+    if let [only] = path.lanes[..] {
+        return lane(query, only);
+    }
+    for (n, one) in path.lanes.iter().enumerate() {
+        query.push(if n == 0 {
+            "select * from ("
+        } else {
+            " union all select * from ("
+        });
+        lane(query, *one);
+        query.push(" limit ").push_value(most).push(")");
+    }
+    query.push(ordered(by, "id", order));
+}
+
+fn ordered(at: &str, id: &str, order: Order) -> String {
+    let direction = order.direction();
+    format!(" order by {at} {direction}, {id} {direction}")
+}
+
+/// The rows of a lane. `indexed by`: the planner does not know how many jobs a filter matches, and would guess.
+fn from(query: &mut Query, lane: Lane<'_>, by: OrderBy, columns: &str) {
+    match lane {
+        Lane::Label((key, value)) => {
+            // a place in the index needs no job
+            let job = if columns.contains("job.") {
+                " cross join job on job.id = job_label.job_id"
+            } else {
+                ""
+            };
+            query.push(format!(
+                "select {columns} from job_label{job} where job_label.key = "
+            ));
+            query
+                .push_value(key.clone())
+                .push(" and job_label.value = ");
+            query.push_value(value.clone());
+        }
+        Lane::Value(index, field, value) => {
+            let column = field.column;
+            query.push(format!(
+                "select {columns} from job indexed by {index} where {column} = "
+            ));
+            query.push_value(value.clone());
+        }
+        Lane::All => {
+            let (index, all) = match by {
+                OrderBy::CreatedAt => ("job_by_created", "true"),
+                OrderBy::FinishedAt => ("job_by_finished", "finished_at is not null"),
+            };
+            query.push(format!(
+                "select {columns} from job indexed by {index} where {all}"
+            ));
+        }
+    }
+}
+
+/// The number of jobs in each group.
+pub(super) fn counted(filter: &Filter, group_by: Option<GroupBy>) -> Query {
+    let group = group_by.map_or("''", Into::into);
+    let mut query = Query::default();
+    query.push(format!(
+        "select {group} as kind, count(*) as jobs from job where true"
+    ));
+    conditions(&mut query, filter, None, OrderBy::CreatedAt);
+    let window = Window {
+        after: None,
+        last: None,
+        order: Order::NEWEST_FIRST,
+    };
+    let place = Place::of(Lane::All, OrderBy::CreatedAt);
+    bounds(&mut query, filter, place, window);
+    query.push(" group by kind order by kind");
+    query
+}
+
+/// The conditions of a filter, except for that of the lane and for bounds of the time that orders the list.
+fn conditions(query: &mut Query, filter: &Filter, lane: Option<Lane<'_>>, by: OrderBy) {
+    for (field, values) in values_of(filter) {
+        let of_lane = matches!(lane, Some(Lane::Value(_, own, _)) if own.name == field.name);
+        if of_lane || field.column == <&str>::from(by) {
+            continue;
+        }
+        if field.comparison != "=" {
+            query.push(format!(" and job.{} {} ", field.column, field.comparison));
+            for value in values {
+                query.push_value(value);
+            }
+            continue;
+        }
+        query.push(format!(" and job.{} in (", field.column));
+        for (n, value) in values.into_iter().enumerate() {
+            query.push(if n == 0 { "" } else { ", " });
+            query.push_value(value);
+        }
+        query.push(")");
+    }
+    for label in &filter.labels {
+        match lane {
+            Some(Lane::Label(own)) if own == label => continue,
+            // one lookup for each row of the lane
+            Some(_) => query.push(
+                " and exists (select 1 from job_label where created_at = job.created_at and job_id = job.id and key = ",
+            ),
+            None => query.push(" and job.id in (select job_id from job_label where key = "),
+        };
+        let (key, value) = label.clone();
+        query.push_value(key).push(" and value = ");
+        query.push_value(value).push(")");
+    }
+}
+
+/// The names of the time that orders the rows of a lane and of the key.
+#[derive(Clone, Copy)]
+struct Place {
+    at: &'static str,
+    id: &'static str,
+}
+
+impl Place {
+    fn of(lane: Lane<'_>, by: OrderBy) -> Place {
+        match (lane, by) {
+            (Lane::Label(_), OrderBy::CreatedAt) => Place {
+                at: "job_label.created_at",
+                id: "job_label.job_id",
+            },
+            (_, OrderBy::CreatedAt) => Place {
+                at: "job.created_at",
+                id: "job.id",
+            },
+            (_, OrderBy::FinishedAt) => Place {
+                at: "job.finished_at",
+                id: "job.id",
+            },
+        }
+    }
+}
+
+/// The bounds of the time that orders the rows, and those of the window. No job ends before it was accepted: a bound on
+/// one time is also one on the other. A bound that the window implies is left out, since the index would be read from
+/// the weaker one as well.
+fn bounds(query: &mut Query, filter: &Filter, place: Place, window: Window) {
+    let Place { at, id } = place;
+    let Window { after, last, order } = window;
+    let (least, most) = match order.by {
+        OrderBy::CreatedAt => {
+            let before = [filter.created_before, filter.finished_before];
+            (filter.created_after, before.into_iter().flatten().min())
+        }
+        OrderBy::FinishedAt => (
+            filter.finished_after.max(filter.created_after),
+            filter.finished_before,
+        ),
+    };
+    let (lower, upper) = if order.descending {
+        (last, after)
+    } else {
+        (after, last)
+    };
+    for (time, comparison, implied) in [(least, ">=", lower), (most, "<", upper)] {
+        if let (Some(time), None) = (time, implied) {
+            query.push(format!(" and {at} {comparison} "));
+            query.push_value(time.micros());
+        }
+    }
+    for (place, comparison) in [
+        (after, if order.descending { "<" } else { ">" }),
+        (last, if order.descending { ">=" } else { "<=" }),
+    ] {
+        if let Some(Cursor { micros, key }) = place {
+            query.push(format!(" and ({at}, {id}) {comparison} ("));
+            query
+                .push_value(micros)
+                .push(", ")
+                .push_value(key)
+                .push(")");
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! One job: found by its public id; details of it by its key.
+
+use std::sync::Arc;
+
+use base::{
+    caller::Owners,
+    job::{Job, JobId, Status},
+};
+
+use super::{
+    content::{self, Holder, name},
+    damage::Table,
+    database::Store,
+    error::Result,
+    rows::{find_row, with_id},
+    sql::Sql,
+};
+
+impl Store {
+    /// The job with this public id, with its queue position.
+    pub async fn job(self: &Arc<Self>, owners: Owners, id: JobId) -> Result<Option<Job>> {
+        self.read(move |store, connection| {
+            let Some(mut job) = with_id(connection, &owners, id)? else {
+                store.damages.have_all(&[Table::Jobs])?;
+                return Ok(None);
+            };
+            store.complete(connection, std::slice::from_mut(&mut job))?;
+            Ok(Some(job))
+        })
+        .await
+    }
+
+    /// The title of a job, and its problem as JSON without the title.
+    pub async fn problem(self: &Arc<Self>, key: i64) -> Result<Option<(Option<String>, String)>> {
+        self.read(move |_, connection| {
+            let tx = connection.unchecked_transaction()?;
+            let Some((row, _)) = find_row(&tx, key)? else {
+                return Ok(None);
+            };
+            let body = content::read_text(&tx, Holder::Job(key), name::PROBLEM)?;
+            Ok(Some((row.title, body)))
+        })
+        .await
+    }
+
+    /// Whether the job is terminal, so that its events contain `done`; `None` if it no longer exists.
+    pub async fn has_ended(self: &Arc<Self>, key: i64) -> Result<Option<bool>> {
+        self.read(move |_, connection| {
+            let status = "select status from job where id = ?";
+            let status: Option<String> = connection.optional_value(status, [key])?;
+            Ok(status.map(|word| word.parse().is_ok_and(Status::is_terminal)))
+        })
+        .await
+    }
+
+    /// The age of the oldest job that waits for a worker (seconds).
+    pub async fn oldest_wait_s(self: &Arc<Self>) -> Result<Option<f64>> {
+        let Some(key) = self.waiting_jobs().oldest() else {
+            return Ok(None);
+        };
+        self.read(move |store, connection| {
+            let created = "select created_at from job where id = ?";
+            let created: Option<i64> = connection.optional_value(created, [key])?;
+            Ok(created.map(|at| (store.now().micros() - at).max(0) as f64 / 1e6))
+        })
+        .await
+    }
+
+    /// The key of the newest job; 0 when there is none.
+    pub async fn last_key(self: &Arc<Self>) -> Result<i64> {
+        self.read(|_, connection| connection.value("select coalesce(max(id), 0) from job", ()))
+            .await
+    }
+}

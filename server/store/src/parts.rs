@@ -1,0 +1,273 @@
+//! The stored form of a result: named parts behind an index of them, and the fields by themselves.
+//!
+//! The parts are one content ([`name::RESULT`]), so that a job whose input has a result gets all of it by one row: a version,
+//! length and checksum of the index, the index, the parts one after the other. The fields, which can be deleted alone, are another
+//! ([`name::FIELDS`]); the index says how they are encoded.
+//!
+//! [`name::RESULT`]: super::content::name::RESULT
+//! [`name::FIELDS`]: super::content::name::FIELDS
+
+use std::{borrow::Cow, collections::BTreeMap};
+
+use base::run::{Document, Step};
+use files::columns;
+use serde::{Deserialize, Serialize};
+use solver::solution::{ContactProfile, Fields};
+
+use super::{
+    content::{Fingerprint, NewContent, name},
+    encoding::{Encoding, PartInfo, deflated, deflated_json, info_of_fields, info_of_json},
+};
+
+/// The version of the form: a later one may be another.
+const VERSION: u8 = 1;
+/// Bytes before the index: the version, its length and its CRC-32.
+pub(super) const HEADER_BYTES: usize = 9;
+
+/// The stored form of a document.
+#[derive(Debug)]
+pub struct Parts {
+    parts: Vec<Part>,
+    /// What is stored before the parts: header and index.
+    index: Vec<u8>,
+    /// Of index and parts.
+    result: Fingerprint,
+    /// Of the fields, if there are some.
+    fields: Option<Fingerprint>,
+}
+
+/// A part of a result.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct Part {
+    pub(super) name: String,
+    /// How `body` holds it.
+    pub(super) encoding: Encoding,
+    /// The bytes that are stored. Between processes they follow the message.
+    #[serde(skip)]
+    pub body: Vec<u8>,
+    pub(super) info: PartInfo,
+}
+
+/// A part in the index.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Entry {
+    pub(super) name: String,
+    pub(super) encoding: Encoding,
+    pub(super) info: PartInfo,
+    /// Bytes that are stored; those of fields are stored elsewhere.
+    pub(super) bytes: usize,
+}
+
+impl Part {
+    /// Its name: `summary`, `fields`, …
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// A part from what its JSON says.
+    fn of_value(name: String, value: &impl Serialize) -> serde_json::Result<Part> {
+        let (info, body) = deflated_json(value)?;
+        Ok(Part {
+            name,
+            encoding: Encoding::Deflated,
+            info,
+            body,
+        })
+    }
+
+    /// A part from its JSON.
+    pub(super) fn new(name: String, json: &[u8]) -> Part {
+        Part {
+            name,
+            encoding: Encoding::Deflated,
+            info: info_of_json(json),
+            body: deflated(json),
+        }
+    }
+
+    /// Fields, whose JSON is never in memory as a whole.
+    pub(super) fn of_fields(fields: &Fields, law: &columns::Law) -> serde_json::Result<Part> {
+        let info = info_of_fields(fields)?;
+        let body = columns::encode(fields, law)
+            .map_err(<serde_json::Error as serde::ser::Error>::custom)?;
+        Ok(Part {
+            name: name::FIELDS.into(),
+            encoding: Encoding::Columns,
+            body,
+            info,
+        })
+    }
+
+    fn is_fields(&self) -> bool {
+        self.name == name::FIELDS
+    }
+}
+
+/// What is stored of a step in the part `steps`.
+#[derive(Serialize)]
+struct StepPart<'a> {
+    name: &'a str,
+    summary: &'a solver::solution::Summary,
+}
+
+impl Parts {
+    /// Divides a document into the parts that can be requested. What was divided is freed at once: both would take twice
+    /// as much. `go_on` is asked after every load step; `None` if it says no.
+    pub fn of(
+        document: Document,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> serde_json::Result<Option<Parts>> {
+        let mut parts = vec![];
+        parts.push(Part::of_value("summary".into(), &document.summary)?);
+        if !go_on() {
+            return Ok(None);
+        }
+        // a partial result has none: its events go on after it
+        if !document.history.is_empty() {
+            parts.push(Part::of_value("history".into(), &document.history)?);
+        }
+        drop(document.history);
+        // the iterations of a step are part of the history; its profiles are requested one by one
+        let steps = document.steps.iter();
+        let steps: Vec<StepPart<'_>> = steps
+            .map(|Step { name, summary, .. }| StepPart { name, summary })
+            .collect();
+        parts.push(Part::of_value("steps".into(), &steps)?);
+        let mut add_all = |points, step, profiles: BTreeMap<String, ContactProfile>| {
+            profiles.into_iter().try_for_each(|(boundary, profile)| {
+                let name = profile_part(&boundary, points, step);
+                parts.push(Part::of_value(name, &profile)?);
+                Ok::<_, serde_json::Error>(())
+            })
+        };
+        for (number, step) in document.steps.into_iter().enumerate() {
+            if !go_on() {
+                return Ok(None);
+            }
+            let step_number = Some(number);
+            add_all(ProfilePoints::All, step_number, step.profiles)?;
+            add_all(ProfilePoints::Nodes, step_number, step.node_profiles)?;
+            add_all(ProfilePoints::Friction, step_number, step.friction_profiles)?;
+        }
+        add_all(ProfilePoints::All, None, document.profiles)?;
+        add_all(ProfilePoints::Nodes, None, document.node_profiles)?;
+        add_all(ProfilePoints::Friction, None, document.friction_profiles)?;
+        if !document.fields.x.is_empty() {
+            parts.push(Part::of_fields(&document.fields, &document.law)?);
+        }
+        Ok(Some(Parts::new(parts)))
+    }
+
+    /// From parts, also those of another process.
+    pub fn new(parts: Vec<Part>) -> Parts {
+        let entries = parts.iter().map(|part| Entry {
+            name: part.name.clone(),
+            encoding: part.encoding,
+            info: part.info.clone(),
+            bytes: if part.is_fields() { 0 } else { part.body.len() },
+        });
+        let index = write_index(&entries.collect::<Vec<_>>());
+        let in_result = parts.iter().filter(|part| !part.is_fields());
+        let chunks = in_result.map(|part| &*part.body);
+        let result = Fingerprint::of([&*index].into_iter().chain(chunks));
+        let fields = parts.iter().find(|part| part.is_fields());
+        Parts {
+            result,
+            fields: fields.map(|part| Fingerprint::of([&*part.body])),
+            parts,
+            index,
+        }
+    }
+
+    /// One after the other, for another process.
+    pub fn into_parts(self) -> impl Iterator<Item = Part> {
+        self.parts.into_iter()
+    }
+
+    /// The stored size of all parts together.
+    pub fn bytes(&self) -> usize {
+        self.parts.iter().map(|part| part.body.len()).sum()
+    }
+
+    /// What is stored, with the names under which it is attached to the job.
+    pub(super) fn contents(&self) -> Vec<(&'static str, NewContent<'_>)> {
+        let bodies = |fields| {
+            let parts = self
+                .parts
+                .iter()
+                .filter(move |part| part.is_fields() == fields);
+            parts.map(|part| &*part.body)
+        };
+        let result = NewContent {
+            fingerprint: Cow::Borrowed(&self.result),
+            chunks: [&*self.index].into_iter().chain(bodies(false)).collect(),
+        };
+        let fields = self.fields.iter().map(|fields| NewContent {
+            fingerprint: Cow::Borrowed(fields),
+            chunks: bodies(true).collect(),
+        });
+        let fields = fields.map(|content| (name::FIELDS, content));
+        [(name::RESULT, result)].into_iter().chain(fields).collect()
+    }
+
+    /// The hashes of what is stored.
+    pub(super) fn fingerprints(&self) -> Vec<&Fingerprint> {
+        [&self.result].into_iter().chain(&self.fields).collect()
+    }
+}
+
+/// The index of parts, with what is stored before it.
+pub(super) fn write_index(entries: &[Entry]) -> Vec<u8> {
+    // writing to memory does not fail
+    let index = postcard::to_stdvec(entries).unwrap_or_default();
+    let mut stored = vec![VERSION];
+    stored.extend((index.len() as u32).to_le_bytes());
+    stored.extend(crc32fast::hash(&index).to_le_bytes());
+    stored.extend(index);
+    stored
+}
+
+/// How long the index is that follows this header. `Err`: what is wrong with it.
+pub(super) fn index_bytes(stored: &[u8]) -> std::result::Result<usize, String> {
+    match stored.first_chunk::<5>() {
+        Some([VERSION, length @ ..]) => Ok(u32::from_le_bytes(*length) as usize),
+        Some(_) => Err("it is stored in a form that this program does not know".into()),
+        None => Err("it is too short".into()),
+    }
+}
+
+/// The index in what begins with a header. `Err`: what is wrong with it.
+pub(super) fn read_index(stored: &[u8]) -> std::result::Result<Vec<Entry>, String> {
+    let end = HEADER_BYTES + index_bytes(stored)?;
+    let index = stored
+        .get(HEADER_BYTES..end)
+        .ok_or("its index is cut off")?;
+    if stored[HEADER_BYTES - 4..HEADER_BYTES] != crc32fast::hash(index).to_le_bytes() {
+        return Err("the checksum of its index does not match its content".into());
+    }
+    postcard::from_bytes(index).map_err(|error| error.to_string())
+}
+
+/// The points at which a stored profile has its values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ProfilePoints {
+    /// At nodes and friction points and the places of the peaks.
+    All,
+    /// At the nodes of the boundary.
+    Nodes,
+    /// Where friction acts.
+    Friction,
+}
+
+/// The part that holds the profile of a boundary, at the end or at the end of a load step.
+pub(super) fn profile_part(boundary: &str, points: ProfilePoints, step: Option<usize>) -> String {
+    let kind = match points {
+        ProfilePoints::All => "all",
+        ProfilePoints::Nodes => "profile",
+        ProfilePoints::Friction => "friction",
+    };
+    match step {
+        None => format!("{kind}/{boundary}"),
+        Some(number) => format!("step/{number}/{kind}/{boundary}"),
+    }
+}

@@ -1,0 +1,190 @@
+//! A backup becomes a store again.
+
+use std::{
+    fs::{self, DirBuilder, File},
+    io::{self, ErrorKind},
+    os::unix::fs::DirBuilderExt,
+    path::{Path, PathBuf},
+};
+
+use base::time::Time;
+
+use super::{
+    backup::{FORMAT, MANIFEST, Manifest, copy_and_digest, new_file, sync_folder},
+    connections::{Mode, blocking, open},
+    error::{Result, StoreError},
+    folder::{DATABASE, FILES, Folder, RESTORING, unusable},
+    migrations,
+    progress::{self, Progress},
+};
+
+/// How the name of a folder begins that has a store which was replaced, and how it ends as long as that is not complete.
+const ASIDE: &str = "replaced-";
+const PARTIAL: &str = ".partial";
+
+/// A store that was made from a backup.
+#[derive(Debug)]
+pub struct Restored {
+    /// What the backup contains.
+    pub manifest: Manifest,
+    /// Where the store is that was in the folder before.
+    pub replaced: Option<PathBuf>,
+}
+
+/// Makes the backup in `backup` the store in `data`, which must be empty or missing, unless it is to be replaced. The
+/// service refuses to start on it until this is complete.
+pub async fn restore(backup: &Path, data: &Path, replace: bool) -> Result<Restored> {
+    let (backup, data) = (backup.to_owned(), data.to_owned());
+    blocking(move || write_store(&backup, &data, replace)).await
+}
+
+fn write_store(backup: &Path, data: &Path, replace: bool) -> Result<Restored> {
+    let manifest = read_manifest(backup)?;
+    let folder = Folder::lock(data)?;
+    let unusable = |error: io::Error| unusable(data, error);
+    let occupied = is_occupied(data).map_err(unusable)?;
+    if occupied && !replace {
+        return Err(StoreError::Folder(format!(
+            "{} is not empty; name a new folder, or move its store aside with --replace",
+            data.display()
+        )));
+    }
+    let new = data.join(RESTORING);
+    let _ = fs::remove_file(&new); // of a restore that was interrupted
+    let last = copy(backup, &new, &manifest).inspect_err(|_| {
+        let _ = fs::remove_file(&new); // nothing was moved yet
+    })?;
+    let replaced = if occupied {
+        Some(put_aside(data).map_err(unusable)?)
+    } else {
+        None
+    };
+    if let Some(last) = last {
+        Progress::start(data, last).map_err(unusable)?;
+    }
+    // the last step: until then the service does not start on it
+    fs::rename(&new, folder.database()).map_err(unusable)?;
+    sync_folder(data).map_err(unusable)?;
+    folder.tighten();
+    Ok(Restored { manifest, replaced })
+}
+
+fn read_manifest(backup: &Path) -> Result<Manifest> {
+    let path = backup.join(MANIFEST);
+    let text = fs::read(&path).map_err(|error| {
+        let why = match error.kind() {
+            ErrorKind::NotFound => {
+                format!("it contains no {MANIFEST}: it is not a backup, or was not completed")
+            }
+            _ => format!("{}: {error}", path.display()),
+        };
+        StoreError::Folder(format!(
+            "{} cannot be read as a backup: {why}",
+            backup.display()
+        ))
+    })?;
+    let damaged = |error| StoreError::Lost(format!("{} is damaged: {error}", path.display()));
+    let manifest: serde_json::Value = serde_json::from_slice(&text).map_err(damaged)?;
+    let later = |what: &str| {
+        StoreError::Schema(format!(
+            "the backup {} was made by a later version of this program ({what}); use that version",
+            backup.display()
+        ))
+    };
+    if manifest["format"]
+        .as_u64()
+        .is_some_and(|format| format > FORMAT.into())
+    {
+        return Err(later("its manifest has another form"));
+    }
+    let manifest: Manifest = serde_json::from_value(manifest).map_err(damaged)?;
+    if manifest.tables > migrations::last_step() {
+        Err(later(&manifest.version))
+    } else {
+        Ok(manifest)
+    }
+}
+
+/// Whether there is anything but what an interrupted restore leaves, or a file system.
+fn is_occupied(data: &Path) -> io::Result<bool> {
+    let store = data.join(DATABASE).exists();
+    for entry in fs::read_dir(data)? {
+        let name = entry?.file_name();
+        let ours = name == RESTORING || name == "lost+found";
+        if !ours && (store || name != progress::FILE) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// Copies the database and compares it with the manifest; on the disk when this returns. Gives how far it had come.
+fn copy(backup: &Path, new: &Path, manifest: &Manifest) -> Result<Option<progress::LastCommit>> {
+    let source = backup.join(DATABASE);
+    let copied = || -> io::Result<_> {
+        let mut file = new_file(new)?;
+        let found = copy_and_digest(&mut File::open(&source)?, &mut file)?;
+        file.sync_all()?;
+        Ok(found)
+    };
+    let (digest, bytes) = copied().map_err(|error| {
+        StoreError::Folder(format!(
+            "cannot copy {} to {}: {error}",
+            source.display(),
+            new.display()
+        ))
+    })?;
+    if (&digest, bytes) != (&manifest.digest, manifest.bytes) {
+        return Err(StoreError::Lost(format!(
+            "{} was changed: it has {bytes} bytes with {digest}, but {MANIFEST} says {} with {}; use \
+             another backup, or save what is intact with `signorini doctor --data {} --salvage NEW_FOLDER`",
+            source.display(),
+            manifest.bytes,
+            manifest.digest,
+            backup.display()
+        )));
+    }
+    let connection = open(new, Mode::Read)?;
+    migrations::check(&connection)?;
+    progress::in_database(&connection)
+}
+
+/// Moves the store in this folder to a folder within it, whose name is returned. Until all of it is there, that folder is
+/// called `….partial`, and a restore that follows one that was killed goes on with it.
+fn put_aside(data: &Path) -> io::Result<PathBuf> {
+    let partial = match begun(data)? {
+        Some(partial) => partial,
+        None => {
+            let partial = data.join(format!("{ASIDE}{}{PARTIAL}", Time::now().micros()));
+            DirBuilder::new().mode(0o700).create(&partial)?;
+            partial
+        }
+    };
+    for name in FILES {
+        match fs::rename(data.join(name), partial.join(name)) {
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
+            Ok(()) | Err(_) => {}
+        }
+    }
+    sync_folder(&partial)?;
+    let aside = partial.with_extension("");
+    fs::rename(&partial, &aside)?;
+    sync_folder(data)?;
+    Ok(aside)
+}
+
+/// The folder to which a restore that was killed has moved a part of this store: what is there is not here.
+fn begun(data: &Path) -> io::Result<Option<PathBuf>> {
+    for entry in fs::read_dir(data)? {
+        let entry = entry?;
+        let name = entry.file_name();
+        let ours = name
+            .to_str()
+            .is_some_and(|name| name.starts_with(ASIDE) && name.ends_with(PARTIAL));
+        let twice = |name: &str| data.join(name).exists() && entry.path().join(name).exists();
+        if ours && !FILES.iter().any(|name| twice(name)) {
+            return Ok(Some(entry.path()));
+        }
+    }
+    Ok(None)
+}

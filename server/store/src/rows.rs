@@ -1,0 +1,359 @@
+//! A row of the table `job`: read, checked, and written. Only this file has statements that write this table.
+
+use std::{collections::BTreeMap, str::FromStr};
+
+use base::{
+    address::link,
+    caller::Owners,
+    catalog::explained_at,
+    job::{Failure, Job, JobId, Limits, Reason, ResultAvailable, Status, SweepId},
+    time::Time,
+};
+use rusqlite::{Connection, Row, params, params_from_iter};
+use serde::Serialize;
+use uuid::Uuid;
+
+use super::{
+    checksum::{self, Value},
+    error::{Record, Result, StoreError},
+    sql::{Sql, optional_text, text},
+};
+
+/// All that is stored in a row: the job as clients see it, and what only the store needs.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct JobRow {
+    pub(super) job: Job,
+    /// The problem's title.
+    pub(super) title: Option<String>,
+    /// Fingerprint of everything that the client submitted; none in rows of early versions.
+    pub(super) payload: Option<String>,
+    /// When it fails unless it was started before.
+    pub(super) expires_at: Option<Time>,
+    /// The version of this program that ended it.
+    pub(super) solver_version: Option<String>,
+    /// Number of its last event.
+    pub(super) last_seq: i64,
+}
+
+/// The error that a job is missing which must exist.
+pub(super) fn missing(key: i64) -> StoreError {
+    Record::of_job(key, "record").damaged("it is missing")
+}
+
+/// The job with this key, if it still exists.
+pub(super) fn find(connection: &Connection, key: i64) -> Result<Option<Job>> {
+    Ok(find_row(connection, key)?.map(|(row, _)| row.job))
+}
+
+/// The row of the job with this key, if it still exists, and its values as they are stored.
+pub(super) fn find_row(connection: &Connection, key: i64) -> Result<Option<(JobRow, Vec<Value>)>> {
+    connection.row("select * from job where id = ?", [key], checked)
+}
+
+/// The job with this public id, without its queue position. A job of another owner is not found.
+pub(super) fn with_id(connection: &Connection, owners: &Owners, id: JobId) -> Result<Option<Job>> {
+    let job = "select * from job where uuid = ?";
+    let job = connection.row(job, [id.0.to_string()], from_row)?;
+    Ok(job.filter(|job| owners.include(&job.owner)))
+}
+
+/// Whether this attempt of the job is the current one, and running.
+pub(super) fn is_current(tx: &Connection, key: i64, attempt: i32) -> Result<bool> {
+    let current =
+        "select exists (select 1 from job where id = ? and status = 'running' and attempt = ?)";
+    tx.value(current, (key, attempt))
+}
+
+/// The key of the next job: no key is given twice, not even that of a deleted job.
+pub(super) fn next_key(tx: &Connection) -> Result<i64> {
+    let next = "select coalesce((select seq from sqlite_sequence where name = 'job'), 0) + 1";
+    tx.value(next, ())
+}
+
+/// Inserts a row; returns its values as they are stored.
+pub(super) fn insert(tx: &Connection, row: &JobRow) -> Result<Vec<Value>> {
+    let (names, values) = row.columns()?;
+    let places = "?, ".repeat(names.len());
+    let names = names.join(", ");
+    let statement = format!("insert into job ({names}, checksum) values ({places}?)");
+    let checksum = Value::from(checksum::of_values(&values));
+    tx.run(
+        &statement,
+        params_from_iter(values.iter().chain([&checksum])),
+    )?;
+    Ok(values)
+}
+
+/// Writes a row that is in the table as `stored`, and its checksum; returns its values as they are stored now. Columns that
+/// stay as they are, and with them their indexes, are not written.
+pub(super) fn update(tx: &Connection, stored: &[Value], row: &JobRow) -> Result<Vec<Value>> {
+    let (names, values) = row.columns()?;
+    let columns = names.iter().zip(values.iter().zip(stored));
+    let changed: Vec<_> = columns.filter(|(_, (new, old))| new != old).collect();
+    if changed.is_empty() {
+        return Ok(values);
+    }
+    let names = changed.iter().map(|(name, _)| format!("{name} = ?, "));
+    let names: String = names.collect();
+    let statement = format!("update job set {names}checksum = ? where id = ?");
+    let new = changed.iter().map(|(_, (new, _))| *new);
+    let last = [checksum::of_values(&values), row.job.key].map(Value::from);
+    match tx.run(&statement, params_from_iter(new.chain(&last)))? {
+        1 => Ok(values),
+        _ => Err(missing(row.job.key)),
+    }
+}
+
+/// Deletes a job, and what only this job has.
+pub(super) fn delete(tx: &Connection, job: &Job, now: Time) -> Result<()> {
+    tx.run(
+        "insert into deleted_job (uuid, id, owner, deleted_at) values (?, ?, ?, ?)",
+        params![job.id.0.to_string(), job.key, job.owner, now.micros()],
+    )?;
+    for of_its_own in [
+        "delete from event where job_id = ?",
+        "delete from job_label where job_id = ?",
+        "delete from job_size where job_id = ?",
+        "delete from attachment where kind = 'job' and key = ?",
+        "delete from job where id = ?",
+    ] {
+        tx.run(of_its_own, [job.key])?;
+    }
+    Ok(())
+}
+
+/// A row of the table as a job, if it is as it was written.
+pub(super) fn from_row(row: &Row<'_>) -> Result<Job> {
+    checked(row).map(|(row, _)| row.job)
+}
+
+/// A row of the table, if it is as it was written, and its values.
+fn checked(row: &Row<'_>) -> Result<(JobRow, Vec<Value>)> {
+    let read = || {
+        let values = checksum::values(row)?;
+        match row.get::<_, Option<i64>>("checksum")? {
+            Some(sum) if sum == checksum::of_values(&values) => Ok((parse(row)?, values)),
+            _ => Err(corrupt("checksum")),
+        }
+    };
+    let record = || Record {
+        job: row.get("id").ok(),
+        name: "record".into(),
+    };
+    read().map_err(|error: StoreError| error.reading(record))
+}
+
+fn parse(row: &Row<'_>) -> Result<JobRow> {
+    let uuid = text(row, "uuid")?;
+    let reason = optional_text(row, "reason")?;
+    let time = |name: &str| -> Result<Option<Time>> {
+        Ok(row.get::<_, Option<i64>>(name)?.map(Time::from_micros))
+    };
+    let progress = optional_text(row, "progress")?;
+    let memory_bytes: Option<i64> = row.get("memory_bytes")?;
+    let failure = optional_text(row, "failure")?;
+    let warnings = optional_text(row, "warnings")?;
+    let other = |name: &str| -> Result<Option<JobId>> {
+        let uuid = optional_text(row, name)?;
+        let read = |text| Uuid::try_parse(text).map(JobId).map_err(|_| corrupt(name));
+        uuid.map(read).transpose()
+    };
+    let failure: Option<Failure> = failure.map(serde_json::from_str).transpose()?;
+    let job = Job {
+        key: row.get("id")?,
+        coalesced_into: row.get("coalesced_into")?,
+        cache: word("cache", text(row, "cache")?)?,
+        id: JobId(Uuid::try_parse(uuid).map_err(|_| corrupt("uuid"))?),
+        status: word("status", text(row, "status")?)?,
+        reason: reason.map(|text| word("reason", text)).transpose()?,
+        cancel_requested: row.get("cancel_requested")?,
+        version: row.get("version")?,
+        name: row.get("name")?,
+        labels: serde_json::from_str(text(row, "labels")?)?,
+        owner: row.get("owner")?,
+        priority: row.get("priority")?,
+        attempt: row.get("attempt")?,
+        max_attempts: row.get("max_attempts")?,
+        input_hash: row.get("input_hash")?,
+        cached_from: other("cached_from")?,
+        parent: other("parent")?,
+        sweep: other("sweep")?.map(|JobId(uuid)| SweepId(uuid)),
+        pinned: row.get("pinned")?,
+        created_at: Time::from_micros(row.get("created_at")?),
+        started_at: time("started_at")?,
+        finished_at: time("finished_at")?,
+        progress: progress.map(serde_json::from_str).transpose()?,
+        limits: Limits {
+            timeout_s: row.get("timeout_s")?,
+            queue_ttl_s: row.get("queue_ttl_s")?,
+        },
+        // the prefix may be another one than when it was stored
+        failure: failure.map(|failure| Failure {
+            r#type: explained_at(&failure.code),
+            ..failure
+        }),
+        result_available: word("result_available", text(row, "result_available")?)?,
+        warnings: warnings.map_or(Ok(vec![]), serde_json::from_str)?,
+        mesh: row.get("mesh")?,
+        memory_bytes: memory_bytes.map(i64::unsigned_abs),
+        // what follows from the rest, below; and what others fill in
+        ..Job::default()
+    };
+    let mut row = JobRow {
+        job,
+        title: row.get("title")?,
+        payload: row.get("payload")?,
+        expires_at: time("expires_at")?,
+        solver_version: row.get("solver_version")?,
+        last_seq: row.get("last_seq")?,
+    };
+    row.derive();
+    Ok(row)
+}
+
+impl JobRow {
+    /// Fills in what follows from the rest.
+    pub(super) fn derive(&mut self) {
+        let job = &mut self.job;
+        let started = job.started_at;
+        job.queue_wait_s = started.map(|start| job.created_at.seconds_until(start));
+        let run = started.zip(job.finished_at);
+        job.run_s = run.map(|(start, end)| start.seconds_until(end));
+        job.links = links(job);
+    }
+
+    /// Names and values of its columns, in the order of the table, but for the checksum. A column that a migration adds is
+    /// added here and where rows are read.
+    fn columns(&self) -> Result<(Vec<&'static str>, Vec<Value>)> {
+        let job = &self.job;
+        let uuid = |id: Option<JobId>| Value::from(id.map(|id| id.0.to_string()));
+        let micros = |time: Option<Time>| Value::from(time.map(Time::micros));
+        let memory_bytes = job.memory_bytes.map(|bytes| bytes as i64);
+        let warnings = (!job.warnings.is_empty()).then_some(&job.warnings);
+        let columns = [
+            ("id", job.key.into()),
+            ("uuid", uuid(Some(job.id))),
+            ("status", word_of(job.status)),
+            ("reason", job.reason.map(word_of).into()),
+            ("cancel_requested", i64::from(job.cancel_requested).into()),
+            ("version", job.version.into()),
+            ("name", job.name.clone().into()),
+            ("title", self.title.clone().into()),
+            ("labels", json(Some(&job.labels))?),
+            ("owner", job.owner.clone().into()),
+            ("priority", i64::from(job.priority).into()),
+            ("attempt", i64::from(job.attempt).into()),
+            ("max_attempts", i64::from(job.max_attempts).into()),
+            ("input_hash", job.input_hash.clone().into()),
+            ("created_at", micros(Some(job.created_at))),
+            ("started_at", micros(job.started_at)),
+            ("finished_at", micros(job.finished_at)),
+            ("progress", json(job.progress.as_ref())?),
+            ("failure", json(job.failure.as_ref())?),
+            ("result_available", word_of(job.result_available)),
+            ("last_seq", self.last_seq.into()),
+            ("payload", self.payload.clone().into()),
+            ("parent", uuid(job.parent)),
+            ("pinned", i64::from(job.pinned).into()),
+            ("cache", word_of(job.cache)),
+            ("cached_from", uuid(job.cached_from)),
+            ("memory_bytes", memory_bytes.into()),
+            ("coalesced_into", job.coalesced_into.into()),
+            ("timeout_s", Value::Real(job.limits.timeout_s)),
+            ("queue_ttl_s", Value::Real(job.limits.queue_ttl_s)),
+            ("expires_at", micros(self.expires_at)),
+            ("solver_version", self.solver_version.clone().into()),
+            ("sweep", uuid(job.sweep.map(|SweepId(id)| JobId(id)))),
+            ("warnings", json(warnings)?),
+            ("mesh", job.mesh.clone().into()),
+        ];
+        Ok(columns.into_iter().unzip())
+    }
+}
+
+fn json<T: Serialize>(value: Option<&T>) -> Result<Value> {
+    let text = value.map(serde_json::to_string).transpose()?;
+    Ok(text.into())
+}
+
+fn word_of(word: impl Into<&'static str>) -> Value {
+    let word: &str = word.into();
+    word.to_owned().into()
+}
+
+/// The value of a word in this column.
+fn word<T: FromStr>(column: &str, text: &str) -> Result<T> {
+    text.parse().map_err(|_| corrupt(column))
+}
+
+fn corrupt(column: &str) -> StoreError {
+    Record::named("record").damaged(format!("job.{column}"))
+}
+
+fn links(job: &Job) -> BTreeMap<String, String> {
+    let id = job.id;
+    let plots = plots(job).into_iter().map(|plot| {
+        (
+            format!("plot_{plot}"),
+            link(&format!("/v1/jobs/{id}/plots/{plot}.svg")),
+        )
+    });
+    ["problem", "events", "history", "result", "fields", "cancel"]
+        .into_iter()
+        .map(|verb| (verb.to_string(), link(&format!("/v1/jobs/{id}/{verb}"))))
+        .chain([
+            ("self".to_string(), link(&format!("/v1/jobs/{id}"))),
+            // a template: the boundaries are those of the problem
+            (
+                "profiles".to_string(),
+                link(&format!("/v1/jobs/{id}/profiles/{{boundary}}")),
+            ),
+        ])
+        .chain(plots)
+        .collect()
+}
+
+/// The figures that can be drawn of a job, as far as its row says.
+fn plots(job: &Job) -> Vec<&'static str> {
+    // without contacts there is one iteration without a residual; a job that was answered by another one has counted none itself
+    let iterations = job.progress.as_ref().is_some_and(|made| {
+        made.iteration > 1 || (made.iteration == 1 && made.residual.is_some_and(|left| left > 0.0))
+    });
+    let has_contacts = iterations || job.cached_from.is_some();
+    let has_result = job.result_available != ResultAvailable::None;
+    // fields are those of a solver that came to an end by itself
+    let solved = job.status == Status::Succeeded
+        || (job.status == Status::Failed
+            && job.reason.is_some_and(|reason| {
+                matches!(
+                    reason,
+                    Reason::NotConverged | Reason::ContactCycling | Reason::FalseConvergence
+                )
+            }));
+    [
+        ("mesh", true),
+        ("convergence", has_contacts),
+        ("profile", has_contacts && has_result),
+        ("deformed", solved && has_result),
+    ]
+    .into_iter()
+    .filter_map(|(plot, is_there)| is_there.then_some(plot))
+    .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::Store;
+
+    #[tokio::test]
+    async fn the_columns_are_those_of_the_table() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path()).await.unwrap();
+        let names = "select name from pragma_table_info('job') where name <> 'checksum'";
+        let names = store.read(|_, connection| connection.values::<String>(names, ()));
+        let names = names.await.unwrap();
+        assert_eq!(names, JobRow::default().columns().unwrap().0);
+    }
+}

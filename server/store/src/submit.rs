@@ -1,0 +1,229 @@
+//! Accepting jobs: one commit for many clients.
+//!
+//! A commit costs a flush of the disk, whatever it contains. Submissions that arrive during a commit therefore wait
+//! together and share the next one, each with a savepoint of its own, so that a refused one does not affect the
+//! others.
+
+use std::sync::{Arc, Weak};
+
+use base::{
+    failpoint::{self, Point},
+    job::Cache,
+};
+use tokio::sync::{mpsc, oneshot};
+
+use super::{
+    change::{Change, Savepoint},
+    claim, coalescing,
+    connections::closed,
+    content::{self, Holder, NewContent, name},
+    database::{Store, Writer},
+    error::{Result, StoreError},
+    keys, labels, meshes,
+    rows::JobRow,
+    submission::{Accepted, MOST_PER_COMMIT, NewJob, Pending, QueueLimits, Submission},
+    sweeps,
+};
+
+impl Store {
+    /// Accepts jobs. They are stored on the disk when this returns. With `claim` (a worker is free) the next job of the
+    /// queue is claimed in the same commit, if it fits into the memory budget.
+    pub async fn submit(self: &Arc<Self>, submission: Submission, claim: bool) -> Result<Accepted> {
+        for job in submission.jobs.iter().filter(|job| job.cache == Cache::Use) {
+            self.check_earlier_result(&job.input_hash).await;
+        }
+        if claim {
+            self.check_result_for_next().await;
+        }
+        let (reply, answer) = oneshot::channel();
+        let sent = self
+            .inbox
+            .0
+            .send(Pending {
+                submission,
+                claim,
+                reply,
+            })
+            .await;
+        sent.map_err(|_| closed())?;
+        answer.await.map_err(|_| closed())?
+    }
+
+    /// Accepts submissions in one commit, and answers each.
+    async fn commit_together(self: &Arc<Self>, pending: Vec<Pending>) {
+        let (mut submissions, mut replies) = (vec![], vec![]);
+        for one in pending {
+            submissions.push((one.submission, one.claim));
+            replies.push(one.reply);
+        }
+        let committed = self.write(|writer| accept_together(writer, submissions));
+        match committed.await {
+            Ok(answers) => {
+                let jobs = answers.iter().flatten().flat_map(|answer| &answer.jobs);
+                jobs.for_each(|job| failpoint::pass(Point::Answered, job.id));
+                for (reply, accepted) in replies.into_iter().zip(answers) {
+                    let _ = reply.send(accepted); // the client may have disconnected
+                }
+            }
+            Err(cause) => {
+                for reply in replies {
+                    let _ = reply.send(Err(cause.for_another()));
+                }
+            }
+        }
+    }
+}
+
+/// Accepts submissions in one transaction; for each, what has become of it.
+fn accept_together(
+    writer: &Writer<'_>,
+    submissions: Vec<(Submission, bool)>,
+) -> Result<Vec<Result<Accepted>>> {
+    let mut change = writer.change()?;
+    let mut answers = vec![];
+    for (submission, claim) in submissions {
+        let savepoint = change.savepoint()?;
+        match accept(&mut change, savepoint, submission, claim) {
+            Ok(accepted) => {
+                change.release()?;
+                answers.push(Ok(accepted));
+            }
+            Err(cause) => match change.roll_back_to(savepoint) {
+                Ok(()) => answers.push(Err(cause)),
+                // a full disk has made the database roll back everything: report that as the cause
+                Err(_) => return Err(cause),
+            },
+        }
+    }
+    change.commit()?;
+    for accepted in answers.iter_mut().flatten() {
+        let store = writer.store;
+        store.try_to_complete(writer.connection(), &mut accepted.jobs);
+    }
+    Ok(answers)
+}
+
+/// Accepts one submission within the transaction.
+fn accept(
+    change: &mut Change<'_>,
+    savepoint: Savepoint,
+    submission: Submission,
+    claim: bool,
+) -> Result<Accepted> {
+    let Submission {
+        owner,
+        jobs,
+        sweep,
+        key,
+        limits,
+    } = submission;
+    if let Some(old) = keys::already_submitted(change, &owner, &jobs, key.as_ref())? {
+        return Ok(Accepted {
+            jobs: old,
+            replayed: true,
+            claim: None,
+            changed: vec![],
+        });
+    }
+    let mut inserted = vec![];
+    let sweep_key = match &sweep {
+        Some(new) => Some((
+            sweeps::insert(change, &owner, new)?,
+            NewContent::new(new.definition.as_bytes()),
+        )),
+        None => None,
+    };
+    let mut groups = sweep.iter().flat_map(|sweep| &sweep.groups);
+    for new in &jobs {
+        let key = insert(change, &owner, new, limits)?;
+        if let (Some((sweep, definition)), Some(members)) = (&sweep_key, groups.next()) {
+            let tx = change.sql()?;
+            sweeps::insert_members(tx, *sweep, key, members)?;
+            let is_first = inserted.is_empty();
+            sweeps::attach_definition(tx, key, definition, is_first)?;
+        }
+        inserted.push(key);
+    }
+    if let Some(key) = &key {
+        keys::remember(change, &owner, key, &inserted)?;
+    }
+    let claim = if claim { claim::claim(change)? } else { None };
+    let mut accepted = vec![];
+    for key in inserted {
+        accepted.push(change.read(key)?);
+    }
+    if accepted
+        .iter()
+        .any(|job| failpoint::fails(Point::Accepted, job.id))
+    {
+        return Err(StoreError::Full);
+    }
+    Ok(Accepted {
+        jobs: accepted,
+        replayed: false,
+        claim,
+        changed: change.changed_since(savepoint),
+    })
+}
+
+/// Commits submissions until the store is dropped.
+pub(super) async fn commit_submissions(store: Weak<Store>, mut inbox: mpsc::Receiver<Pending>) {
+    while let Some(first) = inbox.recv().await {
+        let Some(store) = store.upgrade() else { return };
+        let mut pending = vec![first];
+        while pending.len() < MOST_PER_COMMIT
+            && let Ok(next) = inbox.try_recv()
+        {
+            pending.push(next);
+        }
+        // in its own task: a panic there must not close the inbox for all later submissions
+        let done = tokio::spawn(async move { store.commit_together(pending).await }).await;
+        if let Err(panic) = done {
+            tracing::error!(%panic, "submissions were lost to a panic: {panic}");
+        }
+    }
+}
+
+/// Inserts a job: waiting for a worker, answered at once by an earlier result, or coalesced into another.
+pub(super) fn insert(
+    change: &mut Change<'_>,
+    owner: &str,
+    new: &NewJob,
+    limits: QueueLimits,
+) -> Result<i64> {
+    let answer = match new.cache {
+        Cache::Use => coalescing::earlier_result(change, &new.input_hash)?,
+        Cache::Refresh | Cache::Off => None,
+    };
+    let coalesced_into = match (&answer, new.cache) {
+        (None, Cache::Use) => coalescing::primary_for(change, owner, new)?,
+        _ => None,
+    };
+    if answer.is_none() && change.waiting() >= limits.queued as usize {
+        return Err(StoreError::QueueFull);
+    }
+    if answer.is_none()
+        && let Some(most) = limits.queued_of_owner
+        && change.waiting_of(owner) >= most as usize
+    {
+        return Err(StoreError::OwnerQueueFull);
+    }
+    if answer.is_none() {
+        meshes::require(change.sql()?, new.mesh.as_deref())?;
+    }
+    let now = change.now();
+    let key = change.insert(|key| {
+        let mut row = JobRow::accepted(key, owner, new, now);
+        row.job.coalesced_into = coalesced_into;
+        row
+    })?;
+    let problem = NewContent::new(new.problem.as_bytes());
+    let tx = change.sql()?;
+    content::attach(tx, Holder::Job(key), name::PROBLEM, &problem)?;
+    let job = change.read(key)?;
+    labels::write(change, &job)?;
+    if let Some(source) = answer {
+        coalescing::answer(change, key, &source)?;
+    }
+    Ok(key)
+}

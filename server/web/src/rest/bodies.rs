@@ -1,0 +1,514 @@
+//! Bodies of requests in JSON: each is a type, whose schema every body is checked against, with all violations at once,
+//! before serde reads it (`files::body`). How large what was read may be is checked by the operation, which checks
+//! the same for requests over gRPC.
+//!
+//! A body is kept whole until it is read (16 MiB by default), since the problem may stand before what is said about it, and
+//! violations quote their places. Larger meshes are uploaded.
+
+use std::collections::BTreeMap;
+
+use base::{
+    caller::MAX_OWNER,
+    job::{Cache, Limits, MAX_PRIORITY, MIN_PRIORITY},
+};
+use files::{
+    body::{Body, Content, Embedded},
+    sweep::{self, Axis, MOST_MEMBERS, MOST_PATHS, Points, Variation},
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Deserializer, de::DeserializeOwned};
+use serde_json::value::RawValue;
+use service::{
+    error::ApiError,
+    verbs::{
+        envelope::{Envelope, JobRequest, MAX_LABEL, MAX_LABELS, MAX_NAME},
+        jobs::LabelChanges,
+        retry::Changes,
+        submit::MAX_BATCH,
+        sweeps::SweepRequest,
+        tokens::{self, TokenRequest},
+    },
+};
+use solver::{error::Violation, problem::Problem};
+use store::Edit;
+
+/// A body that submits a job.
+#[derive(Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct Submission {
+    /// What to solve.
+    #[serde(rename = "problem")]
+    _problem: Embedded,
+    /// A name for people, at most 256 characters.
+    #[serde(default)]
+    #[schemars(length(max = MAX_NAME))]
+    name: Option<String>,
+    /// Labels for programs, at most 64.
+    #[serde(default)]
+    #[schemars(extend("maxProperties" = MAX_LABELS))]
+    labels: Option<Labels>,
+    /// Jobs of higher priority run first; absent: 0.
+    #[serde(default)]
+    #[schemars(range(min = MIN_PRIORITY, max = MAX_PRIORITY))]
+    priority: Option<i32>,
+    /// Time limits.
+    #[serde(default)]
+    limits: Option<Limits>,
+    /// Whether the result of an earlier job with the same input may be used; absent: use.
+    #[serde(default)]
+    cache: Option<Cache>,
+}
+
+/// A body that submits many jobs.
+#[derive(Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct Submissions {
+    /// The jobs; all or none of them are accepted.
+    #[schemars(length(min = 1, max = MAX_BATCH))]
+    jobs: Vec<Submission>,
+}
+
+/// A body that submits a sweep.
+#[derive(Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct SweepSubmission {
+    /// The problem that members differ from. It must be valid itself.
+    #[serde(rename = "base")]
+    _base: Embedded,
+    /// What members differ in, with the modes grid and zip.
+    #[serde(default)]
+    #[schemars(length(min = 1, max = MOST_PATHS))]
+    axes: Option<Vec<Axis>>,
+    /// How the values of several axes are combined; absent: grid.
+    #[serde(default)]
+    mode: Option<sweep::Mode>,
+    /// With the mode list: the values of each member by JSON Pointer; what a point leaves out is as in the base.
+    #[serde(default)]
+    #[schemars(with = "Option<Points>", length(min = 1, max = MOST_MEMBERS))]
+    points: Option<Vec<Box<RawValue>>>,
+    /// A name for people, at most 256 characters.
+    #[serde(default)]
+    #[schemars(length(max = MAX_NAME))]
+    name: Option<String>,
+    /// Labels for programs, at most 64.
+    #[serde(default)]
+    #[schemars(extend("maxProperties" = MAX_LABELS))]
+    labels: Option<Labels>,
+    /// Its jobs run before those of lower priority; absent: 0.
+    #[serde(default)]
+    #[schemars(range(min = MIN_PRIORITY, max = MAX_PRIORITY))]
+    priority: Option<i32>,
+    /// Time limits of each of its jobs; absent: 600 s to solve the first member and 6 s for each further one of the job,
+    /// at most a week.
+    #[serde(default)]
+    limits: Option<Limits>,
+}
+
+/// A body that changes a job: absent fields stay unchanged.
+#[derive(Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct Edits {
+    /// A name for people, at most 256 characters; null removes it.
+    #[serde(default, deserialize_with = "given")]
+    #[schemars(length(max = MAX_NAME))]
+    name: Option<Option<String>>,
+    /// The new labels, all of them, at most 64: they replace the old ones; null removes them.
+    #[serde(default, deserialize_with = "given")]
+    #[schemars(extend("maxProperties" = MAX_LABELS))]
+    labels: Option<Option<Labels>>,
+    /// Jobs of higher priority run first.
+    #[serde(default)]
+    #[schemars(range(min = MIN_PRIORITY, max = MAX_PRIORITY))]
+    priority: Option<i32>,
+    /// Never deleted because of its age; it can still be deleted on request.
+    #[serde(default)]
+    pinned: Option<bool>,
+}
+
+/// A body that changes a job, as a merge patch (RFC 7396): absent fields and labels stay unchanged.
+#[derive(Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct MergePatch {
+    /// A name for people, at most 256 characters; null removes it.
+    #[serde(default, deserialize_with = "given")]
+    #[schemars(length(max = MAX_NAME))]
+    name: Option<Option<String>>,
+    /// Labels that are set, or removed by null; null for all of them removes all.
+    #[serde(default, deserialize_with = "given")]
+    #[schemars(extend("maxProperties" = 2 * MAX_LABELS))]
+    labels: Option<Option<BTreeMap<Label, Option<Label>>>>,
+    /// Jobs of higher priority run first; null is 0.
+    #[serde(default, deserialize_with = "given")]
+    #[schemars(range(min = MIN_PRIORITY, max = MAX_PRIORITY))]
+    priority: Option<Option<i32>>,
+    /// Never deleted because of its age; null is false.
+    #[serde(default, deserialize_with = "given")]
+    pinned: Option<Option<bool>>,
+}
+
+/// A body that changes the new job of a retry: absent fields stay unchanged.
+#[derive(Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct Retry {
+    /// Time limits; absent ones stay unchanged.
+    #[serde(default)]
+    limits: Option<NewLimits>,
+    /// Jobs of higher priority run first.
+    #[serde(default)]
+    #[schemars(range(min = MIN_PRIORITY, max = MAX_PRIORITY))]
+    priority: Option<i32>,
+}
+
+/// Time limits that are changed.
+#[derive(Default, Deserialize, JsonSchema)]
+#[serde(default)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct NewLimits {
+    /// Seconds from a start to the end.
+    timeout_s: Option<f64>,
+    /// Seconds that the job may wait in the queue.
+    queue_ttl_s: Option<f64>,
+}
+
+/// Key or value of a label.
+#[derive(Deserialize, JsonSchema, PartialEq, Eq, PartialOrd, Ord)]
+#[schemars(inline)]
+struct Label(#[schemars(length(max = MAX_LABEL))] String);
+
+type Labels = BTreeMap<Label, Label>;
+
+/// A body that makes a token.
+#[derive(Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct TokenFields {
+    /// For people: where it is used.
+    #[schemars(length(min = 1, max = tokens::MAX_NAME))]
+    name: String,
+    /// The owner of the jobs that it submits: letters, digits and . _ @ + -
+    #[schemars(length(min = 1, max = MAX_OWNER), regex(pattern = r"^[A-Za-z0-9._@+-]+$"))]
+    owner: String,
+    /// What it allows; the first token of a service must have admin.
+    #[schemars(
+        length(min = 1),
+        inner(regex(pattern = r"^(read|submit|cancel|admin)$"))
+    )]
+    scopes: Vec<String>,
+    /// Seconds until it expires; absent: it does not expire.
+    #[serde(default)]
+    #[schemars(range(min = tokens::MIN_EXPIRES_IN_S, max = tokens::MAX_EXPIRES_IN_S))]
+    expires_in_s: Option<f64>,
+}
+
+/// A body with a problem and nothing else.
+#[derive(Deserialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub(super) struct BareProblem {
+    /// What to check.
+    #[serde(rename = "problem")]
+    _problem: Embedded,
+}
+
+/// Reads a value that null stands for, too: without it the value is absent.
+fn given<'de, T: Deserialize<'de>, D: Deserializer<'de>>(reader: D) -> Result<Option<T>, D::Error> {
+    T::deserialize(reader).map(Some)
+}
+
+impl Submission {
+    fn envelope(self) -> Envelope {
+        let Submission {
+            _problem: Embedded,
+            name,
+            labels,
+            priority,
+            limits,
+            cache,
+        } = self;
+        Envelope {
+            name,
+            labels: labels.map(texts).unwrap_or_default(),
+            priority: priority.unwrap_or_default(),
+            limits: limits.unwrap_or_default(),
+            cache: cache.unwrap_or_default(),
+        }
+    }
+}
+
+fn texts(labels: Labels) -> BTreeMap<String, String> {
+    let texts = labels.into_iter().map(|(key, value)| (key.0, value.0));
+    texts.collect()
+}
+
+/// A body of this type that has no problem in it.
+fn whole<T: DeserializeOwned + JsonSchema>(
+    body: &'static Body<T>,
+    text: &str,
+) -> Result<T, ApiError> {
+    let mut content = body.read(text).map_err(ApiError::MalformedJson)?;
+    match content.fields.take() {
+        Some(fields) if content.violations.is_empty() => Ok(fields),
+        _ => Err(ApiError::InvalidProblem(content.into_violations())),
+    }
+}
+
+/// The one problem of a body, or all that is wrong with the body.
+fn problem<T>(mut content: Content<'_, T>) -> Result<Problem, Vec<Violation>> {
+    let read = content.parse_problems().pop();
+    read.filter(|_| content.violations.is_empty())
+        .ok_or_else(|| content.into_violations())
+}
+
+/// A body with a problem and what comes beside it.
+pub(super) fn submission(text: &str) -> Result<JobRequest, ApiError> {
+    static BODY: Body<Submission> = Body::new();
+    let mut content = BODY.read(text).map_err(ApiError::MalformedJson)?;
+    let fields = content.fields.take();
+    Ok(JobRequest {
+        envelope: fields.map_or_else(Envelope::default, Submission::envelope),
+        problem: problem(content),
+    })
+}
+
+/// A body with many submissions.
+pub(super) fn batch(text: &str) -> Result<Vec<JobRequest>, ApiError> {
+    static BODY: Body<Submissions> = Body::new();
+    let mut content = BODY.read(text).map_err(ApiError::MalformedJson)?;
+    let problems = content.parse_problems();
+    match content.fields.take() {
+        Some(Submissions { jobs }) if content.violations.is_empty() => {
+            let both = jobs.into_iter().zip(problems);
+            let requests = both.map(|(job, problem)| JobRequest {
+                envelope: job.envelope(),
+                problem: Ok(problem),
+            });
+            Ok(requests.collect())
+        }
+        _ => Err(ApiError::InvalidProblem(content.into_violations())),
+    }
+}
+
+/// A body with a sweep and what comes beside it.
+pub(super) fn sweep(text: &str) -> Result<SweepRequest, ApiError> {
+    static BODY: Body<SweepSubmission> = Body::new();
+    let mut content = BODY.read(text).map_err(ApiError::MalformedJson)?;
+    let mut envelope = Envelope {
+        cache: Cache::Off,
+        ..Envelope::default()
+    };
+    let mut own_limits = None;
+    let variation = content.fields.take().map(|fields| {
+        let SweepSubmission {
+            _base: Embedded,
+            axes,
+            mode,
+            points,
+            name,
+            labels,
+            priority,
+            limits,
+        } = fields;
+        own_limits = limits;
+        envelope = Envelope {
+            name,
+            labels: labels.map(texts).unwrap_or_default(),
+            priority: priority.unwrap_or_default(),
+            limits: limits.unwrap_or_default(),
+            cache: Cache::Off,
+        };
+        Variation { mode, axes, points }
+    });
+    Ok(SweepRequest {
+        envelope,
+        limits: own_limits,
+        definition: sweep::of_body(content.with(variation)),
+    })
+}
+
+/// A body with changes of a job: absent fields stay unchanged; null removes a name or labels.
+pub(super) fn edit(text: &str) -> Result<Edit, ApiError> {
+    static BODY: Body<Edits> = Body::new();
+    let Edits {
+        name,
+        labels,
+        priority,
+        pinned,
+    } = whole(&BODY, text)?;
+    Ok(Edit {
+        name,
+        labels: labels.map(|labels| labels.map(texts).unwrap_or_default()),
+        priority,
+        pinned,
+    })
+}
+
+/// The same as a merge patch (RFC 7396): labels that are absent stay, and null removes what it stands for, or resets it.
+pub(super) fn merge_patch(text: &str) -> Result<(Edit, LabelChanges), ApiError> {
+    static BODY: Body<MergePatch> = Body::new();
+    let MergePatch {
+        name,
+        labels,
+        priority,
+        pinned,
+    } = whole(&BODY, text)?;
+    let edit = Edit {
+        name,
+        labels: matches!(labels, Some(None)).then(BTreeMap::new),
+        priority: priority.map(Option::unwrap_or_default),
+        pinned: pinned.map(Option::unwrap_or_default),
+    };
+    let changes = labels.flatten().unwrap_or_default().into_iter();
+    let changes = changes.map(|(key, value)| (key.0, value.map(|value| value.0)));
+    Ok((edit, changes.collect()))
+}
+
+/// A body with changes for a retry: absent fields stay unchanged.
+pub(super) fn retry(text: &str) -> Result<Changes, ApiError> {
+    static BODY: Body<Retry> = Body::new();
+    let Retry { limits, priority } = whole(&BODY, text)?;
+    let NewLimits {
+        timeout_s,
+        queue_ttl_s,
+    } = limits.unwrap_or_default();
+    Ok(Changes {
+        timeout_s,
+        queue_ttl_s,
+        priority,
+    })
+}
+
+/// A body with a new token.
+pub(super) fn token(text: &str) -> Result<TokenRequest, ApiError> {
+    static BODY: Body<TokenFields> = Body::new();
+    let TokenFields {
+        name,
+        owner,
+        scopes,
+        expires_in_s,
+    } = whole(&BODY, text)?;
+    Ok(TokenRequest {
+        name,
+        owner,
+        scopes,
+        expires_in_s,
+    })
+}
+
+/// A body with a problem and nothing else.
+pub(super) fn bare_problem(text: &str) -> Result<Result<Problem, Vec<Violation>>, ApiError> {
+    static BODY: Body<BareProblem> = Body::new();
+    let content = BODY.read(text).map_err(ApiError::MalformedJson)?;
+    Ok(problem(content))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use solver::error::Reason;
+
+    use super::*;
+
+    fn pointers(text: &str) -> Vec<String> {
+        submission(text)
+            .unwrap()
+            .problem
+            .unwrap_err()
+            .into_iter()
+            .map(|v| v.pointer)
+            .collect()
+    }
+
+    /// A body whose schema cannot be read would allow anything.
+    #[test]
+    fn every_body_refuses_names_that_are_not_described() {
+        const OTHER: &str = r#"{"other": 1}"#;
+        let refused = |read: Result<(), ApiError>| match read {
+            Err(ApiError::InvalidProblem(found)) => found,
+            _ => vec![],
+        };
+        let invalid =
+            |read: Result<(), Vec<Violation>>| refused(read.map_err(ApiError::InvalidProblem));
+        for found in [
+            invalid(submission(OTHER).unwrap().problem.map(|_| ())),
+            refused(batch(OTHER).map(|_| ())),
+            invalid(sweep(OTHER).unwrap().definition.map(|_| ())),
+            invalid(bare_problem(OTHER).unwrap().map(|_| ())),
+            refused(edit(OTHER).map(|_| ())),
+            refused(merge_patch(OTHER).map(|_| ())),
+            refused(retry(OTHER).map(|_| ())),
+            refused(token(OTHER).map(|_| ())),
+        ] {
+            let unknown = |v: &Violation| v.pointer == "/other" && v.reason == Reason::UnknownName;
+            assert!(found.iter().any(unknown), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn all_violations_of_an_envelope_are_reported_together() {
+        let limits = retry(r#"{"limits": [null, null]}"#).err();
+        assert!(
+            matches!(limits, Some(ApiError::InvalidProblem(found)) if found[0].pointer == "/limits")
+        );
+        let found = pointers(r#"{"problem": {}, "limits": [1, 2]}"#);
+        assert!(
+            found.iter().any(|pointer| pointer == "/limits"),
+            "{found:?}"
+        );
+        let text = r#"{"name": 7, "labels": {"a": 1}, "priority": 0.5, "wait": 3}"#;
+        assert_eq!(
+            pointers(text),
+            ["/name", "/labels/a", "/priority", "/problem", "/wait"]
+        );
+    }
+
+    #[test]
+    fn a_merge_patch_removes_and_resets_by_null() {
+        let (edit, labels) = merge_patch(r#"{"labels": {"a": null, "b": "2"}}"#).unwrap();
+        assert!(edit.name.is_none() && edit.labels.is_none() && edit.pinned.is_none());
+        assert_eq!(
+            labels,
+            [("a".into(), None), ("b".into(), Some("2".into()))].into()
+        );
+        let nulls = r#"{"name": null, "labels": null, "priority": null, "pinned": null}"#;
+        let (edit, labels) = merge_patch(nulls).unwrap();
+        assert_eq!(
+            (edit.name, edit.priority, edit.pinned),
+            (Some(None), Some(0), Some(false))
+        );
+        assert!(edit.labels.is_some_and(|all| all.is_empty()) && labels.is_empty());
+        assert!(merge_patch(r#"{"labels": {"a": {}}}"#).is_err());
+    }
+
+    #[test]
+    fn a_bare_problem_is_one_violation() {
+        let text = serde_json::to_string(&fake::problem()).unwrap();
+        let by_both = [
+            submission(&text).unwrap().problem.unwrap_err(),
+            bare_problem(&text).unwrap().unwrap_err(),
+        ];
+        for violations in by_both {
+            assert_eq!(violations.len(), 1, "{violations:?}");
+            assert!(violations[0].hint.contains(r#"{"problem": …}"#));
+        }
+    }
+
+    #[test]
+    fn at_most_a_hundred_unknown_names_are_reported_and_long_ones_are_truncated() {
+        let names: Vec<String> = (0..1000).map(|n| format!("\"n{n}\": 1")).collect();
+        let text = format!("{{\"problem\": {{}}, {}}}", names.join(", "));
+        assert_eq!(pointers(&text).len(), 100);
+        let text = format!("{{\"problem\": {{}}, \"{}\": 1}}", "x".repeat(1 << 20));
+        let violations = submission(&text).unwrap().problem.unwrap_err();
+        let longest = violations.iter().map(|v| v.pointer.len().max(v.got.len()));
+        assert!(longest.max() < Some(120));
+        let long = violations.iter().find(|v| v.pointer.starts_with("/xxx"));
+        assert!(long.unwrap().got.ends_with("… (1048576 characters)`"));
+    }
+
+    #[test]
+    fn malformed_json_is_distinguished_from_a_wrong_type() {
+        assert!(matches!(
+            submission("{\"problem\": "),
+            Err(ApiError::MalformedJson(_))
+        ));
+        assert_eq!(pointers("[1]"), [""]);
+    }
+}

@@ -1,0 +1,216 @@
+//! The operation `/v1/jobs/{id}/events`: past events, then live ones, as server-sent events or as JSON Lines.
+
+use std::{cmp::Ordering, time::Duration};
+
+use axum::{
+    body::Body,
+    http::{HeaderMap, StatusCode, header},
+    response::{
+        IntoResponse, Response,
+        sse::{self, KeepAlive, Sse},
+    },
+};
+use base::{event::Event, job::JobId, sweep::SweepEvent, values::Integers};
+use futures_util::{Stream, StreamExt, TryStreamExt};
+use serde::Serialize;
+use service::{
+    error::ApiError,
+    parameters::Parameter,
+    verbs::watch::{AFTER_SEQ, watch},
+    violations,
+};
+
+use super::{
+    accept::{accepted, prefers, weight},
+    call::Call,
+};
+
+/// Interval of the comments that keep the connection open through proxies and clients.
+const PING: Duration = Duration::from_secs(15);
+/// The media type of server-sent events.
+const SSE: &str = "text/event-stream";
+/// The media types of JSON Lines, a JSON object on each line.
+const LINES: [&str; 2] = ["application/jsonl", "application/x-ndjson"];
+
+/// The header that a browser adds when it reconnects to the same address.
+pub(super) const LAST_EVENT_ID: Parameter<Integers> = Parameter {
+    name: "Last-Event-ID",
+    meaning: "Same as after_seq; takes precedence over it",
+    values: AFTER_SEQ.values,
+};
+
+pub(super) async fn events(
+    call: Call,
+    id: JobId,
+    asked: Option<i64>,
+    seen: Option<i64>,
+) -> Result<Response, ApiError> {
+    let after = seen.or(asked).unwrap_or(0);
+    let events = watch(&call.service, &call.caller, id, after).await?;
+    answer(&call.headers, events)
+}
+
+/// A stream of events in the format that the client asks for, or the answer that there are none.
+pub(super) fn answer<E: Numbered>(
+    headers: &HeaderMap,
+    events: Option<impl Stream<Item = Result<E, ApiError>> + Send + 'static>,
+) -> Result<Response, ApiError> {
+    let Some(events) = events else {
+        return Ok(StatusCode::NO_CONTENT.into_response());
+    };
+    Ok(write(events, chosen(headers)?))
+}
+
+/// The format that the client prefers; of equal ones, and without `Accept`, server-sent events.
+fn chosen(headers: &HeaderMap) -> Result<Encoding, ApiError> {
+    let accepted = accepted(headers);
+    let most = |media: &[&str]| {
+        let weights = media.iter().map(|media| weight(&accepted, media));
+        let positive = weights.filter(|weight| weight.0 > 0.0);
+        positive.max_by(|one, other| one.partial_cmp(other).unwrap_or(Ordering::Equal))
+    };
+    match (most(&[SSE]), most(&LINES)) {
+        _ if accepted.is_empty() => Ok(Encoding::Stream),
+        (None, None) => Err(ApiError::NotAcceptable {
+            got: violations::quoted(&accepted.join(", ")),
+            available: format!("{SSE}, {}", LINES[0]),
+        }),
+        (stream, lines) if lines > stream => Ok(Encoding::Lines),
+        _ => Ok(Encoding::Stream),
+    }
+}
+
+/// An event with a number and a type.
+pub(super) trait Numbered: Serialize + Send + 'static {
+    /// The event's number.
+    fn seq(&self) -> i64;
+    /// The event's type.
+    fn kind(&self) -> &'static str;
+}
+
+impl Numbered for Event {
+    fn seq(&self) -> i64 {
+        self.seq
+    }
+
+    fn kind(&self) -> &'static str {
+        self.payload.kind()
+    }
+}
+
+impl Numbered for SweepEvent {
+    fn seq(&self) -> i64 {
+        self.seq
+    }
+
+    fn kind(&self) -> &'static str {
+        (&self.payload).into()
+    }
+}
+
+/// The format of a stream of events.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Encoding {
+    /// Server-sent events.
+    Stream,
+    /// JSON Lines.
+    Lines,
+}
+
+/// The format in which the client prefers the events of a job to a JSON answer, if it does.
+pub(super) fn preferred(headers: &HeaderMap) -> Option<Encoding> {
+    if prefers(headers, &[SSE]) {
+        return Some(Encoding::Stream);
+    }
+    prefers(headers, &LINES).then_some(Encoding::Lines)
+}
+
+/// A header for nginx, which as a proxy would otherwise hold back events until it has four kilobytes of them.
+const UNBUFFERED: [(&str, &str); 1] = [("x-accel-buffering", "no")];
+
+/// A stream of events. An error ends the stream without `done`, so that the client knows that it is incomplete.
+pub(super) fn write<E: Numbered>(
+    events: impl Stream<Item = Result<E, ApiError>> + Send + 'static,
+    encoding: Encoding,
+) -> Response {
+    let events = events.inspect_err(|error| tracing::debug!(%error, "event stream ended: {error}"));
+    match encoding {
+        Encoding::Stream => {
+            let events = events.map(|event| event.and_then(|event| message(&event)));
+            let events = events.take_while(|event| std::future::ready(event.is_ok()));
+            let keep_alive = KeepAlive::new().interval(PING).text("ping");
+            let stream = Sse::new(events).keep_alive(keep_alive);
+            (UNBUFFERED, stream).into_response()
+        }
+        Encoding::Lines => {
+            let lines = events.map(|event| event.and_then(|event| line(&event)));
+            let lines = lines.take_while(|line| std::future::ready(line.is_ok()));
+            let headers = [
+                (header::CONTENT_TYPE, LINES[0]),
+                (header::CACHE_CONTROL, "no-cache"),
+            ];
+            (UNBUFFERED, headers, Body::from_stream(lines)).into_response()
+        }
+    }
+}
+
+fn message(event: &impl Numbered) -> Result<sse::Event, ApiError> {
+    let data = serde_json::to_string(event).map_err(ApiError::internal)?;
+    Ok(sse::Event::default()
+        .id(event.seq().to_string())
+        .event(event.kind())
+        .data(data))
+}
+
+fn line(event: &impl Numbered) -> Result<Vec<u8>, ApiError> {
+    let mut line = serde_json::to_vec(event).map_err(ApiError::internal)?;
+    line.push(b'\n');
+    Ok(line)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn events_come_in_a_format_that_the_client_takes_or_not_at_all() {
+        let chosen = |accept: Option<&str>| {
+            let mut headers = HeaderMap::new();
+            if let Some(accept) = accept {
+                headers.insert(header::ACCEPT, accept.parse().unwrap());
+            }
+            chosen(&headers)
+        };
+        for stream in [
+            None,
+            Some("*/*"),
+            Some("text/event-stream"),
+            Some("application/json, text/event-stream"),
+            Some("application/json, text/plain, */*"),
+            Some("text/event-stream, application/jsonl"),
+            Some("application/jsonl;q=0.5, text/event-stream"),
+        ] {
+            let found = chosen(stream);
+            assert!(matches!(found, Ok(Encoding::Stream)), "{stream:?}");
+        }
+        for lines in [
+            "application/jsonl",
+            "application/x-ndjson",
+            "application/jsonl, */*",
+            "application/*",
+            "text/event-stream;q=0.5, application/jsonl",
+            "text/event-stream;q=0, */*",
+        ] {
+            let found = chosen(Some(lines));
+            assert!(matches!(found, Ok(Encoding::Lines)), "{lines}");
+        }
+        for neither in ["application/json", "text/html", "application/*;q=0"] {
+            let found = chosen(Some(neither));
+            assert!(
+                matches!(found, Err(ApiError::NotAcceptable { .. })),
+                "{neither}"
+            );
+        }
+    }
+}

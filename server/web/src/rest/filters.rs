@@ -1,0 +1,70 @@
+//! The filters of lists of jobs, read from a query.
+
+use service::{
+    error::ApiError,
+    parameters::Description,
+    verbs::filters::{self, LABEL},
+};
+use store::Filter;
+
+use super::input::{Input, RawInput};
+
+/// All filters; without any, every job matches.
+pub(super) const FILTERS: Filters = Filters;
+
+/// The input of all filters.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Filters;
+
+impl Input for Filters {
+    type Value = Filter;
+
+    fn descriptions(&self) -> Vec<Description> {
+        filters::describe()
+    }
+
+    fn extract(&self, raw: &RawInput<'_>) -> Result<Filter, ApiError> {
+        let mut filter = Filter {
+            labels: raw.keyed(LABEL.name).collect(),
+            ..Filter::default()
+        };
+        for field in store::FILTERS {
+            for text in raw.all(field.name) {
+                let list = field.several.then(|| text.split(','));
+                let one = (!field.several).then_some(text);
+                for text in list.into_iter().flatten().chain(one) {
+                    filters::set(&mut filter, field, text)?;
+                }
+            }
+        }
+        filters::checked(filter)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use axum::http::HeaderMap;
+
+    use super::*;
+
+    #[test]
+    fn every_filter_that_is_described_is_read() {
+        let headers = HeaderMap::new();
+        for filter in filters::describe() {
+            let name = filter.name.replace("{key}", "a");
+            let found = [
+                "queued",
+                "2026-01-31T12:00:00Z",
+                "sweep_01890a5d-ac96-774b-bcce-b302099a8057",
+            ]
+            .into_iter()
+            .find_map(|value| {
+                let query = format!("{name}={value}");
+                let raw = RawInput::new(vec![], Some(&query), &headers);
+                FILTERS.extract(&raw).ok()
+            });
+            assert_ne!(found.unwrap(), Filter::default(), "{name}");
+        }
+    }
+}
