@@ -23,7 +23,9 @@ from outside import TOP, check
 
 TARGETS = {
     "fuzz": ["changed_gmsh_files", "changed_decks", "changed_inline_meshes", "changed_problems"],
-    "service": ["changed_filters", "changed_headers", "changed_bodies", "changed_tokens", "changed_messages"],
+    "web": ["changed_filters", "changed_headers", "changed_bodies"],
+    "rpc": ["changed_messages"],
+    "service": ["changed_tokens"],
 }
 SOAK = "--soak" in sys.argv
 HOURS = float(sys.argv[2]) if SOAK else 0.0
@@ -50,8 +52,8 @@ def main():
     seed = time.time_ns() % (1 << 32)
     print("seed %d" % seed, flush=True)
     found = programs()
-    # those of the server find their files from its folder, as under Cargo
-    work = [(found[program], TOP / ("tests" if program == "fuzz" else "server"), name)
+    # those of the server find their files from the folder of their crate, as under Cargo
+    work = [(found[program], TOP / ("tests" if program == "fuzz" else "server/" + program), name)
             for program, names in TARGETS.items() for name in names]
     environment = dict(os.environ, SIGNORINI_FUZZ_SECONDS=str(SECONDS), SIGNORINI_FUZZ_SEED=str(seed),
                        SIGNORINI_FUZZ_CORPUS=str(CORPUS))
