@@ -214,7 +214,8 @@ impl Service {
         self.work_on(async { Ok(()) }, |()| work()).await
     }
 
-    /// Runs work on data that are loaded first, once there is a permit, so that waiting requests use no memory.
+    /// Runs work on data that are loaded first, once there is a permit, so that waiting requests use no memory. The permit is
+    /// that of the request until the data are loaded: what must count until then runs `detached`.
     pub async fn work_on<L: Send + 'static, T: Send + 'static>(
         &self,
         load: impl Future<Output = Result<L, ApiError>>,

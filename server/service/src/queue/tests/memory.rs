@@ -45,9 +45,13 @@ async fn a_job_waits_until_it_fits_beside_the_running_ones_and_is_not_overtaken(
         );
     }
     // while a claim is tried, a worker is reserved for it
-    while rig.queue.state().idle != 1 {
+    for _ in 0..500 {
+        if rig.queue.state().idle == 1 {
+            break;
+        }
         tokio::time::sleep(Duration::from_millis(10)).await;
     }
+    assert_eq!(rig.queue.state().idle, 1);
     rig.queue.cancel(first.key).await.unwrap();
     // both fit now
     rig.until_at_work(&second).await;
