@@ -2,7 +2,7 @@
 //!
 //! A job is changed by [`Change::update`] and in no other way: a function of its row, from which everything else follows. The
 //! row is written whole, with its checksum, before the next statement of the transaction or its commit; its version is
-//! counted, its events are appended, its move in the queue, its watchers and its line in the log are kept for after the commit.
+//! counted, its events are appended, its watchers and its line in the log are kept for after the commit.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -30,7 +30,6 @@ use super::{
     rows::{self, JobRow},
     rules::{self, Ended},
     sql::Sql,
-    waiting::{Move, Owner},
 };
 
 /// Rows that a transaction keeps in memory. Some change all jobs that wait.
@@ -47,9 +46,6 @@ pub(super) struct Change<'a> {
     unwritten: BTreeSet<i64>,
     /// The key of the next job, once one was inserted.
     next_key: Option<i64>,
-    moves: Vec<Move>,
-    /// How many more jobs of each owner wait by these moves.
-    more: BTreeMap<Owner, isize>,
     /// Jobs that have changed, for their watchers.
     changed: Vec<i64>,
     /// What the log will tell of jobs that end or are deleted.
@@ -72,14 +68,12 @@ enum LogLine {
 /// A point in a transaction to which it can be rolled back.
 #[derive(Clone, Copy)]
 pub(super) struct Savepoint {
-    moves: usize,
     changed: usize,
     log_lines: usize,
 }
 
 impl Writer<'_> {
-    /// Begins a transaction that may change jobs. No other one begins before its moves are applied, so that moves are applied
-    /// in the order of commits.
+    /// Begins a transaction that may change jobs.
     pub(super) fn change(&self) -> Result<Change<'_>> {
         self.store.reserve.has_room()?;
         self.control_change()
@@ -94,8 +88,6 @@ impl Writer<'_> {
             rows: BTreeMap::new(),
             unwritten: BTreeSet::new(),
             next_key: None,
-            moves: vec![],
-            more: BTreeMap::new(),
             changed: vec![],
             log_lines: vec![],
         })
@@ -131,7 +123,6 @@ impl Change<'_> {
         let mut row = new(key);
         let event = rules::event(None, &row.job, self.now());
         row.last_seq = event.iter().len() as i64;
-        self.move_job(rules::moves(None, &row.job));
         let stored = rows::insert(&self.tx, &row)?;
         let (first, attempt) = (1, row.job.attempt);
         events::insert(&self.tx, key, first, attempt, event.as_slice())?;
@@ -159,7 +150,6 @@ impl Change<'_> {
         let job = new.job.clone();
         let old = mem::replace(&mut cached.row, new).job;
         self.unwritten.insert(key);
-        self.move_job(rules::moves(Some(&old), &job));
         if old.status != job.status {
             self.changed.push(key);
         }
@@ -253,6 +243,11 @@ impl Change<'_> {
         Ok(&self.tx)
     }
 
+    /// The store that is changed.
+    pub(super) fn store(&self) -> &Store {
+        self.store
+    }
+
     /// What was found damaged.
     pub(super) fn damages(&self) -> &Damages {
         &self.store.damages
@@ -266,28 +261,6 @@ impl Change<'_> {
     /// The memory that running jobs share.
     pub(super) fn budget(&self) -> &Arc<Budget> {
         self.store.budget()
-    }
-
-    /// An owner has a turn, once this is committed.
-    pub(super) fn take_turn(&mut self, turn: Move) {
-        self.moves.push(turn);
-    }
-
-    fn move_job(&mut self, moves: Vec<Move>) {
-        moves.iter().for_each(|change| self.count(change, 1));
-        self.moves.extend(moves);
-    }
-
-    /// Counts a move, or takes it back: looking at all moves for every job of a large submission would take minutes.
-    fn count(&mut self, change: &Move, sign: isize) {
-        let (owner, more) = match change {
-            Move::Enter(place) => (&place.owner, 1),
-            Move::Attach(owner) => (owner, 1),
-            Move::Leave(place) => (&place.owner, -1),
-            Move::Detach(owner) => (owner, -1),
-            Move::Start(_) | Move::Stop(_) | Move::Turn { .. } => return,
-        };
-        *self.more.entry(owner.clone()).or_default() += sign * more;
     }
 
     /// What was read, unless it is damaged, which is noted.
@@ -344,31 +317,10 @@ impl Change<'_> {
             .to_vec()
     }
 
-    /// How many jobs of this owner wait, with the changes of this transaction.
-    pub(super) fn waiting_of(&self, owner: &str) -> usize {
-        let more = self.more.get(owner).copied().unwrap_or_default();
-        let waiting = self.store.waiting_jobs().len_of(owner);
-        waiting.saturating_add_signed(more)
-    }
-
-    /// The next job that waits, with the changes of this transaction, and its owner's turn.
-    pub(super) fn next(&self, damaged: &BTreeSet<i64>) -> Option<(i64, Move)> {
-        let most_running = self.store.most_running_of_owner();
-        let mut waiting = self.store.waiting_jobs();
-        waiting.with(&self.moves, |waiting| waiting.next(damaged, most_running))
-    }
-
-    /// How many jobs wait, with the changes of this transaction.
-    pub(super) fn waiting(&self) -> usize {
-        let more: isize = self.more.values().sum();
-        self.store.waiting_jobs().len().saturating_add_signed(more)
-    }
-
     /// Sets a point to roll back to. There is one at a time: it is released or rolled back to before the next is set.
     pub(super) fn savepoint(&mut self) -> Result<Savepoint> {
         self.sql()?.run("savepoint submission", ())?;
         Ok(Savepoint {
-            moves: self.moves.len(),
             changed: self.changed.len(),
             log_lines: self.log_lines.len(),
         })
@@ -387,24 +339,17 @@ impl Change<'_> {
         self.next_key = None;
         self.sql()?.run("rollback to submission", ())?;
         self.release()?;
-        for change in self.moves.split_off(savepoint.moves) {
-            self.count(&change, -1);
-        }
         self.changed.truncate(savepoint.changed);
         self.log_lines.truncate(savepoint.log_lines);
         Ok(())
     }
 
-    /// Commits: the changes are on the disk when this returns, and only then applied to the jobs in memory. Returns the
-    /// jobs that have changed.
+    /// Commits: the changes are on the disk when this returns. Returns the jobs that have changed.
     pub(super) fn commit(mut self) -> Result<Vec<i64>> {
         self.write_rows()?;
+        let waiting = self.waiting()?;
         self.tx.commit()?;
-        let mut waiting = self.store.waiting_jobs();
-        for change in self.moves {
-            waiting.apply(change);
-        }
-        drop(waiting);
+        self.store.note_waiting(waiting);
         self.log_lines.iter().for_each(|(id, line)| line.log(*id));
         Ok(self.changed)
     }

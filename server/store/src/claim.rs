@@ -15,11 +15,10 @@ use super::{
     error::{Result, StoreError},
     rules::Ending,
     submission::Claim,
-    waiting::Move,
 };
 
 impl Store {
-    /// Starts an attempt of the next job of the queue, in the order of `waiting`. Jobs before it for which there is a
+    /// Starts an attempt of the next job of the queue, in the order of `turns`. Jobs before it for which there is a
     /// result by now are answered. Also returns all jobs that have changed.
     pub async fn claim_next(self: &Arc<Self>) -> Result<(Option<Claim>, Vec<i64>)> {
         self.check_result_for_next().await;
@@ -32,14 +31,14 @@ impl Store {
     }
 }
 
-/// The next job of the queue and its owner's turn, but for damaged ones, of which nothing can be trusted: they wait until
+/// The next job of the queue, but for damaged ones, of which nothing can be trusted: they wait until
 /// the operator removes them, and the others go on.
-fn next(change: &mut Change<'_>) -> Result<Option<(Job, Move)>> {
+fn next(change: &mut Change<'_>) -> Result<Option<Job>> {
     let mut damaged = BTreeSet::new();
-    while let Some((key, turn)) = change.next(&damaged) {
+    while let Some(key) = change.next(&damaged)? {
         let found = change.read(key);
         match change.unless_damaged(found)? {
-            Some(job) => return Ok(Some((job, turn))),
+            Some(job) => return Ok(Some(job)),
             None => damaged.insert(key),
         };
     }
@@ -53,7 +52,7 @@ pub(super) fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
     /// With more jobs than this, one transaction would take too long.
     const MOST_ANSWERED: usize = 100;
     for _ in 0..MOST_ANSWERED {
-        let Some((waiting, turn)) = next(change)? else {
+        let Some(waiting) = next(change)? else {
             return Ok(None);
         };
         // there may be a result by now
@@ -79,7 +78,7 @@ pub(super) fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
         };
         let now = change.now();
         let job = change.update(waiting.key, |row| row.start(now))?;
-        change.take_turn(turn);
+        change.take_turn(&job.owner)?;
         let problem = match problem {
             Ok(problem) => problem,
             // it fails alone, and does not stop the queue

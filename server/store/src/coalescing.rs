@@ -25,6 +25,7 @@ use super::{
     sizes,
     sql::Sql,
     submission::NewJob,
+    turns,
 };
 
 /// Most jobs that are coalesced into one: they end in one transaction with it. Further ones wait for a worker, and
@@ -79,11 +80,15 @@ impl Store {
 
     /// The same for the job that is probably claimed next.
     pub(super) async fn check_result_for_next(self: &Arc<Self>) {
-        let most_running = self.most_running_of_owner();
-        let next = self.waiting_jobs().next(&BTreeSet::new(), most_running);
-        let Some((key, _)) = next else { return };
+        if self.waiting() == 0 {
+            return;
+        }
         let _ = self
             .read(move |store, connection| {
+                let most_running = store.most_running_of_owner();
+                let Some(key) = turns::next(connection, &BTreeSet::new(), most_running)? else {
+                    return Ok(());
+                };
                 let hash = "select input_hash from job where id = ? and cache = 'use'";
                 match connection.optional_value::<String>(hash, [key]) {
                     Ok(Some(hash)) => check_earlier_result(store, connection, &hash),

@@ -1,6 +1,6 @@
 //! The one SQLite file: its connections, and the data that is also kept in memory.
 
-use parking_lot::{Mutex, MutexGuard, RwLock};
+use parking_lot::{Mutex, RwLock};
 use std::{
     cell::Cell,
     collections::HashSet,
@@ -8,7 +8,7 @@ use std::{
     path::Path,
     sync::{
         Arc, OnceLock,
-        atomic::{AtomicBool, AtomicI64},
+        atomic::{AtomicBool, AtomicI64, AtomicUsize},
     },
     time::{Duration, Instant},
 };
@@ -31,7 +31,6 @@ use super::{
     reserve::Reserve,
     sql::Sql,
     submission::{Inbox, Pending},
-    waiting::WaitingJobs,
 };
 
 /// How long a query or a change waits for a connection; one that waits longer, behind others on a disk that hardly answers,
@@ -43,15 +42,15 @@ const LIST_PATIENCE: Duration = Duration::from_secs(5);
 /// The database of one server.
 #[derive(Debug)]
 pub struct Store {
-    /// The only one that writes: one transaction at a time changes the jobs that wait.
+    /// The only one that writes.
     writer: Arc<Connections>,
     /// What the writer reads with beside its transaction, which a page that cannot be read would end.
     beside: Arc<Connections>,
     pub(super) reader: Arc<Connections>,
     /// For lists and counts, which may be slow, so that they do not delay other reads.
     lists: Arc<Connections>,
-    /// The jobs that wait, as they are on the disk after every commit.
-    pub(super) waiting: Mutex<WaitingJobs>,
+    /// How many jobs wait, as it is on the disk after every commit.
+    pub(super) waiting: AtomicUsize,
     /// Whether the queue is paused, as it is on the disk after every commit.
     pub(super) paused: AtomicBool,
     /// Who may use the service, as it is on the disk after every commit.
@@ -215,7 +214,7 @@ impl Store {
             beside,
             reader,
             lists,
-            waiting: Mutex::default(),
+            waiting: AtomicUsize::default(),
             paused: AtomicBool::default(),
             tokens: RwLock::default(),
             any_tokens: AtomicBool::default(),
@@ -235,11 +234,6 @@ impl Store {
             folder,
         };
         Ok((store, submissions))
-    }
-
-    /// The waiting jobs.
-    pub(super) fn waiting_jobs(&self) -> MutexGuard<'_, WaitingJobs> {
-        self.waiting.lock()
     }
 
     /// Closes every connection, and with the last one the write-ahead log. Another server may use the folder then.

@@ -84,6 +84,6 @@ fn try_to_edit(
     let mut edited = change.read(key)?;
     change.commit()?;
     let store = writer.store;
-    store.try_to_complete(writer.connection(), std::slice::from_mut(&mut edited));
+    store.try_to_complete(writer.connection(), &mut [&mut edited]);
     Ok(Some(Ok(edited)))
 }

@@ -14,7 +14,7 @@ pub(super) fn end_job(change: &mut Change<'_>, key: i64, ending: &Ending) -> Res
         results::remove(tx, key)?;
     }
     sizes::count(tx, key)?;
-    sizes::add_sizes(tx, std::slice::from_mut(&mut ended))?;
+    sizes::add_sizes(tx, &mut [&mut ended])?;
     if ended.result_available == ResultAvailable::Final && ended.cached_from.is_none() {
         // its own result is the newest of its input now, and was not read yet
         change.forget_checked(&ended.input_hash);

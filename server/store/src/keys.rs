@@ -38,7 +38,7 @@ impl Store {
                 store.damages.have_all(&[Table::Jobs, Table::Deleted])?;
                 return Ok(None);
             };
-            store.complete(connection, &mut jobs)?;
+            store.complete(connection, &mut jobs.iter_mut().collect::<Vec<_>>())?;
             Ok(Some(jobs))
         })
         .await

@@ -23,7 +23,7 @@
 //! | the row of a job; how it may change, and what follows | `rows`, `rules` |
 //! | the end of one job, with all that belongs to it | `end_job` |
 //! | a transaction of the writer and what follows its commit: the mirror of the queue, watchers, the log line of a job's end | `change` |
-//! | whose turn it is | `waiting` |
+//! | whose turn it is | `turns` |
 //! | positions in the queue | `positions` |
 //! | lists of jobs: filters | `filter` |
 //! | lists of jobs: pages and the indexes they use | `list` |
@@ -86,10 +86,9 @@ mod pauses;
 mod progress;
 mod reserve;
 
-// The row of a job, the rules of how it may change, and what follows; the jobs that wait, mirrored in memory.
+// The row of a job, the rules of how it may change, and what follows.
 mod rows;
 mod rules;
-mod waiting;
 
 // The database; one transaction of its single writer.
 mod change;
@@ -135,6 +134,7 @@ mod health;
 mod list;
 mod positions;
 mod snapshot;
+mod turns;
 
 // What is found by keys and hashes, read from time to time.
 mod scrub;
@@ -190,6 +190,7 @@ pub use self::{
     space::{Space, compact_folder},
     submission::{Accepted, Claim, NewJob, NewSweep, QueueLimits, RequestKey, Submission},
     sweeps::{MemberEvents, MembersTask},
+    turns::Load,
 };
 
 impl Store {
@@ -213,7 +214,7 @@ impl Store {
         let connect = move || Store::connect(&folder, Rebuild::IfItCannotGiveBack);
         let (store, submissions) = connections::blocking(connect).await?;
         let store = Arc::new(store);
-        store.read_waiting_jobs().await?;
+        store.count_queue().await?;
         store.read_settings().await?;
         store.read_tokens().await?;
         store.read_clock().await?;

@@ -128,7 +128,7 @@ impl Store {
                     break;
                 }
             }
-            store.complete(connection, &mut jobs.items)?;
+            store.complete(connection, &mut jobs.items.iter_mut().collect::<Vec<_>>())?;
             store.damages.have_all(tables_of(&filter))?;
             Ok(jobs)
         })

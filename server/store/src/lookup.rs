@@ -24,7 +24,7 @@ impl Store {
                 store.damages.have_all(&[Table::Jobs])?;
                 return Ok(None);
             };
-            store.complete(connection, std::slice::from_mut(&mut job))?;
+            store.complete(connection, &mut [&mut job])?;
             Ok(Some(job))
         })
         .await
@@ -49,19 +49,6 @@ impl Store {
             let status = "select status from job where id = ?";
             let status: Option<String> = connection.optional_value(status, [key])?;
             Ok(status.map(|word| word.parse().is_ok_and(Status::is_terminal)))
-        })
-        .await
-    }
-
-    /// The age of the oldest job that waits for a worker (seconds).
-    pub async fn oldest_wait_s(self: &Arc<Self>) -> Result<Option<f64>> {
-        let Some(key) = self.waiting_jobs().oldest() else {
-            return Ok(None);
-        };
-        self.read(move |store, connection| {
-            let created = "select created_at from job where id = ?";
-            let created: Option<i64> = connection.optional_value(created, [key])?;
-            Ok(created.map(|at| (store.now().micros() - at).max(0) as f64 / 1e6))
         })
         .await
     }

@@ -23,7 +23,7 @@ const APPLIED: &str = "create table if not exists _sqlx_migrations (
 )";
 
 /// Every step, with the name of its file; a test compares the list with the folder.
-const STEPS: [(i64, &str, &str); 18] = [
+const STEPS: [(i64, &str, &str); 19] = [
     (1, "jobs", include_str!("../../../migrations/0001_jobs.sql")),
     (
         2,
@@ -109,6 +109,11 @@ const STEPS: [(i64, &str, &str); 18] = [
         18,
         "only content",
         include_str!("../../../migrations/0018_only_content.sql"),
+    ),
+    (
+        19,
+        "turns",
+        include_str!("../../../migrations/0019_turns.sql"),
     ),
 ];
 

@@ -1,5 +1,5 @@
 //! The rules of a job: which status may follow which, what each verb does to a job, and what follows from a change of its
-//! row: a version, an event, a move in the queue, a line in the log. No I/O.
+//! row: a version, an event, a line in the log. No I/O.
 
 use base::{
     event::{Payload, Requeue},
@@ -13,7 +13,6 @@ use super::{
     error::{Damage, Result, StoreError},
     rows::JobRow,
     submission::NewJob,
-    waiting::{Move, Place},
 };
 
 /// Attempts that may end with the process before a job fails.
@@ -269,27 +268,6 @@ pub(super) fn event(old: Option<&Job>, new: &Job, now: Time) -> Option<(Time, Pa
     }
 }
 
-/// What a change means for the queue: the job leaves the place that it had, and takes its new one.
-pub(super) fn moves(old: Option<&Job>, new: &Job) -> Vec<Move> {
-    let (before, after) = (old.and_then(taking_a_place), taking_a_place(new));
-    if before == after {
-        vec![]
-    } else {
-        before.map(Move::inverse).into_iter().chain(after).collect()
-    }
-}
-
-/// How a job takes its place in the queue; none if it has ended.
-fn taking_a_place(job: &Job) -> Option<Move> {
-    let owner = || job.owner.as_str().into();
-    match job.status {
-        Status::Queued if job.coalesced_into.is_none() => Some(Move::Enter(Place::of(job))),
-        Status::Queued => Some(Move::Attach(owner())),
-        Status::Running => Some(Move::Start(owner())),
-        Status::Succeeded | Status::Failed | Status::Canceled => None,
-    }
-}
-
 /// The end of a job, as the log and the counters tell it.
 #[derive(Debug, PartialEq)]
 pub(super) struct Ended {
@@ -324,7 +302,6 @@ mod tests {
     use strum::VariantArray;
 
     use super::*;
-    use crate::waiting::WaitingJobs;
     use base::job::{Cache, JobId, Limits};
 
     const ACCEPTED: Time = Time::from_micros(1_000_000);
@@ -608,35 +585,5 @@ mod tests {
         expired.derive();
         let told = ended(&queued.job, &expired.job).unwrap();
         assert_eq!((told.times_s, told.detail.as_str()), (None, "so"));
-    }
-
-    /// Whatever a job was and becomes, the queue is as if it had always been so.
-    #[test]
-    fn moves_lead_from_any_state_to_any_other() {
-        let mut states = vec![];
-        for row in of_each_status() {
-            for (priority, coalesced_into) in [(0, None), (3, None), (0, Some(1)), (3, Some(2))] {
-                let mut job = row.job.clone();
-                job.priority = priority;
-                job.coalesced_into = coalesced_into;
-                states.push(job);
-            }
-        }
-        let queue = |job: &Job| {
-            let mut queue = WaitingJobs::default();
-            moves(None, job)
-                .into_iter()
-                .for_each(|change| assert!(queue.apply(change)));
-            queue
-        };
-        for old in &states {
-            for new in &states {
-                let mut moved = queue(old);
-                for change in moves(Some(old), new) {
-                    assert!(moved.apply(change));
-                }
-                moved.assert_same(&queue(new));
-            }
-        }
     }
 }

@@ -111,7 +111,7 @@ pub(super) fn count(tx: &Connection, key: i64) -> Result<()> {
 }
 
 /// Fills in what jobs keep.
-pub(super) fn add_sizes(connection: &Connection, jobs: &mut [Job]) -> Result<()> {
+pub(super) fn add_sizes(connection: &Connection, jobs: &mut [&mut Job]) -> Result<()> {
     let ended = jobs.iter().filter(|job| job.status.is_terminal());
     let keys: Vec<i64> = ended.map(|job| job.key).collect();
     if keys.is_empty() {

@@ -8,7 +8,7 @@ use std::sync::{Arc, Weak};
 
 use base::{
     failpoint::{self, Point},
-    job::Cache,
+    job::{Cache, Job},
 };
 use tokio::sync::{mpsc, oneshot};
 
@@ -96,10 +96,9 @@ fn accept_together(
         }
     }
     change.commit()?;
-    for accepted in answers.iter_mut().flatten() {
-        let store = writer.store;
-        store.try_to_complete(writer.connection(), &mut accepted.jobs);
-    }
+    let accepted = answers.iter_mut().flatten();
+    let mut jobs: Vec<&mut Job> = accepted.flat_map(|answer| &mut answer.jobs).collect();
+    writer.store.try_to_complete(writer.connection(), &mut jobs);
     Ok(answers)
 }
 
@@ -199,12 +198,12 @@ pub(super) fn insert(
         (None, Cache::Use) => coalescing::primary_for(change, owner, new)?,
         _ => None,
     };
-    if answer.is_none() && change.waiting() >= limits.queued as usize {
+    if answer.is_none() && change.waiting()? >= limits.queued as usize {
         return Err(StoreError::QueueFull);
     }
     if answer.is_none()
         && let Some(most) = limits.queued_of_owner
-        && change.waiting_of(owner) >= most as usize
+        && change.waiting_of(owner)? >= u64::from(most)
     {
         return Err(StoreError::OwnerQueueFull);
     }

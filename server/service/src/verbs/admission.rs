@@ -250,6 +250,10 @@ pub(super) async fn enqueue_sweep(
     {
         rates.give_back(caller.owner(), asked);
     }
+    let used = match accepted {
+        Err(StoreError::OwnerQueueFull) => service.store.load_of(caller.owner()).await?.queued,
+        _ => 0,
+    };
     let accepted = accepted.map_err(|error| match error {
         StoreError::QueueFull => ApiError::QueueFull {
             limit,
@@ -259,7 +263,7 @@ pub(super) async fn enqueue_sweep(
             owner: caller.owner().to_owned(),
             of: QuotaOf::Queued,
             limit: most_of_owner.unwrap_or(limit).into(),
-            used: service.store.load_of(caller.owner()).0 as u64,
+            used,
             asked,
         }),
         // it was stored when the problem was checked, and has been deleted since

@@ -150,7 +150,7 @@ pub fn me<'a>(service: &'a Service, caller: &'a Caller) -> BoxFuture<'a, Result<
                 left: rates.left(caller.owner())?,
             })
         };
-        let (queued, running) = service.store.load_of(caller.owner());
+        let load = service.store.load_of(caller.owner()).await?;
         let queued_limit = service.max_queued_of_owner().unwrap_or(service.max_queued);
         let workers = service.queue.state().workers;
         let running_limit = service.max_running_per_owner.unwrap_or(workers);
@@ -158,11 +158,11 @@ pub fn me<'a>(service: &'a Service, caller: &'a Caller) -> BoxFuture<'a, Result<
             owner: caller.owner().to_owned(),
             scopes: caller.scopes().collect(),
             queued: Share {
-                used: queued as u64,
+                used: load.queued,
                 limit: queued_limit.into(),
             },
             running: Share {
-                used: running as u64,
+                used: load.running,
                 limit: running_limit.min(workers).into(),
             },
             stored_bytes: Kept {
@@ -183,18 +183,21 @@ pub fn owners<'a>(
     Box::pin(async move {
         const MOST: i64 = 1000;
         let mut sizes = service.store.sizes_of_owners(MOST).await?;
-        let mut others = service.store.owners_with_load();
-        for known in &sizes {
-            others.remove(&known.owner);
-        }
-        for owner in others.into_iter().take(MOST as usize) {
-            sizes.push(service.store.size_of_owner(&owner).await?);
+        let loads = service.store.loads().await?;
+        let known: BTreeSet<&String> = sizes.iter().map(|size| &size.owner).collect();
+        let others: BTreeSet<&String> = loads
+            .keys()
+            .filter(|owner| !known.contains(owner))
+            .collect();
+        let others: Vec<&String> = others.into_iter().take(MOST as usize).collect();
+        for owner in others {
+            sizes.push(service.store.size_of_owner(owner).await?);
         }
         let with_load = |size: OwnerSize| {
-            let (queued, running) = service.store.load_of(&size.owner);
+            let load = loads.get(&size.owner).copied().unwrap_or_default();
             OwnerUse {
-                queued: queued as u64,
-                running: running as u64,
+                queued: load.queued,
+                running: load.running,
                 jobs: size.jobs,
                 job_bytes: size.job_bytes,
                 mesh_bytes: size.mesh_bytes,

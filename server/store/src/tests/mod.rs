@@ -10,6 +10,7 @@ mod simulation;
 mod space;
 mod starts;
 mod sweeps;
+mod taking_turns;
 mod upgrades;
 
 use base::{

@@ -30,7 +30,6 @@ async fn the_queries_of_the_queue_use_indexes() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
     for question in [
-        positions::WAITING,
         end::EXPIRED,
         coalescing::EARLIER_RESULT,
         coalescing::PRIMARY,
@@ -39,6 +38,23 @@ async fn the_queries_of_the_queue_use_indexes() {
         assert!(steps[0].contains("INDEX job_"), "{question}: {steps:?}");
         assert!(!sorts(&steps), "{question}: {steps:?}");
     }
+}
+
+/// A claim looks at one job of each owner who has any.
+#[tokio::test]
+async fn a_claim_does_not_read_the_jobs_that_wait() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let steps = plan(&store, turns::NEXT).await;
+    let jobs = steps.iter().filter(|step| step.contains(" job "));
+    let jobs: Vec<&String> = jobs.collect();
+    assert!(
+        !jobs.is_empty()
+            && jobs
+                .iter()
+                .all(|step| step.contains("INDEX job_queue (priority=? AND owner=?")),
+        "{steps:?}"
+    );
 }
 
 /// A page is read along an index, from its cursor to the row that is the last to be checked, without a sort; how far an

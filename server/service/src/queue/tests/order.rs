@@ -85,7 +85,7 @@ async fn a_paused_queue_starts_nothing_until_it_is_resumed_even_across_a_restart
 }
 
 #[tokio::test]
-async fn the_waiting_jobs_in_memory_are_those_on_the_disk() {
+async fn positions_are_those_in_which_jobs_start() {
     let rig = rig(fake::solve).await;
     let all = Filter::default();
     for priority in [0, 3, 0, -2, 3] {

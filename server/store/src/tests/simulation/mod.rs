@@ -68,7 +68,7 @@ struct World {
     over: Vec<(i64, i32)>,
     /// The queue is paused.
     paused: bool,
-    /// The number of every owner's last turn since the store was started; and how many turns there were.
+    /// The number of every owner's last turn; and how many turns there were.
     turns: BTreeMap<String, usize>,
     turn: usize,
     done: Steps,

@@ -145,7 +145,6 @@ impl World {
     }
 
     async fn start(&mut self, folder: &Path) {
-        self.turns.clear(); // all owners begin anew
         self.set_clock();
         self.full = false;
         self.store = Store::open_unwatched(folder).await.unwrap();

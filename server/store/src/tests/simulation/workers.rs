@@ -35,20 +35,19 @@ impl World {
         self.note(format!("    {} starts, attempt {}", job.key, job.attempt));
         let jobs = self.listed().await;
         let waiting = jobs.iter().filter(|job| job.waits_for_a_worker());
-        let turn = |owner: &str| self.turns.get(owner).copied();
-        let first_of = |other: &Job| {
-            let theirs = jobs.iter().filter(|one| {
-                one.waits_for_a_worker()
-                    && one.owner == other.owner
-                    && one.priority == other.priority
-            });
-            theirs.map(|one| one.key).min()
+        // an owner who had no turn yet comes before those who had, in the order of their first jobs
+        let turn = |owner: &str| {
+            let known = self.jobs.iter().filter(|(_, known)| known.owner == owner);
+            let listed = jobs.iter().filter(|job| job.owner == owner);
+            let first = known
+                .map(|(key, _)| *key)
+                .chain(listed.map(|job| job.key))
+                .min();
+            (self.turns.get(owner).copied(), first)
         };
         let is_before = |other: &Job| match job.priority.cmp(&other.priority) {
             Ordering::Equal if job.owner == other.owner => job.key < other.key,
-            Ordering::Equal => {
-                (turn(&job.owner), Some(job.key)) < (turn(&other.owner), first_of(other))
-            }
+            Ordering::Equal => turn(&job.owner) < turn(&other.owner),
             order => order == Ordering::Greater,
         };
         for other in waiting {
