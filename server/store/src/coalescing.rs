@@ -10,13 +10,13 @@ use std::{
     sync::Arc,
 };
 
-use base::job::{Job, Reason, Status};
+use base::job::{Cache, Job, Reason, Status};
 use rusqlite::Connection;
 
 use super::{
     change::Change,
     content::{self, Holder},
-    database::Store,
+    database::{Store, Writer},
     end_job::end_job,
     error::Result,
     intact, results,
@@ -108,6 +108,20 @@ fn check_earlier_result(store: &Store, connection: &Connection, input_hash: &str
         store.intact.inputs.insert(input_hash.to_owned());
     }
     Ok(())
+}
+
+/// Whether there is an earlier result for one of these jobs that was not checked since the store was opened.
+pub(super) fn has_result_to_check(writer: &Writer<'_>, jobs: &[NewJob]) -> bool {
+    let inputs = &writer.store.intact.inputs;
+    let jobs = jobs.iter().filter(|job| job.cache == Cache::Use);
+    let mut unchecked = jobs.filter(|job| !inputs.contains(&job.input_hash));
+    unchecked.any(|job| {
+        let version = env!("CARGO_PKG_VERSION");
+        let newest: Result<Option<i64>> = writer
+            .beside()
+            .optional_value(EARLIER_RESULT, [&job.input_hash, version]);
+        matches!(newest, Ok(Some(_)))
+    })
 }
 
 /// The job that a new one of this owner may be coalesced into. One that waits with a lower priority or for another owner's

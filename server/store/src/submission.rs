@@ -128,8 +128,19 @@ pub(super) struct Pending {
     pub(super) submission: Submission,
     /// Whether the next job of the queue is to be claimed with it.
     pub(super) claim: bool,
+    /// Whether the results that may answer its jobs were checked before.
+    pub(super) checked: bool,
     /// The channel for the answer.
-    pub(super) reply: oneshot::Sender<Result<Accepted>>,
+    pub(super) reply: oneshot::Sender<Result<Answer>>,
+}
+
+/// What becomes of a submission.
+#[derive(Debug)]
+pub(super) enum Answer {
+    /// It is on the disk.
+    Accepted(Accepted),
+    /// An earlier result may answer one of its jobs, and has to be checked first, which would occupy the single writer.
+    ToCheck(Submission),
 }
 
 /// The inbox in which submissions wait for the next commit.

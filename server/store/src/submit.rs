@@ -4,12 +4,16 @@
 //! together and share the next one, each with a savepoint of its own, so that a refused one does not affect the
 //! others.
 
-use std::sync::{Arc, Weak};
+use std::{
+    panic::AssertUnwindSafe,
+    sync::{Arc, Weak},
+};
 
 use base::{
     failpoint::{self, Point},
     job::{Cache, Job},
 };
+use futures_util::FutureExt;
 use tokio::sync::{mpsc, oneshot};
 
 use super::{
@@ -21,7 +25,7 @@ use super::{
     error::{Result, StoreError},
     keys, labels, meshes,
     rows::JobRow,
-    submission::{Accepted, MOST_PER_COMMIT, NewJob, Pending, QueueLimits, Submission},
+    submission::{Accepted, Answer, MOST_PER_COMMIT, NewJob, Pending, QueueLimits, Submission},
     sweeps,
 };
 
@@ -29,22 +33,34 @@ impl Store {
     /// Accepts jobs. They are stored on the disk when this returns. With `claim` (a worker is free) the next job of the
     /// queue is claimed in the same commit, if it fits into the memory budget.
     pub async fn submit(self: &Arc<Self>, submission: Submission, claim: bool) -> Result<Accepted> {
-        for job in submission.jobs.iter().filter(|job| job.cache == Cache::Use) {
-            self.check_earlier_result(&job.input_hash).await;
-        }
         if claim {
             self.check_result_for_next().await;
         }
+        match self.send(submission, claim, false).await? {
+            Answer::Accepted(accepted) => Ok(accepted),
+            Answer::ToCheck(submission) => {
+                let jobs = submission.jobs.iter();
+                for job in jobs.filter(|job| job.cache == Cache::Use) {
+                    self.check_earlier_result(&job.input_hash).await;
+                }
+                match self.send(submission, claim, true).await? {
+                    Answer::Accepted(accepted) => Ok(accepted),
+                    Answer::ToCheck(_) => Err(StoreError::Unexpected("checked twice".into())),
+                }
+            }
+        }
+    }
+
+    /// Sends a submission to the next commit.
+    async fn send(&self, submission: Submission, claim: bool, checked: bool) -> Result<Answer> {
         let (reply, answer) = oneshot::channel();
-        let sent = self
-            .inbox
-            .0
-            .send(Pending {
-                submission,
-                claim,
-                reply,
-            })
-            .await;
+        let pending = Pending {
+            submission,
+            claim,
+            checked,
+            reply,
+        };
+        let sent = self.inbox.0.send(pending).await;
         sent.map_err(|_| closed())?;
         answer.await.map_err(|_| closed())?
     }
@@ -53,16 +69,18 @@ impl Store {
     async fn commit_together(self: &Arc<Self>, pending: Vec<Pending>) {
         let (mut submissions, mut replies) = (vec![], vec![]);
         for one in pending {
-            submissions.push((one.submission, one.claim));
+            submissions.push((one.submission, one.claim, one.checked));
             replies.push(one.reply);
         }
         let committed = self.write(|writer| accept_together(writer, submissions));
         match committed.await {
             Ok(answers) => {
-                let jobs = answers.iter().flatten().flat_map(|answer| &answer.jobs);
-                jobs.for_each(|job| failpoint::pass(Point::Answered, job.id));
-                for (reply, accepted) in replies.into_iter().zip(answers) {
-                    let _ = reply.send(accepted); // the client may have disconnected
+                for (reply, answer) in replies.into_iter().zip(answers) {
+                    if let Ok(Answer::Accepted(accepted)) = &answer {
+                        let jobs = accepted.jobs.iter();
+                        jobs.for_each(|job| failpoint::pass(Point::Answered, job.id));
+                    }
+                    let _ = reply.send(answer); // the client may have disconnected
                 }
             }
             Err(cause) => {
@@ -77,16 +95,20 @@ impl Store {
 /// Accepts submissions in one transaction; for each, what has become of it.
 fn accept_together(
     writer: &Writer<'_>,
-    submissions: Vec<(Submission, bool)>,
-) -> Result<Vec<Result<Accepted>>> {
+    submissions: Vec<(Submission, bool, bool)>,
+) -> Result<Vec<Result<Answer>>> {
     let mut change = writer.change()?;
     let mut answers = vec![];
-    for (submission, claim) in submissions {
+    for (submission, claim, checked) in submissions {
+        if !checked && coalescing::has_result_to_check(writer, &submission.jobs) {
+            answers.push(Ok(Answer::ToCheck(submission)));
+            continue;
+        }
         let savepoint = change.savepoint()?;
         match accept(&mut change, savepoint, submission, claim) {
             Ok(accepted) => {
                 change.release()?;
-                answers.push(Ok(accepted));
+                answers.push(Ok(Answer::Accepted(accepted)));
             }
             Err(cause) => match change.roll_back_to(savepoint) {
                 Ok(()) => answers.push(Err(cause)),
@@ -96,7 +118,13 @@ fn accept_together(
         }
     }
     change.commit()?;
-    let accepted = answers.iter_mut().flatten();
+    let accepted = answers
+        .iter_mut()
+        .flatten()
+        .filter_map(|answer| match answer {
+            Answer::Accepted(accepted) => Some(accepted),
+            Answer::ToCheck(_) => None,
+        });
     let mut jobs: Vec<&mut Job> = accepted.flat_map(|answer| &mut answer.jobs).collect();
     writer.store.try_to_complete(writer.connection(), &mut jobs);
     Ok(answers)
@@ -175,10 +203,10 @@ pub(super) async fn commit_submissions(store: Weak<Store>, mut inbox: mpsc::Rece
         {
             pending.push(next);
         }
-        // in its own task: a panic there must not close the inbox for all later submissions
-        let done = tokio::spawn(async move { store.commit_together(pending).await }).await;
-        if let Err(panic) = done {
-            tracing::error!(%panic, "submissions were lost to a panic: {panic}");
+        // a panic there must not close the inbox for all later submissions
+        let committed = AssertUnwindSafe(store.commit_together(pending)).catch_unwind();
+        if committed.await.is_err() {
+            tracing::error!("submissions were lost to a panic");
         }
     }
 }

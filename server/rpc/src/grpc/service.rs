@@ -678,8 +678,8 @@ impl Grpc {
             .as_deref()
             .map(|id| ID.read(id))
             .transpose()?;
-        let request = self.service.work(|| job_request(request)).await?;
-        submit::create(&self.service, caller, request, id, key).await
+        let read = Box::new(|| Ok(job_request(request)));
+        submit::create(&self.service, caller, read, id, key).await
     }
 }
 

@@ -4,10 +4,12 @@ use base::{
     caller::Caller,
     digest,
     job::{Job, JobId, Limits},
+    mesh::MeshInfo,
     metrics::METRICS,
 };
 use solver::{
     error::{Findings, Reason, Violation},
+    mesh::Mesh,
     problem::Problem,
 };
 use store::{Accepted, NewJob, NewSweep, QueueLimits, RequestKey, StoreError, Submission};
@@ -36,34 +38,108 @@ pub(super) struct Prepared {
     pub(super) payload: String,
 }
 
-/// Computes the fingerprints of a job and of its problem once, since that of a large mesh takes half a second.
+impl Prepared {
+    /// Computes the fingerprints of a job and of its problem once, since that of a large mesh takes half a second: call this on
+    /// a blocking thread.
+    pub(super) fn new(
+        JobRequest { envelope, problem }: JobRequest,
+        id: Option<JobId>,
+    ) -> Result<Prepared, ApiError> {
+        let violations = envelope.violations();
+        let mut payload = String::new();
+        let problem = match problem {
+            Ok(problem) => {
+                let input_hash = digest::input_hash(&problem).map_err(ApiError::internal)?;
+                let submitted = (&envelope, &problem.title, &input_hash, id);
+                payload = digest::of_json(&submitted).map_err(ApiError::internal)?;
+                Ok((problem, input_hash))
+            }
+            Err(violations) => Err(violations),
+        };
+        Ok(Prepared {
+            envelope,
+            problem,
+            violations,
+            id,
+            payload,
+        })
+    }
+
+    /// Whether its problem refers to a stored mesh.
+    pub(super) fn has_stored_mesh(&self) -> bool {
+        let problem = self.problem.as_ref();
+        problem.is_ok_and(|(problem, _)| problem.mesh.stored().is_some())
+    }
+
+    /// Checks the job in depth, on the stored mesh that its problem refers to, and within the memory budget (bytes): call this on
+    /// a blocking thread.
+    pub(super) fn check(
+        self,
+        stored: Option<(MeshInfo, Mesh)>,
+        budget_bytes: u64,
+    ) -> Result<NewJob, ApiError> {
+        let Prepared {
+            envelope,
+            problem,
+            mut violations,
+            id,
+            payload,
+        } = self;
+        let admitted = problem.and_then(|(problem, input_hash)| {
+            match problems::admit(problem, stored, budget_bytes) {
+                Err(ApiError::InvalidProblem(more)) => Err(more),
+                admitted => Ok(admitted.map(|admitted| (admitted, input_hash))),
+            }
+        });
+        let (admitted, input_hash) = match admitted {
+            Ok(admitted) => admitted?,
+            Err(more) => {
+                violations.extend(more);
+                return Err(ApiError::InvalidProblem(violations.into_violations()));
+            }
+        };
+        violations.extend(time_violation(admitted.run_s, &envelope.limits));
+        let admitted = violations.into_result(admitted);
+        let Admitted {
+            title,
+            json,
+            mesh,
+            memory_bytes,
+            run_s: _,
+        } = admitted.map_err(ApiError::InvalidProblem)?;
+        let Envelope {
+            name,
+            labels,
+            priority,
+            limits,
+            cache,
+        } = envelope;
+        Ok(NewJob {
+            id,
+            name,
+            labels,
+            priority,
+            limits,
+            cache,
+            parent: None,
+            sweep: None,
+            title,
+            input_hash,
+            problem: json,
+            mesh,
+            memory_bytes,
+            payload,
+        })
+    }
+}
+
+/// A job that was read and fingerprinted.
 pub(super) async fn prepare(
     service: &Service,
-    JobRequest { envelope, problem }: JobRequest,
+    request: JobRequest,
     id: Option<JobId>,
 ) -> Result<Prepared, ApiError> {
-    let violations = envelope.violations();
-    service
-        .work(move || {
-            let mut payload = String::new();
-            let problem = match problem {
-                Ok(problem) => {
-                    let input_hash = digest::input_hash(&problem).map_err(ApiError::internal)?;
-                    let submitted = (&envelope, &problem.title, &input_hash, id);
-                    payload = digest::of_json(&submitted).map_err(ApiError::internal)?;
-                    Ok((problem, input_hash))
-                }
-                Err(violations) => Err(violations),
-            };
-            Ok(Prepared {
-                envelope,
-                problem,
-                violations,
-                id,
-                payload,
-            })
-        })
-        .await?
+    service.work(move || Prepared::new(request, id)).await?
 }
 
 /// The jobs of a key that this caller used before, for the same request.
@@ -104,60 +180,22 @@ pub(super) async fn admit(
     caller: &Caller,
     prepared: Prepared,
 ) -> Result<NewJob, ApiError> {
-    let Prepared {
-        envelope,
-        problem,
-        mut violations,
-        id,
-        payload,
-    } = prepared;
-    let admitted = match problem {
-        Ok((problem, input_hash)) => match problems::admit(service, caller, problem).await {
-            Err(ApiError::InvalidProblem(more)) => Err(more),
-            admitted => Ok((admitted?, input_hash)),
-        },
-        Err(more) => Err(more),
+    let budget_bytes = service.memory_budget_bytes;
+    let stored = match &prepared.problem {
+        Ok((problem, _)) => problems::stored(service, caller, problem).await,
+        Err(_) => Ok(None),
     };
-    match admitted {
-        Ok(admitted) => {
-            violations.extend(time_violation(admitted.0.run_s, &envelope.limits));
-            let admitted = violations.into_result(admitted);
-            let (admitted, input_hash) = admitted.map_err(ApiError::InvalidProblem)?;
-            let Admitted {
-                title,
-                json,
-                mesh,
-                memory_bytes,
-                run_s: _,
-            } = admitted;
-            let Envelope {
-                name,
-                labels,
-                priority,
-                limits,
-                cache,
-            } = envelope;
-            Ok(NewJob {
-                id,
-                name,
-                labels,
-                priority,
-                limits,
-                cache,
-                parent: None,
-                sweep: None,
-                title,
-                input_hash,
-                problem: json,
-                mesh,
-                memory_bytes,
-                payload,
-            })
+    match stored {
+        Ok(stored) => {
+            let check = move || prepared.check(stored, budget_bytes);
+            service.work(check).await?
         }
-        Err(more) => {
+        Err(ApiError::InvalidProblem(more)) => {
+            let mut violations = prepared.violations;
             violations.extend(more);
             Err(ApiError::InvalidProblem(violations.into_violations()))
         }
+        Err(other) => Err(other),
     }
 }
 

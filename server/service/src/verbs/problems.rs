@@ -151,7 +151,7 @@ pub(super) struct Admitted {
 }
 
 /// The stored mesh that a problem refers to, if it does.
-async fn stored(
+pub(super) async fn stored(
     service: &Service,
     caller: &Caller,
     problem: &Problem,
@@ -162,44 +162,39 @@ async fn stored(
     }
 }
 
-/// Admits a problem that is valid and within the memory budget.
-pub(super) async fn admit(
-    service: &Service,
-    caller: &Caller,
+/// Admits a problem, on the stored mesh that it refers to, if it is valid and within the memory budget (bytes).
+pub(super) fn admit(
     mut problem: Problem,
+    stored: Option<(MeshInfo, Mesh)>,
+    budget_bytes: u64,
 ) -> Result<Admitted, ApiError> {
-    let budget_bytes = service.memory_budget_bytes;
-    let stored = stored(service, caller, &problem).await?;
-    let admit = move || {
-        let within = |estimate: Estimate| {
-            if estimate.memory_bytes > budget_bytes {
-                Err(ApiError::ProblemTooLarge {
-                    estimate,
-                    budget_bytes,
-                })
-            } else {
-                Ok(estimate)
-            }
-        };
-        let before = estimate(&problem, stored.as_ref());
-        within(before.map_err(|violation| ApiError::InvalidProblem(vec![violation]))?)?;
-        let checked = check(&problem, stored).map_err(ApiError::InvalidProblem)?;
-        let Estimate {
-            memory_bytes,
-            run_s,
-            ..
-        } = within(checked.estimate)?;
-        let title = problem.title.take();
-        let json = serde_json::to_string(&problem).map_err(ApiError::internal)?;
-        Ok(Admitted {
-            title,
-            json,
-            mesh: problem.mesh.stored().map(str::to_owned),
-            memory_bytes,
-            run_s: expected_run_s(&problem, run_s),
-        })
+    let within = |estimate: Estimate| {
+        if estimate.memory_bytes > budget_bytes {
+            Err(ApiError::ProblemTooLarge {
+                estimate,
+                budget_bytes,
+            })
+        } else {
+            Ok(estimate)
+        }
     };
-    service.work(admit).await?
+    let before = estimate(&problem, stored.as_ref());
+    within(before.map_err(|violation| ApiError::InvalidProblem(vec![violation]))?)?;
+    let checked = check(&problem, stored).map_err(ApiError::InvalidProblem)?;
+    let Estimate {
+        memory_bytes,
+        run_s,
+        ..
+    } = within(checked.estimate)?;
+    let title = problem.title.take();
+    let json = serde_json::to_string(&problem).map_err(ApiError::internal)?;
+    Ok(Admitted {
+        title,
+        json,
+        mesh: problem.mesh.stored().map(str::to_owned),
+        memory_bytes,
+        run_s: expected_run_s(&problem, run_s),
+    })
 }
 
 /// Estimates the memory before meshing, since the mesh itself may need too much.

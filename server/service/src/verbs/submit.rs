@@ -11,10 +11,10 @@ use base::{
 use futures_util::future::BoxFuture;
 use futures_util::{StreamExt, TryStreamExt};
 use solver::error::{Findings, Reason, Violation};
-use store::{Accepted, RequestKey};
+use store::{Accepted, NewJob, RequestKey};
 
 use super::{
-    admission::{admit, enqueue, has_share, prepare, replayed},
+    admission::{Prepared, admit, enqueue, has_share, prepare, replayed},
     envelope::JobRequest,
     key::Key,
     service::{Service, detached},
@@ -33,12 +33,15 @@ pub struct Submitted<T> {
     pub replayed: bool,
 }
 
+/// Reads a request for a job; called on a blocking thread.
+pub type ReadRequest = Box<dyn FnOnce() -> Result<JobRequest, ApiError> + Send>;
+
 /// Accepts a job. It is durable when this returns. Violations of envelope and problem are reported together. With
 /// a key, or an id chosen by the client, the same request gives the same job, however often it is repeated.
 pub fn create<'a>(
     service: &'a Arc<Service>,
     caller: &'a Caller,
-    request: JobRequest,
+    request: ReadRequest,
     id: Option<JobId>,
     key: Option<Key>,
 ) -> BoxFuture<'a, Result<Submitted<Job>, ApiError>> {
@@ -46,30 +49,70 @@ pub fn create<'a>(
         service.accepting()?;
         let (service, caller) = (service.clone(), caller.clone());
         detached(async move {
-            let prepared = prepare(&service, request, id).await?;
-            let payload = prepared.payload.clone();
-            let key = key.map(|Key(key)| RequestKey { key, payload });
-            if let Some(old) = replayed(&service, &caller, key.as_ref()).await? {
-                return single(old, true);
-            }
-            // before it is checked in depth: a request that was accepted once need not be acceptable now
-            if let Some(id) = prepared.id
-                && !prepared.payload.is_empty()
-            {
-                let owner = caller.owner();
-                let named = service.store.replay_with_id(owner, id, &prepared.payload);
-                if let Some(old) = named.await? {
-                    return single(vec![old], true);
+            let (new, key) = if key.is_none() && id.is_none() {
+                has_share(&service, &caller, 1).await?;
+                (admit_new(&service, &caller, request).await?, None)
+            } else {
+                let prepared = service
+                    .work(move || Prepared::new(request()?, id))
+                    .await??;
+                let payload = prepared.payload.clone();
+                let key = key.map(|Key(key)| RequestKey { key, payload });
+                if let Some(old) = repeated(&service, &caller, &prepared, key.as_ref()).await? {
+                    return single(old, true);
                 }
-            }
-            has_share(&service, &caller, 1).await?;
-            let new = admit(&service, &caller, prepared).await?;
-            let Accepted { jobs, replayed, .. } =
-                enqueue(&service, &caller, vec![new], key).await?;
-            single(jobs, replayed)
+                has_share(&service, &caller, 1).await?;
+                (admit(&service, &caller, prepared).await?, key)
+            };
+            let accepted = enqueue(&service, &caller, vec![new], key).await?;
+            single(accepted.jobs, accepted.replayed)
         })
         .await
     })
+}
+
+/// Reads and checks a job that repeats no other; in one go, unless its mesh has to be loaded.
+async fn admit_new(
+    service: &Service,
+    caller: &Caller,
+    request: ReadRequest,
+) -> Result<NewJob, ApiError> {
+    enum Read {
+        Checked(NewJob),
+        OnStoredMesh(Prepared),
+    }
+    let budget_bytes = service.memory_budget_bytes;
+    let read = move || {
+        let prepared = Prepared::new(request()?, None)?;
+        if prepared.has_stored_mesh() {
+            Ok(Read::OnStoredMesh(prepared))
+        } else {
+            prepared.check(None, budget_bytes).map(Read::Checked)
+        }
+    };
+    match service.work(read).await?? {
+        Read::Checked(new) => Ok(new),
+        Read::OnStoredMesh(prepared) => admit(service, caller, prepared).await,
+    }
+}
+
+/// The jobs that this request has submitted before, by its key or the id that the client has chosen. They are looked for before
+/// the job is checked in depth: a request that was accepted once need not be acceptable now.
+async fn repeated(
+    service: &Service,
+    caller: &Caller,
+    prepared: &Prepared,
+    key: Option<&RequestKey>,
+) -> Result<Option<Vec<Job>>, ApiError> {
+    let old = replayed(service, caller, key).await?;
+    match prepared.id {
+        Some(id) if old.is_none() && !prepared.payload.is_empty() => {
+            let owner = caller.owner();
+            let named = service.store.replay_with_id(owner, id, &prepared.payload);
+            Ok(named.await?.map(|old| vec![old]))
+        }
+        _ => Ok(old),
+    }
 }
 
 /// Accepts all of these jobs or none. Violations of all are reported together, with pointers `/jobs/{n}/…`.

@@ -696,6 +696,6 @@ pub fn solve_member<'a>(
             },
             problem,
         };
-        submit::create(service, caller, request, None, key).await
+        submit::create(service, caller, Box::new(|| Ok(request)), None, key).await
     })
 }

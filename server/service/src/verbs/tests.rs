@@ -87,7 +87,7 @@ fn request() -> JobRequest {
 }
 
 async fn create(service: &Arc<Service>, caller: &Caller, id: Option<JobId>) -> Job {
-    let submitted = submit::create(service, caller, request(), id, None).await;
+    let submitted = submit::create(service, caller, Box::new(|| Ok(request())), id, None).await;
     submitted.unwrap().accepted
 }
 
@@ -203,7 +203,8 @@ async fn keys_and_ids_belong_to_the_owner_who_used_them() {
     let key = || Some(IDEMPOTENCY_KEY.read("k").unwrap());
     let mut ids = vec![];
     for caller in [ada, bob, ada] {
-        let submitted = submit::create(service, caller, request(), None, key()).await;
+        let submitted =
+            submit::create(service, caller, Box::new(|| Ok(request())), None, key()).await;
         ids.push(submitted.unwrap().accepted.id);
     }
     assert_eq!(ids[0], ids[2]);
@@ -212,7 +213,7 @@ async fn keys_and_ids_belong_to_the_owner_who_used_them() {
     let id = JobId::new();
     create(service, ada, Some(id)).await;
     assert_eq!(create(service, ada, Some(id)).await.id, id);
-    let theirs = submit::create(service, bob, request(), Some(id), None).await;
+    let theirs = submit::create(service, bob, Box::new(|| Ok(request())), Some(id), None).await;
     assert!(matches!(theirs, Err(ApiError::IdConflict(_))));
 }
 

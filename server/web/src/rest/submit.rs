@@ -58,8 +58,8 @@ async fn submit(
 ) -> Result<Response, ApiError> {
     call.service.accepting()?;
     let text = call.json().await?;
-    let request = call.service.work(move || submission(&text)).await??;
-    let submitted = verbs::create(&call.service, &call.caller, request, id, key).await?;
+    let read = Box::new(move || submission(&text));
+    let submitted = verbs::create(&call.service, &call.caller, read, id, key).await?;
     // the job is stored: waiting for its end takes no memory
     call.received.release();
     answer(call, submitted, wait_s, id.is_some()).await
