@@ -150,7 +150,7 @@ fn fill(data: &Path, partial: &Partial, check: bool) -> Result<Backup> {
 struct Partial {
     target: PathBuf,
     path: PathBuf,
-    /// It is locked as long as this exists, so that a second backup to the same target does not mix with this one.
+    /// The lock on the target folder, held so that a second backup to the same target does not mix with this one.
     _lock: File,
 }
 

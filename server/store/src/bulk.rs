@@ -34,9 +34,9 @@ pub struct Batch {
     pub seen: usize,
     /// How many of them it has canceled or deleted.
     pub done: usize,
-    /// Those that run, and were left alone.
+    /// Jobs that run, and were left alone.
     pub running: Vec<i64>,
-    /// Those that were to be deleted and were not.
+    /// Jobs that were to be deleted and were not.
     pub left: Vec<i64>,
     /// Jobs that have changed, these or others, for their watchers.
     pub changed: Vec<i64>,
@@ -45,9 +45,9 @@ pub struct Batch {
 /// Which jobs are discarded that have ended, and what of them.
 #[derive(Clone, Debug)]
 pub(super) enum Discard {
-    /// Those of these owners.
+    /// The jobs of these owners.
     Jobs(Owners),
-    /// Those that ended before, unless they are pinned.
+    /// Jobs that ended before this time, unless they are pinned.
     OldJobs(Time),
     /// The fields of those.
     OldFields(Time),

@@ -42,7 +42,7 @@ pub(super) struct Change<'a> {
     tx: Writing<'a>,
     /// Rows of jobs as this transaction has changed them, by their keys.
     rows: BTreeMap<i64, Cached>,
-    /// Those of them that are not written yet.
+    /// The keys of rows in `rows` that are not written yet.
     unwritten: BTreeSet<i64>,
     /// The key of the next job, once one was inserted.
     next_key: Option<i64>,
@@ -55,7 +55,7 @@ pub(super) struct Change<'a> {
 /// A row of a job.
 struct Cached {
     row: JobRow,
-    /// Its values in the database.
+    /// The values of its columns, as they are in the database.
     stored: Vec<Value>,
 }
 
@@ -79,7 +79,7 @@ impl Writer<'_> {
         self.control_change()
     }
 
-    /// The same for what must work even if the disk is full.
+    /// Begins a transaction that must work even if the disk is full, such as a cancel.
     pub(super) fn control_change(&self) -> Result<Change<'_>> {
         Ok(Change {
             writer: self,
@@ -102,7 +102,7 @@ impl Change<'_> {
         Ok(found.map(|cached| cached.row.job.clone()))
     }
 
-    /// The same of a job that must exist.
+    /// The job with this key, which must exist, as this transaction has left it.
     pub(super) fn read(&mut self, key: i64) -> Result<Job> {
         self.find(key)?.ok_or_else(|| rows::missing(key))
     }
@@ -162,7 +162,7 @@ impl Change<'_> {
         Ok(job)
     }
 
-    /// The same by a step that no status forbids.
+    /// Changes a job, which must exist, by a step that is allowed in every status. Returns the job as it is now.
     pub(super) fn set(&mut self, key: i64, step: impl FnOnce(&mut JobRow)) -> Result<Job> {
         let step = |row: &mut JobRow| {
             step(row);
@@ -304,7 +304,7 @@ impl Change<'_> {
         Ok(self.unless_damaged(checked)?.is_some())
     }
 
-    /// This moment, by the clock of the store.
+    /// The present time, by the clock of the store.
     pub(super) fn now(&self) -> Time {
         self.store.now()
     }

@@ -49,7 +49,7 @@ impl Store {
         Ok(())
     }
 
-    /// This moment.
+    /// The present time, by the clock of the store: never before the newest time that is stored.
     pub(super) fn now(&self) -> Time {
         self.by_our_clock(Time::now())
     }

@@ -78,7 +78,7 @@ impl Store {
             .await;
     }
 
-    /// The same for the job that is probably claimed next.
+    /// Checks the result that may answer the job that is probably claimed next, as `check_earlier_result` does.
     pub(super) async fn check_result_for_next(self: &Arc<Self>) {
         if self.waiting() == 0 {
             return;

@@ -24,7 +24,7 @@ pub(super) enum Mode {
     Read,
     /// To read and write it.
     ReadWrite,
-    /// The same; it is created if it does not exist.
+    /// To read and write it; it is created if it does not exist.
     #[cfg(test)]
     Create,
 }
@@ -74,7 +74,7 @@ pub(super) struct Connections {
 }
 
 impl Connections {
-    /// So many connections, opened by `open`, for which others wait so long.
+    /// Opens `count` connections by `open`. Who needs one waits for at most `patience`.
     pub(super) fn new(
         count: u32,
         patience: Duration,
@@ -160,7 +160,7 @@ impl Lease {
         }
     }
 
-    /// It is opened anew when it is needed next.
+    /// Closes the connection; a new one is opened when one is needed next.
     pub(super) fn discard(&mut self) {
         self.connection = None;
     }

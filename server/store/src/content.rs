@@ -73,7 +73,7 @@ pub struct Fingerprint {
 }
 
 impl Fingerprint {
-    /// That of bytes which lie in several places.
+    /// The fingerprint of bytes that lie in several places.
     pub(super) fn of<'a>(chunks: impl IntoIterator<Item = &'a [u8]>) -> Fingerprint {
         let (mut hash, mut bytes) = (Sha256::new(), 0);
         for chunk in chunks {
@@ -110,7 +110,7 @@ impl<'a> NewContent<'a> {
         }
     }
 
-    /// Its pieces, in order.
+    /// The bytes in pieces as they are stored, in order.
     pub(super) fn pieces(&self) -> Vec<Cow<'a, [u8]>> {
         let mut pieces: Vec<Cow<'a, [u8]>> = vec![Cow::Borrowed(&[])];
         for chunk in &self.chunks {
@@ -247,7 +247,7 @@ pub(super) fn detach(tx: &Connection, holder: Holder, names: &[&str]) -> Result<
 /// Content that is attached.
 #[derive(Debug)]
 pub(super) struct Content {
-    /// Its number.
+    /// The number of the content in the table `content`.
     pub(super) id: i64,
     /// The name under which it is attached.
     pub(super) name: String,

@@ -36,7 +36,7 @@ use super::{
 /// How long a query or a change waits for a connection; one that waits longer, behind others on a disk that hardly answers,
 /// fails, and may be tried again.
 const PATIENCE: Duration = Duration::from_secs(30);
-/// The same of a list.
+/// How long a list or a count waits for a connection.
 const LIST_PATIENCE: Duration = Duration::from_secs(5);
 
 /// The database of one server.
@@ -144,7 +144,7 @@ impl Writer<'_> {
         self.begin_control()
     }
 
-    /// The same for what must work even if the disk is full.
+    /// Begins a transaction that must work even if the disk is full.
     pub(super) fn begin_control(&self) -> Result<Writing<'_>> {
         self.store.damages.can_write()?;
         self.store.identity.check()?;
@@ -241,12 +241,12 @@ impl Store {
         self.close_as(true).await;
     }
 
-    /// The same by a command that is not the service: whether the service has stopped or died, its next start still knows.
+    /// Closes the store for a command that is not the service: the record of whether the service has stopped or died stays as it was.
     pub async fn close_as_found(self: &Arc<Self>) {
         self.close_as(self.was_stopped).await;
     }
 
-    /// Whether it was closed.
+    /// Whether the store was closed.
     pub(super) fn is_closed(&self) -> bool {
         self.writer.is_closed()
     }
@@ -289,7 +289,7 @@ impl Store {
         self.query(lease, query).await
     }
 
-    /// The same for lists and counts.
+    /// Runs a list or a count, as `read` does, on connections of their own, so that other queries do not wait for them.
     pub(super) async fn read_list<T: Send + 'static>(
         self: &Arc<Self>,
         query: impl FnOnce(&Store, &Connection) -> Result<T> + Send + 'static,
@@ -328,7 +328,7 @@ impl Store {
         .await
     }
 
-    /// The same for what must work even if the disk is full: then once more, with the space that is reserved for it.
+    /// Runs what writes, as `write` does, and must work even if the disk is full: then once more, with the space reserved for it.
     pub(super) async fn control<T: Send + 'static>(
         self: &Arc<Self>,
         work: impl Fn(&Writer<'_>) -> Result<T> + Send + 'static,

@@ -16,9 +16,9 @@ pub(super) const PAUSE: Duration = Duration::from_millis(20);
 /// The effect of deleting a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Deletion {
-    /// It was deleted.
+    /// The job was deleted.
     Deleted,
-    /// It waits or runs, and was not deleted.
+    /// The job waits or runs, and was not deleted.
     Active,
     /// There is no such job.
     Unknown,

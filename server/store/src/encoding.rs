@@ -11,18 +11,18 @@ use solver::solution::Fields;
 /// Size and hash of the JSON of a part.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PartInfo {
-    /// Its size.
+    /// The size of its JSON.
     pub bytes: u64,
-    /// Its SHA-256.
+    /// The SHA-256 of its JSON.
     pub digest: Vec<u8>,
 }
 
 /// How the pieces of a part hold it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Encoding {
-    /// Its JSON, as versions before this one stored it.
+    /// JSON as it is, as earlier versions stored it.
     Plain,
-    /// Its JSON, deflated.
+    /// JSON, deflated.
     Deflated,
     /// The columns of fields.
     Columns,
@@ -31,7 +31,7 @@ pub(super) enum Encoding {
 /// The content of a part.
 #[derive(Debug)]
 pub(super) enum Decoded {
-    /// Its JSON.
+    /// The part as JSON.
     Json(Vec<u8>),
     /// Fields.
     Fields(Box<Fields>),

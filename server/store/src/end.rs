@@ -27,14 +27,14 @@ use super::{
 /// The effect of asking a job to stop.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum CancelOutcome {
-    /// It was not running, and is canceled; with the jobs that have changed.
+    /// The job was not running, and is canceled; with the keys of the jobs that have changed.
     Canceled(Vec<i64>),
-    /// This attempt is running and should stop.
+    /// This attempt of the job is running and should stop.
     Requested {
         /// The number of the attempt.
         attempt: i32,
     },
-    /// It had ended before.
+    /// The job had ended before.
     AlreadyTerminal,
 }
 

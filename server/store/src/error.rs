@@ -24,7 +24,7 @@ pub enum StoreError {
     /// The queue has reached its largest number of jobs.
     #[error("the queue is full")]
     QueueFull,
-    /// This owner already has the maximum number of waiting jobs.
+    /// The owner already has the maximum number of waiting jobs.
     #[error("this owner already has the maximum number of waiting jobs")]
     OwnerQueueFull,
     /// The key was used for another request.
@@ -67,7 +67,7 @@ pub enum StoreError {
 pub struct Record {
     /// The job that it belongs to, by its key.
     pub job: Option<i64>,
-    /// Its name, like "event 12".
+    /// The name of the record, like "event 12".
     pub name: String,
 }
 
@@ -115,7 +115,7 @@ impl Record {
         Record::named("database")
     }
 
-    /// Whether it is the database itself.
+    /// Whether the record is the database itself.
     pub(super) fn is_database(&self) -> bool {
         *self == Record::database()
     }
@@ -189,7 +189,7 @@ impl StoreError {
         matches!(self, StoreError::Broken(_)) || self.is_damage_of(key)
     }
 
-    /// The same error for another submission of the same transaction.
+    /// This error for another submission of the same transaction.
     pub(super) fn for_another(&self) -> StoreError {
         match self {
             StoreError::Full => StoreError::Full,
@@ -202,7 +202,7 @@ impl StoreError {
         }
     }
 
-    /// The same, with the record that was being read if nothing more is known of it.
+    /// This error, naming the record that was being read if no job is known yet that it belongs to.
     pub(super) fn reading(self, record: impl FnOnce() -> Record) -> StoreError {
         match self {
             StoreError::Damaged(damage) if damage.record.job.is_none() => {

@@ -67,7 +67,7 @@ job_filters!(define);
 /// A filter: how it is described and read, and what it means.
 #[derive(Clone, Copy, Debug)]
 pub struct Field {
-    /// Its name in requests.
+    /// The name of the filter in requests.
     pub name: &'static str,
     /// What it does: one line, without a full stop.
     pub meaning: &'static str,
@@ -202,7 +202,7 @@ impl Filter {
     /// Most labels in one filter.
     pub const MOST_LABELS: usize = 64;
 
-    /// The same filter with each status and label once.
+    /// This filter with each status and label once.
     pub fn tidied(mut self) -> Self {
         self.statuses
             .sort_unstable_by_key(|status| <&str>::from(*status));
@@ -212,7 +212,7 @@ impl Filter {
         self
     }
 
-    /// The same filter restricted to these owners; `None` if it requests the jobs of another.
+    /// This filter restricted to these owners; `None` if it requests the jobs of another.
     pub(super) fn among(&self, owners: &Owners) -> Option<Self> {
         let mut filter = self.clone();
         if let Owners::Only(owner) = owners {
@@ -224,7 +224,7 @@ impl Filter {
         Some(filter)
     }
 
-    /// It matches every job.
+    /// Whether the filter matches every job.
     pub fn is_empty(&self) -> bool {
         *self == Filter::default()
     }
@@ -252,9 +252,9 @@ pub enum OrderBy {
 /// The last job of a page, after which the next one begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cursor {
-    /// Its time in the list's order, in microseconds.
+    /// The time of the last job by which the list is ordered, in microseconds.
     pub micros: i64,
-    /// Its key.
+    /// The key of the last job.
     pub key: i64,
 }
 
@@ -262,9 +262,9 @@ pub struct Cursor {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, EnumString, VariantArray)]
 #[strum(serialize_all = "snake_case")]
 pub enum GroupBy {
-    /// Their status.
+    /// By their status.
     Status,
-    /// Their owner.
+    /// By their owner.
     Owner,
 }
 

@@ -118,7 +118,7 @@ impl Folder {
         }
     }
 
-    /// Its path.
+    /// The path of the folder.
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
@@ -201,7 +201,7 @@ pub(super) struct Identity {
 struct Seen {
     database: Option<(u64, u64)>,
     log: Option<(u64, u64)>,
-    /// It shrinks only when the store gives space back.
+    /// The size of the database; it shrinks only when the store gives space back.
     bytes: u64,
     /// Then it may become as small as this, whenever the log is next copied into it.
     least: Option<u64>,

@@ -74,14 +74,14 @@ impl Store {
 }
 
 impl Parts {
-    /// Those of a result that is nothing but a summary.
+    /// The parts of a result that is nothing but a summary.
     pub fn of_a_summary() -> Parts {
         Parts::new(vec![parts::Part::new("summary".into(), b"{}")])
     }
 }
 
 impl Part {
-    /// Its JSON, for tests.
+    /// The JSON of the part, for tests.
     pub fn json(self) -> Vec<u8> {
         match encoding::decoded(self.body, self.encoding, &self.info) {
             Ok((_, encoding::Decoded::Json(json))) => json,

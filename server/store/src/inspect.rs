@@ -34,7 +34,7 @@ pub struct Report {
     pub findings: Vec<String>,
     /// Jobs of which at least a trace was found.
     pub jobs: u64,
-    /// Those that are intact, with their problem, events and result.
+    /// Jobs that are intact, with their problem, events and result.
     pub intact: u64,
     /// The tables cannot be read: there may be more jobs.
     pub incomplete: bool,
@@ -115,7 +115,7 @@ impl Report {
         Ok(report)
     }
 
-    /// The same with what the store in this folder contains.
+    /// Adds to the report what the store in this folder contains.
     fn complete(mut self, folder: &Path, target: Option<&Writer<'_>>) -> Result<Report> {
         match open(&folder.join(DATABASE), Mode::Read) {
             Ok(source) => {

@@ -22,7 +22,7 @@
 //! | the life of a job: claimed, ended, requeued | `claim`, `end`, `requeue` |
 //! | the row of a job; how it may change, and what follows | `rows`, `rules` |
 //! | the end of one job, with all that belongs to it | `end_job` |
-//! | a transaction of the writer and what follows its commit: the mirror of the queue, watchers, the log line of a job's end | `change` |
+//! | a transaction of the writer and what follows its commit: watchers, the log line of a job's end | `change` |
 //! | whose turn it is | `turns` |
 //! | positions in the queue | `positions` |
 //! | lists of jobs: filters | `filter` |
@@ -208,7 +208,7 @@ impl Store {
         Ok(store)
     }
 
-    /// The same, without the tasks that look after it from time to time.
+    /// Opens the store without the tasks that look after it from time to time.
     async fn open_unwatched(folder: &Path) -> Result<Arc<Store>> {
         let folder = folder.to_owned();
         let connect = move || Store::connect(&folder, Rebuild::IfItCannotGiveBack);

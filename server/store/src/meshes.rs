@@ -17,7 +17,7 @@ use super::{
 /// The effect of removing a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Removal {
-    /// It was removed.
+    /// The mesh was removed.
     Removed,
     /// There is no such mesh.
     Unknown,
@@ -30,7 +30,7 @@ pub enum Removal {
 pub struct StoredMesh {
     /// Order of arrival.
     pub key: i64,
-    /// Its description, as clients see it.
+    /// The description of the mesh, as clients see it.
     pub info: MeshInfo,
 }
 

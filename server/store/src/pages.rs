@@ -9,7 +9,7 @@ use super::error::Result;
 pub(super) struct Pages {
     /// All of them.
     pub(super) count: i64,
-    /// Those without content.
+    /// Pages without content.
     pub(super) free: i64,
     /// Bytes of each.
     bytes: i64,

@@ -59,7 +59,7 @@ pub(super) struct Entry {
 }
 
 impl Part {
-    /// Its name: `summary`, `fields`, …
+    /// The name of the part: `summary`, `fields`, …
     pub fn name(&self) -> &str {
         &self.name
     }

@@ -23,7 +23,7 @@ use super::{
 
 /// The name of the file.
 pub(super) const FILE: &str = "signorini.progress";
-/// Its words for how the service ended: it runs, or died, or it stopped. They have the same length.
+/// The words of the file for how the service ended: it runs or died, or it was stopped. They have the same length.
 const RUNNING: &str = "running";
 const STOPPED: &str = "stopped";
 

@@ -69,7 +69,7 @@ impl Reserve {
         full
     }
 
-    /// Whether it was full when it was last asked, a second ago; without asking the file system.
+    /// Whether the disk was full when that was last checked, at most a second ago; without asking the file system.
     pub(super) fn was_disk_full(&self) -> bool {
         self.full.load(Ordering::Relaxed)
     }

@@ -64,7 +64,7 @@ impl Ending {
         }
     }
 
-    /// That of a job that was answered by this one.
+    /// The end of a job that is answered by the result of this one.
     pub(super) fn like(source: &Job) -> Self {
         Ending {
             status: source.status,
@@ -91,13 +91,13 @@ impl Ending {
 /// What the request of a client to cancel a job does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Cancel {
-    /// It does not run, and ends at once.
+    /// The job does not run, and ends at once.
     End,
-    /// It runs, and is asked to stop.
+    /// The job runs, and is asked to stop.
     Ask,
-    /// It runs, and was asked before.
+    /// The job runs, and was asked to stop before.
     Asked,
-    /// It has ended.
+    /// The job has ended.
     TooLate,
 }
 
@@ -106,7 +106,7 @@ pub(super) enum Cancel {
 pub(super) enum Interrupted {
     /// A client has asked it to stop: it ends.
     Cancel,
-    /// It waits again.
+    /// The job waits again.
     Requeue(Requeue),
     /// The process died in the last attempt that it had: it fails.
     Fail,
@@ -178,14 +178,14 @@ impl JobRow {
         Ok(())
     }
 
-    /// It starts, to be ended at once with the result of another job of the same input.
+    /// Starts a job that is ended at once with the result of another job of the same input.
     pub(super) fn start_with_answer(&mut self, source: &Job, now: Time) -> Result<()> {
         self.start(now)?;
         self.job.cached_from = Some(source.id);
         Ok(())
     }
 
-    /// It ends.
+    /// Ends the job.
     pub(super) fn end(&mut self, ending: &Ending, now: Time) -> Result<()> {
         self.becomes(ending.status)?;
         let job = &mut self.job;
@@ -201,7 +201,7 @@ impl JobRow {
         Ok(())
     }
 
-    /// It waits again.
+    /// The job waits again.
     pub(super) fn requeue(&mut self, why: Requeue, now: Time) -> Result<()> {
         self.becomes(Status::Queued)?;
         // The attempt keeps its number, by which events are distinguished; if it does not count, one more is allowed.
@@ -215,12 +215,12 @@ impl JobRow {
         self.job.cancel_requested = true;
     }
 
-    /// Its time in the queue begins now.
+    /// Begins the time that the job may wait, now.
     pub(super) fn waits_from(&mut self, now: Time) {
         self.expires_at = Some(now.after_s(self.job.limits.queue_ttl_s));
     }
 
-    /// It is not coalesced into another job any more.
+    /// Lets a coalesced job wait for a worker by itself.
     pub(super) fn waits_by_itself(&mut self) {
         self.job.coalesced_into = None;
     }

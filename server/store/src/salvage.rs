@@ -119,7 +119,7 @@ impl StoredRow {
         Ok(())
     }
 
-    /// Its number, if it has one.
+    /// The number of the row, if it has one.
     pub(super) fn id(&self) -> Option<i64> {
         let place = self.names.iter().position(|name| name == "id")?;
         match self.values[place] {

@@ -10,7 +10,7 @@ use super::{database::Store, error::Result, sql::Sql};
 /// What an owner keeps.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct OwnerSize {
-    /// Their name.
+    /// The name of the owner.
     pub owner: String,
     /// Jobs that have ended.
     pub jobs: u64,

@@ -88,7 +88,7 @@ pub struct Snapshot {
 /// What is stored of a job at one moment.
 struct Stored {
     moment: Moment,
-    /// Its result, once it was asked for.
+    /// The result of the job, once it was asked for.
     result: Option<StoredResult>,
 }
 

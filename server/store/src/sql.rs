@@ -103,12 +103,12 @@ impl Query {
         self
     }
 
-    /// Its text.
+    /// The text of the query.
     pub(super) fn sql(&self) -> &str {
         &self.sql
     }
 
-    /// Its values.
+    /// The values of the query's parameters.
     pub(super) fn values(&self) -> impl Params + use<'_> {
         params_from_iter(&self.values)
     }

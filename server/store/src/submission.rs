@@ -13,7 +13,7 @@ use super::error::Result;
 /// A job that is about to be accepted.
 #[derive(Clone, Debug)]
 pub struct NewJob {
-    /// Its public id, if the client has chosen it.
+    /// The public id, if the client has chosen it.
     pub id: Option<JobId>,
     /// A name for people.
     pub name: Option<String>,
@@ -21,7 +21,7 @@ pub struct NewJob {
     pub labels: BTreeMap<String, String>,
     /// −10 … 10.
     pub priority: i32,
-    /// Its time limits.
+    /// The time limits of the job.
     pub limits: Limits,
     /// Whether earlier results may answer it.
     pub cache: Cache,
@@ -46,7 +46,7 @@ pub struct NewJob {
 /// A sweep that is about to be accepted with its jobs.
 #[derive(Clone, Debug)]
 pub struct NewSweep {
-    /// Its public id.
+    /// The public id of the sweep.
     pub id: SweepId,
     /// A name for people.
     pub name: Option<String>,
@@ -96,9 +96,9 @@ pub struct QueueLimits {
 /// The result of a submission.
 #[derive(Debug)]
 pub struct Accepted {
-    /// Its jobs, in order.
+    /// The jobs, in the order in which they were submitted.
     pub jobs: Vec<Job>,
-    /// They existed already: the key, or the id chosen by the client, was used before.
+    /// Whether the jobs existed already: the key, or the id chosen by the client, was used before.
     pub replayed: bool,
     /// The next job of the queue, if a claim was requested and there is one.
     pub claim: Option<Claim>,
@@ -111,7 +111,7 @@ pub struct Accepted {
 pub struct Claim {
     /// The job, running.
     pub job: Job,
-    /// Its problem as JSON, without the title.
+    /// The problem of the job as JSON, without its title.
     pub problem: String,
     /// The stored mesh that it names.
     pub mesh: Option<String>,
@@ -137,7 +137,7 @@ pub(super) struct Pending {
 /// What becomes of a submission.
 #[derive(Debug)]
 pub(super) enum Answer {
-    /// It is on the disk.
+    /// The jobs are accepted, and on the disk.
     Accepted(Accepted),
     /// An earlier result may answer one of its jobs, and has to be checked first, which would occupy the single writer.
     ToCheck(Submission),
