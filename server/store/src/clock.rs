@@ -49,7 +49,7 @@ impl Store {
         Ok(())
     }
 
-    /// The present time, by the clock of the store: never before the newest time that is stored.
+    /// The present time, by the clock of the store.
     pub(super) fn now(&self) -> Time {
         self.by_our_clock(Time::now())
     }
