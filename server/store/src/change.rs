@@ -55,8 +55,17 @@ pub(super) struct Change<'a> {
 /// A row of a job.
 struct Cached {
     row: JobRow,
-    /// The values of its columns, as they are in the database.
-    stored: Vec<Value>,
+    /// The values of its columns, as they are in the database; none if it was not inserted yet.
+    stored: Option<Vec<Value>>,
+    /// Events that are appended once the row is inserted.
+    events: Vec<Events>,
+}
+
+/// Events of one attempt, numbered from `first`.
+struct Events {
+    first: i64,
+    attempt: i32,
+    events: Vec<(Time, Payload)>,
 }
 
 /// What the log tells of a job.
@@ -121,12 +130,20 @@ impl Change<'_> {
         };
         self.next_key = Some(key + 1);
         let mut row = new(key);
-        let event = rules::event(None, &row.job, self.now());
-        row.last_seq = event.iter().len() as i64;
-        let stored = rows::insert(&self.tx, &row)?;
-        let (first, attempt) = (1, row.job.attempt);
-        events::insert(&self.tx, key, first, attempt, event.as_slice())?;
-        self.keep(key, Cached { row, stored })?;
+        let events = Vec::from_iter(rules::event(None, &row.job, self.now()));
+        row.last_seq = events.len() as i64;
+        let first = Events {
+            first: 1,
+            attempt: row.job.attempt,
+            events,
+        };
+        let cached = Cached {
+            row,
+            stored: None,
+            events: vec![first],
+        };
+        self.keep(key, cached)?;
+        self.unwritten.insert(key);
         Ok(key)
     }
 
@@ -174,11 +191,23 @@ impl Change<'_> {
     /// Appends events to those of a job, which must exist.
     pub(super) fn append(&mut self, key: i64, events: &[(Time, Payload)]) -> Result<()> {
         let cached = self.cached(key)?;
-        let row = &mut cached.ok_or_else(|| rows::missing(key))?.row;
+        let cached = cached.ok_or_else(|| rows::missing(key))?;
+        let row = &mut cached.row;
         let (first, attempt) = (row.last_seq + 1, row.job.attempt);
         row.last_seq += events.len() as i64;
+        let inserted = cached.stored.is_some();
+        if !inserted {
+            cached.events.push(Events {
+                first,
+                attempt,
+                events: events.to_vec(),
+            });
+        }
         self.unwritten.insert(key);
-        events::insert(&self.tx, key, first, attempt, events)
+        if inserted {
+            events::insert(&self.tx, key, first, attempt, events)?;
+        }
+        Ok(())
     }
 
     /// Appends events of the current attempt, with the progress after them.
@@ -211,7 +240,15 @@ impl Change<'_> {
             let Some((row, stored)) = rows::find_row(&self.tx, key)? else {
                 return Ok(None);
             };
-            self.keep(key, Cached { row, stored })?;
+            let (stored, events) = (Some(stored), vec![]);
+            self.keep(
+                key,
+                Cached {
+                    row,
+                    stored,
+                    events,
+                },
+            )?;
         }
         Ok(self.rows.get_mut(&key))
     }
@@ -228,8 +265,21 @@ impl Change<'_> {
     /// Writes the rows that have changed.
     fn write_rows(&mut self) -> Result<()> {
         for key in mem::take(&mut self.unwritten) {
-            if let Some(Cached { row, stored }) = self.rows.get_mut(&key) {
-                *stored = rows::update(&self.tx, stored, row)?;
+            let Some(cached) = self.rows.get_mut(&key) else {
+                continue;
+            };
+            let row = &cached.row;
+            cached.stored = Some(match &cached.stored {
+                Some(stored) => rows::update(&self.tx, stored, row)?,
+                None => rows::insert(&self.tx, row)?,
+            });
+            for batch in mem::take(&mut cached.events) {
+                let Events {
+                    first,
+                    attempt,
+                    events,
+                } = batch;
+                events::insert(&self.tx, key, first, attempt, &events)?;
             }
         }
         Ok(())
@@ -246,6 +296,12 @@ impl Change<'_> {
     /// The store that is changed.
     pub(super) fn store(&self) -> &Store {
         self.store
+    }
+
+    /// The connection, for statements on what a job has that neither read nor name jobs: rows that have changed are not written
+    /// for them, so that a job that is answered at once is written once.
+    pub(super) fn sql_beside_jobs(&self) -> &Connection {
+        &self.tx
     }
 
     /// What was found damaged.

@@ -256,7 +256,7 @@ fn is_shared(status: Status, reason: Option<Reason>) -> bool {
 pub(super) fn answer(change: &mut Change<'_>, key: i64, source: &Job) -> Result<()> {
     let now = change.now();
     let job = change.update(key, |row| row.start_with_answer(source, now))?;
-    let tx = change.sql()?;
+    let tx = change.sql_beside_jobs();
     if job.attempt > 1 {
         // that of finished load steps of an earlier attempt
         results::remove(tx, key)?;

@@ -7,6 +7,9 @@ use super::{change::Change, error::Result, sql::Sql};
 
 /// Writes the labels of a job.
 pub(super) fn write(change: &mut Change<'_>, job: &Job) -> Result<()> {
+    if job.labels.is_empty() {
+        return Ok(());
+    }
     let tx = change.sql()?;
     for (name, value) in &job.labels {
         tx.run(

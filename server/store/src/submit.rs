@@ -245,7 +245,7 @@ pub(super) fn insert(
         row
     })?;
     let problem = NewContent::new(new.problem.as_bytes());
-    let tx = change.sql()?;
+    let tx = change.sql_beside_jobs();
     content::attach(tx, Holder::Job(key), name::PROBLEM, &problem)?;
     let job = change.read(key)?;
     labels::write(change, &job)?;

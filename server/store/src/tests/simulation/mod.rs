@@ -79,6 +79,8 @@ struct Known {
     id: JobId,
     owner: String,
     new: NewJob,
+    /// Whether it has waited, and was not answered when it was accepted.
+    waited: bool,
     /// Its events, as they were read first.
     events: Vec<Event>,
     /// As it was when it was first seen after its end.

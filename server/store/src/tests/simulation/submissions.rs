@@ -246,6 +246,7 @@ impl World {
                 new,
                 events: vec![],
                 ended: None,
+                waited: !job.status.is_terminal(),
                 deleted: false,
                 attempts: 0,
             };

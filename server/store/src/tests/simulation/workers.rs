@@ -35,14 +35,10 @@ impl World {
         self.note(format!("    {} starts, attempt {}", job.key, job.attempt));
         let jobs = self.listed().await;
         let waiting = jobs.iter().filter(|job| job.waits_for_a_worker());
-        // an owner who had no turn yet comes before those who had, in the order of their first jobs
+        // an owner who had no turn yet comes before those who had, in the order of the first of their jobs that waited
         let turn = |owner: &str| {
-            let known = self.jobs.iter().filter(|(_, known)| known.owner == owner);
-            let listed = jobs.iter().filter(|job| job.owner == owner);
-            let first = known
-                .map(|(key, _)| *key)
-                .chain(listed.map(|job| job.key))
-                .min();
+            let mut theirs = self.jobs.iter().filter(|(_, known)| known.owner == owner);
+            let first = theirs.find(|(_, known)| known.waited).map(|(key, _)| *key);
             (self.turns.get(owner).copied(), first)
         };
         let is_before = |other: &Job| match job.priority.cmp(&other.priority) {
