@@ -2,7 +2,8 @@
 //!
 //! A job is changed by [`Change::update`] and in no other way: a function of its row, from which everything else follows. The
 //! row is written whole, with its checksum, before the next statement of the transaction or its commit; its version is
-//! counted, its events are appended, its watchers and its line in the log are kept for after the commit.
+//! counted, its events are appended, its line in the log is kept for after the commit, and its key, if the status has changed, is
+//! returned by the commit for those who wake its watchers.
 
 use std::{
     collections::{BTreeMap, BTreeSet},

@@ -140,7 +140,7 @@ impl Store {
         }
     }
 
-    /// When was what is now of this age (seconds), as far as the store has seen the time since then pass?
+    /// The time `age_s` seconds before `now`, without the long pauses in which no service ran.
     pub(super) fn cutoff(&self, now: Time, age_s: f64) -> Time {
         Time::from_micros(self.pauses.cutoff(now.micros(), (age_s * 1e6) as i64))
     }

@@ -210,7 +210,7 @@ struct Seen {
 }
 
 impl Identity {
-    /// Of the database as it is now.
+    /// Opens the file of the database, so that `check` can tell later whether it was removed, replaced or cut short.
     pub(super) fn of(folder: &Folder) -> Result<Identity> {
         let file = File::open(folder.database());
         let file = file.map_err(|error| {

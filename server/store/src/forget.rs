@@ -33,7 +33,7 @@ impl Store {
         .await
     }
 
-    /// Removes the oldest ids of deleted jobs beyond so many.
+    /// Removes the oldest ids of deleted jobs, so that at most `most` remain.
     pub(super) async fn forget_beyond(self: &Arc<Self>, most: u32) -> Result<()> {
         let newest = self.read(move |_, connection| connection.optional_value(BEYOND, [most]));
         match newest.await? {

@@ -45,9 +45,9 @@ pub(super) struct Path<'a> {
 /// The part of a path that is read for a page.
 #[derive(Clone, Copy)]
 pub(super) struct Window {
-    /// Behind this row.
+    /// The window begins after this row; none: at the first row.
     pub(super) after: Option<Cursor>,
-    /// Up to this one; none: to the end.
+    /// The window ends with this row; none: at the end of the list.
     pub(super) last: Option<Cursor>,
     pub(super) order: Order,
 }

@@ -158,7 +158,7 @@ impl Parts {
         Ok(Some(Parts::new(parts)))
     }
 
-    /// From parts, also those of another process.
+    /// A result of these parts, which may come from another process.
     pub fn new(parts: Vec<Part>) -> Parts {
         let entries = parts.iter().map(|part| Entry {
             name: part.name.clone(),
@@ -179,7 +179,7 @@ impl Parts {
         }
     }
 
-    /// One after the other, for another process.
+    /// The parts in their order, to be sent to another process.
     pub fn into_parts(self) -> impl Iterator<Item = Part> {
         self.parts.into_iter()
     }

@@ -42,7 +42,7 @@ impl Pauses {
         kept
     }
 
-    /// When was what is now of this age, as far as the store has seen the time since then pass (µs)?
+    /// The time `age` before `now` (µs), without the pauses.
     pub(super) fn cutoff(&self, now: i64, age: i64) -> i64 {
         cutoff(&self.all(), now, age)
     }

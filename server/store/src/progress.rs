@@ -137,7 +137,7 @@ impl Progress {
         Ok(Progress(Arc::new(Mutex::new(open))))
     }
 
-    /// The transaction with this number is on the disk.
+    /// Records that the transaction with this number is on the disk.
     pub(super) fn reached(&self, number: i64) {
         let mut open = self.0.lock();
         if number <= open.last.commits {
@@ -151,7 +151,7 @@ impl Progress {
         open.failed = written.is_err();
     }
 
-    /// The service stops, and nothing is written any more. Needs no space on the disk.
+    /// Records that the service has stopped: nothing is written any more. Needs no space on the disk.
     pub(super) fn stop(&self) -> io::Result<()> {
         {
             let mut open = self.0.lock();

@@ -228,7 +228,7 @@ impl StoredResult {
         match decoded(stored, entry.encoding, &entry.info) {
             Ok((found, decoded)) if found == entry.info => Ok(Some((found, decoded))),
             Ok((found, _)) => Err(self.record(part).damaged(format!(
-                "{} bytes of another hash in place of {}",
+                "its size or hash is not the recorded one: {} bytes were read, {} are recorded",
                 found.bytes, entry.info.bytes
             ))),
             Err(cause) => Err(self.record(part).damaged(cause)),

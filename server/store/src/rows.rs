@@ -1,4 +1,5 @@
-//! A row of the table `job`: read, checked, and written. Only this file has statements that write this table.
+//! A row of the table `job`: read, checked, and written. Only this file has statements that write this table, but for `old_content`, which moves
+//! what earlier versions stored.
 
 use std::{collections::BTreeMap, str::FromStr};
 

@@ -1,4 +1,4 @@
-//! The rules of a job: which status may follow which, what each verb does to a job, and what follows from a change of its
+//! The rules of a job: which status may follow which (`base::job::Status::may_become`), what each verb does to a job, and what follows from a change of its
 //! row: a version, an event, a line in the log. No I/O.
 
 use base::{
@@ -244,7 +244,8 @@ pub(super) fn is_new_version(old: &Job, new: &Job) -> bool {
     counted(old) != counted(new) || old.name != new.name || old.labels != new.labels
 }
 
-/// The event of a change of status, but for that of the end, which tells what the job keeps in the store.
+/// The event for a change of status; none if the status did not change, or if the job has ended: `end_job` makes the event of the
+/// end, which also tells what the job keeps in the store.
 pub(super) fn event(old: Option<&Job>, new: &Job, now: Time) -> Option<(Time, Payload)> {
     if old.is_some_and(|old| old.status == new.status) {
         return None;

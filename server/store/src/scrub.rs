@@ -92,7 +92,7 @@ pub(super) async fn read_once(store: &Weak<Store>) {
             Err(StoreError::Damaged(damage)) => drop(store.damages.note(*damage)),
             Err(cause) => tracing::warn!(
                 %cause,
-                "the table {name} could not be read {TRIES} times: {cause}; damage by the disk in it will be detected tomorrow"
+                "reading the table {name} failed {TRIES} times: {cause}; it will be checked for damage again in 24 hours"
             ),
             Ok(()) => {}
         }

@@ -102,7 +102,8 @@ pub struct Accepted {
     pub replayed: bool,
     /// The next job of the queue, if a claim was requested and there is one.
     pub claim: Option<Claim>,
-    /// Jobs that have changed: these, and those that were answered while the next job was claimed.
+    /// Jobs whose status has changed since they were inserted: those of these that were started or answered at once, and others
+    /// that were answered while the next job was claimed.
     pub changed: Vec<i64>,
 }
 
