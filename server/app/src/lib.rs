@@ -200,7 +200,7 @@ impl App {
             None => None,
         };
         let queue = Queue::new(store.clone(), solver, config.workers);
-        let service = Arc::new(Service::new(config, store.clone(), queue.clone()));
+        let service = Arc::new(Service::new(config.clone(), store.clone(), queue.clone()));
         let (grpc, health) = grpc::router(service.clone()).await?;
         let router = rest::router(service, grpc);
 

@@ -262,7 +262,7 @@ pub(super) async fn enqueue_sweep(
     key: Option<RequestKey>,
 ) -> Result<Accepted, ApiError> {
     may_have_priorities(caller, jobs.iter().map(|job| job.priority))?;
-    let limit = service.max_queued;
+    let limit = service.config.max_queued;
     let asked = jobs.len() as u64;
     service.may_keep_more(caller.owner()).await?;
     if let Some(rates) = service.rates()

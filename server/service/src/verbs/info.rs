@@ -151,9 +151,11 @@ pub fn me<'a>(service: &'a Service, caller: &'a Caller) -> BoxFuture<'a, Result<
             })
         };
         let load = service.store.load_of(caller.owner()).await?;
-        let queued_limit = service.max_queued_of_owner().unwrap_or(service.max_queued);
+        let queued_limit = service
+            .max_queued_of_owner()
+            .unwrap_or(service.config.max_queued);
         let workers = service.queue.state().workers;
-        let running_limit = service.max_running_per_owner.unwrap_or(workers);
+        let running_limit = service.config.max_running_per_owner.unwrap_or(workers);
         Ok(Me {
             owner: caller.owner().to_owned(),
             scopes: caller.scopes().collect(),
@@ -222,14 +224,14 @@ pub fn info<'a>(
             version: env!("CARGO_PKG_VERSION").into(),
             api_version: "v1".into(),
             workers: service.queue.state().workers.into(),
-            isolation: service.isolation,
+            isolation: service.config.isolation,
             limits: ServiceLimits {
-                max_body_bytes: service.max_body_bytes as u64,
+                max_body_bytes: service.config.max_body_bytes as u64,
                 max_message_bytes: MAX_MESSAGE_BYTES as u64,
-                max_mesh_bytes: service.max_mesh_bytes as u64,
+                max_mesh_bytes: service.config.max_mesh_bytes as u64,
                 memory_budget_bytes: service.memory_budget_bytes,
                 body_cache_bytes: budget.of_bodies(),
-                max_queued: service.max_queued,
+                max_queued: service.config.max_queued,
                 max_batch: MAX_BATCH as u32,
                 max_page_size: MAX_PAGE_SIZE as u32,
                 max_wait_s: MAX_WAIT_S,

@@ -74,9 +74,9 @@ pub async fn upload(
     let room = service.room_of(&owner).await?;
     room.holds(0)?;
     let mut upload = service.begin_upload(&owner)?;
-    let limit_bytes = service.max_mesh_bytes;
+    let limit_bytes = service.config.max_mesh_bytes;
     // without a name: the system removes it when the process ends
-    let file = tempfile::tempfile_in(&service.data).map_err(unwritten)?;
+    let file = tempfile::tempfile_in(&service.config.store.data).map_err(unwritten)?;
     let mut out = tokio::io::BufWriter::with_capacity(
         PIECE_BYTES,
         tokio::fs::File::from_std(file.try_clone().map_err(unwritten)?),
@@ -112,7 +112,7 @@ pub async fn upload(
         return Ok((known, new));
     }
     let name = hash.clone();
-    let folder = service.data.clone();
+    let folder = service.config.store.data.clone();
     let parsed = service
         .work(move || parse(file, &folder, name, bytes as u64))
         .await??;

@@ -87,7 +87,7 @@ pub fn metrics<'a>(
         let help = "Records found damaged since the start of the service";
         now.gauge("signorini_damaged_records", help, health.damaged as f64);
 
-        let data = service.data.clone();
+        let data = service.config.store.data.clone();
         // what follows reads files: those of the store, and of /proc
         let text = tokio::task::spawn_blocking(move || {
             add_disk(&mut now, &data);

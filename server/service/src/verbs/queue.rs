@@ -36,7 +36,7 @@ pub fn state(service: &Service, _caller: &Caller) -> QueueState {
         running: state.running as u64,
         workers: u32::from(state.workers),
         idle: state.idle as u32,
-        max_queued: service.max_queued,
+        max_queued: service.config.max_queued,
     }
 }
 

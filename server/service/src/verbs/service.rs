@@ -1,6 +1,6 @@
 //! The service, which every verb receives.
 
-use std::{path::PathBuf, sync::Arc, time::Duration};
+use std::{sync::Arc, time::Duration};
 
 use base::tasks;
 use store::{Health, Store, StoreError};
@@ -13,7 +13,7 @@ use super::{
     uploads::{Upload, Uploads},
 };
 use crate::{
-    config::{Config, Isolation, ProxyTrust, Web},
+    config::Config,
     error::{ApiError, Quota, QuotaOf},
     queue::Queue,
     rates::Rates,
@@ -29,43 +29,24 @@ pub const MAX_MESSAGE_BYTES: usize = 1 << 20;
 /// The service, which every verb receives.
 #[derive(Debug)]
 pub struct Service {
+    /// The settings.
+    pub config: Config,
     /// The durable data.
     pub store: Arc<Store>,
     /// The queue, which runs the jobs.
     pub queue: Arc<Queue>,
     /// Limits how many problems are checked and results converted at the same time, since each takes a core.
     checks: Arc<Semaphore>,
-    /// Maximum number of waiting jobs; further ones are refused.
-    pub(super) max_queued: u32,
-    /// Maximum number of waiting jobs of one owner.
-    max_queued_per_owner: u32,
-    /// Maximum number of running jobs of one owner.
-    pub(super) max_running_per_owner: Option<u16>,
-    /// Maximum number of bytes that one owner may store.
-    max_bytes_per_owner: Option<u64>,
     /// Limits how many jobs each owner submits.
     rates: Rates,
-    /// Memory that one job may need, by the estimate.
+    /// Memory that one job may need, by the estimate: that of the settings, or a part of the machine's.
     pub(super) memory_budget_bytes: u64,
-    pub(super) isolation: Isolation,
-    /// Largest body of a request over REST.
-    pub max_body_bytes: usize,
-    /// Largest mesh file.
-    pub max_mesh_bytes: usize,
     /// Bytes of bodies in memory, over all requests.
     pub received: Limit,
     /// Bytes of answers in memory, over all requests.
     pub sent: Limit,
     /// Fields that are being sent.
     pub(super) fields_in_memory: FieldsInMemory,
-    /// The proxies that identify users.
-    pub trust: ProxyTrust,
-    /// The hosts and origins that requests from browsers may name.
-    pub web: Web,
-    /// Whether the service itself uses TLS.
-    pub tls: bool,
-    /// The folder for uploads until they are read.
-    pub(super) data: PathBuf,
     /// The uploads that are arriving.
     uploads: Arc<Uploads>,
 }
@@ -111,45 +92,36 @@ impl Room {
 
 impl Service {
     /// A service on this store and queue.
-    pub fn new(config: &Config, store: Arc<Store>, queue: Arc<Queue>) -> Service {
+    pub fn new(config: Config, store: Arc<Store>, queue: Arc<Queue>) -> Service {
         Service {
             store,
             queue,
             checks: Arc::new(Semaphore::new(2)),
-            max_queued: config.max_queued,
-            max_queued_per_owner: config.max_queued_per_owner,
-            max_running_per_owner: config.max_running_per_owner,
-            max_bytes_per_owner: config.max_bytes_per_owner,
             rates: Rates::new(config.max_submissions_per_owner_per_minute),
             memory_budget_bytes: config.memory.bytes(),
-            isolation: config.isolation,
-            max_body_bytes: config.max_body_bytes,
-            max_mesh_bytes: config.max_mesh_bytes,
             received: Limit::new(config.max_received_bytes),
             sent: Limit::new(config.max_sent_bytes),
             fields_in_memory: FieldsInMemory::default(),
-            trust: config.trust.clone(),
-            web: config.web.clone(),
-            tls: config.tls.is_on(),
-            data: config.store.data.clone(),
             uploads: Arc::default(),
+            config,
         }
     }
 
     /// How many jobs of one owner may wait; `None`: no separate limit, because a service without authentication has
     /// only one owner.
     pub(super) fn max_queued_of_owner(&self) -> Option<u32> {
-        self.is_shared().then_some(self.max_queued_per_owner)
+        self.is_shared().then_some(self.config.max_queued_per_owner)
     }
 
     /// Whether the service distinguishes owners.
     fn is_shared(&self) -> bool {
-        self.store.has_tokens() || self.trust.is_on()
+        self.store.has_tokens() || self.config.trust.is_on()
     }
 
     /// How many bytes one owner may store.
     pub(super) fn max_bytes_of_owner(&self) -> Option<u64> {
-        self.max_bytes_per_owner.filter(|_| self.is_shared())
+        let most = self.config.max_bytes_per_owner;
+        most.filter(|_| self.is_shared())
     }
 
     /// The limit of jobs that each owner may submit.

@@ -67,7 +67,7 @@ pub(super) async fn service(folder: &Path) -> Arc<Service> {
     };
     let store = Store::open(folder).await.unwrap();
     let queue = Queue::new(store.clone(), Solver::Threads(fake::solve), 1);
-    Arc::new(Service::new(&config, store, queue))
+    Arc::new(Service::new(config, store, queue))
 }
 
 /// A caller who may do everything with their own jobs.

@@ -66,8 +66,8 @@ fn identified(
     access: Access,
 ) -> Result<Identified, ApiError> {
     let peer = request.extensions().get::<Peer>().copied();
-    let credentials = credentials(request.headers(), &service.trust.user_header);
-    match identify(&service.store, &service.trust, peer, &credentials) {
+    let credentials = credentials(request.headers(), &service.config.trust.user_header);
+    match identify(&service.store, &service.config.trust, peer, &credentials) {
         // also with a token that is no longer valid, as a monitor may have it
         Err(_) if access == Access::Open => Ok(Identified {
             caller: Caller::anonymous(),

@@ -44,7 +44,7 @@ impl Call {
         body::json_text(
             body::is_json(&self.headers)?,
             body,
-            self.service.max_body_bytes,
+            self.service.config.max_body_bytes,
             &self.received,
         )
         .await
@@ -53,7 +53,7 @@ impl Call {
     /// The body as text, if it is declared as a merge patch and is not too large.
     pub(super) async fn merge_patch(&mut self) -> Result<String, ApiError> {
         let body = std::mem::take(&mut self.body);
-        let limit_bytes = self.service.max_body_bytes;
+        let limit_bytes = self.service.config.max_body_bytes;
         body::json_text(&self.headers, body, limit_bytes, &self.received).await
     }
 

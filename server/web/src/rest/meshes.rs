@@ -21,7 +21,7 @@ use super::{
 
 /// Stores the body as a mesh file, whatever its media type: its format is recognised from its first bytes.
 pub(super) async fn upload(call: Call) -> Result<Response, ApiError> {
-    let limit_bytes = call.service.max_mesh_bytes;
+    let limit_bytes = call.service.config.max_mesh_bytes;
     let mut body = call.body.into_data_stream();
     let found = if declared_length(&call.headers).is_some_and(|length| length > limit_bytes) {
         Err(ApiError::PayloadTooLarge { limit_bytes })

@@ -32,7 +32,8 @@ pub(super) async fn own_site(
     request: Request,
     next: Next,
 ) -> Response {
-    match check(&request, &service.web, &service.trust, service.tls) {
+    let config = &service.config;
+    match check(&request, &config.web, &config.trust, config.tls.is_on()) {
         Ok(()) => next.run(request).await,
         Err(error) => refusal(is_grpc(&request), request.uri().path(), error),
     }

@@ -17,7 +17,7 @@ use super::{
 
 /// All routes, REST and gRPC. Unknown paths are answered by `reply::not_found`.
 pub fn router(service: Arc<Service>, grpc: Router) -> Router {
-    let (prefix, sent) = (service.web.path_prefix.clone(), service.sent.clone());
+    let (prefix, sent) = (service.config.web.path_prefix.clone(), service.sent.clone());
     let routes = operations::routes()
         .method_not_allowed_fallback(async || ApiError::MethodNotAllowed)
         .with_state(AppState {
@@ -40,7 +40,7 @@ pub fn router(service: Arc<Service>, grpc: Router) -> Router {
         .layer(middleware::from_fn_with_state(sent, compressed))
         // outside of the authentication: a browser asks beforehand, without the token; and of the limits, whose refusals a page
         // may read
-        .layer(option_layer(origin::cors(&service.web)))
+        .layer(option_layer(origin::cors(&service.config.web)))
         .layer(middleware::from_fn_with_state(service, origin::own_site))
         // outermost: it sees what the client is answered
         .layer(middleware::from_fn(request_report::observe));
