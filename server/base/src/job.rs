@@ -1,13 +1,13 @@
 //! A job: its identity, its status and how that may change. No I/O.
 
-use std::{borrow::Cow, collections::BTreeMap, fmt};
+use std::collections::BTreeMap;
 
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use solver::solution::{Outcome, Residuals, Warning};
 use strum::{Display, EnumString, IntoStaticStr, VariantArray};
-use uuid::Uuid;
 
+pub use crate::id::{JobId, SweepId};
 use crate::{
     catalog::{Code, Kind, explained_at},
     time::Time,
@@ -109,118 +109,6 @@ impl Job {
     /// Whether the job waits for a worker and is not coalesced into another job.
     pub fn waits_for_a_worker(&self) -> bool {
         self.status == Status::Queued && self.coalesced_into.is_none()
-    }
-}
-
-/// The public id of a job, `job_<uuidv7>`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct JobId(pub Uuid);
-
-impl JobId {
-    /// A new id, later than all before it.
-    pub fn new() -> Self {
-        JobId(Uuid::now_v7())
-    }
-
-    /// Reads the id of a job in its canonical form only, so that each job has one spelling.
-    pub fn parse(text: &str) -> Option<Self> {
-        let id = JobId(Uuid::try_parse(text.strip_prefix("job_")?).ok()?);
-        (id.to_string() == text).then_some(id)
-    }
-}
-
-impl Default for JobId {
-    fn default() -> Self {
-        JobId::new()
-    }
-}
-
-impl fmt::Display for JobId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "job_{}", self.0)
-    }
-}
-
-impl Serialize for JobId {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
-}
-
-impl<'de> Deserialize<'de> for JobId {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let text = String::deserialize(deserializer)?;
-        JobId::parse(&text).ok_or_else(|| serde::de::Error::custom("not a job id"))
-    }
-}
-
-impl JsonSchema for JobId {
-    fn schema_name() -> Cow<'static, str> {
-        "JobId".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({
-            "description": "The public id of a job, job_<uuidv7>.",
-            "type": "string",
-            "pattern": "^job_[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}$",
-        })
-    }
-}
-
-/// The public id of a sweep, `sweep_<uuidv7>`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct SweepId(pub Uuid);
-
-impl SweepId {
-    /// A new id, later than all before it.
-    pub fn new() -> Self {
-        SweepId(Uuid::now_v7())
-    }
-
-    /// Reads the id of a sweep in its canonical form only, so that each sweep has one spelling.
-    pub fn parse(text: &str) -> Option<Self> {
-        let id = SweepId(Uuid::try_parse(text.strip_prefix("sweep_")?).ok()?);
-        (id.to_string() == text).then_some(id)
-    }
-}
-
-impl Default for SweepId {
-    fn default() -> Self {
-        SweepId::new()
-    }
-}
-
-impl fmt::Display for SweepId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "sweep_{}", self.0)
-    }
-}
-
-impl Serialize for SweepId {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
-}
-
-impl<'de> Deserialize<'de> for SweepId {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let text = String::deserialize(deserializer)?;
-        SweepId::parse(&text).ok_or_else(|| serde::de::Error::custom("not a sweep id"))
-    }
-}
-
-impl JsonSchema for SweepId {
-    fn schema_name() -> Cow<'static, str> {
-        "SweepId".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({
-            "description": "The public id of a sweep, sweep_<uuidv7>.",
-            "type": "string",
-            "pattern": "^sweep_[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}$",
-        })
     }
 }
 
@@ -616,21 +504,6 @@ mod tests {
             assert_eq!(failure.code, word.replace('_', "-"));
             assert_eq!(failure.r#type, format!("/v1/errors/{}", failure.code));
             assert!(!failure.title.is_empty(), "{reason:?}");
-        }
-    }
-
-    #[test]
-    fn a_job_id_has_one_valid_spelling() {
-        let id = JobId::new();
-        let text = id.to_string();
-        assert_eq!(JobId::parse(&text), Some(id));
-        for other in [
-            text.to_uppercase(),
-            text.replace('-', ""),
-            text[4..].to_string(),
-            format!("{text} "),
-        ] {
-            assert_eq!(JobId::parse(&other), None, "{other}");
         }
     }
 }

@@ -17,6 +17,7 @@
 //! | the trace of a request | `trace.rs` |
 //! | fingerprints of problem, result and body | `digest` |
 //! | points where tests make a job fail | `failpoint.rs` |
+//! | ids of jobs and sweeps | `id.rs` |
 //! | allowed values of parameters | `values.rs` |
 //! | work on other threads and in tasks of its own | `tasks.rs` |
 
@@ -33,8 +34,9 @@ pub mod caller;
 pub mod catalog;
 pub mod token;
 
-// Jobs, sweeps, meshes and events.
+// Jobs, sweeps, meshes and events; their ids.
 pub mod event;
+pub mod id;
 pub mod job;
 pub mod mesh;
 pub mod sweep;

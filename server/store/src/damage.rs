@@ -135,7 +135,7 @@ impl Damages {
         let connection = connection.get().ok()?;
         let uuid = "select uuid from job where id = ?";
         let uuid: Option<String> = connection.optional_value(uuid, [key?]).ok()?;
-        Some(JobId(Uuid::try_parse(&uuid?).ok()?))
+        Uuid::try_parse(&uuid?).ok().map(JobId::from)
     }
 
     /// How many parts, and the incidents of the first few.

@@ -85,5 +85,7 @@ pub(super) fn owner_of_deleted(connection: &Connection, id: JobId) -> Result<Opt
 pub(super) fn deleted_id(connection: &Connection, key: i64) -> Result<Option<JobId>> {
     let uuid = "select uuid from deleted_job where id = ?";
     let uuid: Option<String> = connection.optional_value(uuid, [key])?;
-    Ok(uuid.and_then(|text| text.parse().ok()).map(JobId))
+    Ok(uuid
+        .and_then(|text| text.parse::<uuid::Uuid>().ok())
+        .map(JobId::from))
 }

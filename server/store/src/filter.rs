@@ -3,12 +3,12 @@
 
 use base::{
     caller::Owners,
+    id::Ids,
     job::{Status, SweepId},
     time::Time,
     values::{Text, Times, Values, Words},
 };
 use rusqlite::types::Value;
-use serde_json::json;
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
 /// All filters but that by label, which is a name for each key. A line: the field of [`Filter`], its type, the name in
@@ -86,26 +86,6 @@ pub struct Field {
     pub(super) values: fn(&Filter) -> Vec<Value>,
 }
 
-/// The ids of sweeps.
-#[derive(Clone, Copy, Debug)]
-pub struct SweepIds;
-
-impl Values for SweepIds {
-    type Value = SweepId;
-
-    fn schema(&self) -> serde_json::Value {
-        json!({ "$ref": "#/components/schemas/SweepId" })
-    }
-
-    fn expected(&self) -> String {
-        "sweep_ and a UUID in lower case".into()
-    }
-
-    fn read(&self, text: &str) -> Option<SweepId> {
-        SweepId::parse(text)
-    }
-}
-
 /// A value of a filter.
 trait Asked: Sized {
     fn allowed() -> impl Values<Value = Self>;
@@ -135,7 +115,7 @@ impl Asked for String {
 
 impl Asked for SweepId {
     fn allowed() -> impl Values<Value = Self> {
-        SweepIds
+        Ids::all()
     }
 
     fn stored(&self) -> Value {

@@ -174,7 +174,7 @@ pub use self::{
     entries::Entries,
     error::{Damage, Record, Result, StoreError},
     events::FinalBatch,
-    filter::{Cursor, FILTERS, Field, Filter, GroupBy, Order, OrderBy, SweepIds},
+    filter::{Cursor, FILTERS, Field, Filter, GroupBy, Order, OrderBy},
     health::Health,
     inspect::{Report, inspect},
     list::Keys,

@@ -7,7 +7,7 @@ use base::{
     address::link,
     caller::Owners,
     catalog::explained_at,
-    job::{Failure, Job, JobId, Limits, Reason, ResultAvailable, Status, SweepId},
+    job::{Failure, Job, JobId, Limits, Reason, ResultAvailable, Status},
     time::Time,
 };
 use rusqlite::{Connection, Row, params, params_from_iter};
@@ -156,7 +156,11 @@ fn parse(row: &Row<'_>) -> Result<JobRow> {
     let warnings = optional_text(row, "warnings")?;
     let other = |name: &str| -> Result<Option<JobId>> {
         let uuid = optional_text(row, name)?;
-        let read = |text| Uuid::try_parse(text).map(JobId).map_err(|_| corrupt(name));
+        let read = |text| {
+            Uuid::try_parse(text)
+                .map(JobId::from)
+                .map_err(|_| corrupt(name))
+        };
         uuid.map(read).transpose()
     };
     let failure: Option<Failure> = failure.map(serde_json::from_str).transpose()?;
@@ -164,7 +168,7 @@ fn parse(row: &Row<'_>) -> Result<JobRow> {
         key: row.get("id")?,
         coalesced_into: row.get("coalesced_into")?,
         cache: word("cache", text(row, "cache")?)?,
-        id: JobId(Uuid::try_parse(uuid).map_err(|_| corrupt("uuid"))?),
+        id: JobId::from(Uuid::try_parse(uuid).map_err(|_| corrupt("uuid"))?),
         status: word("status", text(row, "status")?)?,
         reason: reason.map(|text| word("reason", text)).transpose()?,
         cancel_requested: row.get("cancel_requested")?,
@@ -178,7 +182,7 @@ fn parse(row: &Row<'_>) -> Result<JobRow> {
         input_hash: row.get("input_hash")?,
         cached_from: other("cached_from")?,
         parent: other("parent")?,
-        sweep: other("sweep")?.map(|JobId(uuid)| SweepId(uuid)),
+        sweep: other("sweep")?.map(|id| id.0.into()),
         pinned: row.get("pinned")?,
         created_at: Time::from_micros(row.get("created_at")?),
         started_at: time("started_at")?,
@@ -264,7 +268,7 @@ impl JobRow {
             ("queue_ttl_s", Value::Real(job.limits.queue_ttl_s)),
             ("expires_at", micros(self.expires_at)),
             ("solver_version", self.solver_version.clone().into()),
-            ("sweep", uuid(job.sweep.map(|SweepId(id)| JobId(id)))),
+            ("sweep", uuid(job.sweep.map(|id| id.0.into()))),
             ("warnings", json(warnings)?),
             ("mesh", job.mesh.clone().into()),
         ];

@@ -589,7 +589,7 @@ fn described(connection: &Connection, row: &Row<'_>) -> Result<Sweep> {
     intact(row, key)?;
     let uuid = text(row, "uuid")?;
     let id = Uuid::try_parse(uuid).map_err(|error| record(key, "record").damaged(error))?;
-    let id = SweepId(id);
+    let id = SweepId::from(id);
     let (mut jobs, mut queued, mut running, mut versions, mut finished) = (0, 0, 0, 0, None);
     let of_jobs: Vec<(String, i64, i64, Option<i64>)> = connection.rows(
         "select status, count(*), sum(version), max(finished_at) from job indexed by job_by_sweep

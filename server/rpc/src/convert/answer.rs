@@ -6,7 +6,8 @@ use std::collections::BTreeSet;
 use base::{
     caller::Scope,
     event::{Event, Payload, TimedIteration},
-    job::{JobId, Reason, SweepId, Waiting},
+    id::{Id, Kind},
+    job::{Reason, Waiting},
     run::Summary,
     sweep::{SweepEvent, SweepPayload},
     time::Time,
@@ -36,13 +37,7 @@ impl IntoMessage<Option<Timestamp>> for Time {
     }
 }
 
-impl IntoMessage<String> for SweepId {
-    fn into_message(self) -> String {
-        self.to_string()
-    }
-}
-
-impl IntoMessage<String> for JobId {
+impl<K: Kind> IntoMessage<String> for Id<K> {
     fn into_message(self) -> String {
         self.to_string()
     }

@@ -15,11 +15,11 @@ use service::{
     verbs::{
         envelope::{Envelope, JobRequest},
         filters,
-        sweeps::SweepRequest,
+        sweeps::{self, SweepRequest},
     },
 };
 use solver::{error::Reason, problem::Problem};
-use store::{Edit, Filter, SweepIds, job_filters};
+use store::{Edit, Filter, job_filters};
 
 use super::{Reader, read};
 use crate::pb;
@@ -215,7 +215,7 @@ impl Criterion<Option<String>> for Option<String> {
 impl Criterion<Option<SweepId>> for Option<String> {
     fn read(self, name: &'static str) -> Result<Option<SweepId>, ApiError> {
         let sweep = |id: String| {
-            SweepId::parse(&id).ok_or_else(|| invalid_field(name, id, SweepIds.expected()))
+            SweepId::parse(&id).ok_or_else(|| invalid_field(name, id, sweeps::ID.values.expected()))
         };
         self.map(sweep).transpose()
     }

@@ -4,12 +4,11 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use base::{
     caller::Caller,
+    id::{Ids, OfJob},
     job::{Job, JobId},
-    values::Values,
 };
 use futures_util::future::BoxFuture;
 use schemars::JsonSchema;
-use serde_json::json;
 use solver::{error::Findings, problem::Problem};
 use store::{CancelOutcome, Deletion, Edit, Snapshot};
 
@@ -21,32 +20,12 @@ use super::{
 use crate::{error::ApiError, parameters::Variable};
 
 /// The id of a job in a path.
-pub const ID: Variable<JobIds> = Variable {
+pub const ID: Variable<Ids<OfJob>> = Variable {
     name: "id",
     kind: "job",
     meaning: "The job",
-    values: JobIds,
+    values: Ids::all(),
 };
-
-/// The ids of jobs, as values.
-#[derive(Clone, Copy, Debug)]
-pub struct JobIds;
-
-impl Values for JobIds {
-    type Value = JobId;
-
-    fn schema(&self) -> serde_json::Value {
-        json!({ "$ref": "#/components/schemas/JobId" })
-    }
-
-    fn expected(&self) -> String {
-        "job_ and a UUID in lower case".into()
-    }
-
-    fn read(&self, text: &str) -> Option<JobId> {
-        JobId::parse(text)
-    }
-}
 
 /// The job in its present state.
 pub fn get<'a>(

@@ -8,6 +8,7 @@ use axum::body::Bytes;
 use base::{
     caller::Caller,
     digest,
+    id::{Ids, OfSweep},
     job::{Cache, Job, Limits, SweepId},
     sweep::{MemberRow, Sweep, SweepEvent, SweepPayload, limits_for},
     time::Time,
@@ -21,7 +22,7 @@ use solver::{
     error::{Findings, Reason, Violation},
     problem::Problem,
 };
-use store::{Accepted, Cursor, Filter, MemberEvents, NewJob, NewSweep, RequestKey, SweepIds};
+use store::{Accepted, Cursor, Filter, MemberEvents, NewJob, NewSweep, RequestKey};
 use tokio::time::{Instant, timeout, timeout_at};
 
 use super::{
@@ -42,11 +43,11 @@ use crate::{
 };
 
 /// The id of a sweep in a path.
-pub const ID: Variable<SweepIds> = Variable {
+pub const ID: Variable<Ids<OfSweep>> = Variable {
     name: "id",
     kind: "sweep",
     meaning: "The sweep",
-    values: SweepIds,
+    values: Ids::all(),
 };
 
 /// The number of a member in a path.

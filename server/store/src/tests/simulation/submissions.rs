@@ -20,7 +20,7 @@ impl World {
         let queue_ttl_s = [60.0, 3600.0, 86_400.0][self.dice.usize(0..3)];
         let known: Vec<JobId> = self.jobs.values().map(|job| job.id).collect();
         NewJob {
-            id: Some(JobId(uuid::Uuid::from_u128(self.dice.u128(..)))),
+            id: Some(uuid::Uuid::from_u128(self.dice.u128(..)).into()),
             labels: if self.once_in(3) {
                 [("study".to_owned(), input.to_string())].into()
             } else {
