@@ -2,7 +2,7 @@
 
 use super::mesh_results::relative_error;
 use crate::model::estimate::MOST_ADAPTIVE_ELEMENTS;
-use crate::problem::{AdaptiveRefine, Interpolation, Obstacle, Problem};
+use crate::problem::{AdaptiveRefine, Problem};
 use crate::solution::{
     ErrorMethod, EstimatedQuantity, QuantityName, Refinement, Solution, Summary, Warning,
     WarningCode,
@@ -150,7 +150,7 @@ pub(super) fn unfinished(
                 return false;
             }
             let contact = problem.contacts.iter().find(|c| c.boundary == q.contact);
-            contact.is_some_and(|contact| has_kinks(&contact.obstacle))
+            contact.is_some_and(|contact| contact.obstacle.has_kinks())
         };
         sentences.push(match above.iter().find(kinks) {
             Some(q) => format!(
@@ -182,19 +182,4 @@ pub(super) fn unfinished(
         pointer: "/mesh/refine/tolerance".to_owned(),
         message: sentences.join(" "),
     })
-}
-
-/// Whether the profile is made of straight pieces.
-fn has_kinks(obstacle: &Obstacle) -> bool {
-    match obstacle {
-        Obstacle::Table {
-            x, interpolation, ..
-        } => x.len() > 2 && *interpolation == Interpolation::Linear,
-        Obstacle::Polyline {
-            points,
-            interpolation,
-            ..
-        } => points.len() > 2 && *interpolation == Interpolation::Linear,
-        _ => false,
-    }
 }

@@ -115,13 +115,10 @@ pub fn ends_inside_edges(
     // supports turn a normal by rounding only
     let free = HeldDirections::new();
     let view = View::new(mesh, boundary, &free, obstacle);
-    // a rounded flat ends in two flanks: a node there would face along the body what is beside it
-    let limits = match obstacle {
-        Obstacle::RoundedFlat { from, to, .. } => [
-            from.unwrap_or(f64::NEG_INFINITY),
-            to.unwrap_or(f64::INFINITY),
-        ],
-        _ => view.limits(obstacle),
+    let limits = if obstacle.ends_in_flanks() {
+        given_ends(obstacle)
+    } else {
+        view.limits(obstacle)
     };
     let mut found = Vec::new();
     for (k, edge) in boundary.iter().enumerate() {
@@ -132,6 +129,15 @@ pub fn ends_inside_edges(
         found.extend(ends.into_iter().map(|xi| (*edge, xi)));
     }
     found
+}
+
+/// The range of the coordinate c between the `from` and `to` of an obstacle.
+fn given_ends(obstacle: &Obstacle) -> [f64; 2] {
+    let (from, to, _) = obstacle.span();
+    [
+        from.unwrap_or(f64::NEG_INFINITY),
+        to.unwrap_or(f64::INFINITY),
+    ]
 }
 
 /// A boundary and the obstacle as seen from it.
@@ -260,12 +266,8 @@ impl<'a> View<'a> {
 
     /// The range of the coordinate c that the obstacle covers.
     fn limits(&self, obstacle: &Obstacle) -> [f64; 2] {
-        let (from, to, _) = obstacle.span();
-        let [first, last] = self.shape.ends();
-        [
-            from.unwrap_or(f64::NEG_INFINITY).max(first),
-            to.unwrap_or(f64::INFINITY).min(last),
-        ]
+        let ([from, to], [first, last]) = (given_ends(obstacle), self.shape.ends());
+        [from.max(first), to.min(last)]
     }
 
     /// The place on an edge with the coordinate c, if the edge contains it.

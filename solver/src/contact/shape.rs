@@ -1,4 +1,5 @@
-//! The shape of an obstacle: its distance as a function of the coordinate c, or a curve.
+//! The shape of an obstacle: its distance as a function of the coordinate c, or a curve; and what follows from the shape
+//! alone.
 
 use super::curve::Curve;
 use crate::problem::{Interpolation, Obstacle};
@@ -6,6 +7,54 @@ use crate::spline::{Spline, smoothed};
 
 /// A circle ends where its flank is almost vertical: at this part of its radius below its centre.
 const FLANK: f64 = 1e-3;
+
+/// What follows from the shape of an obstacle, wherever it is.
+impl Obstacle {
+    /// The exponent of a profile that is a power of the distance from its center.
+    pub(crate) fn power(&self) -> Option<f64> {
+        match self {
+            Obstacle::Circle { .. } | Obstacle::Parabola { .. } => Some(2.0),
+            Obstacle::Wedge { .. } | Obstacle::Cone { .. } => Some(1.0),
+            Obstacle::Power { exponent, .. } => Some(*exponent),
+            Obstacle::Flat { .. }
+            | Obstacle::Tilted { .. }
+            | Obstacle::RoundedFlat { .. }
+            | Obstacle::Table { .. }
+            | Obstacle::Polyline { .. }
+            | Obstacle::Line { .. } => None,
+        }
+    }
+
+    /// Whether sliding along itself leaves it as it is.
+    pub(crate) fn is_straight(&self) -> bool {
+        matches!(self, Obstacle::Flat { .. } | Obstacle::Line { .. })
+    }
+
+    /// Whether it is a curve in the plane, which has no coordinate c.
+    pub(crate) fn is_in_space(&self) -> bool {
+        matches!(self, Obstacle::Line { .. } | Obstacle::Polyline { .. })
+    }
+
+    /// Whether it is made of several straight pieces.
+    pub(crate) fn has_kinks(&self) -> bool {
+        match self {
+            Obstacle::Table {
+                x, interpolation, ..
+            } => x.len() > 2 && *interpolation == Interpolation::Linear,
+            Obstacle::Polyline {
+                points,
+                interpolation,
+                ..
+            } => points.len() > 2 && *interpolation == Interpolation::Linear,
+            _ => false,
+        }
+    }
+
+    /// Whether it ends in flanks: a node at its end would face along the body what is beside it.
+    pub(super) fn ends_in_flanks(&self) -> bool {
+        matches!(self, Obstacle::RoundedFlat { .. })
+    }
+}
 
 /// A place where the obstacle has a kink, or may be nearer to the body than on both sides of it.
 #[derive(Clone, Copy, Debug, PartialEq)]

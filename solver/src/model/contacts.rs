@@ -16,7 +16,7 @@ use crate::elasticity::Section;
 use crate::error::{AllChecks, Checked, Reason};
 use crate::friction::{Average, FrictionLaw};
 use crate::mesh::{self, Edge, Mesh};
-use crate::problem::{Algorithm, Condition, Contact, NormalOf, Obstacle, Problem, Step};
+use crate::problem::{Algorithm, Condition, Contact, NormalOf, Problem, Step};
 use crate::solution::WarningCode;
 
 /// The friction law of a contact; none: frictionless.
@@ -124,10 +124,7 @@ impl Checks {
             cut,
             profile,
             places: run.places,
-            in_space: matches!(
-                contact.obstacle,
-                Obstacle::Line { .. } | Obstacle::Polyline { .. }
-            ),
+            in_space: contact.obstacle.is_in_space(),
             end_slopes,
             indentation: contact.indentation,
             push,
@@ -139,7 +136,7 @@ impl Checks {
             tangential_displacement: contact.tangential_displacement,
             normal: contact.normal,
             condition: contact.condition,
-            power: power(&contact.obstacle),
+            power: contact.obstacle.power(),
             friction,
         })
     }
@@ -271,10 +268,7 @@ impl Checks {
             ));
         }
         // a flat does not depend on the coordinate, and a curve in space has none
-        let curved = !matches!(
-            contact.obstacle,
-            Obstacle::Flat { .. } | Obstacle::Line { .. } | Obstacle::Polyline { .. }
-        );
+        let curved = !contact.obstacle.is_straight() && !contact.obstacle.is_in_space();
         let grows = |pair: &[f64]| pair[1] > pair[0];
         let falls = |pair: &[f64]| pair[1] < pair[0];
         if curved && !run.coordinate.windows(2).all(grows) && !run.coordinate.windows(2).all(falls)
@@ -633,19 +627,4 @@ fn push_along([x, y]: [f64; 2], boundary: &ContactBoundary) -> Vec<[f64; 2]> {
         ]
     };
     (0..boundary.nodes.len()).map(parts).collect()
-}
-
-/// The exponent of a profile that is a power.
-fn power(obstacle: &Obstacle) -> Option<f64> {
-    match obstacle {
-        Obstacle::Circle { .. } | Obstacle::Parabola { .. } => Some(2.0),
-        Obstacle::Wedge { .. } | Obstacle::Cone { .. } => Some(1.0),
-        Obstacle::Power { exponent, .. } => Some(*exponent),
-        Obstacle::Flat { .. }
-        | Obstacle::Tilted { .. }
-        | Obstacle::RoundedFlat { .. }
-        | Obstacle::Table { .. }
-        | Obstacle::Polyline { .. }
-        | Obstacle::Line { .. } => None,
-    }
 }

@@ -137,7 +137,6 @@ pub(super) fn endless(
     profile: &[f64],
 ) -> bool {
     let unbounded = matches!(obstacle.span(), (None, None, _));
-    let straight = matches!(obstacle, Obstacle::Flat { .. } | Obstacle::Line { .. });
     let [a, b] = boundary.normals[0];
     let errors = &boundary.normal_errors;
     let same = |([c, d], error): (&[f64; 2], &f64)| {
@@ -147,7 +146,7 @@ pub(super) fn endless(
     let parallel = profile
         .iter()
         .all(|p| (p - profile[0]).abs() <= ALIGNED * boundary.length());
-    unbounded && straight && even && parallel && !goes_on(mesh, boundary)
+    unbounded && obstacle.is_straight() && even && parallel && !goes_on(mesh, boundary)
 }
 
 /// Whether the surface of the body continues straight beyond an end of a boundary.
