@@ -1,7 +1,7 @@
 //! The commands `signorini cancel`, `retry` and `rm`, which change jobs.
 
 use base::job::JobId;
-use clap::Args;
+use clap::{Args, Subcommand};
 use reqwest::Method;
 use serde_json::{Value, json};
 
@@ -14,6 +14,24 @@ use super::{
     id::Id,
     listing::{Found, Shown},
 };
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Ask jobs to stop
+    Cancel(Cancel),
+    /// Submit the problem of a job again, to be solved once more
+    Retry(Retry),
+    /// Delete jobs and sweeps that have ended
+    Rm(Remove),
+}
+
+pub(super) async fn run(command: Command) -> anyhow::Result<Exit> {
+    match command {
+        Command::Cancel(arguments) => cancel(arguments).await,
+        Command::Retry(arguments) => retry(arguments).await,
+        Command::Rm(arguments) => remove(arguments).await,
+    }
+}
 
 #[derive(Debug, Args)]
 #[command(
@@ -31,8 +49,8 @@ pub(crate) struct Cancel {
     service: Connection,
 }
 
-/// Runs `cancel`: asks each job to stop. A job that has ended already is no error, and is printed as it is.
-pub(super) async fn cancel(arguments: Cancel) -> anyhow::Result<Exit> {
+/// Asks each job to stop. A job that has ended already is no error, and is printed as it is.
+async fn cancel(arguments: Cancel) -> anyhow::Result<Exit> {
     let service = arguments.service.open()?;
     let mut documents = vec![];
     for id in arguments.ids {
@@ -70,8 +88,8 @@ fn job(text: &str) -> Result<JobId, String> {
         .ok_or_else(|| "expected the id of a job, as `signorini ls` prints them: job_…".into())
 }
 
-/// Runs `retry`: submits the problem of each job again, and prints the new jobs.
-pub(super) async fn retry(arguments: Retry) -> anyhow::Result<Exit> {
+/// Submits the problem of each job again, and prints the new jobs.
+async fn retry(arguments: Retry) -> anyhow::Result<Exit> {
     let service = arguments.service.open()?;
     let mut documents: Vec<Value> = vec![];
     for id in arguments.ids {
@@ -105,8 +123,8 @@ pub(crate) struct Remove {
     service: Connection,
 }
 
-/// Runs `rm`: deletes each job or sweep, and prints their ids.
-pub(super) async fn remove(arguments: Remove) -> anyhow::Result<Exit> {
+/// Deletes each job or sweep, and prints their ids.
+async fn remove(arguments: Remove) -> anyhow::Result<Exit> {
     let service = arguments.service.open()?;
     if arguments.fields && arguments.ids.iter().any(|id| matches!(id, Id::Sweep(_))) {
         eprintln!("signorini: --fields is for jobs: a sweep has no fields");

@@ -48,12 +48,8 @@ pub(super) enum Command {
     Result(Box<result::Arguments>),
     /// Draw stresses and convergence in the terminal, or save and open figures
     Plot(plot::Arguments),
-    /// Ask jobs to stop
-    Cancel(change::Cancel),
-    /// Submit the problem of a job again, to be solved once more
-    Retry(change::Retry),
-    /// Delete jobs and sweeps that have ended
-    Rm(change::Remove),
+    #[command(flatten)]
+    Change(change::Command),
     /// Check a problem without submitting it: all violations with their lines, or its cost. Exit code: 0 valid, 2 invalid
     Validate(validate::Arguments),
 }
@@ -67,9 +63,7 @@ pub(super) async fn run(command: Command) -> anyhow::Result<Exit> {
         Command::Ls(arguments) => ls::run(*arguments).await,
         Command::Result(arguments) => result::run(*arguments).await,
         Command::Plot(arguments) => plot::run(arguments).await,
-        Command::Cancel(arguments) => change::cancel(arguments).await,
-        Command::Retry(arguments) => change::retry(arguments).await,
-        Command::Rm(arguments) => change::remove(arguments).await,
+        Command::Change(command) => change::run(command).await,
         Command::Validate(arguments) => validate::run(arguments).await,
     }
 }
