@@ -21,7 +21,7 @@ use super::{
     body::content_type,
     refused,
     reply::{is_grpc, refusal},
-    service::is_probe,
+    request_target::is_probe,
 };
 
 /// The path of uploads, whose bytes are written to a file as they arrive and not kept in memory.

@@ -4,7 +4,7 @@
 //!
 //! | subject | where |
 //! |---|---|
-//! | every operation: route, access, input, handler, rpc, answers, errors; which tests cover it | `operations` |
+//! | every operation: route, access, input, handler, rpc, answers, errors; which tests cover it | `operations`, a file for each subject |
 //! | made from that list: routes | `router` |
 //! | made from that list: `/openapi.json` | `openapi` |
 //! | made from that list: docs/api.md | `reference` |
@@ -23,7 +23,7 @@
 //! | answers: entity tags, digests, ranges | `data` |
 //! | log line, metrics and span of a request | `request_report`, `request_target` |
 //! | refused requests in the log | `refused` |
-//! | handlers by subject | `jobs`, `submit`, `events`, `results`, `plots`, `sweeps`, `meshes`, `tokens`, `service` |
+//! | streams of events; figures | `events`, `plots` |
 //! | the page at /docs | `docs` |
 
 // Requests: parameters and headers, bodies, the caller.
@@ -49,17 +49,10 @@ mod request_report;
 mod request_target;
 mod revocation;
 
-// Handlers, by subject.
+// Answers that are more than a translation.
 mod docs;
 mod events;
-mod jobs;
-mod meshes;
 mod plots;
-mod results;
-mod service;
-mod submit;
-mod sweeps;
-mod tokens;
 
 // The list of operations, and what is made from it.
 mod openapi;
@@ -73,5 +66,5 @@ mod fuzz;
 pub use openapi::openapi;
 pub use reference::reference;
 pub use reply::refuse;
+pub use request_target::is_probe;
 pub use router::router;
-pub use service::is_probe;

@@ -27,8 +27,8 @@ use tonic::Code;
 use tracing::{Level, debug, enabled, info};
 
 use super::{
+    request_target::is_probe,
     request_target::{RequestTarget, UNKNOWN, name_of},
-    service::is_probe,
 };
 
 /// The header in which a client names its request, and receives the name.

@@ -94,3 +94,11 @@ pub(super) fn name_of(code: Code) -> &'static str {
         Code::Unauthenticated => "UNAUTHENTICATED",
     }
 }
+
+/// Whether a request is for one of the probes or for metrics, which are answered even if all connections are busy.
+pub fn is_probe(path: &str) -> bool {
+    matches!(
+        path,
+        "/livez" | "/readyz" | "/metrics" | "/grpc.health.v1.Health/Check"
+    )
+}

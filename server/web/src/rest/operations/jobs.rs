@@ -1,75 +1,64 @@
-//! The operations on jobs: submit, get, list, wait, watch, edit, cancel, delete.
+//! The operations on jobs that exist: get, list, wait, watch, edit, cancel, delete.
 
-use base::{catalog::Code, event::Event, job::Job};
-use service::verbs::{
-    bulk::BulkResult,
-    jobs::ID,
-    key::{IDEMPOTENCY_KEY, Keys},
-    lists::{Count, GROUP_BY, ORDER_BY},
-    page::{PAGE_SIZE, PAGE_TOKEN},
-    watch::{AFTER_SEQ, UNTIL, WAIT},
+use axum::{
+    Json,
+    http::{StatusCode, header},
+    response::{IntoResponse, Response},
 };
+use base::{
+    catalog::Code,
+    event::Event,
+    job::{Job, JobId},
+    values::Values,
+};
+use schemars::JsonSchema;
+use serde::Serialize;
+use service::{
+    error::ApiError,
+    verbs::{
+        bulk::{self, BulkResult},
+        jobs::{self as verbs, Cancellation, ID, LabelChanges},
+        lists::{self, Count, GROUP_BY, ORDER_BY},
+        page::{PAGE_SIZE, PAGE_TOKEN, Paging},
+        watch::{self, AFTER_SEQ, UNTIL, Until, WAIT},
+    },
+};
+use solver::problem::Problem;
+use store::{Filter, GroupBy, Order};
 
 use super::{
-    content::{json, lines, merge_patch, nothing, stream, submission, the_problem},
-    headers::{etag, location, preference_applied, replayed, retry_after},
-    operation::{CANCEL, Operation, READ, SUBMIT, delete, get, patch, post, put},
+    content::{json, lines, merge_patch, nothing, stream, the_problem},
+    headers::etag,
+    operation::{CANCEL, Operation, READ, SUBMIT, delete, get, patch, post},
 };
 use crate::rest::{
-    bodies::{Edits, MergePatch, Retry, Submission, Submissions},
+    bodies::{self, Edits, MergePatch},
+    body::is_merge_patch,
+    call::Call,
     events::{self, LAST_EVENT_ID},
     filters::FILTERS,
-    headers::{Header, IF_MATCH, IF_NONE_MATCH, PREFER},
-    jobs, submit,
+    headers::{Header, IF_MATCH, IF_NONE_MATCH, Tags, version_tag},
 };
-
-/// The header that makes a request safe to repeat.
-pub(super) const KEY: Header<Keys> = Header(IDEMPOTENCY_KEY);
 
 pub(super) fn operations() -> Vec<Operation> {
     vec![
-        post(SUBMIT, "/v1/jobs", (KEY, PREFER), submit::create)
-            .rpcs(&["CreateJob", "SubmitAndWatch"])
-            .summary("Submits a job; when the answer is sent, the job is stored on disk")
-            .body(json::<Submission>())
-            .example(submission())
-            .submits(),
-        put(SUBMIT, "/v1/jobs/{id}", (ID, KEY, PREFER), submit::put)
-            .rpcs(&["CreateJob"])
-            .named("PutJob")
-            .summary("Submits a job under an id chosen by the client; repeating the request changes nothing")
-            .body(json::<Submission>())
-            .example(submission())
-            .answers(200, "The job with this id, submitted before with the same content", json::<Job>())
-            .with([location(), etag()])
-            .sometimes_with(replayed())
-            .submits()
-            .fails(&[Code::IdConflict]),
-        post(SUBMIT, "/v1/jobs/batch", (KEY,), submit::create_batch)
-            .rpcs(&["BatchCreateJobs"])
-            .summary("Submits up to 1000 jobs, all or none of them")
-            .body(json::<Submissions>())
-            .answers(202, "The accepted jobs, in their order", json::<submit::Batch>())
-            .with([retry_after()])
-            .sometimes_with(replayed())
-            .fails(SUBMITTING),
-        get(READ, "/v1/jobs", (FILTERS, PAGE_SIZE, PAGE_TOKEN, ORDER_BY), jobs::list)
+        get(READ, "/v1/jobs", (FILTERS, PAGE_SIZE, PAGE_TOKEN, ORDER_BY), list_jobs)
             .rpcs(&["ListJobs"])
             .summary("Lists jobs, newest first")
-            .answers(200, "A page of jobs. It may be short or empty before the list ends, since only so many jobs are checked for each page: the list ends where there is no next_page_token", json::<jobs::List>())
+            .answers(200, "A page of jobs. It may be short or empty before the list ends, since only so many jobs are checked for each page: the list ends where there is no next_page_token", json::<List>())
             .fails(&[Code::BadPageToken]),
-        get(READ, "/v1/jobs/count", (FILTERS, GROUP_BY), jobs::count)
+        get(READ, "/v1/jobs/count", (FILTERS, GROUP_BY), count_jobs)
             .rpcs(&["CountJobs"])
             .summary("Counts jobs")
             .answers(200, "The number of jobs", json::<Count>()),
-        get(READ, "/v1/jobs/{id}", (ID, WAIT, UNTIL, IF_NONE_MATCH), jobs::get)
+        get(READ, "/v1/jobs/{id}", (ID, WAIT, UNTIL, IF_NONE_MATCH), get_job)
             .rpcs(&["GetJob", "WaitJob"])
             .summary("Returns a job now, or after it has changed or ended")
             .answers(200, "The job", json::<Job>())
             .with([etag()])
             .answers(304, "The job has not changed", nothing())
             .with([etag()]),
-        get(READ, "/v1/jobs/{id}/problem", (ID,), jobs::problem)
+        get(READ, "/v1/jobs/{id}/problem", (ID,), get_job_problem)
             .rpcs(&["GetJobProblem"])
             .summary("Returns the exact input of a job, with its defaults filled in")
             .answers(200, "The problem", the_problem()),
@@ -79,36 +68,30 @@ pub(super) fn operations() -> Vec<Operation> {
             .answers(200, "The events, each with its number; a comment every 15 s", [stream::<Event>(), lines()].concat())
             .answers(204, "The job has ended, and there are no events after that number", nothing())
             .fails(&[Code::NotAcceptable, Code::Draining]),
-        patch(SUBMIT, "/v1/jobs/{id}", (ID, IF_MATCH), jobs::update)
+        patch(SUBMIT, "/v1/jobs/{id}", (ID, IF_MATCH), update_job)
             .rpcs(&["UpdateJob"])
             .summary("Changes the name, labels or priority of a job, or whether it is kept permanently")
             .body([json::<Edits>(), merge_patch::<MergePatch>()].concat())
             .answers(200, "The changed job", json::<Job>())
             .with([etag()])
             .fails(&[Code::InvalidProblem, Code::StaleVersion, Code::StorageFull]),
-        post(CANCEL, "/v1/jobs/{id}/cancel", (ID,), jobs::cancel)
+        post(CANCEL, "/v1/jobs/{id}/cancel", (ID,), cancel_job)
             .rpcs(&["CancelJob"])
             .summary("Asks a job to stop, which ends within half a second")
-            .answers(200, "The effect, and the job", json::<jobs::Canceled>())
+            .answers(200, "The effect, and the job", json::<Canceled>())
             .with([etag()])
             .fails(&[Code::StorageFull]),
-        post(SUBMIT, "/v1/jobs/{id}/retry", (ID, KEY, PREFER), submit::retry)
-            .rpcs(&["RetryJob"])
-            .summary("Submits the problem of an ended job again as a new job, with the old one as its parent, and without the cache; a body changes its limits and priority")
-            .optional_body(json::<Retry>())
-            .submits()
-            .fails(&[Code::JobActive]),
-        delete(CANCEL, "/v1/jobs/{id}", (ID,), jobs::delete)
+        delete(CANCEL, "/v1/jobs/{id}", (ID,), delete_job)
             .rpcs(&["DeleteJob"])
             .summary("Deletes a job that has ended, with its events and its result")
             .answers(204, "Deleted; its id answers 410 for 7 days (kept for the last 100,000 deleted jobs)", nothing())
             .fails(&[Code::JobActive, Code::StorageFull]),
-        post(CANCEL, "/v1/jobs/cancel", (FILTERS,), jobs::cancel_many)
+        post(CANCEL, "/v1/jobs/cancel", (FILTERS,), cancel_jobs)
             .rpcs(&["CancelJobs"])
             .summary("Asks all jobs that match the filters to stop")
             .answers(200, "How many jobs matched, and how many of them changed", json::<BulkResult>())
             .fails(&[Code::MissingFilter, Code::StorageFull]),
-        delete(CANCEL, "/v1/jobs", (FILTERS,), jobs::delete_many)
+        delete(CANCEL, "/v1/jobs", (FILTERS,), delete_jobs)
             .rpcs(&["DeleteJobs"])
             .summary("Deletes all jobs that match the filters and have ended, pinned ones too")
             .answers(200, "How many jobs matched, and how many of them were deleted", json::<BulkResult>())
@@ -116,35 +99,126 @@ pub(super) fn operations() -> Vec<Operation> {
     ]
 }
 
-/// The reasons for which a submission may be refused.
-pub(super) const SUBMITTING: &[Code] = &[
-    Code::InvalidProblem,
-    Code::ProblemTooLarge,
-    Code::IdempotencyKeyReuse,
-    Code::Deleted, // the key or id of a deleted job
-    Code::QuotaExceeded,
-    Code::Forbidden, // a priority above 0
-    Code::QueueFull,
-    Code::Draining,
-    Code::StorageFull,
-];
-
-impl Operation {
-    /// Adds the answers with the submitted job: when it has ended, at once, or with its events.
-    pub(super) fn submits(self) -> Self {
-        let accepted = [json::<Job>(), stream::<Event>(), lines()].concat();
-        self.answers(201, "The job, which has ended within the wait", json::<Job>())
-            .with([location(), etag(), preference_applied()])
-            .sometimes_with(replayed())
-            .answers(
-                202,
-                "The accepted job; with Accept: text/event-stream or application/jsonl its events, as from /events",
-                accepted,
-            )
-            .with([location()])
-            .sometimes_with(etag())
-            .sometimes_with(retry_after())
-            .sometimes_with(replayed())
-            .fails(SUBMITTING)
+async fn get_job(
+    call: Call,
+    id: JobId,
+    wait_s: Option<f64>,
+    until: Option<Until>,
+    seen: Option<Tags>,
+) -> Result<Response, ApiError> {
+    if let (Some(_), None) = (until, wait_s) {
+        return Err(ApiError::BadParameter {
+            name: UNTIL.name,
+            got: format!("`{}` without `{}`", UNTIL.name, WAIT.name),
+            expected: format!("also `{}`, {}", WAIT.name, WAIT.values.expected()),
+        });
     }
+    let Call {
+        service, caller, ..
+    } = &call;
+    let job = match wait_s {
+        None => verbs::get(service, caller, id).await?,
+        Some(wait_s) => {
+            let known = seen.as_ref().and_then(Tags::version);
+            let until = until.unwrap_or(known.map_or(Until::NextChange, Until::Changed));
+            let (job, _) = watch::wait(service, caller, id, until, wait_s).await?;
+            job
+        }
+    };
+    let tag = tag(&job);
+    if seen.is_some_and(|seen| seen.contain(&tag)) {
+        return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, tag)]).into_response());
+    }
+    Ok(job_response(&job))
+}
+
+/// A page of jobs.
+#[derive(Serialize, JsonSchema)]
+#[schemars(rename = "JobList")]
+struct List {
+    jobs: Vec<Job>,
+    next_page_token: Option<String>,
+}
+
+async fn list_jobs(
+    call: Call,
+    filter: Filter,
+    size: Option<i64>,
+    token: Option<String>,
+    order: Option<Order>,
+) -> Result<Json<List>, ApiError> {
+    let paging = Paging { size, token };
+    let page = lists::list(&call.service, &call.caller, &filter, order, &paging).await?;
+    Ok(Json(List {
+        jobs: page.items,
+        next_page_token: page.next,
+    }))
+}
+
+async fn count_jobs(
+    call: Call,
+    filter: Filter,
+    group_by: Option<GroupBy>,
+) -> Result<Json<Count>, ApiError> {
+    let count = lists::count(&call.service, &call.caller, &filter, group_by).await?;
+    Ok(Json(count))
+}
+
+async fn get_job_problem(call: Call, id: JobId) -> Result<Json<Problem>, ApiError> {
+    Ok(Json(verbs::problem(&call.service, &call.caller, id).await?))
+}
+
+async fn update_job(
+    mut call: Call,
+    id: JobId,
+    meant_for: Option<Tags>,
+) -> Result<Response, ApiError> {
+    let (edit, labels) = if is_merge_patch(&call.headers) {
+        bodies::merge_patch(&call.merge_patch().await?)?
+    } else {
+        (bodies::edit(&call.json().await?)?, LabelChanges::new())
+    };
+    let Call {
+        service, caller, ..
+    } = &call;
+    let versions = meant_for.as_ref().and_then(Tags::versions);
+    let job = verbs::update(service, caller, id, edit, labels, versions).await?;
+    Ok(job_response(&job))
+}
+
+async fn cancel_job(call: Call, id: JobId) -> Result<Response, ApiError> {
+    let (outcome, job) = verbs::cancel(&call.service, &call.caller, id).await?;
+    let tag = [(header::ETAG, tag(&job))];
+    Ok((tag, Json(Canceled { outcome, job })).into_response())
+}
+
+async fn delete_job(call: Call, id: JobId) -> Result<StatusCode, ApiError> {
+    verbs::delete(&call.service, &call.caller, id).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+async fn cancel_jobs(call: Call, filter: Filter) -> Result<Json<BulkResult>, ApiError> {
+    let many = bulk::cancel_many(&call.service, &call.caller, filter).await?;
+    Ok(Json(many))
+}
+
+async fn delete_jobs(call: Call, filter: Filter) -> Result<Json<BulkResult>, ApiError> {
+    let many = bulk::delete_many(&call.service, &call.caller, filter).await?;
+    Ok(Json(many))
+}
+
+/// One job with its version as entity tag.
+pub(super) fn job_response(job: &Job) -> Response {
+    ([(header::ETAG, tag(job))], Json(job)).into_response()
+}
+
+pub(super) fn tag(job: &Job) -> String {
+    version_tag(job.version)
+}
+
+/// The effect of asking a job to stop, and the job.
+#[derive(Serialize, JsonSchema)]
+struct Canceled {
+    outcome: Cancellation,
+    job: Job,
 }

@@ -11,11 +11,12 @@ mod content;
 mod headers;
 mod operation;
 
-// The groups.
+// The groups: entries, and their handlers.
 mod jobs;
 mod meshes;
 mod results;
 mod service;
+mod submit;
 mod sweeps;
 mod tokens;
 
@@ -31,7 +32,12 @@ pub(super) const DESCRIPTION: Access = operation::READ;
 
 /// The groups in the order in which they are documented: name, subject and operations.
 pub(super) const GROUPS: [Group; 6] = [
-    ("jobs", "Submit, get, list, watch, cancel", jobs::operations),
+    ("jobs", "Submit, get, list, watch, cancel", || {
+        submit::operations()
+            .into_iter()
+            .chain(jobs::operations())
+            .collect()
+    }),
     ("results", "The results of a job", results::operations),
     (
         "sweeps",

@@ -1,14 +1,23 @@
 //! The operations on the results of a job, as data and as figures.
 
-use base::{catalog::Code, event::TimedIteration};
+use axum::{
+    Extension, Json,
+    body::Body,
+    http::{StatusCode, header::CONTENT_TYPE},
+    response::Response,
+};
+use base::{catalog::Code, event::TimedIteration, job::JobId};
 use service::{
-    formats::Format,
+    error::ApiError,
+    formats::{self, Format},
+    transfer::{HasShare, with_own_share},
     verbs::{
-        history::MAX_POINTS,
-        jobs::ID,
+        fields as stored,
+        history::{self as rows, MAX_POINTS},
+        jobs::{self, ID},
         plots::{PLOT, SIZE, STRESS, THEME},
-        profiles::{BOUNDARY, POINTS, STEP},
-        results::JobResult,
+        profiles::{self, BOUNDARY, POINTS, Points, STEP},
+        results::{self, JobResult},
     },
 };
 use solver::solution::{ContactProfile, Fields};
@@ -20,16 +29,17 @@ use super::{
 };
 use crate::rest::{
     accept::FormatOf,
-    data::PART,
+    call::Call,
+    data::{self, PART, Part, marked},
     headers::{header, text},
-    plots, results,
+    plots,
 };
 
 pub(super) fn operations() -> Vec<Operation> {
     const TABLE: FormatOf = FormatOf(Format::OF_TABLES);
     const FIELDS: FormatOf = FormatOf(Format::OF_FIELDS);
     vec![
-        get(READ, "/v1/jobs/{id}/result", (ID,), results::result)
+        get(READ, "/v1/jobs/{id}/result", (ID,), get_result)
             .rpcs(&["GetResult"])
             .summary("Returns the summary of a job's result, and one for each load step")
             .answers(200, "The summary", json::<JobResult>())
@@ -39,7 +49,7 @@ pub(super) fn operations() -> Vec<Operation> {
             READ,
             "/v1/jobs/{id}/history",
             (ID, TABLE, MAX_POINTS, PART),
-            results::history,
+            list_iterations,
         )
         .rpcs(&["ListIterations"])
         .summary("Returns the iterations of a job's last attempt, one row each")
@@ -48,7 +58,7 @@ pub(super) fn operations() -> Vec<Operation> {
             READ,
             "/v1/jobs/{id}/profiles/{boundary}",
             (ID, BOUNDARY, TABLE, STEP, POINTS, PART),
-            results::profile,
+            get_profile,
         )
         .rpcs(&["GetProfile"])
         .summary("Returns columns along a contact boundary, by arc length")
@@ -58,13 +68,13 @@ pub(super) fn operations() -> Vec<Operation> {
             READ,
             "/v1/jobs/{id}/fields",
             (ID, FIELDS, PART),
-            results::fields,
+            stream_result,
         )
         .rpcs(&["StreamResult"])
         .summary("Returns mesh, displacements and stresses")
         .file_of_result("The fields", data::<Fields>(Format::OF_FIELDS))
         .fails(NO_RESULT),
-        delete(CANCEL, "/v1/jobs/{id}/fields", (ID,), results::delete_fields)
+        delete(CANCEL, "/v1/jobs/{id}/fields", (ID,), delete_fields)
             .rpcs(&["DeleteFields"])
             .summary("Deletes mesh, displacements and stresses of a job that has ended, which are most of its data; summary, history and profiles remain")
             .answers(204, "Deleted", nothing())
@@ -125,4 +135,93 @@ impl Operation {
         }
         self
     }
+}
+
+async fn get_result(call: Call, id: JobId) -> Result<Response, ApiError> {
+    let found = results::result(&call.service, &call.caller, id).await?;
+    let (available, result, share) = (found.available, found.content, found.share);
+    let Some(share) = share else {
+        return Ok(marked(Json(result), available));
+    };
+    let written = call.service.work(move || serde_json::to_vec(&result));
+    let bytes = written.await?.map_err(ApiError::internal)?;
+    let json = [(CONTENT_TYPE, Format::Json.content_type())];
+    let answer = (json, Extension(HasShare), with_own_share(bytes, share));
+    Ok(marked(answer, available))
+}
+
+async fn list_iterations(
+    call: Call,
+    id: JobId,
+    format: Format,
+    max_points: Option<i64>,
+    part: Part,
+) -> Result<Response, ApiError> {
+    let found = rows::history(&call.service, &call.caller, id, max_points).await?;
+    let (available, rows, share) = (found.available, found.content, found.share);
+    let bytes = call.service.work(move || formats::history(&rows, format));
+    let bytes = bytes.await?.map_err(ApiError::internal)?;
+    let name = format!("{id}.history");
+    let Some(share) = share else {
+        return Ok(marked(data::whole(&part, format, name, bytes)?, available));
+    };
+    let whole = data::whole(&part, format, name, with_own_share(bytes, share))?;
+    Ok(marked((Extension(HasShare), whole), available))
+}
+
+async fn get_profile(
+    call: Call,
+    id: JobId,
+    boundary: String,
+    format: Format,
+    step: Option<String>,
+    points: Option<Points>,
+    part: Part,
+) -> Result<Response, ApiError> {
+    let Call {
+        service, caller, ..
+    } = &call;
+    let points = points.unwrap_or_default();
+    let profile = profiles::profile(service, caller, id, &boundary, step.as_deref(), points);
+    let found = profile.await?;
+    let (available, profile) = (found.available, found.content);
+    let bytes = service.work(move || formats::profile(&profile, format));
+    let bytes = bytes.await?.map_err(ApiError::internal)?;
+    let whole = data::whole(&part, format, format!("{id}.profile.{boundary}"), bytes)?;
+    Ok(marked(whole, available))
+}
+
+async fn delete_fields(call: Call, id: JobId) -> Result<StatusCode, ApiError> {
+    jobs::delete_fields(&call.service, &call.caller, id).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+async fn stream_result(
+    call: Call,
+    id: JobId,
+    format: Format,
+    part: Part,
+) -> Result<Response, ApiError> {
+    let Call {
+        service, caller, ..
+    } = &call;
+    let name = format!("{id}.fields");
+    if format != Format::Json {
+        let found = stored::converted_fields(service, caller, id, format).await?;
+        let whole = data::whole(&part, format, name, found.content)?;
+        return Ok(marked(whole, found.available));
+    }
+    // JSON may be large, and is sent in pieces
+    let found = stored::fields(service, caller, id).await?;
+    let (available, fields) = (found.available, found.content);
+    let file = data::File {
+        format,
+        name,
+        bytes: fields.info.bytes,
+        digest: fields.info.digest.clone(),
+    };
+    let answer = data::answer(&part, &file, |range| {
+        Body::from_stream(fields.bytes(service, range.start, range.end))
+    })?;
+    Ok(marked(answer, available))
 }

@@ -1,75 +1,92 @@
 //! The operations for checking a problem, the queue, errors, the description of the API, and the probes.
 
-use ::service::verbs::{
-    info::{Info, Me},
-    problems::Validation,
-    queue::QueueState,
+use axum::{
+    Json,
+    http::header,
+    response::{IntoResponse, Response},
 };
-use base::catalog::{Code, Kind, WarningKind};
+use base::{
+    catalog::{self, Code, Kind, WarningKind},
+    values::Words,
+};
+use schemars::JsonSchema;
+use serde::Serialize;
+use serde_json::Value;
+use service::{
+    error::ApiError,
+    parameters::Variable,
+    verbs::{
+        info::{self as about, Info, Me, OwnerUse},
+        metrics::metrics as all_metrics,
+        problems::{self, Validation},
+        queue::{self as verbs, QueueState},
+    },
+};
+use solver::solution::WarningCode;
 
 use super::{
     content::{bytes, json, submission},
     operation::{ADMIN, IDENTIFIED, OPEN, Operation, READ, SUBMIT, get, post, probe},
 };
 use crate::rest::{
-    bodies::BareProblem,
+    accept::prefers,
+    bodies::{self, BareProblem},
+    call::Call,
     docs::{self, FILE},
-    service::{self, CODE, WARNING},
-    submit,
 };
 
 pub(super) fn operations() -> Vec<Operation> {
     vec![
-        post(SUBMIT, "/v1/problems/validate", (), submit::validate)
+        post(SUBMIT, "/v1/problems/validate", (), validate_problem)
             .rpcs(&["ValidateProblem"])
             .summary("Checks a problem and estimates its cost; stores nothing; an invalid problem is also answered with 200")
             .body(json::<BareProblem>())
             .example(submission())
             .answers(200, "Whether it is valid, and its estimated cost", json::<Validation>())
             .fails(&[Code::InvalidProblem]),
-        get(READ, "/v1/queue", (), service::queue)
+        get(READ, "/v1/queue", (), get_queue)
             .rpcs(&["GetQueue"])
             .summary("Returns the state of the queue")
             .answers(200, "Its state", json::<QueueState>()),
-        post(ADMIN, "/v1/queue/pause", (), service::pause)
+        post(ADMIN, "/v1/queue/pause", (), pause_queue)
             .rpcs(&["PauseQueue"])
             .summary("Pauses the queue: no more jobs are started until it is resumed, also after a restart; running jobs continue")
             .answers(200, "The state of the queue", json::<QueueState>())
             .fails(&[Code::StorageFull]),
-        post(ADMIN, "/v1/queue/resume", (), service::resume)
+        post(ADMIN, "/v1/queue/resume", (), resume_queue)
             .rpcs(&["ResumeQueue"])
             .summary("Resumes the queue: jobs are started again")
             .answers(200, "The state of the queue", json::<QueueState>())
             .fails(&[Code::StorageFull]),
-        get(READ, "/v1/info", (), service::info)
+        get(READ, "/v1/info", (), get_server_info)
             .rpcs(&["GetServerInfo"])
             .summary("Returns the version and the limits of this service")
             .answers(200, "Version and limits", json::<Info>()),
-        get(IDENTIFIED, "/v1/me", (), service::me)
+        get(IDENTIFIED, "/v1/me", (), get_caller)
             .rpcs(&["GetCaller"])
             .summary("Returns the caller: their owner name, scopes, and limits")
             .answers(200, "The caller", json::<Me>()),
-        get(ADMIN, "/v1/owners", (), service::owners)
+        get(ADMIN, "/v1/owners", (), list_owners)
             .rpcs(&["ListOwners"])
             .summary("Returns the use of the service by every owner: stored jobs and bytes, queued and running jobs")
-            .answers(200, "The owners, those with the most stored bytes first", json::<service::Owners>()),
-        get(OPEN, "/v1/errors/{code}", (CODE,), service::error)
+            .answers(200, "The owners, those with the most stored bytes first", json::<Owners>()),
+        get(OPEN, "/v1/errors/{code}", (CODE,), get_error)
             .rest_only("GetError")
             .summary("Explains a kind of error and what to do, for programs or as a page")
             .answers(200, "The explanation", [json::<Kind>(), bytes("text/html")].concat()),
-        get(OPEN, "/v1/warnings/{code}", (WARNING,), service::warning)
+        get(OPEN, "/v1/warnings/{code}", (WARNING,), get_warning)
             .rest_only("GetWarning")
             .summary("Explains a warning of a result")
             .answers(200, "The explanation", json::<WarningKind>()),
-        get(READ, "/v1/schema/problem.json", (), service::schema)
+        get(READ, "/v1/schema/problem.json", (), get_problem_schema)
             .rest_only("GetProblemSchema")
             .summary("Returns the JSON Schema of a problem: every field with its meaning and default")
             .answers(200, "The schema", bytes("application/json")),
-        get(READ, "/openapi.json", (), service::openapi)
+        get(READ, "/openapi.json", (), get_openapi)
             .rest_only("GetOpenApi")
             .summary("Returns this description of the API over REST")
             .answers(200, "An OpenAPI document", bytes("application/json")),
-        get(READ, "/proto/signorini.proto", (), service::proto)
+        get(READ, "/proto/signorini.proto", (), get_proto)
             .rest_only("GetProto")
             .summary("Returns the description of the API over gRPC")
             .answers(200, "The protocol buffers", bytes("text/plain")),
@@ -81,15 +98,15 @@ pub(super) fn operations() -> Vec<Operation> {
             .rest_only("GetDocsFile")
             .summary("Returns a file that the page at /docs loads")
             .answers(200, "The file", PARTS.map(bytes).concat()),
-        get(READ, "/metrics", (), service::metrics)
+        get(READ, "/metrics", (), get_metrics)
             .rest_only("GetMetrics")
             .summary("Returns metrics for Prometheus: queue, jobs, solver, store, requests, memory, process")
             .answers(200, "The text format of OpenMetrics", bytes("application/openmetrics-text")),
-        probe("/livez", service::livez)
+        probe("/livez", live)
             .rest_only("Live")
             .summary("Answers as long as the process is alive")
             .answers(200, "ok", bytes("text/plain")),
-        probe("/readyz", service::readyz)
+        probe("/readyz", ready)
             .rest_only("Ready")
             .summary("Answers 200 while the service accepts jobs and can read them; the first line is ok or degraded")
             .answers(200, "ok; or degraded with the reason, such as a full disk or damaged records", bytes("text/plain"))
@@ -99,3 +116,151 @@ pub(super) fn operations() -> Vec<Operation> {
 
 /// The media types of the files of the page.
 const PARTS: [&str; 3] = ["text/css", "text/javascript", "text/plain"];
+
+async fn validate_problem(mut call: Call) -> Result<Json<Validation>, ApiError> {
+    let text = call.json().await?;
+    let problem = call
+        .service
+        .work(move || bodies::bare_problem(&text))
+        .await??;
+    let validation = problems::validate(&call.service, &call.caller, problem).await?;
+    Ok(Json(validation))
+}
+
+async fn get_queue(call: Call) -> Result<Json<QueueState>, ApiError> {
+    Ok(Json(verbs::state(&call.service, &call.caller)))
+}
+
+async fn pause_queue(call: Call) -> Result<Json<QueueState>, ApiError> {
+    Ok(Json(verbs::pause(&call.service, &call.caller).await?))
+}
+
+async fn resume_queue(call: Call) -> Result<Json<QueueState>, ApiError> {
+    Ok(Json(verbs::resume(&call.service, &call.caller).await?))
+}
+
+async fn get_server_info(call: Call) -> Result<Json<Info>, ApiError> {
+    Ok(Json(about::info(&call.service, &call.caller).await?))
+}
+
+async fn get_caller(call: Call) -> Result<Json<Me>, ApiError> {
+    Ok(Json(about::me(&call.service, &call.caller).await?))
+}
+
+/// The owners and their use of the service.
+#[derive(Serialize, JsonSchema)]
+struct Owners {
+    /// The owners, those with the most stored bytes first.
+    owners: Vec<OwnerUse>,
+}
+
+async fn list_owners(call: Call) -> Result<Json<Owners>, ApiError> {
+    let owners = about::owners(&call.service, &call.caller).await?;
+    Ok(Json(Owners { owners }))
+}
+
+/// A kind of error in a path.
+const CODE: Variable<Words<Code>> = Variable {
+    name: "code",
+    kind: "error",
+    meaning: "The kind of error",
+    values: Words::all(),
+};
+
+/// The explanation of a kind of error: as JSON for programs, or as a page for people.
+async fn get_error(call: Call, code: Code) -> Result<Response, ApiError> {
+    let kind = code.kind();
+    let vary = [(header::VARY, "Accept")];
+    if prefers(&call.headers, &["text/html"]) {
+        let html = [
+            (header::CONTENT_TYPE, "text/html; charset=utf-8"),
+            (
+                header::CONTENT_SECURITY_POLICY,
+                "default-src 'none'; style-src 'unsafe-inline'",
+            ),
+        ];
+        return Ok((vary, html, page(&kind)).into_response());
+    }
+    Ok((vary, Json(kind)).into_response())
+}
+
+/// The explanation as a page. Its texts are constants without any character that HTML would interpret.
+fn page(kind: &Kind) -> String {
+    let Kind {
+        code,
+        title,
+        explanation,
+        ..
+    } = kind;
+    let facts: String = kind
+        .facts()
+        .iter()
+        .map(|fact| format!("<p>{fact}</p>"))
+        .collect();
+    format!(
+        "<!doctype html><html lang=en><meta charset=utf-8><meta name=viewport content=\"width=device-width\">\
+         <title>{code} – Signorini</title>\
+         <style>body{{font:1rem/1.5 system-ui,sans-serif;max-width:40rem;margin:3rem auto;padding:0 1rem}}\
+         code{{font-size:1.1em}}</style>\
+         <h1>{title}</h1><p><code>{code}</code></p>{facts}<p>{explanation}</p></html>\n"
+    )
+}
+
+/// A warning in a path.
+const WARNING: Variable<Words<WarningCode>> = Variable {
+    name: "code",
+    kind: "warning",
+    meaning: "The code of a warning",
+    values: Words::all(),
+};
+
+/// The explanation of a warning.
+async fn get_warning(_: Call, code: WarningCode) -> Result<Json<WarningKind>, ApiError> {
+    Ok(Json(catalog::warning(code)))
+}
+
+/// Returns the JSON Schema of a problem.
+async fn get_problem_schema(_: Call) -> Result<Json<Value>, ApiError> {
+    Ok(Json(files::schema()))
+}
+
+/// Returns the description of the API over REST.
+async fn get_openapi(call: Call) -> Result<Json<&'static Value>, ApiError> {
+    Ok(Json((call.openapi)()))
+}
+
+/// Returns the description of the API over gRPC.
+async fn get_proto(_: Call) -> Result<impl IntoResponse, ApiError> {
+    const TEXT: &str = include_str!("../../../../../proto/signorini/v1/signorini.proto");
+    Ok(([(header::CONTENT_TYPE, "text/plain; charset=utf-8")], TEXT))
+}
+
+/// Returns metrics in the text format of OpenMetrics, which Prometheus and others read whatever format they request.
+async fn get_metrics(call: Call) -> Result<impl IntoResponse, ApiError> {
+    let text = all_metrics(&call.service, &call.caller).await?;
+    Ok(([(header::CONTENT_TYPE, OPENMETRICS)], text))
+}
+
+/// The media type of metrics.
+const OPENMETRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+
+/// Answers that the process is alive.
+async fn live(_: Call) -> Result<&'static str, ApiError> {
+    Ok("ok\n")
+}
+
+/// Answers whether the service works; further lines say what does not. A damaged record is not an error here, since a
+/// proxy would then send no more requests, not even for intact records.
+async fn ready(call: Call) -> Result<String, ApiError> {
+    let health = call.service.health().await?;
+    let mut text = String::from(if health.is_whole() {
+        "ok\n"
+    } else {
+        "degraded\n"
+    });
+    for line in health.lines() {
+        text.push_str(&line);
+        text.push('\n');
+    }
+    Ok(text)
+}

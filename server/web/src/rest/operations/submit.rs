@@ -1,5 +1,4 @@
-//! The operations `POST /v1/jobs`, `PUT /v1/jobs/{id}`, `POST /v1/jobs/batch` and `…/{id}/retry`;
-//! `/v1/problems/validate`.
+//! The operations that submit jobs.
 
 use axum::{
     Json,
@@ -8,6 +7,8 @@ use axum::{
 };
 use base::{
     address::link,
+    catalog::Code,
+    event::Event,
     job::{Job, JobId},
 };
 use schemars::JsonSchema;
@@ -15,8 +16,8 @@ use serde::Serialize;
 use service::{
     error::ApiError,
     verbs::{
-        key::Key,
-        problems::{self, Validation},
+        jobs::ID,
+        key::{IDEMPOTENCY_KEY, Key, Keys},
         retry::{self, Changes},
         submit::{self as verbs, Submitted},
         watch::{self, Until},
@@ -24,16 +25,94 @@ use service::{
 };
 
 use super::{
-    bodies::{self, bare_problem, submission},
+    content::{json, lines, stream, submission},
+    headers::{etag, location, preference_applied, replayed, retry_after},
+    jobs::{job_response, tag},
+    operation::{Operation, SUBMIT, post, put},
+};
+use crate::rest::{
+    bodies::{self, Retry, Submission, Submissions},
     call::Call,
     events,
-    jobs::{job_response, tag},
+    headers::{Header, PREFER},
 };
+
+/// The header that makes a request safe to repeat.
+pub(super) const KEY: Header<Keys> = Header(IDEMPOTENCY_KEY);
+
+pub(super) fn operations() -> Vec<Operation> {
+    vec![
+        post(SUBMIT, "/v1/jobs", (KEY, PREFER), create_job)
+            .rpcs(&["CreateJob", "SubmitAndWatch"])
+            .summary("Submits a job; when the answer is sent, the job is stored on disk")
+            .body(json::<Submission>())
+            .example(submission())
+            .submits(),
+        put(SUBMIT, "/v1/jobs/{id}", (ID, KEY, PREFER), put_job)
+            .rpcs(&["CreateJob"])
+            .named("PutJob")
+            .summary("Submits a job under an id chosen by the client; repeating the request changes nothing")
+            .body(json::<Submission>())
+            .example(submission())
+            .answers(200, "The job with this id, submitted before with the same content", json::<Job>())
+            .with([location(), etag()])
+            .sometimes_with(replayed())
+            .submits()
+            .fails(&[Code::IdConflict]),
+        post(SUBMIT, "/v1/jobs/batch", (KEY,), batch_create_jobs)
+            .rpcs(&["BatchCreateJobs"])
+            .summary("Submits up to 1000 jobs, all or none of them")
+            .body(json::<Submissions>())
+            .answers(202, "The accepted jobs, in their order", json::<Batch>())
+            .with([retry_after()])
+            .sometimes_with(replayed())
+            .fails(SUBMITTING),
+        post(SUBMIT, "/v1/jobs/{id}/retry", (ID, KEY, PREFER), retry_job)
+            .rpcs(&["RetryJob"])
+            .summary("Submits the problem of an ended job again as a new job, with the old one as its parent, and without the cache; a body changes its limits and priority")
+            .optional_body(json::<Retry>())
+            .submits()
+            .fails(&[Code::JobActive]),
+    ]
+}
+
+/// The reasons for which a submission may be refused.
+pub(super) const SUBMITTING: &[Code] = &[
+    Code::InvalidProblem,
+    Code::ProblemTooLarge,
+    Code::IdempotencyKeyReuse,
+    Code::Deleted, // the key or id of a deleted job
+    Code::QuotaExceeded,
+    Code::Forbidden, // a priority above 0
+    Code::QueueFull,
+    Code::Draining,
+    Code::StorageFull,
+];
+
+impl Operation {
+    /// Adds the answers with the submitted job: when it has ended, at once, or with its events.
+    pub(super) fn submits(self) -> Self {
+        let accepted = [json::<Job>(), stream::<Event>(), lines()].concat();
+        self.answers(201, "The job, which has ended within the wait", json::<Job>())
+            .with([location(), etag(), preference_applied()])
+            .sometimes_with(replayed())
+            .answers(
+                202,
+                "The accepted job; with Accept: text/event-stream or application/jsonl its events, as from /events",
+                accepted,
+            )
+            .with([location()])
+            .sometimes_with(etag())
+            .sometimes_with(retry_after())
+            .sometimes_with(replayed())
+            .fails(SUBMITTING)
+    }
+}
 
 /// Seconds after which to poll a job that was accepted.
 const POLL_AFTER_S: u64 = 1;
 
-pub(super) async fn create(
+async fn create_job(
     call: Call,
     key: Option<Key>,
     wait_s: Option<u64>,
@@ -41,7 +120,7 @@ pub(super) async fn create(
     submit(call, None, key, wait_s).await
 }
 
-pub(super) async fn put(
+async fn put_job(
     call: Call,
     id: JobId,
     key: Option<Key>,
@@ -58,14 +137,14 @@ async fn submit(
 ) -> Result<Response, ApiError> {
     call.service.accepting()?;
     let text = call.json().await?;
-    let read = Box::new(move || submission(&text));
+    let read = Box::new(move || bodies::submission(&text));
     let submitted = verbs::create(&call.service, &call.caller, read, id, key).await?;
     // the job is stored: waiting for its end takes no memory
     call.received.release();
     answer(call, submitted, wait_s, id.is_some()).await
 }
 
-pub(super) async fn retry(
+async fn retry_job(
     mut call: Call,
     id: JobId,
     key: Option<Key>,
@@ -99,7 +178,7 @@ pub(super) async fn answer(
     {
         let mut response = events::write(events, encoding);
         *response.status_mut() = StatusCode::ACCEPTED;
-        set(&mut response, header::LOCATION, location(&job));
+        set(&mut response, header::LOCATION, address_of(&job));
         set(&mut response, header::ETAG, tag(&job));
         note_replay(&mut response, replayed);
         return Ok(response);
@@ -115,7 +194,7 @@ pub(super) async fn answer(
         (false, false) => StatusCode::ACCEPTED,
     };
     let mut response = (status, job_response(&job)).into_response();
-    set(&mut response, header::LOCATION, location(&job));
+    set(&mut response, header::LOCATION, address_of(&job));
     note_replay(&mut response, replayed);
     match wait_s {
         Some(wait_s) if done => {
@@ -130,7 +209,7 @@ pub(super) async fn answer(
     Ok(response)
 }
 
-fn location(job: &Job) -> String {
+fn address_of(job: &Job) -> String {
     link(&format!("/v1/jobs/{}", job.id))
 }
 
@@ -149,11 +228,11 @@ fn set(response: &mut Response, name: HeaderName, value: String) {
 
 /// Jobs that were accepted together.
 #[derive(Serialize, JsonSchema)]
-pub(super) struct Batch {
+struct Batch {
     jobs: Vec<Job>,
 }
 
-pub(super) async fn create_batch(mut call: Call, key: Option<Key>) -> Result<Response, ApiError> {
+async fn batch_create_jobs(mut call: Call, key: Option<Key>) -> Result<Response, ApiError> {
     call.service.accepting()?;
     let text = call.json().await?;
     let requests = call.service.work(move || bodies::batch(&text)).await??;
@@ -165,11 +244,4 @@ pub(super) async fn create_batch(mut call: Call, key: Option<Key>) -> Result<Res
     set(&mut response, header::RETRY_AFTER, POLL_AFTER_S.to_string());
     note_replay(&mut response, submitted.replayed);
     Ok(response)
-}
-
-pub(super) async fn validate(mut call: Call) -> Result<Json<Validation>, ApiError> {
-    let text = call.json().await?;
-    let problem = call.service.work(move || bare_problem(&text)).await??;
-    let validation = problems::validate(&call.service, &call.caller, problem).await?;
-    Ok(Json(validation))
 }
