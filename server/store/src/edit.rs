@@ -41,35 +41,32 @@ impl Edit {
 }
 
 impl Store {
-    /// Edits a job, if it has one of these versions or none are given. `Err` holds the version that it has
-    /// instead; `None`: there is no such job.
-    pub async fn edit(
+    /// Edits a job: `edit` decides from the job as it is, or refuses. `None`: there is no such job.
+    pub async fn edit<E: Send + 'static>(
         self: &Arc<Self>,
         owners: Owners,
         id: JobId,
-        edit: &Edit,
-        versions: Option<&[i64]>,
-    ) -> Result<Option<std::result::Result<Job, i64>>> {
-        let (edit, versions) = (edit.clone(), versions.map(<[i64]>::to_vec));
-        self.control(move |writer| try_to_edit(writer, &owners, id, &edit, versions.as_deref()))
+        edit: impl Fn(&Job) -> std::result::Result<Edit, E> + Send + 'static,
+    ) -> Result<Option<std::result::Result<Job, E>>> {
+        self.control(move |writer| try_to_edit(writer, &owners, id, &edit))
             .await
     }
 }
 
-fn try_to_edit(
+fn try_to_edit<E>(
     writer: &Writer<'_>,
     owners: &Owners,
     id: JobId,
-    edit: &Edit,
-    versions: Option<&[i64]>,
-) -> Result<Option<std::result::Result<Job, i64>>> {
+    edit: impl Fn(&Job) -> std::result::Result<Edit, E>,
+) -> Result<Option<std::result::Result<Job, E>>> {
     let mut change = writer.control_change()?;
     let Some(job) = with_id(change.sql()?, owners, id)? else {
         return Ok(None);
     };
-    if versions.is_some_and(|versions| !versions.contains(&job.version)) {
-        return Ok(Some(Err(job.version)));
-    }
+    let edit = match edit(&job) {
+        Ok(edit) => edit,
+        Err(refused) => return Ok(Some(Err(refused))),
+    };
     let key = job.key;
     let edited = change.set(key, |row| edit.apply(&mut row.job))?;
     if edited.labels != job.labels {

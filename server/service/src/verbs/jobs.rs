@@ -92,33 +92,27 @@ pub fn update<'a>(
     versions: Option<Vec<i64>>,
 ) -> BoxFuture<'a, Result<Job, ApiError>> {
     Box::pin(async move {
-        if labels.is_empty() {
-            return replace(service, caller, id, edit, versions).await;
-        }
         // before the job is looked at: a condition is judged only if the request is valid (RFC 9110, 13.2.1)
+        let mut violations = edit_violations(&edit);
         let set = labels.iter();
         let set = set.filter_map(|(name, value)| Some((name.clone(), value.clone()?)));
-        let labels_alone = Edit {
-            labels: Some(set.collect()),
-            ..edit.clone()
-        };
-        let mut violations = edit_violations(&labels_alone);
+        violations.extend(envelope::label_violations(&set.collect()));
         violations.extend(envelope::label_changes_violation(labels.len()));
         violations
             .into_result(())
             .map_err(ApiError::InvalidProblem)?;
-        // Changed on what there is, which must not change meanwhile; a job changes its version a few times in its life.
-        const MOST_TRIES: u32 = 10;
-        let mut tries = 0;
-        loop {
-            let job = get(service, caller, id).await?;
-            if versions
-                .as_ref()
-                .is_some_and(|known| !known.contains(&job.version))
-            {
-                return Err(ApiError::StaleVersion(job.version));
+        let by = caller.clone();
+        let decide = move |job: &Job| {
+            let raised = edit.priority.filter(|priority| *priority != job.priority);
+            may_have_priorities(&by, raised.into_iter())?;
+            match &versions {
+                Some(known) if !known.contains(&job.version) => {
+                    return Err(ApiError::StaleVersion(job.version));
+                }
+                _ if labels.is_empty() => return Ok(edit.clone()),
+                _ => {}
             }
-            let mut all = job.labels;
+            let mut all = job.labels.clone();
             for (name, value) in &labels {
                 match value {
                     Some(text) => drop(all.insert(name.clone(), text.clone())),
@@ -129,12 +123,11 @@ pub fn update<'a>(
                 labels: Some(all),
                 ..edit.clone()
             };
-            tries += 1;
-            match replace(service, caller, id, edit, Some(vec![job.version])).await {
-                Err(ApiError::StaleVersion(_)) if versions.is_none() && tries < MOST_TRIES => {}
-                other => return other,
-            }
-        }
+            edit_violations(&edit)
+                .into_result(edit)
+                .map_err(ApiError::InvalidProblem)
+        };
+        change(service, caller, id, decide).await
     })
 }
 
@@ -150,30 +143,25 @@ fn edit_violations(edit: &Edit) -> Findings {
     violations
 }
 
-async fn replace(
+/// Changes the editable fields of a job: `edit` decides from the job as it is, or refuses.
+async fn change(
     service: &Arc<Service>,
     caller: &Caller,
     id: JobId,
-    edit: Edit,
-    versions: Option<Vec<i64>>,
+    edit: impl Fn(&Job) -> Result<Edit, ApiError> + Send + 'static,
 ) -> Result<Job, ApiError> {
-    edit_violations(&edit)
-        .into_result(())
-        .map_err(ApiError::InvalidProblem)?;
-    if let Some(priority) = edit.priority.filter(|priority| *priority > 0)
-        && get(service, caller, id).await?.priority != priority
-    {
-        may_have_priorities(caller, [priority].into_iter())?;
-    }
     let (service, caller) = (service.clone(), caller.clone());
     detached(async move {
-        let (owners, versions) = (caller.visible_owners(), versions.as_deref());
-        match service.store.edit(owners, id, &edit, versions).await? {
-            Some(Ok(job)) => {
+        match service
+            .store
+            .edit(caller.visible_owners(), id, edit)
+            .await?
+        {
+            Some(edited) => {
+                let job = edited?;
                 service.queue.announce(&[job.key]);
                 Ok(job)
             }
-            Some(Err(version)) => Err(ApiError::StaleVersion(version)),
             None => Err(not_found(&service, &caller, id).await?),
         }
     })
@@ -264,5 +252,57 @@ async fn answer(
         Deletion::Deleted => Ok(()),
         Deletion::Active => Err(ApiError::JobActive(job.status)),
         Deletion::Unknown => Err(not_found(service, caller, job.id).await?),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use futures_util::future::try_join_all;
+
+    use super::*;
+    use crate::verbs::tests::{caller, service, waiting};
+
+    #[tokio::test]
+    async fn labels_that_are_set_at_the_same_time_are_all_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let (service, ada) = (service(folder.path()).await, caller("ada"));
+        let id = waiting(&service, &ada).await;
+        let names: Vec<String> = (0..30).map(|n| n.to_string()).collect();
+        let set = |name: &String| {
+            let change = LabelChanges::from([(name.clone(), Some("x".to_owned()))]);
+            update(&service, &ada, id, Edit::default(), change, None)
+        };
+        try_join_all(names.iter().map(set)).await.unwrap();
+        let job = get(&service, &ada, id).await.unwrap();
+        assert!(names.iter().all(|name| job.labels.contains_key(name)));
+        assert_eq!((job.labels.len(), job.version), (30, 31));
+    }
+
+    /// The priority is compared with that of the job as it is: to leave a high one as it is needs no right.
+    #[tokio::test]
+    async fn an_edit_that_is_refused_changes_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let (service, ada) = (service(folder.path()).await, caller("ada"));
+        let id = waiting(&service, &ada).await;
+        let edit = |priority| Edit {
+            name: Some(Some("new".into())),
+            priority: Some(priority),
+            ..Edit::default()
+        };
+        let none = LabelChanges::new;
+        let raised = update(&service, &ada, id, edit(3), none(), None).await;
+        assert!(matches!(raised, Err(ApiError::Forbidden(_))));
+        let stale = update(&service, &ada, id, edit(0), none(), Some(vec![7])).await;
+        assert!(matches!(stale, Err(ApiError::StaleVersion(1))));
+        let full = (0..65).map(|n| (n.to_string(), Some(String::new())));
+        let full = update(&service, &ada, id, edit(0), full.collect(), None).await;
+        assert!(matches!(full, Err(ApiError::InvalidProblem(_))));
+        let job = get(&service, &ada, id).await.unwrap();
+        assert_eq!((job.name, job.version), (None, 1));
+        let admin = update(&service, &Caller::local(), id, edit(3), none(), None).await;
+        assert_eq!(admin.unwrap().priority, 3);
+        let kept = update(&service, &ada, id, edit(3), none(), Some(vec![2])).await;
+        assert_eq!(kept.unwrap().version, 2);
     }
 }

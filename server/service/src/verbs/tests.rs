@@ -91,6 +91,11 @@ async fn create(service: &Arc<Service>, caller: &Caller, id: Option<JobId>) -> J
     submitted.unwrap().accepted
 }
 
+/// A job that waits, since the queue was not started.
+pub(super) async fn waiting(service: &Arc<Service>, caller: &Caller) -> JobId {
+    create(service, caller, None).await.id
+}
+
 /// Starts the queue, which solves a job.
 pub(super) async fn solved(service: &Arc<Service>, caller: &Caller) -> JobId {
     service.queue.start();

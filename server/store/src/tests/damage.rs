@@ -218,7 +218,9 @@ async fn a_job_without_a_checksum_is_damaged_and_stays_so() {
         pinned: Some(true),
         ..Edit::default()
     };
-    let edited = store.edit(Owners::All, jobs[1].id, &edit, None).await;
+    let edited = store
+        .edit(Owners::All, jobs[1].id, move |_| Ok::<_, ()>(edit.clone()))
+        .await;
     assert!(edited.is_err_and(|told| damaged(&told)));
     let canceled = store.request_cancel(2).await;
     assert!(canceled.is_err_and(|told| damaged(&told)));

@@ -273,18 +273,21 @@ async fn a_job_of_another_owner_cannot_be_changed_or_deleted() {
         ada,
         bob,
     } = two_owners().await;
-    let edit = Edit {
-        pinned: Some(true),
-        ..Edit::default()
+    let edit = |_: &Job| {
+        let pinned = Some(true);
+        Ok::<_, ()>(Edit {
+            pinned,
+            ..Edit::default()
+        })
     };
     assert!(
         store
-            .edit(only("bob"), ada.id, &edit, None)
+            .edit(only("bob"), ada.id, edit)
             .await
             .unwrap()
             .is_none()
     );
-    let edited = store.edit(only("ada"), ada.id, &edit, None).await.unwrap();
+    let edited = store.edit(only("ada"), ada.id, edit).await.unwrap();
     let edited = edited.unwrap().unwrap();
     assert!(
         edited.pinned && edited.version == ada.version + 1,
@@ -292,7 +295,7 @@ async fn a_job_of_another_owner_cannot_be_changed_or_deleted() {
     );
     assert!(
         store
-            .edit(Owners::All, bob.id, &edit, None)
+            .edit(Owners::All, bob.id, edit)
             .await
             .unwrap()
             .is_some()

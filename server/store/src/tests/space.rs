@@ -89,7 +89,10 @@ async fn pin(store: &Arc<Store>, key: i64) {
     };
     let all = jobs(store).await;
     let job = all.iter().find(|job| job.key == key).unwrap();
-    store.edit(Owners::All, job.id, &edit, None).await.unwrap();
+    store
+        .edit(Owners::All, job.id, move |_| Ok::<_, ()>(edit.clone()))
+        .await
+        .unwrap();
 }
 
 fn small_mesh() -> base::mesh::MeshInfo {

@@ -116,7 +116,7 @@ impl Rig {
         };
         let edited = self
             .store
-            .edit(Owners::All, job.id, &edit, None)
+            .edit(Owners::All, job.id, move |_| Ok::<_, ()>(edit.clone()))
             .await
             .unwrap();
         edited.unwrap().unwrap()

@@ -100,7 +100,7 @@ async fn positions_are_those_in_which_jobs_start() {
         ..Edit::default()
     };
     rig.store
-        .edit(Owners::All, moved[1].id, &edit, None)
+        .edit(Owners::All, moved[1].id, move |_| Ok::<_, ()>(edit.clone()))
         .await
         .unwrap();
     rig.queue.cancel(moved[2].key).await.unwrap();

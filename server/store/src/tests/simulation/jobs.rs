@@ -82,7 +82,10 @@ impl World {
             ..Edit::default()
         };
         let id = self.jobs[&key].id;
-        let edited = self.store.edit(Owners::All, id, &edit, None).await?;
+        let edited = self
+            .store
+            .edit(Owners::All, id, move |_| Ok::<_, ()>(edit.clone()))
+            .await?;
         assert_eq!(edited.is_some(), self.is_there_with_id(id));
         if let Some(edited) = edited {
             let edited = edited.unwrap();
