@@ -155,7 +155,7 @@ fn run_steps<'a>(
         // a stopped solution is reported too, if that is little work
         let _ = observe(Progress::Phase(Phase::Recover));
         load_history.system.threads = body.threads(observe);
-        let reported = report(model, body, &load_history.system, &finished, observe)?;
+        let reported = report(&load_history.system, &finished, observe)?;
         let outcome = reported.summary.outcome;
         let last = number + 1 == steps.len() || !can_continue(outcome);
         let assessed = last && !model.contacts.is_empty();
@@ -336,7 +336,7 @@ pub fn run_to_numbers(
     if finished.outcome == Outcome::Canceled {
         return Err(SolveError::Stopped);
     }
-    let (contacts, warnings) = algorithm::numbers(model, &load_history.system, &finished, observe)?;
+    let (contacts, warnings) = algorithm::numbers(&load_history.system, &finished, observe)?;
     let others_begin = finished.outcome == Outcome::Converged && model.steps.is_empty();
     let left = others_begin.then(|| End {
         finished: Finished {
@@ -404,7 +404,7 @@ pub fn run_to_compare(
             match load_history.follow(&steps_of(model), observe) {
                 Some(finished) if finished.outcome != Outcome::Canceled => {
                     load_history.system.threads = body.threads(observe);
-                    let reported = report(model, body, &load_history.system, &finished, observe)?;
+                    let reported = report(&load_history.system, &finished, observe)?;
                     Ok((reported, load_history))
                 }
                 _ => Err(SolveError::Stopped),
@@ -536,8 +536,7 @@ impl<'a> LoadHistory<'a> {
         let Some(finished) = finished.filter(|end| end.outcome != Outcome::Canceled) else {
             return Err(SolveError::Stopped);
         };
-        let (contacts, warnings) =
-            algorithm::numbers(self.model, &self.system, &finished, observe)?;
+        let (contacts, warnings) = algorithm::numbers(&self.system, &finished, observe)?;
         Ok(Numbers {
             finished,
             contacts,

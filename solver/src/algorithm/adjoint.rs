@@ -169,7 +169,7 @@ mod tests {
         let finished = run(system, controls, Place::default(), None, quiet);
         // small forces that are none of the model's loads are missing in the balance of the result
         assert_eq!(finished.outcome, crate::solution::Outcome::Converged);
-        let reported = report(system.model, system.body, system, &finished, quiet).unwrap();
+        let reported = report(system, &finished, quiet).unwrap();
         (finished.state, reported.quantities)
     }
 
