@@ -166,7 +166,7 @@ fn run_steps<'a>(
         let accuracy = assessed.then(|| {
             let (system, mut origins) = (&load_history.system, origins.take());
             if let Some(origins) = origins.as_deref_mut() {
-                let places = reported.missed.iter();
+                let places = reported.along.missed.iter();
                 places.for_each(|place| origins.add_place(model, place.patch, place.s));
             }
             let increments = model.depends_on_path().then(|| {
@@ -198,18 +198,18 @@ fn run_steps<'a>(
                 ..summary.clone()
             },
             history: rows,
-            profiles: reported.profiles.clone(),
-            node_profiles: reported.node_profiles.clone(),
-            friction_profiles: reported.friction_profiles.clone(),
+            profiles: reported.along.profiles.clone(),
+            node_profiles: reported.along.node_profiles.clone(),
+            friction_profiles: reported.along.friction_profiles.clone(),
         });
         summary.iterations = history.len() as u32;
         fields = reported.fields;
         so_far = Some(Solution {
             summary,
             history,
-            profiles: reported.profiles,
-            node_profiles: reported.node_profiles,
-            friction_profiles: reported.friction_profiles,
+            profiles: reported.along.profiles,
+            node_profiles: reported.along.node_profiles,
+            friction_profiles: reported.along.friction_profiles,
             steps: ends,
             fields: Fields::default(),
         });

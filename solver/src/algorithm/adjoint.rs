@@ -170,7 +170,7 @@ mod tests {
         // small forces that are none of the model's loads are missing in the balance of the result
         assert_eq!(finished.outcome, crate::solution::Outcome::Converged);
         let reported = report(system, &finished, quiet).unwrap();
-        (finished.state, reported.quantities)
+        (finished.state, reported.along.quantities)
     }
 
     /// The predicted change z · δf̂ of each quantity under small forces on the contact equals the change found by

@@ -40,14 +40,23 @@ const SLOW_CONTRACTION: f64 = 0.9;
 pub struct Reported {
     /// Scalars, extents and warnings.
     pub summary: Summary,
+    /// The results along the contacts.
+    pub along: AlongContacts,
+    /// Displacements and stresses.
+    pub fields: Fields,
+    /// The difference between recovered stresses and those of the elements.
+    pub difference: StressDifference,
+}
+
+/// The results along the contacts.
+#[derive(Default)]
+pub struct AlongContacts {
     /// Columns along each contact boundary, by its name, at all points.
     pub profiles: BTreeMap<String, ContactProfile>,
     /// Columns at the nodes, by contact boundary.
     pub node_profiles: BTreeMap<String, ContactProfile>,
     /// Columns at the points where friction acts, by contact boundary.
     pub friction_profiles: BTreeMap<String, ContactProfile>,
-    /// Displacements and stresses.
-    pub fields: Fields,
     /// The quantities for which an error is stated.
     pub quantities: Vec<Quantity>,
     /// Places between the nodes at which the obstacle reaches into the body, of all contacts: where a mesh needs nodes.
@@ -55,8 +64,9 @@ pub struct Reported {
     /// The displaced obstacles compared with the linear ones, at all contact nodes, where obstacles were pushed along a
     /// direction.
     pub displaced: Vec<DisplacedNode>,
-    /// The difference between recovered stresses and those of the elements.
-    pub difference: StressDifference,
+    summaries: BTreeMap<String, ContactSummary>,
+    /// [`Fields::contact_state`].
+    states: Vec<i8>,
 }
 
 /// The results of a final state that need no displacements inside the body: numbers by contact, and warnings.
@@ -171,30 +181,11 @@ impl<'a> FinalState<'a> {
     }
 }
 
-/// The results along the contacts.
-struct AlongContacts {
-    summaries: BTreeMap<String, ContactSummary>,
-    profiles: BTreeMap<String, ContactProfile>,
-    node_profiles: BTreeMap<String, ContactProfile>,
-    friction_profiles: BTreeMap<String, ContactProfile>,
-    quantities: Vec<Quantity>,
-    missed: Vec<Missed>,
-    displaced: Vec<DisplacedNode>,
-    /// [`Fields::contact_state`].
-    states: Vec<i8>,
-}
-
 impl AlongContacts {
     fn new(state: &FinalState<'_>, warnings: &mut Vec<Warning>) -> Result<Self, Stopped> {
         let mut along = AlongContacts {
-            summaries: BTreeMap::new(),
-            profiles: BTreeMap::new(),
-            node_profiles: BTreeMap::new(),
-            friction_profiles: BTreeMap::new(),
-            quantities: Vec::new(),
-            missed: Vec::new(),
-            displaced: Vec::new(),
             states: vec![-1; state.system.model.mesh.nodes.len()],
+            ..AlongContacts::default()
         };
         state.view(|patch, view| along.add(patch, view, warnings))?;
         Ok(along)
@@ -246,7 +237,7 @@ pub fn report(
     let state = FinalState::new(system, finished, &mut ask);
     let (inside, difference) = Inside::new(&state)?;
     let mut warnings = system.model.warnings.clone();
-    let along = AlongContacts::new(&state, &mut warnings)?;
+    let mut along = AlongContacts::new(&state, &mut warnings)?;
     let slides = state.warn(&mut warnings);
     if finished.slide.is_none() {
         warnings.extend(large_strain(
@@ -257,21 +248,17 @@ pub fn report(
             slides,
         ));
     }
-    let summary = inside.summary(&state, along.summaries, warnings);
+    let summary = inside.summary(&state, std::mem::take(&mut along.summaries), warnings);
     if !inside.is_finite(&summary) {
         return Err(SolveError::NonFinite {
             phase: Phase::Recover,
         });
     }
+    let fields = inside.fields(system.model, std::mem::take(&mut along.states));
     Ok(Reported {
         summary,
-        profiles: along.profiles,
-        node_profiles: along.node_profiles,
-        friction_profiles: along.friction_profiles,
-        fields: inside.fields(system.model, along.states),
-        quantities: along.quantities,
-        missed: along.missed,
-        displaced: along.displaced,
+        along,
+        fields,
         difference,
     })
 }

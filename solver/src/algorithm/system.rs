@@ -106,6 +106,16 @@ pub struct Oblique {
     pub shared: bool,
 }
 
+impl Oblique {
+    /// Of a node that follows another contact: slip is continued to it, as to a common end that both touch.
+    const OF_FOLLOWING: Self = Oblique {
+        other: Dof::Fixed(0.0),
+        part: [0.0; 2],
+        symmetric: false,
+        shared: true,
+    };
+}
+
 /// The point of the load path that increments have reached.
 pub struct Path {
     /// The anchor g of every friction point.
@@ -284,38 +294,24 @@ impl<'a> System<'a> {
         self.nodes.reserve(count);
         for i in 0..count {
             let [normal, tangent] = body.contact_dofs[first + i];
-            if let Some(node) = following(model, contact, i, [normal, tangent]) {
-                self.nodes.push(node);
-                continue;
-            }
-            let oblique = body.tangents[first + i].map(|part| {
-                let node = boundary.nodes[i];
-                let with_it = |contact: &&ContactModel| contact.boundary.nodes.contains(&node);
-                let shared = model.contacts.iter().filter(with_it).count() > 1;
-                let held = matches!(tangent, Dof::Fixed(value) if value == 0.0);
-                Oblique {
-                    other: tangent,
-                    part,
-                    symmetric: held
-                        && !shared
-                        && contact.held_along_surface(i, &model.oblique[&node]),
-                    shared,
-                }
-            });
+            let follows = follows(model, contact, i, [normal, tangent]);
+            let oblique = match (&follows, body.tangents[first + i]) {
+                (Some(_), _) => Some(Oblique::OF_FOLLOWING),
+                (None, part) => part.map(|part| oblique(model, contact, i, tangent, part)),
+            };
+            let held = Dof::Fixed(0.0);
+            let is_own = follows.is_none();
             self.nodes.push(ContactNode {
-                normal,
-                tangent: match oblique {
-                    None => tangent,
-                    Some(_) => Dof::Fixed(0.0),
-                },
+                normal: if is_own { normal } else { held },
+                tangent: if oblique.is_none() { tangent } else { held },
                 oblique,
-                follows: None,
+                follows,
                 gap: 0.0,
-                bonded: contact.condition == Condition::Bonded,
+                bonded: is_own && contact.condition == Condition::Bonded,
                 drag: 0.0,
                 held_tangent: None,
                 weight: boundary.weights[i],
-                on_axis: model.axis.holds(boundary.positions[i]),
+                on_axis: is_own && model.axis.holds(boundary.positions[i]),
                 beside_axis: None,
             });
         }
@@ -774,46 +770,36 @@ impl<'a> System<'a> {
     }
 }
 
-/// A contact node that belongs to another contact alone. `dofs`: the displacements along the normal and the tangent
-/// of that one.
-fn following(
-    model: &Model,
-    contact: &ContactModel,
-    i: usize,
-    dofs: [Dof; 2],
-) -> Option<ContactNode> {
+/// How a contact node follows another contact, if it belongs to that one alone. `dofs`: the displacements along the
+/// normal and the tangent of that one.
+fn follows(model: &Model, contact: &ContactModel, i: usize, dofs: [Dof; 2]) -> Option<Follows> {
     let node = contact.boundary.nodes[i];
-    let owner = &model.contacts[*model.alone.get(&node)?].boundary;
-    let there = owner.nodes.iter().position(|n| *n == node)?;
-    if model.contacts[model.alone[&node]].name == contact.name {
+    let owner = &model.contacts[*model.alone.get(&node)?];
+    let there = owner.boundary.nodes.iter().position(|n| *n == node)?;
+    if owner.name == contact.name {
         return None;
     }
-    let axes = [owner.normals[there], owner.tangent(there)];
+    let axes = [owner.boundary.normals[there], owner.boundary.tangent(there)];
     let by_axes = |[x, y]: [f64; 2]| axes.map(|[a, b]| x * a + y * b);
-    let held = Dof::Fixed(0.0);
-    Some(ContactNode {
-        normal: held,
-        tangent: held,
-        // slip is continued to it, as to a common end that both touch
-        oblique: Some(Oblique {
-            other: held,
-            part: [0.0; 2],
-            symmetric: false,
-            shared: true,
-        }),
-        follows: Some(Follows {
-            dofs,
-            normal: by_axes(contact.boundary.normals[i]),
-            tangent: by_axes(contact.boundary.tangent(i)),
-        }),
-        gap: 0.0,
-        bonded: false,
-        drag: 0.0,
-        held_tangent: None,
-        weight: contact.boundary.weights[i],
-        on_axis: false,
-        beside_axis: None,
+    Some(Follows {
+        dofs,
+        normal: by_axes(contact.boundary.normals[i]),
+        tangent: by_axes(contact.boundary.tangent(i)),
     })
+}
+
+/// The axes of a contact node whose displacement along `other` is not perpendicular to the normal.
+fn oblique(model: &Model, contact: &ContactModel, i: usize, other: Dof, part: [f64; 2]) -> Oblique {
+    let node = contact.boundary.nodes[i];
+    let with_it = |contact: &&ContactModel| contact.boundary.nodes.contains(&node);
+    let shared = model.contacts.iter().filter(with_it).count() > 1;
+    let held = matches!(other, Dof::Fixed(value) if value == 0.0);
+    Oblique {
+        other,
+        part,
+        symmetric: held && !shared && contact.held_along_surface(i, &model.oblique[&node]),
+        shared,
+    }
 }
 
 /// The shape functions of an edge (start, end, midside) without the nodes that have oblique axes, which are replaced by
