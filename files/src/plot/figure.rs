@@ -405,11 +405,21 @@ fn draw_shade(area: &Area<'_>, palette: &Palette, frame: &Frame, shade: &Shade) 
     if to <= from {
         return Ok(());
     }
-    let colour = shade.kind.colour(palette);
     let place = [(from, frame.top), (to, frame.bottom)];
+    fill(area, place, shade.kind, palette)
+}
+
+/// Fills a rectangle as the shaded parts of the axis.
+fn fill(
+    area: &Area<'_>,
+    place: [(i32, i32); 2],
+    kind: ShadeKind,
+    palette: &Palette,
+) -> Fallible<()> {
+    let colour = kind.colour(palette);
     area.draw(&Rectangle::new(place, colour.mix(0.16).filled()))?;
     // a narrow one would be all hatching, and where stick and slip alternate there are thousands
-    if shade.kind == ShadeKind::Slip && to - from > px(4) {
+    if kind == ShadeKind::Slip && place[1].0 - place[0].0 > px(4) {
         hatch(area, place, colour)?;
     }
     Ok(())
@@ -647,12 +657,9 @@ fn legend(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
         let curve = match entry {
             Entry::Shade(kind) => {
                 let place = [(px(x + 2), px(middle - 6)), (px(x + 22), px(middle + 6))];
-                let colour = kind.colour(&palette);
-                area.draw(&Rectangle::new(place, colour.mix(0.16).filled()))?;
-                if *kind == ShadeKind::Slip {
-                    hatch(area, place, colour)?;
-                }
-                area.draw(&Rectangle::new(place, colour.stroke_width(px(1) as u32)))?;
+                fill(area, place, *kind, &palette)?;
+                let border = kind.colour(&palette).stroke_width(px(1) as u32);
+                area.draw(&Rectangle::new(place, border))?;
                 continue;
             }
             Entry::Curve(curve) => curve,
