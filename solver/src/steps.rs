@@ -155,7 +155,7 @@ fn run_steps<'a>(
         // a stopped solution is reported too, if that is little work
         let _ = observe(Progress::Phase(Phase::Recover));
         load_history.system.threads = body.threads(observe);
-        let reported = report(model, body, &load_history.system, &finished, observe)?;
+        let reported = report(&load_history.system, &finished, observe)?;
         let outcome = reported.summary.outcome;
         let last = number + 1 == steps.len() || !can_continue(outcome);
         let assessed = last && !model.contacts.is_empty();
@@ -166,7 +166,7 @@ fn run_steps<'a>(
         let accuracy = assessed.then(|| {
             let (system, mut origins) = (&load_history.system, origins.take());
             if let Some(origins) = origins.as_deref_mut() {
-                let places = reported.missed.iter();
+                let places = reported.along.missed.iter();
                 places.for_each(|place| origins.add_place(model, place.patch, place.s));
             }
             let increments = model.depends_on_path().then(|| {
@@ -198,18 +198,18 @@ fn run_steps<'a>(
                 ..summary.clone()
             },
             history: rows,
-            profiles: reported.profiles.clone(),
-            node_profiles: reported.node_profiles.clone(),
-            friction_profiles: reported.friction_profiles.clone(),
+            profiles: reported.along.profiles.clone(),
+            node_profiles: reported.along.node_profiles.clone(),
+            friction_profiles: reported.along.friction_profiles.clone(),
         });
         summary.iterations = history.len() as u32;
         fields = reported.fields;
         so_far = Some(Solution {
             summary,
             history,
-            profiles: reported.profiles,
-            node_profiles: reported.node_profiles,
-            friction_profiles: reported.friction_profiles,
+            profiles: reported.along.profiles,
+            node_profiles: reported.along.node_profiles,
+            friction_profiles: reported.along.friction_profiles,
             steps: ends,
             fields: Fields::default(),
         });
@@ -336,7 +336,7 @@ pub fn run_to_numbers(
     if finished.outcome == Outcome::Canceled {
         return Err(SolveError::Stopped);
     }
-    let (contacts, warnings) = algorithm::numbers(model, &load_history.system, &finished, observe)?;
+    let (contacts, warnings) = algorithm::numbers(&load_history.system, &finished, observe)?;
     let others_begin = finished.outcome == Outcome::Converged && model.steps.is_empty();
     let left = others_begin.then(|| End {
         finished: Finished {
@@ -404,7 +404,7 @@ pub fn run_to_compare(
             match load_history.follow(&steps_of(model), observe) {
                 Some(finished) if finished.outcome != Outcome::Canceled => {
                     load_history.system.threads = body.threads(observe);
-                    let reported = report(model, body, &load_history.system, &finished, observe)?;
+                    let reported = report(&load_history.system, &finished, observe)?;
                     Ok((reported, load_history))
                 }
                 _ => Err(SolveError::Stopped),
@@ -536,8 +536,7 @@ impl<'a> LoadHistory<'a> {
         let Some(finished) = finished.filter(|end| end.outcome != Outcome::Canceled) else {
             return Err(SolveError::Stopped);
         };
-        let (contacts, warnings) =
-            algorithm::numbers(self.model, &self.system, &finished, observe)?;
+        let (contacts, warnings) = algorithm::numbers(&self.system, &finished, observe)?;
         Ok(Numbers {
             finished,
             contacts,

@@ -154,7 +154,7 @@ fn solved(
     }
     let name = |patch: usize| &model.contacts[patch].name;
     // one that is no number is none
-    let quantities = reported.quantities.iter();
+    let quantities = reported.along.quantities.iter();
     let quantities = quantities.filter(|q| q.value.is_finite());
     Ok(Ok(quantities
         .map(|q| OnOtherMesh::new(q, name(q.patch)))

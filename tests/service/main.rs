@@ -1,6 +1,6 @@
 //! Tests of the service's promises with the real binary, on a free port with its own store.
 //! Tests do not sleep to wait: they follow events.
-#![allow(clippy::unwrap_used, clippy::panic)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::too_many_lines)]
 
 mod answers;
 mod auth;

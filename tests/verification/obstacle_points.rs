@@ -265,8 +265,8 @@ fn missed(problem: &Problem) -> Vec<Missed> {
     let (model, body) = (&prepared.model, &prepared.body);
     let system = System::new(model, body, &mut quiet).unwrap();
     let finished = algorithm::run(&system, &model.controls, Place::default(), None, &mut quiet);
-    let reported = report(model, body, &system, &finished, &mut quiet);
-    reported.unwrap().missed
+    let reported = report(&system, &finished, &mut quiet);
+    reported.unwrap().along.missed
 }
 
 /// A ridge of height 0.01 on a flat face, between the nodes 0.05 apart: the body did not feel it, and nothing said so.

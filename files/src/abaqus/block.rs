@@ -27,15 +27,7 @@ pub(super) enum Block {
     Skip,
     Title,
     Nodes(Option<Name>),
-    Elements {
-        shape: Shape,
-        /// Whether the lines belong to a rigid surface.
-        is_rigid: bool,
-        set: Option<Name>,
-        pending: Vec<u64>,
-        /// Whether the last line of an element of unknown size ended in a comma.
-        continued: bool,
-    },
+    Elements(Elements),
     NodeSet {
         name: Name,
         of: Option<Name>,
@@ -65,6 +57,18 @@ pub(super) enum Block {
     NoData(&'static str),
 }
 
+/// The elements of one `*ELEMENT`.
+pub(super) struct Elements {
+    pub(super) shape: Shape,
+    /// Whether they belong to a rigid surface.
+    pub(super) is_rigid: bool,
+    pub(super) set: Option<Name>,
+    /// The numbers of an element that the next line continues.
+    pub(super) pending: Vec<u64>,
+    /// Whether the last line of an element of unknown size ended in a comma.
+    pub(super) continued: bool,
+}
+
 /// The largest number of values of an amplitude that are kept: more than any curve of loads has.
 const MOST_VALUES: usize = 1 << 16;
 
@@ -81,43 +85,18 @@ impl Deck {
                     .get_or_insert_with(|| text.chars().take(200).collect());
             }
             Block::NoData(keyword) => {
-                let got = format!("`{text:.40}`");
                 let expected = format!("no data after {keyword}");
-                self.fault(
-                    line,
-                    Reason::Malformed,
-                    got,
-                    &expected,
-                    "Remove the line, or add the keyword that it belongs to.",
-                );
+                self.excess(line, text, &expected);
                 *block = Block::Skip;
             }
             Block::Nodes(set) => self.node(set, line, text),
-            Block::Elements {
-                shape: Shape::Plane(family, nodes),
-                set,
-                pending,
-                ..
-            } => self.plane_elements((*family, *nodes), set, pending, line, text),
-            Block::Elements {
-                shape: Shape::Line(nodes),
-                is_rigid,
-                set,
-                ..
-            } => {
-                self.line_element(*nodes, set, line, text);
-                let next = self.here.numbered.len() as u32;
-                if let (true, Some(lines)) = (*is_rigid, self.here.rigid_lines.last_mut()) {
-                    lines.places.end = next;
+            Block::Elements(elements) => match elements.shape {
+                Shape::Plane(family, count) => {
+                    self.plane_elements(family, count, elements, line, text);
                 }
-            }
-            Block::Elements {
-                shape: Shape::Other(nodes),
-                set,
-                pending,
-                continued,
-                ..
-            } => self.other_element(*nodes, set, (pending, continued), text),
+                Shape::Line(count) => self.line_element(count, elements, line, text),
+                Shape::Other(count) => self.other_element(count, elements, text),
+            },
             Block::NodeSet { name, of, generate } => {
                 if let Some(found) = self.members(*generate, line, text) {
                     self.node_set(name, of, line).extend(found);
@@ -135,29 +114,7 @@ impl Deck {
                 }
             }
             Block::Surface(name) => self.side(name, line, text),
-            Block::Elastic(elastic) => {
-                let words = fields(text);
-                // one more than any form has: the violation reports the excess
-                let room = MOST_CONSTANTS + 1 - elastic.values.len().min(MOST_CONSTANTS);
-                for (k, word) in words.into_iter().take(room).enumerate() {
-                    match number(word) {
-                        Some(value) => elastic.values.push(value),
-                        None => {
-                            elastic.unreadable = true;
-                            let got = match word {
-                                "" => format!("`{text:.60}`: constant {} is blank", k + 1),
-                                _ => format!("`{word:.40}` for constant {}", k + 1),
-                            };
-                            self.doubt(
-                                line,
-                                got,
-                                "a number for each elastic constant",
-                                "Constants have no default: write every one of them, 0 too, as in `210000., 0.3`.",
-                            );
-                        }
-                    }
-                }
-            }
+            Block::Elastic(elastic) => self.elastic_constants(elastic, line, text),
             Block::Orientation(name) => {
                 let values = self.numbers(line, text);
                 if let Some(known) = self.orientations.get_mut(name)
@@ -175,31 +132,13 @@ impl Deck {
                 }
             }
             Block::Thickness => {
-                if let Some(word) = fields(text).first().filter(|word| !word.is_empty()) {
-                    let thickness = number(word);
-                    if thickness.is_none() {
-                        self.doubt(
-                            line,
-                            format!("`{word:.40}`"),
-                            "the thickness, a number",
-                            "Write it alone on the line after *SOLID SECTION, as in `2.5`, or a comma alone for a thickness of 1.",
-                        );
-                    }
-                    if let Some(section) = self.here.sections.last_mut() {
-                        section.thickness = thickness;
-                    }
-                }
+                self.thickness(line, text);
                 *block = Block::Skip;
             }
             Block::InitialTemperatures => self.temperature(true, line, text),
             Block::Temperatures => self.temperature(false, line, text),
             Block::Period => {
-                // a period of 0 stands for that of 1 that a step has by itself
-                let words = fields(text);
-                let period = words.get(1).and_then(|word| number(word));
-                self.period = period.filter(|period| *period > 0.0);
-                let initial = words.first().and_then(|word| number(word));
-                self.contact.note_increments(initial, self.period);
+                self.period(text);
                 *block = Block::Skip;
             }
             Block::Contact(block) => self.contact_data(block, line, text),
@@ -213,26 +152,87 @@ impl Deck {
                 if lines.len() < 2 {
                     lines.push(values);
                 } else {
-                    self.fault(
+                    self.excess(
                         line,
-                        Reason::Malformed,
-                        format!("`{text:.40}`"),
+                        text,
                         "at most two lines after *INSTANCE: its translation, and its rotation",
-                        "Remove the line, or add the keyword that it belongs to.",
                     );
                 }
             }
         }
     }
 
+    /// Reports a data line where none is allowed.
+    fn excess(&mut self, line: u64, text: &str, expected: &str) {
+        self.fault(
+            line,
+            Reason::Malformed,
+            format!("`{text:.40}`"),
+            expected,
+            "Remove the line, or add the keyword that it belongs to.",
+        );
+    }
+
+    /// Reads elastic constants.
+    fn elastic_constants(&mut self, elastic: &mut Elastic, line: u64, text: &str) {
+        // one more than any form has: the violation reports the excess
+        let room = MOST_CONSTANTS + 1 - elastic.values.len().min(MOST_CONSTANTS);
+        for (k, word) in fields(text).into_iter().take(room).enumerate() {
+            let Some(value) = number(word) else {
+                elastic.unreadable = true;
+                let got = match word {
+                    "" => format!("`{text:.60}`: constant {} is blank", k + 1),
+                    _ => format!("`{word:.40}` for constant {}", k + 1),
+                };
+                self.doubt(
+                    line,
+                    got,
+                    "a number for each elastic constant",
+                    "Constants have no default: write every one of them, 0 too, as in `210000., 0.3`.",
+                );
+                continue;
+            };
+            elastic.values.push(value);
+        }
+    }
+
+    /// Reads the thickness of a section.
+    fn thickness(&mut self, line: u64, text: &str) {
+        let words = fields(text);
+        let Some(word) = words.first().filter(|word| !word.is_empty()) else {
+            return;
+        };
+        let thickness = number(word);
+        if thickness.is_none() {
+            self.doubt(
+                line,
+                format!("`{word:.40}`"),
+                "the thickness, a number",
+                "Write it alone on the line after *SOLID SECTION, as in `2.5`, or a comma alone for a thickness of 1.",
+            );
+        }
+        if let Some(section) = self.here.sections.last_mut() {
+            section.thickness = thickness;
+        }
+    }
+
+    /// Reads the first increment and the time of a step.
+    fn period(&mut self, text: &str) {
+        let words = fields(text);
+        let word = |k: usize| words.get(k).and_then(|word| number(word));
+        // a period of 0 stands for that of 1 that a step has by itself
+        self.period = word(1).filter(|period| *period > 0.0);
+        self.contact.note_increments(word(0), self.period);
+    }
+
     /// Ends a block, which must be complete.
     pub(super) fn end(&mut self, block: Block, line: u64) {
         match block {
-            Block::Elements {
+            Block::Elements(Elements {
                 shape: Shape::Plane(_, nodes),
                 pending,
                 ..
-            } if !pending.is_empty() => {
+            }) if !pending.is_empty() => {
                 self.here.incomplete.elements = true;
                 let got = format!("{} numbers for element {}", pending.len() - 1, pending[0]);
                 let expected = format!("{nodes} nodes");
@@ -335,7 +335,7 @@ impl Deck {
     fn forget(&mut self, block: &Block) {
         match block {
             Block::Nodes(_) => self.here.incomplete.nodes = true,
-            Block::Elements { .. } => self.here.incomplete.elements = true,
+            Block::Elements(_) => self.here.incomplete.elements = true,
             _ => self.here.incomplete.names = true,
         }
     }
@@ -391,41 +391,40 @@ impl Deck {
     /// Reads a line of plane elements, which may continue on the next line.
     fn plane_elements(
         &mut self,
-        kind: (Family, usize),
-        set: &Option<Name>,
-        pending: &mut Vec<u64>,
+        family: Family,
+        count: usize,
+        Elements { set, pending, .. }: &mut Elements,
         line: u64,
         text: &str,
     ) {
         for (place, word) in fields(text).into_iter().enumerate() {
-            match word.parse() {
-                Ok(number) => pending.push(number),
-                Err(_) => {
-                    let got = match word {
-                        "" => format!("`{text:.60}`: field {} is blank", place + 1),
-                        _ => format!("`{word:.40}` in `{text:.60}`"),
-                    };
-                    self.fault(
-                        line,
-                        Reason::Malformed,
-                        got,
-                        "an element: its number, and the numbers of its nodes",
-                        "Write whole numbers, as in `4, 1, 2, 12, 11`.",
-                    );
-                    // its next line begins another element, or continues this one: both are unknown
-                    pending.clear();
-                    self.here.incomplete.elements = true;
-                    return;
-                }
-            }
-            if pending.len() == kind.1 + 1 {
+            let Ok(number) = word.parse() else {
+                let got = match word {
+                    "" => format!("`{text:.60}`: field {} is blank", place + 1),
+                    _ => format!("`{word:.40}` in `{text:.60}`"),
+                };
+                self.fault(
+                    line,
+                    Reason::Malformed,
+                    got,
+                    "an element: its number, and the numbers of its nodes",
+                    "Write whole numbers, as in `4, 1, 2, 12, 11`.",
+                );
+                // its next line begins another element, or continues this one: both are unknown
+                pending.clear();
+                self.here.incomplete.elements = true;
+                return;
+            };
+            pending.push(number);
+            if pending.len() == count + 1 {
                 let numbers = std::mem::take(pending);
-                self.element(kind, set, line, &numbers);
+                self.element(family, set, line, &numbers);
             }
         }
     }
 
-    fn element(&mut self, kind: (Family, usize), set: &Option<Name>, line: u64, numbers: &[u64]) {
+    /// Adds an element of a plane mesh. `numbers`: its own, then those of its nodes.
+    fn element(&mut self, family: Family, set: &Option<Name>, line: u64, numbers: &[u64]) {
         let label = numbers[0];
         let mut nodes = [NO_NODE; 9];
         for (slot, number) in nodes.iter_mut().zip(&numbers[1..]) {
@@ -464,13 +463,12 @@ impl Deck {
             );
             return;
         }
-        let [a, b, c, d, e, f, g, h, _] = nodes;
-        self.here.elements.push(match kind {
-            (Family::Quad, _) => Element::Quad([a, b, c, d, e, f, g, h]),
-            (Family::Triangle, 3) => Element::Triangle([a, b, c, NO_NODE, NO_NODE, NO_NODE]),
-            (Family::Triangle, _) => Element::Triangle([a, b, c, d, e, f]),
+        let [a, b, c, d, e, f, g, h, centre] = nodes;
+        self.here.elements.push(match family {
+            Family::Quad => Element::Quad([a, b, c, d, e, f, g, h]),
+            Family::Triangle => Element::Triangle([a, b, c, d, e, f]),
         });
-        self.here.with_centre += usize::from(kind.1 == 9);
+        self.here.with_centre += usize::from(centre != NO_NODE);
         self.here.element_labels.push(label);
     }
 
@@ -488,7 +486,7 @@ impl Deck {
     }
 
     /// Reads a line element; the mesh ignores one that cannot be read.
-    fn line_element(&mut self, count: usize, set: &Option<Name>, line: u64, text: &str) {
+    fn line_element(&mut self, count: usize, elements: &Elements, line: u64, text: &str) {
         let words = fields(text);
         let Some(label) = words.first().and_then(|word| word.parse().ok()) else {
             return;
@@ -506,8 +504,13 @@ impl Deck {
         } else {
             Numbered::Other
         };
-        if self.number(label, place, set, line) && whole {
+        if self.number(label, place, &elements.set, line) && whole {
             self.here.lines.push(nodes);
+        }
+        if elements.is_rigid
+            && let Some(lines) = self.here.rigid_lines.last_mut()
+        {
+            lines.places.end = self.here.numbered.len() as u32;
         }
     }
 
@@ -515,8 +518,12 @@ impl Deck {
     fn other_element(
         &mut self,
         count: Option<usize>,
-        set: &Option<Name>,
-        (pending, continued): (&mut Vec<u64>, &mut bool),
+        Elements {
+            set,
+            pending,
+            continued,
+            ..
+        }: &mut Elements,
         text: &str,
     ) {
         let words = fields(text).into_iter().filter(|word| !word.is_empty());

@@ -2,10 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use super::contact_parts::{Adjust, Behavior, DeckContact, DeckFriction, Pair, WRITTEN_INSTEAD};
+use super::contact_parts::{
+    Adjust, Behavior, DeckContact, DeckFriction, Interaction, Pair, WRITTEN_INSTEAD,
+};
 use super::rigid::{MOST_POINTS, Tools};
 use super::steps::{Motion, common_factors};
-use super::tool::{Joined, Outline, Point, chain, cross, dot, length, met, minus, outline};
+use super::tool::{Joined, Outline, Piece, Point, chain, cross, dot, length, met, minus, outline};
 use super::written::on_line;
 use solver::error::{Reason, Violation};
 use solver::mesh::{Edge, Mesh, runs};
@@ -27,11 +29,12 @@ const CLOSED: f64 = 1e-6;
 /// The largest number of nodes of a boundary that are examined.
 const MOST_LOOKS: usize = 1000;
 
-/// The contacts of a deck, its steps, and warnings about differences from the deck.
+/// The contacts of a deck and its steps, with remarks.
+#[derive(Default)]
 pub(super) struct Translated {
     pub(super) contacts: Vec<Contact>,
     pub(super) steps: Vec<Step>,
-    pub(super) warnings: Vec<Warning>,
+    pub(super) remarks: Remarks,
 }
 
 /// The parts of a deck that contacts are made from.
@@ -47,17 +50,45 @@ pub(super) struct Source<'a> {
     pub(super) motions: &'a [Option<Motion>],
 }
 
-/// Violations: parts of the deck that cannot be a contact here.
+/// What is to be said about the contacts of a deck.
 #[derive(Default)]
-pub(super) struct Refused {
+pub(super) struct Remarks {
+    /// Parts of the deck that cannot be a contact here.
     pub(super) violations: Vec<Violation>,
+    /// Differences from the deck.
+    pub(super) warnings: Vec<Warning>,
 }
 
-impl Refused {
+impl Remarks {
     fn doubt(&mut self, line: u64, got: impl Into<String>, expected: &str, hint: &str) {
         let violation = on_line(line, Reason::NotUnderstood, got.into(), expected, hint);
         self.violations.push(violation);
     }
+
+    /// Adds a violation with which there is no contact.
+    fn refuse<T>(
+        &mut self,
+        line: u64,
+        got: impl Into<String>,
+        expected: &str,
+        hint: &str,
+    ) -> Option<T> {
+        self.doubt(line, got, expected, hint);
+        None
+    }
+
+    fn differs(&mut self, message: String) {
+        self.warnings.push(differs(message));
+    }
+}
+
+/// The two surfaces of a contact pair: a boundary of the body, and a rigid surface.
+struct Surfaces<'a> {
+    boundary: &'a str,
+    tool: &'a str,
+    /// The number of the rigid body.
+    body: usize,
+    pieces: &'a [Piece],
 }
 
 /// One contact, and its motion at the end of each step.
@@ -68,20 +99,15 @@ struct Made {
 }
 
 impl Source<'_> {
-    /// Translates all contacts. `steps`: the factors of loads and supports at the end of each step; `increments`: the
-    /// number that `*STATIC` starts with.
-    pub(super) fn contacts(&self, refused: &mut Refused, others: &[[f64; 2]]) -> Translated {
-        let mut found = Translated {
-            contacts: Vec::new(),
-            steps: Vec::new(),
-            warnings: Vec::new(),
-        };
-        if self.report_shared_sides(refused) {
+    /// Translates all contacts. `others`: the factors of loads and supports at the end of each step.
+    pub(super) fn contacts(&self, others: &[[f64; 2]]) -> Translated {
+        let mut found = Translated::default();
+        if self.report_shared_sides(&mut found.remarks) {
             return found;
         }
         let mut all = Vec::new();
         for (pair, surfaces) in self.said.pairs.iter().zip(self.pairs) {
-            all.extend(self.contact((pair, surfaces), others, refused, &mut found.warnings));
+            all.extend(self.contact(pair, surfaces, others, &mut found.remarks));
         }
         if all.len() < self.said.pairs.len() {
             return found; // with violations
@@ -89,7 +115,7 @@ impl Source<'_> {
         let moved: Vec<&[[f64; 2]]> = all.iter().map(|made| &made.moved[..]).collect();
         let Some(factors) = common_factors(&moved) else {
             let line = self.said.pairs.last().map_or(0, |pair| pair.line);
-            refused.doubt(
+            found.remarks.doubt(
                 line,
                 "rigid bodies that several steps move in different proportions",
                 "motions in the same proportion in every step",
@@ -111,10 +137,10 @@ impl Source<'_> {
             for (k, (factor, other)) in factors.iter().zip(others).enumerate() {
                 let written = self.said.steps.get(k).and_then(|step| step.1);
                 if let Some(more) = written.filter(|n| friction && *n > MOST_INCREMENTS) {
-                    found.warnings.push(differs(format!(
+                    found.remarks.differs(format!(
                         "Step {} begins with {more:.0} increments, but is solved in {MOST_INCREMENTS:.0}. Divide it into several steps if more are needed.",
                         k + 1
-                    )));
+                    ));
                 }
                 found.steps.push(Step {
                     name: Some(format!("Step-{}", k + 1)),
@@ -131,9 +157,9 @@ impl Source<'_> {
     }
 
     /// Reports pairs with sides of the body that an earlier pair has too; returns whether there are any.
-    fn report_shared_sides(&self, refused: &mut Refused) -> bool {
+    fn report_shared_sides(&self, remarks: &mut Remarks) -> bool {
         let mut owners: BTreeMap<Edge, (u64, &str)> = BTreeMap::new();
-        let before = refused.violations.len();
+        let before = remarks.violations.len();
         for (Pair { line, .. }, surfaces) in self.said.pairs.iter().zip(self.pairs) {
             let mut bodies = surfaces.iter();
             let Some(name) = bodies.find(|name| !self.tools.by_surface.contains_key(*name)) else {
@@ -156,7 +182,7 @@ impl Source<'_> {
                         edges.len()
                     )
                 };
-                refused.doubt(
+                remarks.doubt(
                     *line,
                     got,
                     "each side of the body in one contact pair",
@@ -167,149 +193,38 @@ impl Source<'_> {
                 owners.entry(*edge).or_insert((*line, name));
             }
         }
-        refused.violations.len() > before
+        remarks.violations.len() > before
     }
 
     fn contact(
         &self,
-        (pair, [first, second]): (&Pair, &[String; 2]),
+        pair: &Pair,
+        names: &[String; 2],
         others: &[[f64; 2]],
-        refused: &mut Refused,
-        warnings: &mut Vec<Warning>,
+        remarks: &mut Remarks,
     ) -> Option<Made> {
         let line = pair.line;
-        let rigid = [first, second].map(|name| self.tools.by_surface.get(name));
-        let (name, tool, (number, pieces)) = match rigid {
-            [None, Some(tool)] => (first, second, tool),
-            [Some(tool), None] => (second, first, tool),
-            [None, None] => {
-                let got =
-                    format!("a contact of two deformable bodies, `{first:.60}` and `{second:.60}`");
-                refused.doubt(line, got, "one surface of the elastic body, and one of a *RIGID BODY", "Both bodies cannot be elastic here. If one is much stiffer, make it rigid: *RIGID BODY, ELSET=…, REF NODE=….");
-                return None;
-            }
-            [Some(_), Some(_)] => {
-                refused.doubt(
-                    line,
-                    format!("a contact of two rigid surfaces, `{first:.60}` and `{second:.60}`"),
-                    "a surface of the elastic body",
-                    "Name a surface of deformable elements.",
-                );
-                return None;
-            }
-        };
-        let body = &self.tools.bodies[*number];
-        if body.attached {
-            refused.doubt(
-                body.line,
-                "a rigid body that shares nodes with the elastic body",
-                "a rigid body by itself",
-                "Support those nodes by *BOUNDARY instead.",
-            );
-            return None;
-        }
-        let Some(edges) = self
-            .mesh
-            .boundaries
-            .get(name)
-            .filter(|edges| !edges.is_empty())
-        else {
-            refused.doubt(
-                line,
-                format!("`{name:.60}` in a contact pair"),
-                "a surface with sides of the elastic body's surface",
-                "Name it by *SURFACE, TYPE=ELEMENT.",
-            );
-            return None;
-        };
-        let Some(pieces) = chain(pieces) else {
-            refused.doubt(
-                line,
-                format!("the rigid surface `{tool:.60}`, which is not one continuous line"),
-                "lines that follow one another, all with the body on the same side",
-                WRITTEN_INSTEAD,
-            );
-            return None;
-        };
-        let motion = self.motions.get(*number)?.as_ref()?;
-        let outline = outline(&pieces);
-        if outline.points.len() > MOST_POINTS {
-            let got = format!(
-                "{} points of the rigid surface `{tool:.60}`",
-                outline.points.len()
-            );
-            refused.doubt(
-                line,
-                got,
-                &format!("at most {MOST_POINTS}"),
-                "Remove the parts that the body cannot touch.",
-            );
-            return None;
-        }
-        let placed = Placed {
-            mesh: self.mesh,
-            edges,
-            outline,
-            size: self.size(),
-        };
-        if !placed.faces() {
-            refused.doubt(line, format!("the rigid surface `{tool:.60}`, whose outer side does not face `{name:.60}`"), "a rigid surface with the body on its left: the normal is its direction turned counter-clockwise (SPOS of a rigid line, too)", "Write its segments in the opposite order, or name the other side.");
-            return None;
-        }
-        if let Some(adjust) = pair.adjust
-            && placed.is_moved_by(adjust)
-        {
-            refused.doubt(
-                line,
-                "*CONTACT PAIR with ADJUST, which moves nodes here",
-                "nodes that lie on the rigid surface already, or beyond the distance",
-                "Mesh the body so that it touches, and remove ADJUST.",
-            );
-        }
-        let interaction = pair.interaction.as_ref();
-        let unknown = interaction.filter(|name| !self.said.interactions.contains_key(*name));
-        if let Some(unknown) = unknown {
-            let known = self.said.interactions.keys().take(20);
-            let known: Vec<String> = known.map(|name| format!("{name:.60}")).collect();
-            refused.doubt(
-                line,
-                format!("the interaction `{unknown:.60}`"),
-                "a *SURFACE INTERACTION of that name",
-                &format!("Known interactions: {}. Correct INTERACTION=…, or define it by *SURFACE INTERACTION, NAME=….", known.join(", ")),
-            );
-        }
-        let interaction = interaction.and_then(|name| self.said.interactions.get(name));
+        let surfaces = self.surfaces(line, names, remarks)?;
+        let placed = self.placed(pair, &surfaces, remarks)?;
+        let interaction = self.interaction(pair, remarks);
         let friction = interaction.and_then(|i| i.friction.as_ref());
-        let friction =
-            friction.and_then(|friction| self.friction(friction, edges, refused, warnings));
-        let shape = placed.shape(motion, others, self.axisymmetric);
-        let shape = match shape {
+        let friction = friction.and_then(|said| self.friction(said, placed.edges, remarks));
+        let shape = match placed.shape(others, self.axisymmetric) {
             Ok(shape) => shape,
             Err((got, expected)) => {
-                refused.doubt(
-                    line,
-                    format!("{got} (the rigid surface `{tool:.60}`)"),
-                    expected,
-                    WRITTEN_INSTEAD,
-                );
-                return None;
+                let got = format!("{got} (the rigid surface `{:.60}`)", surfaces.tool);
+                return remarks.refuse(line, got, expected, WRITTEN_INSTEAD);
             }
         };
         if let Some(message) = shape.message {
-            warnings.push(differs(format!("*CONTACT PAIR on line {line}: {message}")));
+            remarks.differs(format!("*CONTACT PAIR on line {line}: {message}"));
         }
         if let Some(interaction) = interaction {
-            self.behavior(
-                &interaction.behavior,
-                edges,
-                &shape.moved,
-                refused,
-                warnings,
-            );
+            self.behavior(&interaction.behavior, placed.edges, &shape.moved, remarks);
         }
         Some(Made {
             contact: Contact {
-                boundary: name.clone(),
+                boundary: surfaces.boundary.to_owned(),
                 obstacle: shape.obstacle,
                 indentation: 0.0,
                 direction: shape.direction,
@@ -322,23 +237,144 @@ impl Source<'_> {
         })
     }
 
+    /// Which surface of a pair is the body's, and which is rigid.
+    fn surfaces<'s>(
+        &'s self,
+        line: u64,
+        [first, second]: &'s [String; 2],
+        remarks: &mut Remarks,
+    ) -> Option<Surfaces<'s>> {
+        let rigid = [first, second].map(|name| self.tools.by_surface.get(name));
+        let (boundary, tool, (body, pieces)) = match rigid {
+            [None, Some(tool)] => (first, second, tool),
+            [Some(tool), None] => (second, first, tool),
+            [None, None] => {
+                return remarks.refuse(
+                    line,
+                    format!("a contact of two deformable bodies, `{first:.60}` and `{second:.60}`"),
+                    "one surface of the elastic body, and one of a *RIGID BODY",
+                    "Both bodies cannot be elastic here. If one is much stiffer, make it rigid: *RIGID BODY, ELSET=…, REF NODE=….",
+                );
+            }
+            [Some(_), Some(_)] => {
+                return remarks.refuse(
+                    line,
+                    format!("a contact of two rigid surfaces, `{first:.60}` and `{second:.60}`"),
+                    "a surface of the elastic body",
+                    "Name a surface of deformable elements.",
+                );
+            }
+        };
+        Some(Surfaces {
+            boundary,
+            tool,
+            body: *body,
+            pieces,
+        })
+    }
+
+    /// The rigid surface of a contact in front of the body, with its motion.
+    fn placed<'s>(
+        &'s self,
+        pair: &Pair,
+        surfaces: &Surfaces<'_>,
+        remarks: &mut Remarks,
+    ) -> Option<Placed<'s>> {
+        let (line, tool, name) = (pair.line, surfaces.tool, surfaces.boundary);
+        let body = &self.tools.bodies[surfaces.body];
+        if body.attached {
+            return remarks.refuse(
+                body.line,
+                "a rigid body that shares nodes with the elastic body",
+                "a rigid body by itself",
+                "Support those nodes by *BOUNDARY instead.",
+            );
+        }
+        let edges = self.mesh.boundaries.get(name);
+        let Some(edges) = edges.filter(|edges| !edges.is_empty()) else {
+            return remarks.refuse(
+                line,
+                format!("`{name:.60}` in a contact pair"),
+                "a surface with sides of the elastic body's surface",
+                "Name it by *SURFACE, TYPE=ELEMENT.",
+            );
+        };
+        let Some(pieces) = chain(surfaces.pieces) else {
+            return remarks.refuse(
+                line,
+                format!("the rigid surface `{tool:.60}`, which is not one continuous line"),
+                "lines that follow one another, all with the body on the same side",
+                WRITTEN_INSTEAD,
+            );
+        };
+        let placed = Placed {
+            mesh: self.mesh,
+            edges,
+            outline: outline(&pieces),
+            motion: self.motions.get(surfaces.body)?.as_ref()?,
+            size: self.size(),
+        };
+        let count = placed.outline.points.len();
+        if count > MOST_POINTS {
+            return remarks.refuse(
+                line,
+                format!("{count} points of the rigid surface `{tool:.60}`"),
+                &format!("at most {MOST_POINTS}"),
+                "Remove the parts that the body cannot touch.",
+            );
+        }
+        if !placed.faces() {
+            return remarks.refuse(
+                line,
+                format!("the rigid surface `{tool:.60}`, whose outer side does not face `{name:.60}`"),
+                "a rigid surface with the body on its left: the normal is its direction turned counter-clockwise (SPOS of a rigid line, too)",
+                "Write its segments in the opposite order, or name the other side.",
+            );
+        }
+        if pair.adjust.is_some_and(|adjust| placed.is_moved_by(adjust)) {
+            remarks.doubt(
+                line,
+                "*CONTACT PAIR with ADJUST, which moves nodes here",
+                "nodes that lie on the rigid surface already, or beyond the distance",
+                "Mesh the body so that it touches, and remove ADJUST.",
+            );
+        }
+        Some(placed)
+    }
+
+    /// The interaction that a pair names.
+    fn interaction(&self, pair: &Pair, remarks: &mut Remarks) -> Option<&Interaction> {
+        let name = pair.interaction.as_ref()?;
+        let interactions = &self.said.interactions;
+        let found = interactions.get(name);
+        if found.is_none() {
+            let known = interactions.keys().take(20);
+            let known: Vec<String> = known.map(|name| format!("{name:.60}")).collect();
+            remarks.doubt(
+                pair.line,
+                format!("the interaction `{name:.60}`"),
+                "a *SURFACE INTERACTION of that name",
+                &format!("Known interactions: {}. Correct INTERACTION=…, or define it by *SURFACE INTERACTION, NAME=….", known.join(", ")),
+            );
+        }
+        found
+    }
+
     /// Coulomb's law, which depends on the load path; `None`: without friction.
     fn friction(
         &self,
         said: &DeckFriction,
         edges: &[Edge],
-        refused: &mut Refused,
-        warnings: &mut Vec<Warning>,
+        remarks: &mut Remarks,
     ) -> Option<Friction> {
         let line = said.line;
         let Some(coefficient) = said.coefficient else {
-            refused.doubt(
+            return remarks.refuse(
                 line,
                 "*FRICTION without a coefficient",
                 "a friction coefficient ≥ 0",
                 "Give it on the line after *FRICTION.",
             );
-            return None;
         };
         if coefficient == 0.0 {
             return None;
@@ -350,11 +386,11 @@ impl Source<'_> {
             let ours = format!(
                 "the elastic slip is {elastic_slip:.4e} here, {SLIP_TOLERANCE} of the mean side of the contact"
             );
-            warnings.push(differs(match (said.stick_slope, said.lagrange) {
+            remarks.differs(match (said.stick_slope, said.lagrange) {
                 (Some(slope), _) => format!("*FRICTION on line {line}: the stick slope of {slope:e} makes the slip at which friction is reached proportional to the pressure; {ours}. SLIP TOLERANCE or ELASTIC SLIP sets it."),
                 (None, true) => format!("*FRICTION on line {line}: LAGRANGE sticks without slip; {ours}."),
                 (None, false) => format!("*FRICTION on line {line} gives no elastic slip: {ours}. SLIP TOLERANCE or ELASTIC SLIP sets it."),
-            }));
+            });
         }
         Some(Friction {
             coefficient: Some(coefficient),
@@ -379,8 +415,7 @@ impl Source<'_> {
         behavior: &Behavior,
         edges: &[Edge],
         moved: &[[f64; 2]],
-        refused: &mut Refused,
-        warnings: &mut Vec<Warning>,
+        remarks: &mut Remarks,
     ) {
         match *behavior {
             Behavior::Hard => {}
@@ -394,11 +429,11 @@ impl Source<'_> {
                 let modulus = self.materials.iter().map(stiffness).fold(0.0, f64::max);
                 let least = modulus / self.mean_side(edges);
                 match slope {
-                    Some(slope) if slope >= least => warnings.push(differs(format!(
+                    Some(slope) if slope >= least => remarks.differs(format!(
                         "*SURFACE BEHAVIOR on line {line}: contact is hard here; in the deck the surfaces overlap by p/{slope:e} at a pressure p, {:.1e} for a thousandth of Young's modulus.",
                         1e-3 * modulus / slope
-                    ))),
-                    _ => refused.doubt(
+                    )),
+                    _ => remarks.doubt(
                         line,
                         format!("a pressure of {} per length of overclosure", slope.unwrap_or(0.0)),
                         &format!("hard contact, or a slope of at least {least:e} (Young's modulus per side of an element), which is nearly hard"),
@@ -409,10 +444,10 @@ impl Source<'_> {
             Behavior::Exponential { line, clearance } => {
                 let most = moved.iter().map(|m| m[0].abs()).fold(0.0, f64::max);
                 match clearance {
-                    Some(clearance) if clearance > 0.0 && clearance <= 0.01 * most => warnings.push(differs(format!(
+                    Some(clearance) if clearance > 0.0 && clearance <= 0.01 * most => remarks.differs(format!(
                         "*SURFACE BEHAVIOR on line {line}: contact is hard here; in the deck pressure begins at a clearance of {clearance:e}."
-                    ))),
-                    _ => refused.doubt(
+                    )),
+                    _ => remarks.doubt(
                         line,
                         format!("a pressure that begins at a clearance of {}", clearance.unwrap_or(0.0)),
                         "hard contact, or a clearance of at most a hundredth of the indentation",
@@ -472,6 +507,7 @@ struct Placed<'a> {
     mesh: &'a Mesh,
     edges: &'a [Edge],
     outline: Outline,
+    motion: &'a Motion,
     /// The size of the body (length).
     size: f64,
 }
@@ -556,13 +592,8 @@ impl Placed<'_> {
     }
 
     /// Translates the rigid surface and its motion to an obstacle.
-    fn shape(
-        &self,
-        motion: &Motion,
-        others: &[[f64; 2]],
-        axisymmetric: bool,
-    ) -> Result<Shape, Unlike> {
-        let ends = &motion.ends;
+    fn shape(&self, others: &[[f64; 2]], axisymmetric: bool) -> Result<Shape, Unlike> {
+        let ends = &self.motion.ends;
         if axisymmetric && ends.iter().any(|u| u[0] != 0.0) {
             return Err((
                 "a rigid body of revolution that moves radially".into(),

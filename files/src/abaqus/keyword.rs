@@ -1,6 +1,6 @@
 //! Keyword lines: `*NAME, PARAMETER=value, …`, and the block of data that each begins.
 
-use super::block::{Block, Rows};
+use super::block::{Block, Elements, Rows};
 use super::deck::{Deck, Inside};
 use super::element::{ElementType, Shape, Typed};
 use super::part::{Part, RigidLines};
@@ -91,85 +91,26 @@ impl Deck {
     /// Begins the block of a keyword.
     pub(super) fn begin(&mut self, keyword: &Keyword, line: u64) -> Block {
         if self.names > MOST_NAMES {
-            if !std::mem::replace(&mut self.here.incomplete.names, true) {
-                let (got, expected) = (
-                    format!("more than {MOST_NAMES} names"),
-                    format!("at most {MOST_NAMES} sets and surfaces"),
-                );
-                self.fault(
-                    line,
-                    Reason::TooMany,
-                    got,
-                    &expected,
-                    "Leave out the sets that are not used.",
-                );
-            }
+            self.too_many_names(line);
             return Block::Skip;
         }
         if let Some(block) = self.begin_contact(keyword, line) {
             return block;
         }
-        let name = &keyword.name[..];
-        if ![READ, NOT_WRITTEN_OUT, NOT_ELASTIC, IDLE]
-            .iter()
-            .any(|names| names.contains(&name))
-        {
-            return self.unknown_keyword(name, line);
-        }
         match &keyword.name[..] {
             "HEADING" => Block::Title,
-            "NODE" => {
-                if keyword.has("SYSTEM") || keyword.has("INPUT") {
-                    self.here.incomplete.nodes = true;
-                    self.fault(
-                        line,
-                        Reason::Unsupported,
-                        "*NODE with SYSTEM or INPUT",
-                        "coordinates x, y in the deck itself",
-                        "Write the nodes out.",
-                    );
-                }
-                Block::Nodes(self.named(keyword, "NSET"))
-            }
+            "NODE" => self.node_block(keyword, line),
             "ELEMENT" => self.element_block(keyword, line),
             "NSET" => self.node_set_block(keyword, line),
-            "ELSET" => match self.named(keyword, "ELSET") {
-                Some(name) => {
-                    let of = self.named(keyword, "INSTANCE");
-                    self.element_set(&name, &of, line);
-                    Block::ElementSet {
-                        name,
-                        of,
-                        generate: keyword.has("GENERATE"),
-                    }
-                }
-                None => self.nameless(line, "*ELSET", "ELSET"),
-            },
+            "ELSET" => self.element_set_block(keyword, line),
             "SURFACE" => self.surface_block(keyword, line),
-            "MATERIAL" => {
-                self.material = self.named(keyword, "NAME");
-                if let Some(name) = self.material.clone() {
-                    if self.materials.contains_key(&name) {
-                        self.doubt(
-                            line,
-                            format!("the material `{name:.60}` a second time"),
-                            "each material once",
-                            "Give one of them another name.",
-                        );
-                    }
-                    self.materials.entry(name).or_default();
-                }
-                Block::NoData("*MATERIAL")
-            }
-            "ELASTIC" => {
-                let kind = keyword.get("TYPE").unwrap_or("ISO").to_uppercase();
-                Block::Elastic(Elastic {
-                    line,
-                    kind,
-                    values: Vec::new(),
-                    unreadable: false,
-                })
-            }
+            "MATERIAL" => self.material_block(keyword, line),
+            "ELASTIC" => Block::Elastic(Elastic {
+                line,
+                kind: keyword.get("TYPE").unwrap_or("ISO").to_uppercase(),
+                values: Vec::new(),
+                unreadable: false,
+            }),
             "EXPANSION" => {
                 if let Some(material) = self.material() {
                     material.expansion.get_or_insert(line);
@@ -180,88 +121,14 @@ impl Deck {
             "INITIAL CONDITIONS" => self.initial_conditions(keyword, line),
             "ORIENTATION" => self.orientation_block(keyword),
             "AMPLITUDE" => self.amplitude_block(keyword, line),
-            "SOLID SECTION" => {
-                let (elements, material) = (
-                    self.named(keyword, "ELSET"),
-                    self.named(keyword, "MATERIAL"),
-                );
-                let orientation = self.named(keyword, "ORIENTATION");
-                match (elements, material) {
-                    (Some(elements), Some(material)) => {
-                        self.here.sections.push(Section {
-                            line,
-                            elements,
-                            material,
-                            thickness: None,
-                            orientation,
-                        });
-                        Block::Thickness
-                    }
-                    _ => {
-                        self.doubt(
-                            line,
-                            "*SOLID SECTION",
-                            "*SOLID SECTION with ELSET and MATERIAL",
-                            "Name the elements and their material.",
-                        );
-                        Block::Skip
-                    }
-                }
-            }
-            "BOUNDARY" => {
-                // the first in the first step decides whether those of the model remain
-                let is_first = !std::mem::replace(&mut self.supported_in_step, true);
-                if self.steps == 1 && is_first && keyword.is("OP", "NEW") {
-                    let instances = self.instances.iter_mut().map(|(_, part)| part);
-                    for part in instances.chain(self.parts.values_mut()) {
-                        part.prescribed.clear();
-                        part.held.clear();
-                    }
-                    self.here.prescribed.clear();
-                    self.here.held.clear();
-                }
-                self.note_replacement(keyword, Replaces::Supports, line);
-                Block::Boundary(self.amplitude(keyword, line))
-            }
+            "SOLID SECTION" => self.section_block(keyword, line),
+            "BOUNDARY" => self.boundary_block(keyword, line),
             // those of one step only add to one another
-            "DLOAD" => {
-                self.note_replacement(keyword, Replaces::Pressures, line);
-                Block::Load(Rows::Sides, self.amplitude(keyword, line))
-            }
-            "DSLOAD" => {
-                self.note_replacement(keyword, Replaces::Pressures, line);
-                Block::Load(Rows::Surfaces, self.amplitude(keyword, line))
-            }
-            "CLOAD" => {
-                self.note_replacement(keyword, Replaces::Forces, line);
-                Block::Load(Rows::Nodes, self.amplitude(keyword, line))
-            }
-            "STEP" => {
-                self.steps += 1;
-                self.supported_in_step = false;
-                if keyword.has("NLGEOM") && !keyword.is("NLGEOM", "NO") {
-                    self.doubt(
-                        line,
-                        "*STEP, NLGEOM",
-                        "a linear step",
-                        "Displacements are assumed small; remove NLGEOM.",
-                    );
-                }
-                Block::Skip
-            }
-            "STATIC" => {
-                for name in ["RIKS", "STABILIZE"] {
-                    if keyword.has(name) {
-                        self.doubt(
-                            line,
-                            format!("*STATIC, {name}"),
-                            "a linear static step",
-                            "Remove that parameter.",
-                        );
-                    }
-                }
-                Block::Period
-            }
+            "DLOAD" => self.load_block(Rows::Sides, keyword, line),
+            "DSLOAD" => self.load_block(Rows::Surfaces, keyword, line),
+            "CLOAD" => self.load_block(Rows::Nodes, keyword, line),
+            "STEP" => self.step_block(keyword, line),
+            "STATIC" => self.static_block(keyword, line),
             "PART" | "END PART" | "ASSEMBLY" | "END ASSEMBLY" | "INSTANCE" | "END INSTANCE" => {
                 self.part_block(keyword, line)
             }
@@ -270,21 +137,33 @@ impl Deck {
                 self.fault(
                     line,
                     Reason::Unsupported,
-                    format!("*{}", keyword.name),
+                    format!("*{name}"),
                     "nodes and elements written out in one file",
                     "Let the preprocessor write the whole mesh.",
                 );
                 Block::Skip
             }
             name if IDLE.contains(&name) => Block::Skip,
-            name if NOT_ELASTIC.contains(&name) && self.material.is_some() => {
-                let got = format!("*{name}");
-                if let Some(material) = self.material() {
-                    material.other.push((line, got));
+            name => match self.material() {
+                Some(material) if NOT_ELASTIC.contains(&name) => {
+                    material.other.push((line, format!("*{name}")));
+                    Block::Skip
                 }
-                Block::Skip
-            }
-            name => self.unknown_keyword(name, line),
+                _ => self.unknown_keyword(name, line),
+            },
+        }
+    }
+
+    /// Reports once that the deck has too many names.
+    fn too_many_names(&mut self, line: u64) {
+        if !std::mem::replace(&mut self.here.incomplete.names, true) {
+            self.fault(
+                line,
+                Reason::TooMany,
+                format!("more than {MOST_NAMES} names"),
+                &format!("at most {MOST_NAMES} sets and surfaces"),
+                "Leave out the sets that are not used.",
+            );
         }
     }
 
@@ -355,6 +234,20 @@ impl Deck {
         self.named(keyword, "AMPLITUDE")
     }
 
+    fn node_block(&mut self, keyword: &Keyword, line: u64) -> Block {
+        if keyword.has("SYSTEM") || keyword.has("INPUT") {
+            self.here.incomplete.nodes = true;
+            self.fault(
+                line,
+                Reason::Unsupported,
+                "*NODE with SYSTEM or INPUT",
+                "coordinates x, y in the deck itself",
+                "Write the nodes out.",
+            );
+        }
+        Block::Nodes(self.named(keyword, "NSET"))
+    }
+
     fn node_set_block(&mut self, keyword: &Keyword, line: u64) -> Block {
         let Some(name) = self.named(keyword, "NSET") else {
             return self.nameless(line, "*NSET", "NSET");
@@ -376,6 +269,19 @@ impl Deck {
         }
     }
 
+    fn element_set_block(&mut self, keyword: &Keyword, line: u64) -> Block {
+        let Some(name) = self.named(keyword, "ELSET") else {
+            return self.nameless(line, "*ELSET", "ELSET");
+        };
+        let of = self.named(keyword, "INSTANCE");
+        self.element_set(&name, &of, line);
+        Block::ElementSet {
+            name,
+            of,
+            generate: keyword.has("GENERATE"),
+        }
+    }
+
     fn surface_block(&mut self, keyword: &Keyword, line: u64) -> Block {
         let Some(name) = self.named(keyword, "NAME") else {
             return self.nameless(line, "*SURFACE", "NAME");
@@ -391,6 +297,97 @@ impl Deck {
             }
             _ => Block::Skip,
         }
+    }
+
+    fn material_block(&mut self, keyword: &Keyword, line: u64) -> Block {
+        self.material = self.named(keyword, "NAME");
+        if let Some(name) = self.material.clone() {
+            if self.materials.contains_key(&name) {
+                self.doubt(
+                    line,
+                    format!("the material `{name:.60}` a second time"),
+                    "each material once",
+                    "Give one of them another name.",
+                );
+            }
+            self.materials.entry(name).or_default();
+        }
+        Block::NoData("*MATERIAL")
+    }
+
+    fn section_block(&mut self, keyword: &Keyword, line: u64) -> Block {
+        let names = ["ELSET", "MATERIAL", "ORIENTATION"];
+        let [Some(elements), Some(material), orientation] =
+            names.map(|parameter| self.named(keyword, parameter))
+        else {
+            self.doubt(
+                line,
+                "*SOLID SECTION",
+                "*SOLID SECTION with ELSET and MATERIAL",
+                "Name the elements and their material.",
+            );
+            return Block::Skip;
+        };
+        self.here.sections.push(Section {
+            line,
+            elements,
+            material,
+            thickness: None,
+            orientation,
+        });
+        Block::Thickness
+    }
+
+    fn boundary_block(&mut self, keyword: &Keyword, line: u64) -> Block {
+        // the first in the first step decides whether those of the model remain
+        let is_first = !std::mem::replace(&mut self.supported_in_step, true);
+        if self.steps == 1 && is_first && keyword.is("OP", "NEW") {
+            let instances = self.instances.iter_mut().map(|(_, part)| part);
+            let parts = instances.chain(self.parts.values_mut());
+            for part in parts.chain([&mut self.here]) {
+                part.prescribed.clear();
+                part.held.clear();
+            }
+        }
+        self.note_replacement(keyword, Replaces::Supports, line);
+        Block::Boundary(self.amplitude(keyword, line))
+    }
+
+    fn load_block(&mut self, rows: Rows, keyword: &Keyword, line: u64) -> Block {
+        let replaces = match rows {
+            Rows::Sides | Rows::Surfaces => Replaces::Pressures,
+            Rows::Nodes => Replaces::Forces,
+        };
+        self.note_replacement(keyword, replaces, line);
+        Block::Load(rows, self.amplitude(keyword, line))
+    }
+
+    fn step_block(&mut self, keyword: &Keyword, line: u64) -> Block {
+        self.steps += 1;
+        self.supported_in_step = false;
+        if keyword.has("NLGEOM") && !keyword.is("NLGEOM", "NO") {
+            self.doubt(
+                line,
+                "*STEP, NLGEOM",
+                "a linear step",
+                "Displacements are assumed small; remove NLGEOM.",
+            );
+        }
+        Block::Skip
+    }
+
+    fn static_block(&mut self, keyword: &Keyword, line: u64) -> Block {
+        for name in ["RIKS", "STABILIZE"] {
+            if keyword.has(name) {
+                self.doubt(
+                    line,
+                    format!("*STATIC, {name}"),
+                    "a linear static step",
+                    "Remove that parameter.",
+                );
+            }
+        }
+        Block::Period
     }
 
     fn orientation_block(&mut self, keyword: &Keyword) -> Block {
@@ -474,13 +471,13 @@ impl Deck {
         if matches!(kind.shape, Shape::Other(_)) {
             self.here.unused_type.get_or_insert((line, got));
         }
-        Block::Elements {
+        Block::Elements(Elements {
             shape: kind.shape,
             is_rigid,
             set,
             pending: Vec::new(),
             continued: false,
-        }
+        })
     }
 
     fn part_block(&mut self, keyword: &Keyword, line: u64) -> Block {

@@ -97,10 +97,9 @@ pub fn problem_with_warnings(text: &str) -> Result<(Problem, Vec<Warning>), Vec<
             axisymmetric,
             motions: &motions,
         };
-        let mut refused = contact::Refused::default();
-        let found = source.contacts(&mut refused, &factors);
-        (contacts, steps, warnings) = (found.contacts, found.steps, found.warnings);
-        violations.extend(refused.violations);
+        let found = source.contacts(&factors);
+        (contacts, steps, warnings) = (found.contacts, found.steps, found.remarks.warnings);
+        violations.extend(found.remarks.violations);
     }
     if thickness != 1.0 {
         warnings.push(contact::differs(format!(

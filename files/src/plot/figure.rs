@@ -13,7 +13,7 @@ use super::axis::{
 };
 use super::caption::Caption;
 use super::numbers::{number, rounded, tick};
-use super::page::{self, Area, Fallible, LETTERS, draw_text, px};
+use super::page::{self, Area, Fallible, LETTERS, LegendPlace, draw_text, px};
 use super::style::Style;
 use super::theme::Palette;
 
@@ -70,6 +70,13 @@ pub enum Scale {
     Count,
     /// Logarithmic, over whole numbers; values ≤ 0 are left out.
     Log,
+}
+
+impl Scale {
+    /// Whether the axes are over whole numbers.
+    fn is_whole(self) -> bool {
+        matches!(self, Scale::Count | Scale::Log)
+    }
 }
 
 /// A part of the x axis in a colour of its own.
@@ -183,17 +190,13 @@ pub fn figure(
 
 fn draw_panel(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
     let palette = style.palette();
-    let up = up(panel);
-    let shown = |curve: &Curve| -> Vec<(f64, f64)> {
-        let place = |&(x, y): &(f64, f64)| match panel.scale {
-            Scale::Log => (y > 0.0).then(|| (x, y.log10())),
-            _ => Some((x, y)),
-        };
-        curve.points.iter().filter_map(place).collect()
-    };
-    let curves: Vec<Vec<(f64, f64)>> = panel.curves.iter().map(shown).collect();
-    let whole = matches!(panel.scale, Scale::Count | Scale::Log);
+    let curves: Vec<Vec<(f64, f64)>> = panel
+        .curves
+        .iter()
+        .map(|curve| shown(panel.scale, curve))
+        .collect();
     let places = curves.iter().flatten().map(|p| p.0);
+    let whole = panel.scale.is_whole();
     let across = if whole {
         // the first and the last whole number stand clear of the ends
         extent(places.flat_map(|x| [x - 0.5, x + 0.5]))
@@ -201,16 +204,64 @@ fn draw_panel(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
         extent(places)
     };
     let (head, body) = area.split_vertically(px(LEGEND * rows(style, panel)));
+    let fit = ((style.width() - LEFT - RIGHT) / 66).clamp(4, 9) as usize;
+    let mut chart = axes(&body, style, panel, &across, fit)?;
+    let frame = Frame::of(&body, &chart, across, up(panel));
+    for shade in &panel.shades {
+        draw_shade(&body, &palette, &frame, shade)?;
+    }
+    if frame.up.start < 0.0 && frame.up.end > 0.0 && !whole {
+        let zero = LineSeries::new(
+            [(frame.across.start, 0.0), (frame.across.end, 0.0)],
+            palette.axis.mix(0.5).stroke_width(6),
+        );
+        chart.draw_series(zero)?;
+    }
+    draw_marks(&mut chart, style, &frame, &panel.marks)?;
+    for (curve, points) in panel.curves.iter().zip(&curves) {
+        draw_curve(&mut chart, &palette, &frame, curve.style, points)?;
+    }
+    if panel.scale == Scale::Peaked {
+        draw_cuts(&body, style, &frame, panel)?;
+    }
+    if let Some(above) = &panel.above {
+        draw_above(&body, style, &frame, above, fit)?;
+    }
+    legend(&head, style, panel)
+}
+
+/// The points of a curve that its axis can show, on that axis.
+fn shown(scale: Scale, curve: &Curve) -> Vec<(f64, f64)> {
+    let points = curve.points.iter().copied();
+    match scale {
+        Scale::Log => points
+            .filter(|p| p.1 > 0.0)
+            .map(|(x, y)| (x, y.log10()))
+            .collect(),
+        _ => points.collect(),
+    }
+}
+
+/// Draws the axes of a panel with at most `fit` numbers on the horizontal one.
+fn axes<'a, 'b>(
+    body: &'a Area<'b>,
+    style: Style,
+    panel: &Panel,
+    across: &Range<f64>,
+    fit: usize,
+) -> Fallible<Chart<'a, 'b>> {
+    let palette = style.palette();
+    let up = up(panel);
     let name = if panel.x.is_empty() { 0 } else { NAME };
-    let mut chart: ChartContext<'_, _, Cartesian2d<RangedCoordf64, RangedCoordf64>> =
-        ChartBuilder::on(&body)
-            .margin_top(px(panel.room_above()))
-            .margin_right(px(RIGHT))
-            .margin_bottom(px(MARGIN))
-            .margin_left(px(EDGE))
-            .x_label_area_size(px(NUMBERS + name))
-            .y_label_area_size(px(LEFT - EDGE))
-            .build_cartesian_2d(across.clone(), up.clone())?;
+    let mut chart: Chart<'a, 'b> = ChartBuilder::on(body)
+        .margin_top(px(panel.room_above()))
+        .margin_right(px(RIGHT))
+        .margin_bottom(px(MARGIN))
+        .margin_left(px(EDGE))
+        .x_label_area_size(px(NUMBERS + name))
+        .y_label_area_size(px(LEFT - EDGE))
+        .build_cartesian_2d(across.clone(), up.clone())?;
+    let whole = panel.scale.is_whole();
     let whole_number = |value: f64| match value.round() {
         round if (value - round).abs() < 1e-6 => number(round),
         _ => String::new(),
@@ -227,8 +278,11 @@ fn draw_panel(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
         Scale::Count => whole_number(*value),
         Scale::Peaked | Scale::Linear => tick(*value, up.end - up.start),
     };
-    let room = style.width() - LEFT - RIGHT;
-    let fit = (room / 66).clamp(4, 9) as usize;
+    let (x_labels, y_labels) = if whole {
+        (ticks(across).min(fit + 3), ticks(&up).min(7))
+    } else {
+        (fit, 7)
+    };
     chart
         .configure_mesh()
         .light_line_style(TRANSPARENT)
@@ -237,90 +291,81 @@ fn draw_panel(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
         .set_all_tick_mark_size(px(4))
         .x_desc(&panel.x)
         .y_desc(&panel.y)
-        .x_labels(if whole {
-            ticks(&across).min(fit + 3)
-        } else {
-            fit
-        })
-        .y_labels(if whole { ticks(&up).min(7) } else { 7 })
+        .x_labels(x_labels)
+        .y_labels(y_labels)
         .x_label_formatter(&x_label)
         .y_label_formatter(&y_label)
         .label_style(page::text(style, LETTERS))
         .axis_desc_style(page::text(style, LETTERS))
         .draw()?;
-    let frame = Frame::of(&body, &chart, &across);
-    for shade in &panel.shades {
-        draw_shade(&body, &palette, &frame, shade)?;
-    }
-    if up.start < 0.0 && up.end > 0.0 && !whole {
-        let zero = LineSeries::new(
-            [(across.start, 0.0), (across.end, 0.0)],
-            palette.axis.mix(0.5).stroke_width(6),
-        );
-        chart.draw_series(zero)?;
-    }
-    let thin = palette.faint.stroke_width(px(1) as u32);
+    Ok(chart)
+}
+
+/// Draws vertical lines, each with its word where there is room.
+fn draw_marks(
+    chart: &mut Chart<'_, '_>,
+    style: Style,
+    frame: &Frame,
+    marks: &[(f64, String)],
+) -> Fallible<()> {
+    let Range { start, end: top } = frame.up;
+    let thin = style.palette().faint.stroke_width(px(1) as u32);
     let mut free = i32::MIN; // where the next word may start
-    for (x, word) in &panel.marks {
-        chart.draw_series(LineSeries::new([(*x, up.start), (*x, up.end)], thin))?;
+    for (x, word) in marks {
+        chart.draw_series(LineSeries::new([(*x, start), (*x, top)], thin))?;
         let place = frame.x(*x) + px(4);
         let end = place + px(page::width(word));
         if place >= free && end <= frame.right {
             let text = Text::new(word.clone(), (px(4), px(3)), page::text(style, 13));
-            chart.draw_series([EmptyElement::at((*x, up.end)) + text])?;
+            chart.draw_series([EmptyElement::at((*x, top)) + text])?;
             free = end + px(6);
         }
     }
-    for (curve, points) in panel.curves.iter().zip(&curves) {
-        let line = stroke(&palette, curve.style);
-        let dots = || {
-            let shown = points.iter().copied();
-            shown.filter(|p| up.start <= p.1 && p.1 <= up.end)
-        };
-        match curve.style {
-            LineStyle::Points(_) => {
-                chart.draw_series(dots().map(|p| Circle::new(p, px(3), line)))?;
+    Ok(())
+}
+
+fn draw_curve(
+    chart: &mut Chart<'_, '_>,
+    palette: &Palette,
+    Frame { across, up, .. }: &Frame,
+    style: LineStyle,
+    points: &[(f64, f64)],
+) -> Fallible<()> {
+    let line = stroke(palette, style);
+    let inside = || {
+        let points = points.iter().copied();
+        points.filter(|p| up.start <= p.1 && p.1 <= up.end)
+    };
+    match style {
+        LineStyle::Points(_) => {
+            chart.draw_series(inside().map(|p| Circle::new(p, px(3), line)))?;
+        }
+        LineStyle::Dashed => {
+            // from edge to edge: also one iteration has a limit
+            let first = inside().next().map(|p| (across.start, p.1));
+            let last = inside().next_back().map(|p| (across.end, p.1));
+            let points: Vec<_> = first.into_iter().chain(inside()).chain(last).collect();
+            chart.draw_series(DashedLineSeries::new(points, px(7), px(5), line))?;
+        }
+        LineStyle::Bound => {
+            for part in within(points, up) {
+                chart.draw_series(DashedLineSeries::new(part, px(4), px(3), line))?;
             }
-            LineStyle::Marked(k) => {
-                for part in within(points, &up) {
-                    chart.draw_series(LineSeries::new(part, line))?;
-                }
-                chart.draw_series(dots().map(|p| EmptyElement::at(p) + dot((0, 0), k, line)))?;
+        }
+        LineStyle::Line(_) | LineStyle::Reference | LineStyle::Marked(_) => {
+            for part in within(points, up) {
+                chart.draw_series(LineSeries::new(part, line))?;
             }
-            LineStyle::Dashed => {
-                // from edge to edge: also one iteration has a limit
-                let ends = dots().next().zip(dots().next_back());
-                let points: Vec<_> = ends.map_or(vec![], |(first, last)| {
-                    let inner = dots().collect::<Vec<_>>();
-                    [
-                        vec![(across.start, first.1)],
-                        inner,
-                        vec![(across.end, last.1)],
-                    ]
-                    .concat()
-                });
-                chart.draw_series(DashedLineSeries::new(points, px(7), px(5), line))?;
-            }
-            LineStyle::Bound => {
-                for part in within(points, &up) {
-                    chart.draw_series(DashedLineSeries::new(part, px(4), px(3), line))?;
-                }
-            }
-            LineStyle::Line(_) | LineStyle::Reference => {
-                for part in within(points, &up) {
-                    chart.draw_series(LineSeries::new(part, line))?;
-                }
+            if let LineStyle::Marked(k) = style {
+                let mark = |p| EmptyElement::at(p) + dot((0, 0), k, line);
+                chart.draw_series(inside().map(mark))?;
             }
         }
     }
-    if panel.scale == Scale::Peaked {
-        draw_cuts(&body, style, &frame, panel, &up)?;
-    }
-    if let Some(above) = &panel.above {
-        draw_above(&body, style, &frame, above, fit)?;
-    }
-    legend(&head, style, panel)
+    Ok(())
 }
+
+type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 /// The position of the axes of a panel, in the units of the drawing, and their ranges.
 struct Frame {
@@ -329,14 +374,11 @@ struct Frame {
     top: i32,
     bottom: i32,
     across: Range<f64>,
+    up: Range<f64>,
 }
 
 impl Frame {
-    fn of(
-        body: &Area<'_>,
-        chart: &ChartContext<'_, SVGBackend<'_>, Cartesian2d<RangedCoordf64, RangedCoordf64>>,
-        across: &Range<f64>,
-    ) -> Frame {
+    fn of(body: &Area<'_>, chart: &Chart<'_, '_>, across: Range<f64>, up: Range<f64>) -> Frame {
         let (x, y) = chart.plotting_area().get_pixel_range();
         let (left, top) = body.get_base_pixel();
         Frame {
@@ -344,7 +386,8 @@ impl Frame {
             right: x.end - left,
             top: y.start - top,
             bottom: y.end - top,
-            across: across.clone(),
+            across,
+            up,
         }
     }
 
@@ -362,11 +405,21 @@ fn draw_shade(area: &Area<'_>, palette: &Palette, frame: &Frame, shade: &Shade) 
     if to <= from {
         return Ok(());
     }
-    let colour = shade.kind.colour(palette);
     let place = [(from, frame.top), (to, frame.bottom)];
+    fill(area, place, shade.kind, palette)
+}
+
+/// Fills a rectangle as the shaded parts of the axis.
+fn fill(
+    area: &Area<'_>,
+    place: [(i32, i32); 2],
+    kind: ShadeKind,
+    palette: &Palette,
+) -> Fallible<()> {
+    let colour = kind.colour(palette);
     area.draw(&Rectangle::new(place, colour.mix(0.16).filled()))?;
     // a narrow one would be all hatching, and where stick and slip alternate there are thousands
-    if shade.kind == ShadeKind::Slip && to - from > px(4) {
+    if kind == ShadeKind::Slip && place[1].0 - place[0].0 > px(4) {
         hatch(area, place, colour)?;
     }
     Ok(())
@@ -396,13 +449,8 @@ fn hatch(
 
 /// Draws two strokes through the axis wherever a curve leaves the panel, and the value of the largest peak; a peak that
 /// is not cut off is also named if there is a remark about it.
-fn draw_cuts(
-    area: &Area<'_>,
-    style: Style,
-    frame: &Frame,
-    panel: &Panel,
-    up: &Range<f64>,
-) -> Fallible<()> {
+fn draw_cuts(area: &Area<'_>, style: Style, frame: &Frame, panel: &Panel) -> Fallible<()> {
+    let up = &frame.up;
     let palette = style.palette();
     for curve in panel.curves.iter().filter(|curve| decides(curve.style)) {
         let line = stroke(&palette, curve.style)
@@ -575,8 +623,8 @@ impl Entry<'_> {
     }
 }
 
-/// The entries of a panel's legend, each with its line and its place in it (pixels).
-fn entries(style: Style, panel: &Panel) -> Vec<(Entry<'_>, i32, i32)> {
+/// The entries of a panel's legend.
+fn entries(panel: &Panel) -> Vec<Entry<'_>> {
     let named = panel.curves.iter().filter(|curve| !curve.label.is_empty());
     let mut entries: Vec<Entry<'_>> = named.map(Entry::Curve).collect();
     // they are the same in the panels of one contact, and named in that whose curve needs no name
@@ -586,41 +634,32 @@ fn entries(style: Style, panel: &Panel) -> Vec<(Entry<'_>, i32, i32)> {
             entries.push(Entry::Shade(kind));
         }
     }
-    let (mut x, mut row) = (LEFT, 0);
-    let placed = entries.into_iter().map(|entry| {
-        let width = 28 + page::width(entry.words()) + 14;
-        if x > LEFT && x + width > style.width() {
-            (x, row) = (LEFT, row + 1);
-        }
-        let place = (entry, row, x);
-        x += width;
-        place
-    });
-    placed.collect()
+    entries
+}
+
+fn places(style: Style, entries: &[Entry<'_>]) -> Vec<LegendPlace> {
+    page::legend_places(style, LEFT, 14, entries.iter().map(Entry::words))
 }
 
 /// The number of lines of the legend.
 fn rows(style: Style, panel: &Panel) -> i32 {
-    entries(style, panel)
-        .last()
-        .map_or(0, |(_, row, _)| row + 1)
+    let places = places(style, &entries(panel));
+    places.last().map_or(0, |place| place.row + 1)
 }
 
 /// Draws samples of the curves, above the panel so that they cover no curve.
 fn legend(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
     let palette = style.palette();
-    for (entry, row, x) in entries(style, panel) {
+    let entries = entries(panel);
+    for (entry, LegendPlace { row, x }) in entries.iter().zip(places(style, &entries)) {
         let middle = LEGEND * row + LEGEND / 2;
         draw_text(area, style, entry.words(), (x + 28, middle))?;
         let curve = match entry {
             Entry::Shade(kind) => {
                 let place = [(px(x + 2), px(middle - 6)), (px(x + 22), px(middle + 6))];
-                let colour = kind.colour(&palette);
-                area.draw(&Rectangle::new(place, colour.mix(0.16).filled()))?;
-                if kind == ShadeKind::Slip {
-                    hatch(area, place, colour)?;
-                }
-                area.draw(&Rectangle::new(place, colour.stroke_width(px(1) as u32)))?;
+                fill(area, place, *kind, &palette)?;
+                let border = kind.colour(&palette).stroke_width(px(1) as u32);
+                area.draw(&Rectangle::new(place, border))?;
                 continue;
             }
             Entry::Curve(curve) => curve,

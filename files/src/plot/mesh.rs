@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use plotters::prelude::*;
+use solver::element::Element;
 use solver::error::Violation;
 use solver::error::shortened;
 use solver::mesh::Mesh;
@@ -13,7 +14,7 @@ use solver::solution::Fields;
 use super::body::{self, Frame, Path, Sides, Window};
 use super::caption::Caption;
 use super::obstacle::Face;
-use super::page::{self, draw_text, px, with_unit};
+use super::page::{self, Area, Fallible, LegendPlace, draw_text, px, with_unit};
 use super::style::Style;
 use super::theme::hex;
 use crate::external::external_mesh;
@@ -78,25 +79,82 @@ pub fn mesh_svg(
         return Err("an element has a node that is not there".to_owned());
     }
     let faces: Vec<Face> = model.contacts.iter().map(Face::before).collect();
-    let body = Window::around(nodes.iter().copied()).ok_or("there is no mesh to draw")?;
+    let windows = windows(&model, nodes, &faces).ok_or("there is no mesh to draw")?;
+    let (frames, height) = body::layout(style, &windows);
+    let names = in_order(problem, mesh.boundaries.keys().cloned().collect());
+    let drawing = Drawing::new(elements, nodes);
+    // boundaries are those of the problem's own mesh
+    let own = Sides::of(&mesh.elements, mesh.nodes.len());
+    let content = |frame: &Frame| {
+        let mut content = drawing.content(style, frame);
+        content.extend(faces.iter().map(|face| face.drawn(style, frame)));
+        content += &marks(style, frame, mesh, &own, &names);
+        body::inside(style, frame, &content)
+    };
+    let over: String = frames.iter().map(content).collect();
+
+    let has_obstacle = faces.iter().any(|face| face.points.len() > 1);
+    let entries = entries(problem, &names, has_obstacle);
+    let labels = entries.iter().map(|(label, _)| &label[..]);
+    let places = page::legend_places(style, LEFT, 20, labels);
+    let legend = LEGEND * places.last().map_or(1, |place| place.row + 1) + 6;
+    let unit = page::length(&problem.units);
+    let axes = body::coordinates(&problem.analysis).map(|name| with_unit(name, unit));
+    let outline = if drawing.is_outline { " (outline)" } else { "" };
+    let count = format!(
+        "{} elements, {} nodes{outline}",
+        elements.len(),
+        nodes.len()
+    );
+    page::page(style, caption, height + legend, |area| {
+        for (k, frame) in frames.iter().enumerate() {
+            let said = if k == 0 { &count } else { "near the contact" };
+            body::axes(area, style, frame, said, [&axes[0], &axes[1]])?;
+        }
+        for ((label, sample), LegendPlace { row, x }) in entries.iter().zip(places) {
+            let middle = height + LEGEND * row + LEGEND / 2 - 4;
+            sample.draw(area, style, (x, middle))?;
+            draw_text(area, style, label, (x + 28, middle))?;
+        }
+        Ok(over)
+    })
+}
+
+/// The windows of the figure: the whole body with the obstacles near it, and a small contact.
+fn windows(model: &Model, nodes: &[[f64; 2]], faces: &[Face]) -> Option<Vec<Window>> {
+    let body = Window::around(nodes.iter().copied())?;
     let reach = body.grown(NEAR);
     let near = faces.iter().flat_map(|face| &face.points).copied();
     let near = Window::around(near.filter(|p| reach.holds(*p)));
     let whole = near.map_or(body, |near| body.with(&near));
     let mut windows = vec![whole.grown(0.05)];
-    windows.extend(
-        at_contact(&model, &body).map(|(around, side)| body::square(&around, side, &whole)),
-    );
-    let (frames, height) = body::layout(style, &windows);
-    let palette = style.palette();
+    windows
+        .extend(at_contact(model, &body).map(|(around, side)| body::square(&around, side, &whole)));
+    Some(windows)
+}
 
-    let names = in_order(problem, mesh.boundaries.keys().cloned().collect());
-    let each = elements.len() <= DRAWN;
-    let sides = Sides::of(elements, nodes.len());
-    // boundaries are those of the problem's own mesh
-    let own = Sides::of(&mesh.elements, mesh.nodes.len());
-    let content = |frame: &Frame| {
-        let on_page = |side: &[u32; 3]| side.map(|n| frame.at(nodes[n as usize]));
+/// The elements of a mesh, or their outline.
+struct Drawing<'a> {
+    elements: &'a [Element],
+    nodes: &'a [[f64; 2]],
+    sides: Sides,
+    /// Whether there are too many elements to draw each.
+    is_outline: bool,
+}
+
+impl<'a> Drawing<'a> {
+    fn new(elements: &'a [Element], nodes: &'a [[f64; 2]]) -> Self {
+        Drawing {
+            elements,
+            nodes,
+            sides: Sides::of(elements, nodes.len()),
+            is_outline: elements.len() > DRAWN,
+        }
+    }
+
+    /// What of it is in a window, as SVG.
+    fn content(&self, style: Style, frame: &Frame) -> String {
+        let on_page = |side: &[u32; 3]| side.map(|n| frame.at(self.nodes[n as usize]));
         let visible = |side: &[[f64; 2]; 3]| {
             let corners = |pick: fn(f64, f64) -> f64| {
                 [0, 1].map(|a| side.iter().map(|p| p[a]).reduce(pick).unwrap_or(0.0))
@@ -104,83 +162,81 @@ pub fn mesh_svg(
             frame.shows(corners(f64::min), corners(f64::max))
         };
         let (mut inside, mut lines) = (Path::default(), Path::default());
-        if each {
-            for element in elements {
+        let drawn = if self.is_outline {
+            // the area between its outline and its holes
+            let surface: Vec<_> = self.sides.surface.iter().map(on_page).collect();
+            inside.sides(&surface, false);
+            &self.sides.surface
+        } else {
+            for element in self.elements {
                 let around = element.sides().map(|s| on_page(&s)).collect::<Vec<_>>();
                 if around.iter().any(visible) {
                     inside.sides(&around, true);
                 }
             }
-        } else {
-            // the area between its outline and its holes
-            inside.sides(
-                &sides.surface.iter().map(on_page).collect::<Vec<_>>(),
-                false,
-            );
-        }
-        let drawn = if each { &sides.all } else { &sides.surface };
+            &self.sides.all
+        };
         let drawn: Vec<_> = drawn.iter().map(on_page).filter(visible).collect();
         lines.sides(&drawn, false);
-        let finest = if each && elements.len() > 4000 { 3 } else { 6 };
+        let many = self.elements.len() > 4000 && !self.is_outline;
+        let finest = if many { 3 } else { 6 };
+        let palette = style.palette();
         let (fill, line) = (hex(palette.body), hex(palette.faint));
-        let mut content = inside.drawn(&format!(r#"fill="{fill}" fill-rule="evenodd""#));
-        content += &lines.drawn(&format!(
-            r#"fill="none" stroke="{line}" stroke-width="{finest}""#
-        ));
-        content.extend(faces.iter().map(|face| face.drawn(style, frame)));
-        content + &marks(style, frame, mesh, &own, &names)
-    };
-    let over: Vec<String> = frames
-        .iter()
-        .map(|frame| body::inside(style, frame, &content(frame)))
-        .collect();
+        inside.drawn(&format!(r#"fill="{fill}" fill-rule="evenodd""#))
+            + &lines.drawn(&format!(
+                r#"fill="none" stroke="{line}" stroke-width="{finest}""#
+            ))
+    }
+}
 
-    let mut labels: Vec<String> = names
-        .iter()
-        .take(MOST)
-        .map(|name| label(problem, name))
-        .collect();
-    if names.len() > MOST {
-        labels.push(format!("and {} more", names.len() - MOST));
-    }
-    if faces.iter().any(|face| face.points.len() > 1) {
-        labels.push("obstacle".to_owned());
-    }
-    let places = places(style, &labels);
-    let legend = LEGEND * places.last().map_or(1, |(row, _)| row + 1) + 6;
-    let unit = page::length(&problem.units);
-    let axes = body::coordinates(&problem.analysis).map(|name| with_unit(name, unit));
-    let mut count = format!("{} elements, {} nodes", elements.len(), nodes.len());
-    if !each {
-        count += " (outline)";
-    }
-    page::page(style, caption, height + legend, |area| {
-        for (k, frame) in frames.iter().enumerate() {
-            let said = if k == 0 { &count } else { "near the contact" };
-            body::axes(area, style, frame, said, [&axes[0], &axes[1]])?;
-        }
-        for (k, (label, (row, x))) in labels.iter().zip(&places).enumerate() {
-            let middle = height + LEGEND * row + LEGEND / 2 - 4;
-            if label == "obstacle" && k + 1 == labels.len() {
-                let place = [(px(*x), px(middle - 6)), (px(x + 22), px(middle + 6))];
-                area.draw(&Rectangle::new(place, palette.obstacle.filled()))?;
-            } else if k < names.len().min(MOST) {
+/// The sample before the label of an entry.
+enum Sample {
+    /// The line of a boundary, by its number.
+    Boundary(usize),
+    Obstacle,
+    None,
+}
+
+impl Sample {
+    fn draw(&self, area: &Area<'_>, style: Style, (x, middle): (i32, i32)) -> Fallible<()> {
+        let palette = style.palette();
+        match *self {
+            Sample::Boundary(k) => {
                 let colour = palette.curves[k % palette.curves.len()];
-                let sample = [(px(*x), px(middle)), (px(x + 22), px(middle))];
                 let line = colour.stroke_width(px(3) as u32);
-                if k < palette.curves.len() {
-                    area.draw(&PathElement::new(sample, line))?;
+                let dashes: &[[i32; 2]] = if k < palette.curves.len() {
+                    &[[0, 22]]
                 } else {
-                    for from in [*x, x + 13] {
-                        let dash = [(px(from), px(middle)), (px(from + 8), px(middle))];
-                        area.draw(&PathElement::new(dash, line))?;
-                    }
+                    &[[0, 8], [13, 21]]
+                };
+                for dash in dashes {
+                    let ends = dash.map(|along| (px(x + along), px(middle)));
+                    area.draw(&PathElement::new(ends, line))?;
                 }
             }
-            draw_text(area, style, label, (x + 28, middle))?;
+            Sample::Obstacle => {
+                let place = [(px(x), px(middle - 6)), (px(x + 22), px(middle + 6))];
+                area.draw(&Rectangle::new(place, palette.obstacle.filled()))?;
+            }
+            Sample::None => {}
         }
-        Ok(over.concat())
-    })
+        Ok(())
+    }
+}
+
+/// The entries of the legend: the first boundaries, the number of the others, and the obstacle.
+fn entries(problem: &Problem, names: &[String], has_obstacle: bool) -> Vec<(String, Sample)> {
+    let named = names.iter().take(MOST).enumerate();
+    let mut entries: Vec<(String, Sample)> = named
+        .map(|(k, name)| (label(problem, name), Sample::Boundary(k)))
+        .collect();
+    if names.len() > MOST {
+        entries.push((format!("and {} more", names.len() - MOST), Sample::None));
+    }
+    if has_obstacle {
+        entries.push(("obstacle".to_owned(), Sample::Obstacle));
+    }
+    entries
 }
 
 /// The window around the nodes that the obstacles are pushed to, or that are nearest to them, if those are a small part
@@ -270,23 +326,6 @@ fn label(problem: &Problem, name: &str) -> String {
     } else {
         format!("{name} ({})", roles.join(", "))
     }
-}
-
-/// Line and place of each entry of the legend (pixels).
-fn places(style: Style, labels: &[String]) -> Vec<(i32, i32)> {
-    let (mut x, mut row) = (LEFT, 0);
-    labels
-        .iter()
-        .map(|label| {
-            let width = 28 + page::width(label) + 20;
-            if x > LEFT && x + width > style.width() {
-                (x, row) = (LEFT, row + 1);
-            }
-            let place = (row, x);
-            x += width;
-            place
-        })
-        .collect()
 }
 
 #[cfg(test)]

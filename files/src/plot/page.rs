@@ -221,6 +221,33 @@ pub(super) fn width(words: &str) -> i32 {
     43 * words.chars().count() as i32 / 5
 }
 
+/// The place of an entry of a legend: its row, and its left end (pixels).
+pub(super) struct LegendPlace {
+    pub(super) row: i32,
+    pub(super) x: i32,
+}
+
+/// Places the entries of a legend in rows that begin at `left`, each a sample of a line and words, with `gap` behind
+/// them (pixels).
+pub(super) fn legend_places<'a>(
+    style: Style,
+    left: i32,
+    gap: i32,
+    words: impl Iterator<Item = &'a str>,
+) -> Vec<LegendPlace> {
+    let (mut x, mut row) = (left, 0);
+    let placed = words.map(|words| {
+        let width = 28 + width(words) + gap;
+        if x > left && x + width > style.width() {
+            (x, row) = (left, row + 1);
+        }
+        let place = LegendPlace { row, x };
+        x += width;
+        place
+    });
+    placed.collect()
+}
+
 /// How many large bold letters fit on a line.
 fn bold_letters(width: i32) -> usize {
     ((width - 2 * MARGIN) / 13).max(1) as usize

@@ -1,5 +1,7 @@
 //! The exit codes of the process.
 
+use std::fmt::Display;
+
 use app::{CannotListen, OpenToAll};
 use service::{config::HalfOfTls, error::ApiError};
 use store::StoreError;
@@ -106,6 +108,9 @@ impl Exit {
 
     /// The exit code of a command that ended with this error.
     pub(super) fn of(error: &anyhow::Error) -> Exit {
+        if let Some(Ended(exit)) = error.downcast_ref() {
+            return *exit;
+        }
         match error.downcast_ref() {
             Some(StoreError::Folder(_)) => Exit::Folder,
             Some(StoreError::Locked(_)) => Exit::Locked,
@@ -120,6 +125,17 @@ impl Exit {
             _ => Exit::Failed,
         }
     }
+}
+
+/// The error of a command whose message has been printed.
+#[derive(Debug, thiserror::Error)]
+#[error("the exit code is {}", .0.code())]
+pub(super) struct Ended(pub(super) Exit);
+
+/// Prints what is wrong with the input, and ends the command.
+pub(super) fn refuse(message: impl Display) -> anyhow::Error {
+    eprintln!("{message}");
+    Ended(Exit::Invalid).into()
 }
 
 /// The exit code of a failed call to a running service.

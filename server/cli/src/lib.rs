@@ -52,7 +52,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use tracing::level_filters::LevelFilter;
 use web::rest;
 
-use self::exit::Exit;
+use self::exit::{Ended, Exit};
 
 /// Solves frictional contact problems, one at a time or as jobs of a service
 #[derive(Debug, Parser)]
@@ -204,6 +204,7 @@ pub fn main() -> ExitCode {
                     .iter()
                     .for_each(|violation| eprintln!("signorini: {violation}"));
             }
+            None if error.is::<Ended>() => {}
             _ => eprintln!("signorini: {error:#}"),
         }
         Exit::of(&error)

@@ -1,11 +1,11 @@
 //! Results as text: a line for each iteration, a summary, a table of stresses.
 
-use std::fmt::Write;
+use std::fmt::{Display, Write};
 
 use base::run::{Document, Summary};
 use solver::solution::{
     Accuracy, ContactProfile, ContactSummary, ErrorMethod, EstimatedQuantity, Iteration, NodeState,
-    Outcome, Peak, Phase, QuantityName,
+    Outcome, Peak, Phase, QuantityName, Refinement,
 };
 
 use super::table::harmless;
@@ -55,7 +55,7 @@ pub(super) fn iteration(row: &Iteration) -> String {
 }
 
 /// Facts, one on each line after its name.
-pub(super) fn lines(facts: impl Iterator<Item = (impl std::fmt::Display, String)>) -> String {
+pub(super) fn lines(facts: impl Iterator<Item = (impl Display, String)>) -> String {
     facts
         .map(|(name, value)| format!("{name:<20}{}\n", harmless(&value)))
         .collect()
@@ -93,94 +93,21 @@ pub(super) fn result<'a>(
     steps: impl Iterator<Item = (&'a str, &'a solver::solution::Summary)>,
 ) -> String {
     let s = &summary.solution;
-    let ended = match s.outcome {
-        Outcome::Converged => "converged",
-        Outcome::NotConverged => "NOT CONVERGED",
-        Outcome::ContactCycling => "NOT CONVERGED: the iteration repeats in a cycle",
-        Outcome::FalseConvergence => {
-            "NOT CONVERGED: the iteration converged to a state that is not a solution; see the residuals"
-        }
-        Outcome::Canceled => "CANCELED",
-    };
-    let mut text = String::new();
-    let mut line = |name: &str, value: String| {
-        let _ = writeln!(text, "{name:<20}{value}");
-    };
+    let mut lines = Lines::default();
     if let Some(title) = title {
-        line("title", title.into());
+        lines.add("title", title);
     }
     if let Some(accuracy) = &s.accuracy {
-        let verdict = accuracy.verdict.in_words();
-        let verified = match accuracy.verified {
-            Some(true) => "; compared with the refined mesh",
-            _ => "",
-        };
-        line("accuracy", format!("{verdict}{verified}"));
-        for reason in accuracy.reasons.iter().take(MOST_REASONS) {
-            line("", reason.clone());
-        }
-        if let more @ 1.. = accuracy.reasons.len().saturating_sub(MOST_REASONS) {
-            line("", format!("and {more} more, in summary.accuracy.reasons"));
-        }
-        verified_lines(accuracy, &mut line);
+        lines.add_accuracy(accuracy);
     }
-    let seconds: f64 = summary.timings.values().sum();
-    line(
-        "outcome",
-        format!("{ended} after {} iterations, {seconds:.3} s", s.iterations),
-    );
-    line(
-        "unknowns",
-        format!(
-            "{}, {} of them on contact boundaries",
-            s.dofs, s.contact_dofs
-        ),
-    );
-    for (words, value, name) in [
-        ("normal force", s.normal_force, QuantityName::NormalForce),
-        (
-            "tangential force",
-            s.tangential_force,
-            QuantityName::TangentialForce,
-        ),
-        (
-            "friction force",
-            s.friction_force,
-            QuantityName::FrictionForce,
-        ),
-    ] {
-        let stated = stated(s.accuracy.as_ref(), name, None);
-        line(words, number(value) + &stated);
-    }
-    line(
-        "residuals",
-        format!(
-            "kkt {:.1e}, friction {:.1e}, monolithic {:.1e}, force balance {:.1e}",
-            s.residuals.kkt, s.residuals.friction, s.residuals.monolithic, s.residuals.equilibrium
-        ),
-    );
+    lines.add_end(s, summary.timings.values().sum());
     for mesh in &s.refinements {
-        let change = mesh
-            .change
-            .map_or(String::new(), |change| format!(", changed by {change:.1e}"));
-        let error = mesh.error.map_or(String::new(), |error| {
-            format!(", largest error {:.2} %", 100.0 * error)
-        });
-        line(
-            "  mesh",
-            format!(
-                "{:>6} elements: normal force {}, tangential force {}, peak σ_t {}{change}{error}",
-                mesh.elements,
-                number(mesh.normal_force),
-                number(mesh.tangential_force),
-                number(mesh.peak_tangential_stress)
-            ),
-        );
+        lines.add_mesh(mesh);
     }
     for (name, step) in steps {
-        line(
+        lines.add(
             &format!("step {name:?}"),
-            format!(
+            format_args!(
                 "normal force {}, tangential force {}, {} iterations",
                 number(step.normal_force),
                 number(step.tangential_force),
@@ -199,26 +126,51 @@ pub(super) fn result<'a>(
                 number(second.normal_force)
             ),
         };
-        line("unique", found);
+        lines.add("unique", found);
     }
     for (name, contact) in &s.contacts {
-        contact_lines(name, contact, s.accuracy.as_ref(), &mut line);
+        lines.add_contact(name, contact, s.accuracy.as_ref());
     }
     for warning in &s.warnings {
-        line(
-            "warning",
-            format!("{}: {}", warning.pointer, warning.message),
-        );
+        let text = format_args!("{}: {}", warning.pointer, warning.message);
+        lines.add("warning", text);
     }
-    line("digest", summary.digest.clone());
-    text
+    lines.add("digest", &summary.digest);
+    lines.0
 }
 
-/// Prints a line for each quantity that was compared with the refined mesh.
-fn verified_lines(accuracy: &Accuracy, line: &mut impl FnMut(&str, String)) {
-    for q in &accuracy.quantities {
+/// A text of facts, one on each line after its name.
+#[derive(Default)]
+struct Lines(String);
+
+impl Lines {
+    fn add(&mut self, name: &str, value: impl Display) {
+        let _ = writeln!(self.0, "{name:<20}{value}");
+    }
+
+    fn add_accuracy(&mut self, accuracy: &Accuracy) {
+        let verdict = accuracy.verdict.in_words();
+        let verified = match accuracy.verified {
+            Some(true) => "; compared with the refined mesh",
+            _ => "",
+        };
+        self.add("accuracy", format_args!("{verdict}{verified}"));
+        for reason in accuracy.reasons.iter().take(MOST_REASONS) {
+            self.add("", reason);
+        }
+        if let more @ 1.. = accuracy.reasons.len().saturating_sub(MOST_REASONS) {
+            let others = format_args!("and {more} more, in summary.accuracy.reasons");
+            self.add("", others);
+        }
+        for q in &accuracy.quantities {
+            self.add_verified(q);
+        }
+    }
+
+    /// Adds a quantity if it was compared with the refined mesh.
+    fn add_verified(&mut self, q: &EstimatedQuantity) {
         let (Some(finer), Some(difference)) = (q.finer, q.difference) else {
-            continue;
+            return;
         };
         let order = q
             .order
@@ -229,9 +181,9 @@ fn verified_lines(accuracy: &Accuracy, line: &mut impl FnMut(&str, String)) {
             (None, ErrorMethod::TooMany) => "no stated error".to_owned(),
             (None, _) => "error unknown".to_owned(),
         };
-        line(
+        self.add(
             "  verified",
-            format!(
+            format_args!(
                 "{} at {:?}: {}, on the refined mesh {}, difference {difference:.1e}{order}; {error}",
                 <&str>::from(q.quantity),
                 q.contact,
@@ -239,6 +191,97 @@ fn verified_lines(accuracy: &Accuracy, line: &mut impl FnMut(&str, String)) {
                 number(finer),
             ),
         );
+    }
+
+    /// Adds how the iterations ended, the forces and the residuals.
+    fn add_end(&mut self, s: &solver::solution::Summary, seconds: f64) {
+        let ended = match s.outcome {
+            Outcome::Converged => "converged",
+            Outcome::NotConverged => "NOT CONVERGED",
+            Outcome::ContactCycling => "NOT CONVERGED: the iteration repeats in a cycle",
+            Outcome::FalseConvergence => {
+                "NOT CONVERGED: the iteration converged to a state that is not a solution; see the residuals"
+            }
+            Outcome::Canceled => "CANCELED",
+        };
+        self.add(
+            "outcome",
+            format_args!("{ended} after {} iterations, {seconds:.3} s", s.iterations),
+        );
+        self.add(
+            "unknowns",
+            format_args!(
+                "{}, {} of them on contact boundaries",
+                s.dofs, s.contact_dofs
+            ),
+        );
+        use QuantityName::{FrictionForce, NormalForce, TangentialForce};
+        for (words, value, name) in [
+            ("normal force", s.normal_force, NormalForce),
+            ("tangential force", s.tangential_force, TangentialForce),
+            ("friction force", s.friction_force, FrictionForce),
+        ] {
+            let stated = stated(s.accuracy.as_ref(), name, None);
+            self.add(words, number(value) + &stated);
+        }
+        let r = &s.residuals;
+        self.add(
+            "residuals",
+            format_args!(
+                "kkt {:.1e}, friction {:.1e}, monolithic {:.1e}, force balance {:.1e}",
+                r.kkt, r.friction, r.monolithic, r.equilibrium
+            ),
+        );
+    }
+
+    fn add_mesh(&mut self, mesh: &Refinement) {
+        let change = mesh
+            .change
+            .map_or(String::new(), |change| format!(", changed by {change:.1e}"));
+        let error = mesh.error.map_or(String::new(), |error| {
+            format!(", largest error {:.2} %", 100.0 * error)
+        });
+        self.add(
+            "  mesh",
+            format_args!(
+                "{:>6} elements: normal force {}, tangential force {}, peak σ_t {}{change}{error}",
+                mesh.elements,
+                number(mesh.normal_force),
+                number(mesh.tangential_force),
+                number(mesh.peak_tangential_stress)
+            ),
+        );
+    }
+
+    fn add_contact(&mut self, name: &str, contact: &ContactSummary, accuracy: Option<&Accuracy>) {
+        let ranges = |ranges: &[[f64; 2]]| {
+            let ranges: Vec<String> = ranges
+                .iter()
+                .map(|[start, end]| format!("{start:.4} … {end:.4}"))
+                .collect();
+            if ranges.is_empty() {
+                "nowhere".to_string()
+            } else {
+                ranges.join(", ")
+            }
+        };
+        let (normal, tangential) = (&contact.peak_normal_stress, &contact.peak_tangential_stress);
+        self.add(&format!("contact {name:?}"), "");
+        self.add("  touches, s", ranges(&contact.contact));
+        self.add("  sticks, s", ranges(&contact.stick));
+        for (words, peak, quantity) in [
+            ("  peak σ_n", normal, QuantityName::PeakNormalStress),
+            ("  peak σ_t", tangential, QuantityName::PeakTangentialStress),
+        ] {
+            let Some(Peak { value, s, .. }) = peak else {
+                continue;
+            };
+            let stated = stated(accuracy, quantity, Some(name));
+            self.add(
+                words,
+                format_args!("{} at s = {s:.4}{stated}", number(*value)),
+            );
+        }
     }
 }
 
@@ -251,37 +294,6 @@ pub(super) fn number(value: f64) -> String {
         format!("{value:.*}", 7_usize.saturating_sub(before_point))
     } else {
         format!("{value:.6e}")
-    }
-}
-
-fn contact_lines(
-    name: &str,
-    contact: &ContactSummary,
-    accuracy: Option<&Accuracy>,
-    line: &mut impl FnMut(&str, String),
-) {
-    let ranges = |ranges: &[[f64; 2]]| {
-        let ranges: Vec<String> = ranges
-            .iter()
-            .map(|[start, end]| format!("{start:.4} … {end:.4}"))
-            .collect();
-        if ranges.is_empty() {
-            "nowhere".to_string()
-        } else {
-            ranges.join(", ")
-        }
-    };
-    let peak = |peak: &Peak| format!("{} at s = {:.4}", number(peak.value), peak.s);
-    line(&format!("contact {name:?}"), String::new());
-    line("  touches, s", ranges(&contact.contact));
-    line("  sticks, s", ranges(&contact.stick));
-    if let Some(value) = &contact.peak_normal_stress {
-        let stated = stated(accuracy, QuantityName::PeakNormalStress, Some(name));
-        line("  peak σ_n", peak(value) + &stated);
-    }
-    if let Some(value) = &contact.peak_tangential_stress {
-        let stated = stated(accuracy, QuantityName::PeakTangentialStress, Some(name));
-        line("  peak σ_t", peak(value) + &stated);
     }
 }
 
@@ -308,11 +320,9 @@ fn stated(accuracy: Option<&Accuracy>, name: QuantityName, contact: Option<&str>
 
 /// The lines about one contact.
 pub(super) fn contact(name: &str, contact: &ContactSummary, accuracy: Option<&Accuracy>) -> String {
-    let mut text = String::new();
-    contact_lines(name, contact, accuracy, &mut |name, value| {
-        let _ = writeln!(text, "{name:<20}{value}");
-    });
-    text
+    let mut lines = Lines::default();
+    lines.add_contact(name, contact, accuracy);
+    lines.0
 }
 
 /// The stresses along a contact boundary as a table.

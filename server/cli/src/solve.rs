@@ -1,6 +1,7 @@
 //! The command `signorini solve FILE`, which runs the same code as a worker of the service.
 
 use std::{
+    fmt::Display,
     fs::File,
     io::{BufReader, Read, Seek},
     ops::ControlFlow,
@@ -19,6 +20,7 @@ use files::ReadError;
 use service::{config::MemoryBudget, error::ApiError};
 use sha2::{Digest, Sha256};
 use solver::{
+    Estimate,
     error::{Reason, SolveError, Violation},
     mesh::Mesh,
     problem::Problem,
@@ -26,7 +28,7 @@ use solver::{
 };
 
 use super::{
-    exit::Exit,
+    exit::{Ended, Exit, refuse},
     output::{self, Output},
     progress::{To, View},
     report,
@@ -88,63 +90,17 @@ pub(super) fn run(
     }: &Arguments,
 ) -> anyhow::Result<Exit> {
     let start = Instant::now();
-    let (problem, told) = match read(file) {
-        Ok(Given::Problem(problem, warnings)) => (*problem, warnings),
-        Ok(Given::Mesh) => return only_a_mesh(file),
-        Err(ReadError::Invalid(violations)) => {
-            let exit = invalid(file, &violations);
-            let of_sweep = |violation: &Violation| {
-                violation.reason == Reason::UnknownName
-                    && ["/base", "/axes", "/points"].contains(&violation.pointer.as_str())
-            };
-            if violations.iter().any(of_sweep) {
-                eprintln!("This seems to be a sweep: solve it with `signorini sweep`.");
-            }
-            return Ok(exit);
-        }
-        Err(ReadError::Io(error)) => {
-            return Err(error).with_context(|| format!("cannot read {}", file.display()));
-        }
-    };
+    let (problem, told) = problem(file)?;
     let parse_s = start.elapsed().as_secs_f64();
     let contacts = problem.contacts.iter();
     let contacts: Vec<&str> = contacts.map(|contact| contact.boundary.as_str()).collect();
-    let asked = output.iter().map(|path| Output::parse(path, &contacts));
-    let outputs = match asked.collect::<Result<Vec<_>, _>>() {
-        Ok(outputs) => outputs,
-        Err(problem) => {
-            eprintln!("{problem}");
-            return Ok(Exit::Invalid);
-        }
-    };
-    let (size, stored) = match stored_mesh(&problem, mesh.as_deref()) {
-        Ok(None) => (None, None),
-        Ok(Some((info, mesh))) => (Some(info.size()), Some(mesh)),
-        Err(Unusable::Reason(reason)) => {
-            eprintln!("signorini: {}: {reason}", file.display());
-            return Ok(Exit::Invalid);
-        }
-        Err(Unusable::Read(ReadError::Invalid(violations))) => {
-            return Ok(invalid(mesh.as_deref().unwrap_or(file), &violations));
-        }
-        Err(Unusable::Read(ReadError::Io(error))) => {
-            let mesh = mesh.as_deref().unwrap_or(file);
-            return Err(error).with_context(|| format!("cannot read {}", mesh.display()));
-        }
-    };
-    let budget_bytes = memory.bytes();
-    let estimate = match solver::estimate(&problem, size.as_ref()) {
-        Ok(estimate) => estimate,
-        Err(violation) => return Ok(invalid(file, &[violation])),
-    };
-    if estimate.memory_bytes > budget_bytes {
-        let too_large = ApiError::ProblemTooLarge {
-            estimate,
-            budget_bytes,
-        };
-        eprintln!("{}: {too_large}", file.display());
-        return Ok(Exit::Invalid);
-    }
+    let outputs = output.iter().map(|path| Output::parse(path, &contacts));
+    let outputs = outputs.collect::<Result<Vec<_>, _>>().map_err(refuse)?;
+    let stored = stored_mesh(&problem, file, mesh.as_deref())?;
+    let (size, stored) = stored.map(|(info, mesh)| (info.size(), mesh)).unzip();
+    let estimate = solver::estimate(&problem, size.as_ref());
+    let estimate = estimate.map_err(|violation| invalid(file, &[violation]))?;
+    check_memory(estimate, memory, file.display())?;
     let solve = |observe: &mut Observer<'_>| {
         let mut external = files::external_mesh(&problem, stored.clone());
         if let Some(Ok(external)) = &mut external {
@@ -178,7 +134,7 @@ pub(super) fn run(
     view.end();
     let document = match solved {
         Ok(document) => document,
-        Err(SolveError::Invalid(violations)) => return Ok(invalid(file, &violations)),
+        Err(SolveError::Invalid(violations)) => return Err(invalid(file, &violations)),
         Err(error) => return Err(error.into()),
     };
     let title = problem.title.as_deref();
@@ -206,52 +162,63 @@ pub(super) fn run(
     })
 }
 
-/// Why a file is not the mesh that a problem names.
-enum Unusable {
-    Reason(String),
-    Read(ReadError),
-}
-
-impl From<std::io::Error> for Unusable {
-    fn from(error: std::io::Error) -> Self {
-        Unusable::Read(ReadError::Io(error))
+/// Refuses what needs more memory than there is; `what` names it.
+pub(super) fn check_memory(
+    estimate: Estimate,
+    memory: &MemoryBudget,
+    what: impl Display,
+) -> anyhow::Result<()> {
+    let budget_bytes = memory.bytes();
+    if estimate.memory_bytes <= budget_bytes {
+        return Ok(());
     }
+    let too_large = ApiError::ProblemTooLarge {
+        estimate,
+        budget_bytes,
+    };
+    Err(refuse(format_args!("{what}: {too_large}")))
 }
 
 /// The mesh that a problem names by the hash of its file, from that file; `None` if it names none.
 fn stored_mesh(
     problem: &Problem,
+    problem_file: &Path,
     file: Option<&Path>,
-) -> Result<Option<(MeshInfo, Mesh)>, Unusable> {
+) -> anyhow::Result<Option<(MeshInfo, Mesh)>> {
+    let refused = |reason: &dyn Display| {
+        refuse(format_args!(
+            "signorini: {}: {reason}",
+            problem_file.display()
+        ))
+    };
     let (named, file) = match (problem.mesh.stored(), file) {
         (Some(named), Some(file)) => (named, file),
         (None, None) => return Ok(None),
         (Some(_), None) => {
-            return Err(Unusable::Reason(
-                "the problem names its mesh by a hash (mesh.stored): give its file with --mesh FILE, or submit the problem to a service \
-                 that has the mesh: signorini submit"
-                    .into(),
+            return Err(refused(
+                &"the problem names its mesh by a hash (mesh.stored): give its file with --mesh FILE, or submit the problem to a service \
+                 that has the mesh: signorini submit",
             ));
         }
         (None, Some(_)) => {
-            return Err(Unusable::Reason(
-                "the problem has a mesh of its own; --mesh is for one that names its mesh by a hash (mesh.stored)"
-                    .into(),
+            return Err(refused(
+                &"the problem has a mesh of its own; --mesh is for one that names its mesh by a hash (mesh.stored)",
             ));
         }
     };
-    let mut opened = File::open(file)?;
-    let (found, bytes) = hashed(&mut opened)?;
+    let cannot = || format!("cannot read {}", file.display());
+    let mut opened = File::open(file).with_context(cannot)?;
+    let (found, bytes) = hashed(&mut opened).with_context(cannot)?;
     if found != named {
-        return Err(Unusable::Reason(format!(
+        return Err(refused(&format_args!(
             "--mesh {}: this file has the hash {found}, but the problem names {named}",
             file.display()
         )));
     }
     // the bytes that were hashed, whatever has that name by now
-    opened.rewind()?;
-    let reader = BufReader::new(opened);
-    let (format, mesh, warnings) = files::read_mesh(reader).map_err(Unusable::Read)?;
+    opened.rewind().with_context(cannot)?;
+    let (format, mesh, warnings) =
+        files::read_mesh(BufReader::new(opened)).map_err(|error| unreadable(file, error))?;
     let info = MeshInfo::new(found, bytes, (format, &mesh, warnings));
     Ok(Some((info, mesh)))
 }
@@ -271,25 +238,14 @@ fn hashed(opened: &mut File) -> std::io::Result<(String, u64)> {
     }
 }
 
-/// The content of a file.
-enum Given {
-    /// A problem, and warnings about deviations from its deck.
-    Problem(Box<Problem>, Vec<Warning>),
-    /// A mesh of Gmsh, or a deck without a step.
-    Mesh,
-}
-
 /// Prints what a mesh contains, and how a problem refers to it.
-fn only_a_mesh(file: &Path) -> anyhow::Result<Exit> {
+fn only_a_mesh(file: &Path) -> anyhow::Result<Ended> {
     let cannot = || format!("cannot read {}", file.display());
     let mut opened = File::open(file).with_context(cannot)?;
     let (hash, _) = hashed(&mut opened).with_context(cannot)?;
     opened.rewind().with_context(cannot)?;
-    let mesh = match files::read_mesh(BufReader::new(opened)) {
-        Ok((_, mesh, _)) => mesh,
-        Err(ReadError::Invalid(violations)) => return Ok(invalid(file, &violations)),
-        Err(ReadError::Io(error)) => return Err(error).with_context(cannot),
-    };
+    let (_, mesh, _) =
+        files::read_mesh(BufReader::new(opened)).map_err(|error| unreadable(file, error))?;
     let names = |what: &str, names: Vec<&String>| match names.len() {
         0 => format!("no {what}"),
         count => {
@@ -315,41 +271,60 @@ fn only_a_mesh(file: &Path) -> anyhow::Result<Exit> {
         "  Write a problem as JSON with \"mesh\": {{\"stored\": \"{hash}\"}}, materials, supports and contacts, and solve it with \
          `signorini solve problem.json --mesh {name}`."
     );
-    Ok(Exit::Invalid)
+    Ok(Ended(Exit::Invalid))
 }
 
-/// Reads a file, depending on its extension. For a JSON file with a mesh, only the mesh is held in memory, not its
-/// text.
-fn read(file: &Path) -> Result<Given, ReadError> {
+/// The problem in a file, and warnings about deviations from its deck.
+fn problem(file: &Path) -> anyhow::Result<(Problem, Vec<Warning>)> {
+    match read(file) {
+        Ok(Some(found)) => Ok(found),
+        Ok(None) => Err(only_a_mesh(file)?.into()),
+        Err(error) => {
+            let of_sweep = |violation: &Violation| {
+                violation.reason == Reason::UnknownName
+                    && ["/base", "/axes", "/points"].contains(&violation.pointer.as_str())
+            };
+            let is_sweep = matches!(&error, ReadError::Invalid(all) if all.iter().any(of_sweep));
+            let ended = unreadable(file, error);
+            if is_sweep {
+                eprintln!("This seems to be a sweep: solve it with `signorini sweep`.");
+            }
+            Err(ended)
+        }
+    }
+}
+
+/// Reads a file, depending on its extension; `None` for a mesh, or a deck without a step. For a JSON file with a mesh,
+/// only the mesh is held in memory, not its text.
+fn read(file: &Path) -> Result<Option<(Problem, Vec<Warning>)>, ReadError> {
     let mut opened = File::open(file).map_err(ReadError::Io)?;
     let is = |wanted: &str| {
         let ending = file.extension();
         ending.is_some_and(|ending| ending.eq_ignore_ascii_case(wanted))
     };
     if is("msh") {
-        return Ok(Given::Mesh);
+        return Ok(None);
     }
-    let problem = |problem, warnings| Given::Problem(Box::new(problem), warnings);
     if !is("inp") {
-        return files::read(opened).map(|read| problem(read, Vec::new()));
+        return files::read(opened).map(|problem| Some((problem, Vec::new())));
     }
     let mut bytes = Vec::new();
     let read = opened.read_to_end(&mut bytes);
     read.map_err(ReadError::Io)?;
     let text = files::text(bytes);
     if !files::abaqus::has_step(&text) {
-        return Ok(Given::Mesh);
+        return Ok(None);
     }
-    let (read, warnings) =
+    let (problem, warnings) =
         files::abaqus::problem_with_warnings(&text).map_err(ReadError::Invalid)?;
-    if read.contacts.is_empty() {
+    if problem.contacts.is_empty() {
         eprintln!(
             "{}: a deck without contact, solved as an elastic problem. Contact with a rigid surface is a *CONTACT PAIR, or `contacts` \
              in a problem as JSON with this deck as its mesh.",
             file.display()
         );
     }
-    Ok(problem(read, warnings))
+    Ok(Some((problem, warnings)))
 }
 
 /// The command `signorini schema`.
@@ -358,7 +333,18 @@ pub(super) fn schema() -> anyhow::Result<Exit> {
     Ok(Exit::Ok)
 }
 
-pub(super) fn invalid(file: &Path, violations: &[Violation]) -> Exit {
+/// Prints why a file cannot be used if it could be read.
+fn unreadable(file: &Path, error: ReadError) -> anyhow::Error {
+    match error {
+        ReadError::Invalid(violations) => invalid(file, &violations),
+        ReadError::Io(error) => {
+            anyhow::Error::new(error).context(format!("cannot read {}", file.display()))
+        }
+    }
+}
+
+/// Prints the violations in a file, and ends the command.
+pub(super) fn invalid(file: &Path, violations: &[Violation]) -> anyhow::Error {
     let many = if violations.len() == 1 {
         "violation"
     } else {
@@ -371,7 +357,7 @@ pub(super) fn invalid(file: &Path, violations: &[Violation]) -> Exit {
             None => eprintln!("  {violation}"),
         }
     }
-    Exit::Invalid
+    Ended(Exit::Invalid).into()
 }
 
 #[cfg(test)]

@@ -32,9 +32,9 @@ use solver::{
 };
 
 use super::{
-    exit::Exit,
+    exit::{Exit, refuse},
     output,
-    solve::{Threads, invalid},
+    solve::{Threads, check_memory, invalid},
 };
 
 #[derive(Debug, Args)]
@@ -98,41 +98,19 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
     let text =
         std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
     let text = text.strip_prefix(files::BYTE_ORDER_MARK).unwrap_or(&text);
-    let format = match output.as_deref().map(format_of).transpose() {
-        Ok(format) => format,
-        Err(problem) => {
-            eprintln!("{problem}");
-            return Ok(Exit::Invalid);
-        }
-    };
-    let sweep = match read(file, text)? {
-        Ok(sweep) => sweep,
-        Err(violations) => return Ok(invalid(file, &violations)),
-    };
-    let groups = match groups(&sweep) {
-        Ok(groups) => groups,
-        Err(violations) => return Ok(invalid(file, &violations)),
-    };
+    let format = output.as_deref().map(format_of).transpose();
+    let format = format.map_err(refuse)?;
+    let sweep = read(file, text)?;
+    let groups = groups(&sweep).map_err(|violations| invalid(file, &violations))?;
     let Sweep { base, plan } = &sweep;
-    let budget_bytes = memory.bytes();
     for group in &groups {
-        let Some(Ok(first)) = group
-            .first()
-            .map(|first| plan.whole_problem(*first, &base.mesh))
-        else {
-            continue; // they were read before
-        };
-        match solver::estimate(&first, None) {
-            Ok(estimate) if estimate.memory_bytes > budget_bytes => {
-                let too_large = ApiError::ProblemTooLarge {
-                    estimate,
-                    budget_bytes,
-                };
-                eprintln!("{}: member {}: {too_large}", file.display(), group[0]);
-                return Ok(Exit::Invalid);
-            }
-            // what else is wrong with a member is told in its row
-            Ok(_) | Err(_) => {}
+        // what else is wrong with a member is told in its row
+        if let Some(first) = group.first()
+            && let Ok(problem) = plan.whole_problem(*first, &base.mesh)
+            && let Ok(estimate) = solver::estimate(&problem, None)
+        {
+            let member = format_args!("{}: member {first}", file.display());
+            check_memory(estimate, memory, member)?;
         }
     }
     let count = plan.count();
@@ -247,25 +225,21 @@ fn malformed(pointer: &str, found: String) -> Vec<Violation> {
     )]
 }
 
-/// Reads a sweep from a file's text; the error says why the file of its base cannot be read.
-fn read(file: &Path, text: &str) -> anyhow::Result<Result<Sweep, Vec<Violation>>> {
+/// Reads a sweep from a file's text.
+fn read(file: &Path, text: &str) -> anyhow::Result<Sweep> {
     static BODY: Body<Definition> = Body::new();
-    let mut content = match BODY.read(text) {
-        Ok(content) => content,
-        Err(error) => return Ok(Err(malformed("", error))),
-    };
+    let refused = |violations: Vec<Violation>| invalid(file, &violations);
+    let content = BODY.read(text);
+    let mut content = content.map_err(|error| refused(malformed("", error)))?;
     let from_file = match content.problems.first() {
         Some((_, base)) => base_from_file(file, base),
         None => Ok(None),
     };
-    let from_file = match from_file {
-        Ok(base) => base,
-        Err(error) => match error.downcast() {
-            Ok(ApiError::InvalidProblem(violations)) => return Ok(Err(violations)),
-            Ok(other) => return Err(other.into()),
-            Err(other) => return Err(other),
-        },
-    };
+    let from_file = from_file.map_err(|error| match error.downcast() {
+        Ok(ApiError::InvalidProblem(violations)) => refused(violations),
+        Ok(other) => other.into(),
+        Err(other) => other,
+    })?;
     let variation = content.fields.take().map(|fields| Variation {
         axes: fields.axes,
         mode: fields.mode,
@@ -275,5 +249,5 @@ fn read(file: &Path, text: &str) -> anyhow::Result<Result<Sweep, Vec<Violation>>
     if let (Some(base), Some((_, text))) = (&from_file, content.problems.first_mut()) {
         *text = base.get();
     }
-    Ok(files::sweep::of_body(content))
+    files::sweep::of_body(content).map_err(refused)
 }

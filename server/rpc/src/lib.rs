@@ -20,7 +20,7 @@ pub mod convert;
 pub mod grpc;
 
 /// The gRPC contract, as generated from `proto/signorini/v1/signorini.proto`.
-#[allow(missing_docs, unreachable_pub, clippy::all)]
+#[allow(missing_docs, unreachable_pub, clippy::all, clippy::too_many_lines)]
 pub mod pb {
     tonic::include_proto!("signorini.v1");
 

@@ -148,7 +148,7 @@ pub fn assess(
     origins: Option<&mut Origins>,
     observe: &mut Observer<'_>,
 ) -> Accuracy {
-    let quantities = &reported.quantities;
+    let quantities = &reported.along.quantities;
     let bounds = match reported.summary.outcome {
         Outcome::Converged => bounds(model, body, system, finished, reported, origins, observe),
         _ => None,
@@ -237,7 +237,7 @@ fn bounds(
     mut origins: Option<&mut Origins>,
     observe: &mut Observer<'_>,
 ) -> Option<Vec<Bounds>> {
-    let quantities = &reported.quantities;
+    let quantities = &reported.along.quantities;
     let influencing: Vec<&Quantity> = quantities.iter().filter(|q| q.gradient.is_some()).collect();
     let gradients: Vec<_> = influencing
         .iter()
@@ -286,7 +286,8 @@ fn bounds(
             }
             let dual = (&z[..], &force[..]);
             let active = &finished.state.active;
-            let [sum, size] = by_displaced(system, active, &reported.displaced, &reactions, dual);
+            let [sum, size] =
+                by_displaced(system, active, &reported.along.displaced, &reactions, dual);
             displaced += quantity.factor.abs() * (SECOND_ORDER * sum.abs() + UNSURE * size);
             if origins.is_some() {
                 added = by_weight(quantity, system, (&errors, &away, &out), &smoothing);

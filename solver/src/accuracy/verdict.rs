@@ -34,8 +34,14 @@ pub(super) struct Unpaired {
     pub(super) there: usize,
 }
 
-/// A reason of a verdict, and how serious it is: its error divided by the limit for `good`.
-type Reason = (f64, String);
+/// What one quantity contributes to the verdict.
+struct Finding {
+    /// The best verdict that it permits.
+    verdict: Verdict,
+    /// How serious it is: its error divided by the limit for `good`.
+    seriousness: f64,
+    reason: String,
+}
 
 /// The reference size for the error of a quantity, without its sign: a force or a peak itself; for a tangential force
 /// the friction force; for an end the length of the contact. `own`: values of that kind at the same contact, which has
@@ -82,25 +88,27 @@ pub(super) fn conclude(
     doubts: &[Option<Doubt>],
     unpaired: &[Unpaired],
 ) -> Accuracy {
-    let mut found: Vec<(Verdict, Reason)> = Vec::new();
+    let mut found: Vec<Finding> = Vec::new();
     if outcome == Outcome::Converged {
         let assessed = quantities.iter().zip(doubts);
         found.extend(assessed.filter_map(|(quantity, doubt)| by_error(quantity, *doubt)));
         found.extend(unpaired.iter().map(by_number));
     } else {
-        let reason = "The iterations did not converge, so the errors are unknown.";
-        found.push((Verdict::Poor, (f64::INFINITY, reason.to_owned())));
+        found.push(Finding {
+            verdict: Verdict::Poor,
+            seriousness: f64::INFINITY,
+            reason: "The iterations did not converge, so the errors are unknown.".to_owned(),
+        });
     }
-    let verdicts = found.iter().map(|(verdict, _)| *verdict);
+    let verdicts = found.iter().map(|finding| finding.verdict);
     let verdict = verdicts.fold(Verdict::Good, Verdict::max);
-    let mut reasons: Vec<Reason> = found.into_iter().map(|(_, reason)| reason).collect();
     // the most serious first; equal ones stay in order
-    reasons.sort_by(|a, b| b.0.total_cmp(&a.0));
+    found.sort_by(|a, b| b.seriousness.total_cmp(&a.seriousness));
     let mut told = BTreeSet::new();
-    reasons.retain(|(_, reason)| told.insert(reason.clone()));
+    found.retain(|finding| told.insert(finding.reason.clone()));
     Accuracy {
         verdict,
-        reasons: reasons.into_iter().map(|(_, reason)| reason).collect(),
+        reasons: found.into_iter().map(|finding| finding.reason).collect(),
         quantities,
         verified: None,
     }
@@ -131,8 +139,8 @@ pub fn limit_by(warnings: &[Warning], accuracy: &mut Accuracy) {
     }
 }
 
-/// The verdict on one quantity by its error, or because it has none, with the reason if it is not good.
-fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Reason)> {
+/// What a quantity contributes by its error, or because it has none; nothing if it is good.
+fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<Finding> {
     let (name, contact) = (<&str>::from(q.quantity), &q.contact);
     let [good, fair] = match q.quantity {
         QuantityName::NormalForce | QuantityName::TangentialForce | QuantityName::FrictionForce => {
@@ -140,148 +148,121 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<(Verdict, Rea
         }
         _ => OTHERS,
     };
-    let judged = |relative: f64| {
-        if relative <= fair {
-            Verdict::Fair
-        } else {
-            Verdict::Poor
+    if q.error.is_some() && q.relative.is_some_and(|relative| relative <= good) {
+        return None;
+    }
+    let (verdict, seriousness, reason) = match (q.method, q.error) {
+        (ErrorMethod::NoLimit, _) => (
+            Verdict::Good,
+            0.0,
+            format!(
+                "`{name}` at contact `{contact}` grows without limit as the mesh is refined (at an edge, a tip or a kink of the obstacle, at a corner of the body or where materials meet), so its value means nothing. The verdict is about the other quantities: forces converge, and so does the averaged pressure."
+            ),
+        ),
+        (ErrorMethod::TooMany, _) => (
+            Verdict::Fair,
+            1.0,
+            format!(
+                "Contact `{contact}` has too many ends of stick (`{name}`) to state errors for them: where stick and slip alternate from point to point, they depend on the mesh. Refine the contact, or raise elastic_slip."
+            ),
+        ),
+        // nothing acts, and nothing is wrong
+        (_, Some(0.0)) if q.value == 0.0 && q.relative.is_none() => return None,
+        (_, Some(error)) => {
+            let relative = q.relative.unwrap_or(f64::INFINITY);
+            let verdict = if relative <= fair {
+                Verdict::Fair
+            } else {
+                Verdict::Poor
+            };
+            let reason = format!(
+                "`{name}` at contact `{contact}`, {}.",
+                uncertainty(q, error, relative)
+            );
+            (verdict, relative / good, reason)
+        }
+        (_, None) => {
+            let why = why_unknown(q, doubt);
+            let reason = format!("The error of `{name}` at contact `{contact}` is unknown: {why}.");
+            (Verdict::Poor, f64::INFINITY, reason)
         }
     };
-    let unknown = |why: String| {
-        let reason = format!("The error of `{name}` at contact `{contact}` is unknown: {why}.");
-        Some((Verdict::Poor, (f64::INFINITY, reason)))
-    };
-    let finer = q.finer.unwrap_or_default();
-    let end = matches!(
+    Some(Finding {
+        verdict,
+        seriousness,
+        reason,
+    })
+}
+
+/// The value of a quantity, how far it may be wrong, and mostly why.
+fn uncertainty(q: &EstimatedQuantity, error: f64, relative: f64) -> String {
+    let is_end = matches!(
         q.quantity,
         QuantityName::ContactStart | QuantityName::ContactEnd | QuantityName::StickEnd
     );
-    match (q.error, q.relative, q.method) {
-        (Some(_), Some(relative), _) if relative <= good => None,
-        (_, _, ErrorMethod::NoLimit) => Some((
-            Verdict::Good,
-            (
-                0.0,
-                format!(
-                    "`{name}` at contact `{contact}` grows without limit as the mesh is refined (at an edge, a tip or a kink of the obstacle, at a corner of the body or where materials meet), so its value means nothing. The verdict is about the other quantities: forces converge, and so does the averaged pressure."
-                ),
-            ),
+    let (value, part, finer) = (q.value, percent(relative), q.finer.unwrap_or_default());
+    let mostly = |share: Option<f64>| share.is_some_and(|share| share > 0.5 * error);
+    let of_load = |why: &str| {
+        let of = if is_end {
+            " of the length of the contact"
+        } else {
+            ""
+        };
+        format!(
+            "{value:.5e}, may be wrong by {part}{of}, that is {error:.1e}, mostly because {why}"
+        )
+    };
+    let of_place = |why: &str| {
+        format!(
+            "s = {value:.4}, is known only to ±{error:.1e}, {part} of the length of the contact: {why}"
+        )
+    };
+    let of_mesh =
+        |why: &str| format!("{value:.5e}, may be wrong by {part}, that is {error:.1e}: {why}");
+    if mostly(q.increments) {
+        return of_load(
+            "the load grows in too few increments: give `steps` more `increments` (without `steps` there is one), or a deck a smaller first number in the row of *STATIC",
+        );
+    }
+    if mostly(q.direction) {
+        return of_load(
+            "gaps are linear in an indentation along `direction`: draw the obstacle in its final position with an `indentation` of 0, or push it less far",
+        );
+    }
+    match q.method {
+        ErrorMethod::NodeSpacing => of_place(
+            "that is the distance of the nodes there, or the obstacle ends between two of them",
+        ),
+        ErrorMethod::MeshHalved if is_end => {
+            of_place(&format!("on the refined mesh it is s = {finer:.4}"))
+        }
+        ErrorMethod::MeshHalved => of_mesh(&format!(
+            "on the refined mesh it is {finer:.5e}, and two meshes may agree by chance"
         )),
-        (_, _, ErrorMethod::TooMany) => Some((
-            Verdict::Fair,
-            (
-                1.0,
-                format!(
-                    "Contact `{contact}` has too many ends of stick (`{name}`) to state errors for them: where stick and slip alternate from point to point, they depend on the mesh. Refine the contact, or raise elastic_slip."
-                ),
-            ),
-        )),
-        // nothing acts, and nothing is wrong
-        (Some(error), None, _) if q.value == 0.0 && error == 0.0 => None,
-        (Some(error), relative, _) if q.increments.is_some_and(|part| part > 0.5 * error) => {
-            let relative = relative.unwrap_or(f64::INFINITY);
-            Some((
-                judged(relative),
-                (
-                    relative / good,
-                    format!(
-                        "`{name}` at contact `{contact}`, {:.5e}, may be wrong by {}{}, that is {error:.1e}, mostly because the load grows in too few increments: give `steps` more `increments` (without `steps` there is one), or a deck a smaller first number in the row of *STATIC.",
-                        q.value,
-                        percent(relative),
-                        if end {
-                            " of the length of the contact"
-                        } else {
-                            ""
-                        },
-                    ),
-                ),
-            ))
-        }
-        (Some(error), relative, _) if q.direction.is_some_and(|part| part > 0.5 * error) => {
-            let relative = relative.unwrap_or(f64::INFINITY);
-            Some((
-                judged(relative),
-                (
-                    relative / good,
-                    format!(
-                        "`{name}` at contact `{contact}`, {:.5e}, may be wrong by {}{}, that is {error:.1e}, mostly because gaps are linear in an indentation along `direction`: draw the obstacle in its final position with an `indentation` of 0, or push it less far.",
-                        q.value,
-                        percent(relative),
-                        if end {
-                            " of the length of the contact"
-                        } else {
-                            ""
-                        },
-                    ),
-                ),
-            ))
-        }
-        (Some(error), relative, ErrorMethod::NodeSpacing) => {
-            let relative = relative.unwrap_or(f64::INFINITY);
-            Some((
-                judged(relative),
-                (
-                    relative / good,
-                    format!(
-                        "`{name}` at contact `{contact}`, s = {:.4}, is known only to ±{error:.1e}, {} of the length of the contact: that is the distance of the nodes there, or the obstacle ends between two of them.",
-                        q.value,
-                        percent(relative)
-                    ),
-                ),
-            ))
-        }
-        (Some(error), relative, ErrorMethod::MeshHalved) if end => {
-            let relative = relative.unwrap_or(f64::INFINITY);
-            Some((
-                judged(relative),
-                (
-                    relative / good,
-                    format!(
-                        "`{name}` at contact `{contact}`, s = {:.4}, is known only to ±{error:.1e}, {} of the length of the contact: on the refined mesh it is s = {finer:.4}.",
-                        q.value,
-                        percent(relative)
-                    ),
-                ),
-            ))
-        }
-        (Some(error), relative, method) => {
-            let relative = relative.unwrap_or(f64::INFINITY);
-            let why = match method {
-                ErrorMethod::MeshHalved => format!(
-                    "on the refined mesh it is {finer:.5e}, and two meshes may agree by chance"
-                ),
-                _ => "the mesh is too coarse for it".to_owned(),
-            };
-            Some((
-                judged(relative),
-                (
-                    relative / good,
-                    format!(
-                        "`{name}` at contact `{contact}`, {:.5e}, may be wrong by {}, that is {error:.1e}: {why}.",
-                        q.value,
-                        percent(relative)
-                    ),
-                ),
-            ))
-        }
-        (None, ..) => match doubt {
-            Some(Doubt::Unseen) => {
-                unknown("the shape of the obstacle between the nodes is not resolved".to_owned())
-            }
-            Some(Doubt::Unestimated) => unknown(format!(
-                "it has no estimate; on the refined mesh it is {finer:.5e}, which alone does not bound the error"
-            )),
-            Some(Doubt::Alone) => unknown(
-                "it has no estimate, and the refined mesh has no counterpart to compare with"
-                    .to_owned(),
-            ),
-            None => unknown("the linearised problem has no unique solution".to_owned()),
-        },
+        _ => of_mesh("the mesh is too coarse for it"),
     }
 }
 
+/// Why the error of a quantity is unknown.
+fn why_unknown(q: &EstimatedQuantity, doubt: Option<Doubt>) -> String {
+    let why = match doubt {
+        Some(Doubt::Unseen) => "the shape of the obstacle between the nodes is not resolved",
+        Some(Doubt::Unestimated) => {
+            let finer = q.finer.unwrap_or_default();
+            return format!(
+                "it has no estimate; on the refined mesh it is {finer:.5e}, which alone does not bound the error"
+            );
+        }
+        Some(Doubt::Alone) => {
+            "it has no estimate, and the refined mesh has no counterpart to compare with"
+        }
+        None => "the linearised problem has no unique solution",
+    };
+    why.to_owned()
+}
+
 /// The reason for intervals of contact or stick that exist on only one of the two meshes.
-fn by_number(unpaired: &Unpaired) -> (Verdict, Reason) {
+fn by_number(unpaired: &Unpaired) -> Finding {
     let Unpaired {
         name,
         contact,
@@ -289,11 +270,13 @@ fn by_number(unpaired: &Unpaired) -> (Verdict, Reason) {
         there,
     } = unpaired;
     let name = <&str>::from(*name);
-    let reason = format!(
-        "Contact `{contact}` has {here} of `{name}` on this mesh and {there} on the refined one, so they cannot be compared: their errors are estimates."
-    );
-    // after what is known to be wrong
-    (Verdict::Fair, (1.0, reason))
+    Finding {
+        verdict: Verdict::Fair,
+        seriousness: 1.0, // after what is known to be wrong
+        reason: format!(
+            "Contact `{contact}` has {here} of `{name}` on this mesh and {there} on the refined one, so they cannot be compared: their errors are estimates."
+        ),
+    }
 }
 
 fn percent(part: f64) -> String {

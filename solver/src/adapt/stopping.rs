@@ -44,6 +44,37 @@ pub(super) enum StopReason {
     Inverted,
 }
 
+impl StopReason {
+    /// Why refinement did not go on; none if there is nothing to say of the last mesh.
+    fn why(&self) -> Option<String> {
+        Some(match self {
+            StopReason::Elements(count) => format!(
+                "the next mesh would have {count} elements, more than {MOST_ADAPTIVE_ELEMENTS}"
+            ),
+            StopReason::ContactElements(count, most) => format!(
+                "the next mesh would have {count} elements at one contact, more than {most}"
+            ),
+            StopReason::Memory { unknowns, bytes } => format!(
+                "the next mesh, with {unknowns} unknowns, would need {} MiB, more than this job has left",
+                bytes.div_ceil(1 << 20)
+            ),
+            StopReason::Failed(unknowns, why) => {
+                format!("the next mesh, with {unknowns} unknowns, has no solution ({why})")
+            }
+            StopReason::Meshes => "that is the largest number of meshes".to_owned(),
+            StopReason::Stalled => {
+                format!("the last {PATIENCE} meshes hardly reduced the error, so refinement stopped")
+            }
+            StopReason::Unknown => "the linearised problem has no unique solution, or the obstacle between the nodes is still not resolved".to_owned(),
+            StopReason::Inverted => {
+                "an element of the first mesh is so curved or distorted that its parts would be inverted"
+                    .to_owned()
+            }
+            StopReason::Nothing | StopReason::First(_) => return None,
+        })
+    }
+}
+
 /// Why more meshes would not help; none if they may.
 pub(super) fn given_up(sequence: &[Refinement], tolerance: f64) -> Option<StopReason> {
     let errors: Vec<Option<f64>> = sequence.iter().map(|row| row.error).collect();
@@ -78,87 +109,26 @@ pub(super) fn unfinished(
     reason: StopReason,
     truncation: f64,
 ) -> Option<Warning> {
-    let percent = |part: f64| match 100.0 * part {
-        part if part < 10.0 => format!("{part:.2} %"),
-        part => format!("{part:.0} %"),
-    };
     let accuracy = solution.summary.accuracy.as_ref()?;
-    let name = |q: &EstimatedQuantity| {
-        format!("`{}` of contact `{}`", <&str>::from(q.quantity), q.contact)
-    };
     let mut sentences = Vec::new();
     if let StopReason::First(why) = reason {
         sentences.push(format!(
             "The mesh was not refined, since the problem has no solution on the first mesh: {why}."
         ));
-    } else if !matches!(reason, StopReason::Nothing) {
-        let tolerance = percent(goal.tolerance);
+    } else if let Some(why) = reason.why() {
         let mut above: Vec<&EstimatedQuantity> = accuracy.quantities.iter().collect();
         above.retain(|q| relative_error(q) > goal.tolerance);
         above.sort_by(|a, b| relative_error(b).total_cmp(&relative_error(a)));
-        let known = above.first().map(|q| match relative_error(q) {
-            error if error.is_finite() => {
-                format!("the error of {} is {}", name(q), percent(error))
-            }
-            _ => format!("the error of {} is unknown", name(q)),
-        });
-        let known = known.unwrap_or_else(|| {
-            format!(
-                "the obstacle ends inside an edge, {} of the contact's length from the end of that edge",
-                percent(truncation)
-            )
-        });
-        let others = match above.len() {
-            0 | 1 => String::new(),
-            count => format!(" (and {} more)", count - 1),
-        };
-        let why = match reason {
-            StopReason::Elements(count) => format!(
-                "the next mesh would have {count} elements, more than {MOST_ADAPTIVE_ELEMENTS}"
-            ),
-            StopReason::ContactElements(count, most) => format!(
-                "the next mesh would have {count} elements at one contact, more than {most}"
-            ),
-            StopReason::Memory { unknowns, bytes } => format!(
-                "the next mesh, with {unknowns} unknowns, would need {} MiB, more than this job has left",
-                bytes.div_ceil(1 << 20)
-            ),
-            StopReason::Failed(unknowns, why) => {
-                format!("the next mesh, with {unknowns} unknowns, has no solution ({why})")
-            }
-            StopReason::Meshes => "that is the largest number of meshes".to_owned(),
-            StopReason::Stalled => {
-                format!("the last {PATIENCE} meshes hardly reduced the error, so refinement stopped")
-            }
-            StopReason::Unknown => "the linearised problem has no unique solution, or the obstacle between the nodes is still not resolved".to_owned(),
-            StopReason::Inverted => {
-                "an element of the first mesh is so curved or distorted that its parts would be inverted"
-                    .to_owned()
-            }
-            StopReason::Nothing | StopReason::First(_) => return None,
-        };
         sentences.push(format!(
-            "After {} {known}{others}; the tolerance is {tolerance}: {why}.",
+            "After {} {}; the tolerance is {}: {why}.",
             match sequence.len() {
                 1 => "one mesh".to_owned(),
                 count => format!("{count} meshes"),
-            }
+            },
+            remaining(&above, truncation),
+            percent(goal.tolerance)
         ));
-        let kinks = |q: &&&EstimatedQuantity| {
-            use QuantityName::{PeakNormalStress, PeakTangentialStress};
-            if !matches!(q.quantity, PeakNormalStress | PeakTangentialStress) {
-                return false;
-            }
-            let contact = problem.contacts.iter().find(|c| c.boundary == q.contact);
-            contact.is_some_and(|contact| contact.obstacle.has_kinks())
-        };
-        sentences.push(match above.iter().find(kinks) {
-            Some(q) => format!(
-                "The obstacle of contact `{}` has kinks, and the pressure at a kink grows without limit: use the forces, which converge, and the pressure averaged over a length, or give the obstacle a smooth shape.",
-                q.contact
-            ),
-            None => "Raise the tolerance, or start with a mesh that is finer where the error is large; see summary.refinements and summary.accuracy.".to_owned(),
-        });
+        sentences.push(advice(problem, &above));
     }
     let touches = |summary: &Summary| summary.contacts.values().any(|c| !c.contact.is_empty());
     if !touches(&solution.summary) && solution.steps.iter().any(|step| touches(&step.summary)) {
@@ -167,11 +137,8 @@ pub(super) fn unfinished(
                 .to_owned(),
         );
     }
-    let unlimited = accuracy
-        .quantities
-        .iter()
-        .find(|q| q.method == ErrorMethod::NoLimit);
-    if let Some(q) = unlimited {
+    let mut quantities = accuracy.quantities.iter();
+    if let Some(q) = quantities.find(|q| q.method == ErrorMethod::NoLimit) {
         sentences.push(format!(
             "{} has no limit: it grows with every finer mesh at an edge, a tip or a kink of the obstacle, so the tolerance does not apply to it. Forces converge, and so does the averaged pressure.",
             name(q)
@@ -182,4 +149,53 @@ pub(super) fn unfinished(
         pointer: "/mesh/refine/tolerance".to_owned(),
         message: sentences.join(" "),
     })
+}
+
+/// What remains above the tolerance: the quantities, the worst first, or else the truncation of the obstacle.
+fn remaining(above: &[&EstimatedQuantity], truncation: f64) -> String {
+    let Some(worst) = above.first() else {
+        return format!(
+            "the obstacle ends inside an edge, {} of the contact's length from the end of that edge",
+            percent(truncation)
+        );
+    };
+    let error = match relative_error(worst) {
+        error if error.is_finite() => percent(error),
+        _ => "unknown".to_owned(),
+    };
+    let others = match above.len() {
+        1 => String::new(),
+        count => format!(" (and {} more)", count - 1),
+    };
+    format!("the error of {} is {error}{others}", name(worst))
+}
+
+/// What to do about the quantities above the tolerance.
+fn advice(problem: &Problem, above: &[&EstimatedQuantity]) -> String {
+    let kinks = |q: &&&EstimatedQuantity| {
+        use QuantityName::{PeakNormalStress, PeakTangentialStress};
+        if !matches!(q.quantity, PeakNormalStress | PeakTangentialStress) {
+            return false;
+        }
+        let contact = problem.contacts.iter().find(|c| c.boundary == q.contact);
+        contact.is_some_and(|contact| contact.obstacle.has_kinks())
+    };
+    match above.iter().find(kinks) {
+        Some(q) => format!(
+            "The obstacle of contact `{}` has kinks, and the pressure at a kink grows without limit: use the forces, which converge, and the pressure averaged over a length, or give the obstacle a smooth shape.",
+            q.contact
+        ),
+        None => "Raise the tolerance, or start with a mesh that is finer where the error is large; see summary.refinements and summary.accuracy.".to_owned(),
+    }
+}
+
+fn name(q: &EstimatedQuantity) -> String {
+    format!("`{}` of contact `{}`", <&str>::from(q.quantity), q.contact)
+}
+
+fn percent(part: f64) -> String {
+    match 100.0 * part {
+        part if part < 10.0 => format!("{part:.2} %"),
+        part => format!("{part:.0} %"),
+    }
 }

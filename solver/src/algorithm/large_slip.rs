@@ -22,23 +22,16 @@ impl Sliding {
     }
 }
 
-/// Warns once, about the piece of contact that slides farthest in relation to its length; true if it does.
-pub(super) fn warn_of_large_slip(
-    system: &System<'_>,
-    v: &[f64],
-    reactions: &[f64],
-    warnings: &mut Vec<Warning>,
-) -> bool {
+/// A warning about the piece of contact that slides farthest in relation to its length, if that is far.
+pub(super) fn large_slip(system: &System<'_>, v: &[f64], reactions: &[f64]) -> Option<Warning> {
     let of_patch = |patch| pieces(system, patch, v, reactions).map(move |piece| (patch, piece));
     let largest = system
         .patches
         .iter()
         .flat_map(of_patch)
         .max_by(|a, b| a.1.lengths().total_cmp(&b.1.lengths()));
-    let Some((patch, piece)) = largest.filter(|(_, piece)| piece.lengths() > LARGE_SLIP) else {
-        return false;
-    };
-    warnings.push(Warning {
+    let (patch, piece) = largest.filter(|(_, piece)| piece.lengths() > LARGE_SLIP)?;
+    Some(Warning {
         code: WarningCode::LargeSlip,
         pointer: patch.contact.pointer.clone(),
         message: format!(
@@ -46,8 +39,7 @@ pub(super) fn warn_of_large_slip(
             rounded(piece.slip.abs()),
             rounded(piece.length)
         ),
-    });
-    true
+    })
 }
 
 /// The pieces of a contact that can slide as a whole and matter: a piece that ends on a line of symmetry is not one,

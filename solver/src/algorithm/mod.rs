@@ -51,7 +51,7 @@ pub use finished::Finished;
 pub use may_touch::{Extent, Region, follow_neighbour, run_reduced};
 pub use profile::{DisplacedNode, Estimable, Missed, Quantity};
 pub use recorder::{Cycle, Place};
-pub use report::{Reported, numbers, quantities, report};
+pub use report::{AlongContacts, Reported, numbers, quantities, report};
 pub use rounding::Rounding;
 pub use slides::Slide;
 pub use system::{Averages, ContactNode, Patch, Path, Point, State, System};

@@ -5,11 +5,10 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
 use crate::algorithm::finished::Finished;
-use crate::algorithm::large_slip::warn_of_large_slip;
+use crate::algorithm::large_slip::large_slip;
 use crate::algorithm::profile::{DisplacedNode, Forces, Missed, PatchView, Quantity};
-use crate::algorithm::small_strain::warn_of_large_strain;
-use crate::algorithm::system::System;
-use crate::body::ElasticBody;
+use crate::algorithm::small_strain::large_strain;
+use crate::algorithm::system::{Patch, System};
 use crate::elasticity::{Dof, Recovered, StressDifference, recover};
 use crate::error::SolveError;
 use crate::linear::{Interrupt, Stopped};
@@ -41,14 +40,23 @@ const SLOW_CONTRACTION: f64 = 0.9;
 pub struct Reported {
     /// Scalars, extents and warnings.
     pub summary: Summary,
+    /// The results along the contacts.
+    pub along: AlongContacts,
+    /// Displacements and stresses.
+    pub fields: Fields,
+    /// The difference between recovered stresses and those of the elements.
+    pub difference: StressDifference,
+}
+
+/// The results along the contacts.
+#[derive(Default)]
+pub struct AlongContacts {
     /// Columns along each contact boundary, by its name, at all points.
     pub profiles: BTreeMap<String, ContactProfile>,
     /// Columns at the nodes, by contact boundary.
     pub node_profiles: BTreeMap<String, ContactProfile>,
     /// Columns at the points where friction acts, by contact boundary.
     pub friction_profiles: BTreeMap<String, ContactProfile>,
-    /// Displacements and stresses.
-    pub fields: Fields,
     /// The quantities for which an error is stated.
     pub quantities: Vec<Quantity>,
     /// Places between the nodes at which the obstacle reaches into the body, of all contacts: where a mesh needs nodes.
@@ -56,36 +64,26 @@ pub struct Reported {
     /// The displaced obstacles compared with the linear ones, at all contact nodes, where obstacles were pushed along a
     /// direction.
     pub displaced: Vec<DisplacedNode>,
-    /// The difference between recovered stresses and those of the elements.
-    pub difference: StressDifference,
+    summaries: BTreeMap<String, ContactSummary>,
+    /// [`Fields::contact_state`].
+    states: Vec<i8>,
 }
 
 /// The results of a final state that need no displacements inside the body: numbers by contact, and warnings.
 pub fn numbers(
-    model: &Model,
     system: &System<'_>,
     finished: &Finished,
     observe: &mut Observer<'_>,
 ) -> Result<(BTreeMap<String, ContactSummary>, Vec<Warning>), SolveError> {
-    let forces = Forces::new(system, finished);
     let mut ask = || observe(Progress::Pulse);
-    let questions = Questions::new(&mut ask);
-    let go_on = &|work: f64| questions.worked(work).is_ok();
-    let mut warnings = model.warnings.clone();
+    let state = FinalState::new(system, finished, &mut ask);
+    let mut warnings = system.model.warnings.clone();
     let mut contacts = BTreeMap::new();
-    for (p, patch) in system.patches.iter().enumerate() {
-        questions.worked(work_of_contact(system))?;
-        let view = PatchView::new(system, p, finished, &forces, go_on);
+    state.view(|patch, view| {
         view.warn(&mut warnings);
         contacts.insert(patch.contact.name.clone(), view.summary());
-    }
-    questions.worked(0.0)?;
-    warn_of_iteration(finished, &mut warnings);
-    warn_of_rounding(model, finished, &mut warnings);
-    if finished.slide.is_none() {
-        let v = &finished.state.v;
-        warn_of_large_slip(system, v, &forces.reactions, &mut warnings);
-    }
+    })?;
+    state.warn(&mut warnings);
     Ok((contacts, warnings))
 }
 
@@ -96,19 +94,13 @@ pub fn quantities(
     finished: &Finished,
     observe: &mut Observer<'_>,
 ) -> Vec<Quantity> {
-    let forces = Forces::new(system, finished);
     let mut ask = || observe(Progress::Pulse);
-    let questions = Questions::new(&mut ask);
-    let go_on = &|work: f64| questions.worked(work).is_ok();
+    let state = FinalState::new(system, finished, &mut ask);
     let mut found = Vec::new();
-    for p in 0..system.patches.len() {
-        let view = PatchView::new(system, p, finished, &forces, go_on);
-        found.extend(view.quantities());
-        if questions.worked(work_of_contact(system)).is_err() {
-            return Vec::new();
-        }
+    match state.view(|_, view| found.extend(view.quantities())) {
+        Ok(()) => found,
+        Err(Stopped) => Vec::new(),
     }
-    found
 }
 
 /// One observer shared by many functions that read a state. They are not interrupted themselves; after a stop their
@@ -136,18 +128,97 @@ impl<'a> Questions<'a> {
     }
 }
 
-/// The work for one contact apart from its averages, in multiplications.
-fn work_of_contact(system: &System<'_>) -> f64 {
-    /// The work for each node and friction point of all contacts.
-    const WORK: usize = 100;
-    (WORK * (system.nodes.len() + system.points.len())) as f64
+/// A final state with its nodal forces.
+struct FinalState<'a> {
+    system: &'a System<'a>,
+    finished: &'a Finished,
+    forces: Forces,
+    questions: Questions<'a>,
+}
+
+impl<'a> FinalState<'a> {
+    fn new(
+        system: &'a System<'a>,
+        finished: &'a Finished,
+        ask: &'a mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Self {
+        FinalState {
+            system,
+            finished,
+            forces: Forces::new(system, finished),
+            questions: Questions::new(ask),
+        }
+    }
+
+    /// Calls a function for each contact, unless the observer stops.
+    fn view(&self, mut read: impl FnMut(&Patch<'_>, &PatchView<'_>)) -> Result<(), Stopped> {
+        /// The work for each node and friction point of all contacts, apart from averages, in multiplications.
+        const WORK: usize = 100;
+        let system = self.system;
+        let work = (WORK * (system.nodes.len() + system.points.len())) as f64;
+        let go_on = &|work: f64| self.questions.worked(work).is_ok();
+        for (p, patch) in system.patches.iter().enumerate() {
+            self.questions.worked(work)?;
+            let view = PatchView::new(system, p, self.finished, &self.forces, go_on);
+            read(patch, &view);
+        }
+        self.questions.worked(0.0)
+    }
+
+    /// Warns of how the iterations ended and how far the body slides; returns whether that is too far.
+    fn warn(&self, warnings: &mut Vec<Warning>) -> bool {
+        let (system, finished) = (self.system, self.finished);
+        warn_of_iteration(finished, warnings);
+        warn_of_rounding(system.model, finished, warnings);
+        // how far a body that slides away has come means nothing
+        if finished.slide.is_some() {
+            return false;
+        }
+        let large = large_slip(system, &finished.state.v, &self.forces.reactions);
+        let slides = large.is_some();
+        warnings.extend(large);
+        slides
+    }
+}
+
+impl AlongContacts {
+    fn new(state: &FinalState<'_>, warnings: &mut Vec<Warning>) -> Result<Self, Stopped> {
+        let mut along = AlongContacts {
+            states: vec![-1; state.system.model.mesh.nodes.len()],
+            ..AlongContacts::default()
+        };
+        state.view(|patch, view| along.add(patch, view, warnings))?;
+        Ok(along)
+    }
+
+    fn add(&mut self, patch: &Patch<'_>, view: &PatchView<'_>, warnings: &mut Vec<Warning>) {
+        view.warn(warnings);
+        self.quantities.extend(view.quantities());
+        self.missed.extend_from_slice(view.missed());
+        self.displaced
+            .extend_from_slice(&view.displaced_gaps().nodes);
+        let profile = view.profile();
+        for (&node, state) in patch.contact.boundary.nodes.iter().zip(&profile.state) {
+            let seen: &mut i8 = &mut self.states[node as usize];
+            *seen = (*seen).max(match state {
+                NodeState::Open => 0,
+                NodeState::Stick => 1,
+                NodeState::Slip => 2,
+            });
+        }
+        let (name, friction) = (&patch.contact.name, view.friction_profile(&profile));
+        let peaks = view.peak_profile(&profile);
+        let at_all = at_all_points(&profile, &friction, &peaks);
+        self.profiles.insert(name.clone(), at_all);
+        self.node_profiles.insert(name.clone(), profile);
+        self.friction_profiles.insert(name.clone(), friction);
+        self.summaries.insert(name.clone(), view.summary());
+    }
 }
 
 /// The results of a final state: forces, extents, profiles, fields and warnings. [`SolveError::Stopped`] if the
 /// observer stops and still does at the next calls.
 pub fn report(
-    model: &Model,
-    body: &ElasticBody,
     system: &System<'_>,
     finished: &Finished,
     observe: &mut Observer<'_>,
@@ -160,175 +231,40 @@ pub fn report(
         }
         answer => answer,
     };
-    let questions = Questions::new(&mut ask);
-    let go_on = &|work: f64| questions.worked(work).is_ok();
-    let v = &finished.state.v;
     if system.semidefinite && finished.outcome != Outcome::Canceled {
-        held(model, system, finished)?;
+        held(system, finished)?;
     }
-    let forces = Forces::new(system, finished);
-    let contact_force = contact_force(system, finished, &forces);
-    let displacements = body.displacements_on(system.threads, v, &system.level);
-    let elements = body.elements(model);
-    let body_force = model.body_force(&system.level);
-    let (recovered, difference, errors) = {
-        let interrupt = &mut *questions.interrupt.borrow_mut();
-        let recovered = recover(elements, &displacements, body_force, interrupt)?;
-        let difference = StressDifference::new(elements, &recovered, interrupt)?;
-        let errors = difference.norms(elements, interrupt)?;
-        (recovered, difference, errors)
-    };
-    let (mut quantities, mut missed, mut displaced) = (Vec::new(), Vec::new(), Vec::new());
-    let circumference = system.circumference;
-
-    let mut contact_state = vec![-1; model.mesh.nodes.len()];
-    let mut warnings = model.warnings.clone();
-    let (mut contacts, mut profiles) = (BTreeMap::new(), BTreeMap::new());
-    let (mut node_profiles, mut friction_profiles) = (BTreeMap::new(), BTreeMap::new());
-    for (p, patch) in system.patches.iter().enumerate() {
-        questions.worked(work_of_contact(system))?;
-        let view = PatchView::new(system, p, finished, &forces, go_on);
-        let summary = view.summary();
-        view.warn(&mut warnings);
-        quantities.extend(view.quantities());
-        missed.extend(view.missed());
-        displaced.extend_from_slice(&view.displaced_gaps().nodes);
-        let profile = view.profile();
-        for (&node, state) in patch.contact.boundary.nodes.iter().zip(&profile.state) {
-            let seen: &mut i8 = &mut contact_state[node as usize];
-            *seen = (*seen).max(match state {
-                NodeState::Open => 0,
-                NodeState::Stick => 1,
-                NodeState::Slip => 2,
-            });
-        }
-        let (name, friction) = (&patch.contact.name, view.friction_profile(&profile));
-        let peaks = view.peak_profile(&profile);
-        profiles.insert(name.clone(), at_all_points(&profile, &friction, &peaks));
-        node_profiles.insert(name.clone(), profile);
-        friction_profiles.insert(name.clone(), friction);
-        contacts.insert(name.clone(), summary);
-    }
-    questions.worked(0.0)?;
-    warn_of_iteration(finished, &mut warnings);
-    warn_of_rounding(model, finished, &mut warnings);
-    // how far a body that slides away has come means nothing
+    let state = FinalState::new(system, finished, &mut ask);
+    let (inside, difference) = Inside::new(&state)?;
+    let mut warnings = system.model.warnings.clone();
+    let mut along = AlongContacts::new(&state, &mut warnings)?;
+    let slides = state.warn(&mut warnings);
     if finished.slide.is_none() {
-        let slides = warn_of_large_slip(system, v, &forces.reactions, &mut warnings);
-        warn_of_large_strain(
-            model,
+        warnings.extend(large_strain(
             system,
             &finished.state.active,
-            &recovered,
-            (&displacements, slides),
-            &mut warnings,
-        );
+            &inside.recovered,
+            &inside.displacements,
+            slides,
+        ));
     }
-
-    let total =
-        |f: fn(&ContactSummary) -> f64| contacts.values().map(f).fold(0.0, |sum, x| sum + x);
-    let work = system.work(v, &finished.bound);
-    let work_of_loads: f64 = body
-        .nodal_loads
-        .iter()
-        .zip(&displacements)
-        .map(|(f, u)| f[0] * u[0] + f[1] * u[1])
-        .sum::<f64>()
-        * system.level.loads
-        + recovered.work_on_bubbles;
-    let equilibrium = equilibrium(
-        model,
-        body,
-        system.level.loads,
-        &recovered,
-        &displacements,
-        &body.nodal_forces(&contact_force),
-        FORCE_FLOOR * system.reference_force,
-    );
-    let out_of_balance = if model.section.has_split() {
-        OUT_OF_BALANCE_INCOMPRESSIBLE
-    } else {
-        OUT_OF_BALANCE
-    };
-    let outcome = match finished.outcome {
-        Outcome::Converged if equilibrium > out_of_balance => Outcome::FalseConvergence,
-        outcome => outcome,
-    };
-    // the state of a cycle is no equilibrium, whatever the stiffness
-    let cycling = finished.outcome == Outcome::ContactCycling;
-    if equilibrium > out_of_balance && finished.slide.is_none() && !cycling {
-        warnings.push(Warning {
-            code: WarningCode::OutOfBalance,
-            pointer: String::new(),
-            message: format!(
-                "The forces on the body do not balance: {equilibrium:.1e} of their sum remains. The stiffness is nearly singular: check supports, hinges and badly shaped elements{}.",
-                if model.section.has_split() {
-", and Poisson's ratios closer to 0.5 than 0.49999"
-} else {
-""
-}
-            ),
-        });
-    }
-    let summary = Summary {
-        outcome,
-        converged: outcome == Outcome::Converged,
-        normal_force: total(|c| c.normal_force),
-        tangential_force: total(|c| c.tangential_force),
-        friction_force: total(|c| c.friction_force),
-        contacts,
-        iterations: finished.history.len() as u32,
-        stage: finished.stage,
-        contraction: finished.contraction,
-        residuals: Residuals {
-            equilibrium,
-            ..finished.residuals
-        },
-        energy: circumference
-            * (recovered.strain_energy - work_of_loads + friction_energy(system, finished)),
-        friction_work: circumference * work,
-        accuracy: None,
-        strain_energy: Some(circumference * recovered.strain_energy),
-        increments: 1,
-        cut_backs: 0,
-        uniqueness: None,
-        doubled_increments: None,
-        refinements: Vec::new(),
-        warnings,
-        dofs: body.map.unknowns as u64,
-        contact_dofs: system.load.len() as u64,
-    };
-    let finite = [
-        summary.normal_force,
-        summary.tangential_force,
-        summary.energy,
-        equilibrium,
-    ]
-    .iter()
-    .all(|x| x.is_finite())
-        && displacements.iter().flatten().all(|u| u.is_finite())
-        && recovered.stress.iter().flatten().all(|s| s.is_finite());
-    if !finite {
+    let summary = inside.summary(&state, std::mem::take(&mut along.summaries), warnings);
+    if !inside.is_finite(&summary) {
         return Err(SolveError::NonFinite {
             phase: Phase::Recover,
         });
     }
-    let fields = fields(model, &displacements, recovered, &errors, contact_state);
+    let fields = inside.fields(system.model, std::mem::take(&mut along.states));
     Ok(Reported {
         summary,
-        profiles,
-        node_profiles,
-        friction_profiles,
+        along,
         fields,
-        quantities,
-        missed,
-        displaced,
         difference,
     })
 }
 
 /// Checks that the contacts of the final state, with their friction, prevent the motions that the supports do not.
-fn held(model: &Model, system: &System<'_>, finished: &Finished) -> Result<(), SolveError> {
+fn held(system: &System<'_>, finished: &Finished) -> Result<(), SolveError> {
     let mut hindered = Vec::new();
     for patch in &system.patches {
         let boundary = &patch.contact.boundary;
@@ -351,7 +287,7 @@ fn held(model: &Model, system: &System<'_>, finished: &Finished) -> Result<(), S
             hindered.push(Hold::along_tangent(boundary, i));
         }
     }
-    match model.free_motion(&hindered) {
+    match system.model.free_motion(&hindered) {
         None => Ok(()),
         Some((motion, node)) => Err(SolveError::Unheld { motion, node }),
     }
@@ -384,100 +320,207 @@ fn friction_energy(system: &System<'_>, finished: &Finished) -> f64 {
     energy.sum()
 }
 
-/// The imbalance |Σ forces| / Σ|forces| of loads, contact, friction and the supports' reactions, the last computed from
-/// the stresses in the body. In axisymmetry only the axial sum is a balance. Forces below `floor` are rounding of
-/// larger ones.
-fn equilibrium(
-    model: &Model,
-    body: &ElasticBody,
-    loads: f64,
-    recovered: &Recovered,
-    displacements: &[[f64; 2]],
-    contact_force: &[f64],
-    floor: f64,
-) -> f64 {
-    let first = usize::from(model.section.axisymmetric());
-    let (mut sum, mut size) = ([0.0; 2], 0.0);
-    let interior = body.map.unknowns - contact_force.len();
-    for (node, dofs) in body.map.dofs.iter().enumerate() {
-        let load = body
-            .map
-            .to_axes(node, body.nodal_loads[node].map(|f| loads * f));
-        let internal = body.map.to_axes(node, recovered.internal_force[node]);
-        let external: [f64; 2] = std::array::from_fn(|a| match dofs[a] {
-            Dof::Free(i) if i >= interior => load[a] + contact_force[i - interior],
-            Dof::Free(_) => load[a],
-            Dof::Fixed(_) => internal[a], // the reaction of the support, load included
-        });
-        let [fx, fy] = match body.map.axes[node] {
-            None => external,
-            Some(axes) => {
-                let [n, t] = axes.along;
-                [
-                    n[0] * external[0] + t[0] * external[1],
-                    n[1] * external[0] + t[1] * external[1],
-                ]
-            }
-        };
-        for (a, f) in [fx, fy].into_iter().enumerate().skip(first) {
-            sum[a] += f;
-            size += f.abs();
-        }
-    }
-    // a body in rigid motion has only rounding errors as forces: they must not count as an imbalance
-    let moved = displacements
-        .iter()
-        .flatten()
-        .fold(0.0f64, |most, u| most.max(u.abs()));
-    let depth = model
-        .mesh
-        .nodes
-        .iter()
-        .map(|x| model.section.depth(x[0]))
-        .fold(0.0, f64::max);
-    let of_rigid_motion = FORCE_FLOOR * model.section.modulus() * moved * depth;
-    let sum = sum[0].hypot(sum[1]);
-    if sum == 0.0 {
-        0.0
-    } else {
-        sum / size.max(floor).max(of_rigid_motion)
-    }
+/// The displacements and stresses inside the body.
+struct Inside {
+    displacements: Vec<[f64; 2]>,
+    recovered: Recovered,
+    /// The error of every element, without 2π (energy norm).
+    errors: Vec<f64>,
 }
 
-fn fields(
-    model: &Model,
-    displacements: &[[f64; 2]],
-    recovered: Recovered,
-    errors: &[f64],
-    contact_state: Vec<i8>,
-) -> Fields {
-    let mesh = &model.mesh;
-    let circumference = model.section.circumference().sqrt();
-    let element_error = errors.iter().map(|e| circumference * e).collect();
-    let stress = |component: usize| recovered.stress.iter().map(|s| s[component]).collect();
-    let [x, y] = recovered.points;
-    let [stress_xx, stress_yy, stress_xy, stress_zz] = recovered.point_stress;
-    Fields {
-        x: mesh.nodes.iter().map(|x| x[0]).collect(),
-        y: mesh.nodes.iter().map(|x| x[1]).collect(),
-        ux: displacements.iter().map(|u| u[0]).collect(),
-        uy: displacements.iter().map(|u| u[1]).collect(),
-        stress_xx: stress(0),
-        stress_yy: stress(1),
-        stress_xy: stress(2),
-        stress_zz: stress(3),
-        contact_state,
-        elements: mesh.elements.clone(),
-        element_error,
-        gauss: GaussFields {
-            order: model.quadrature,
-            x,
-            y,
-            stress_xx,
-            stress_yy,
-            stress_xy,
-            stress_zz,
-        },
+impl Inside {
+    fn new(state: &FinalState<'_>) -> Result<(Self, StressDifference), SolveError> {
+        let (system, v) = (state.system, &state.finished.state.v);
+        let (model, body) = (system.model, system.body);
+        let displacements = body.displacements_on(system.threads, v, &system.level);
+        let elements = body.elements(model);
+        let body_force = model.body_force(&system.level);
+        let interrupt = &mut *state.questions.interrupt.borrow_mut();
+        let recovered = recover(elements, &displacements, body_force, interrupt)?;
+        let difference = StressDifference::new(elements, &recovered, interrupt)?;
+        let errors = difference.norms(elements, interrupt)?;
+        let inside = Inside {
+            displacements,
+            recovered,
+            errors,
+        };
+        Ok((inside, difference))
+    }
+
+    /// The summary of a state. Adds a warning if its forces do not balance.
+    fn summary(
+        &self,
+        state: &FinalState<'_>,
+        contacts: BTreeMap<String, ContactSummary>,
+        mut warnings: Vec<Warning>,
+    ) -> Summary {
+        let (system, finished) = (state.system, state.finished);
+        let (circumference, recovered) = (system.circumference, &self.recovered);
+        let equilibrium = self.equilibrium(state);
+        let (most, other_causes) = if system.model.section.has_split() {
+            (
+                OUT_OF_BALANCE_INCOMPRESSIBLE,
+                ", and Poisson's ratios closer to 0.5 than 0.49999",
+            )
+        } else {
+            (OUT_OF_BALANCE, "")
+        };
+        let outcome = match finished.outcome {
+            Outcome::Converged if equilibrium > most => Outcome::FalseConvergence,
+            outcome => outcome,
+        };
+        // the state of a cycle is no equilibrium, whatever the stiffness
+        let cycling = finished.outcome == Outcome::ContactCycling;
+        if equilibrium > most && finished.slide.is_none() && !cycling {
+            warnings.push(Warning {
+                code: WarningCode::OutOfBalance,
+                pointer: String::new(),
+                message: format!(
+                    "The forces on the body do not balance: {equilibrium:.1e} of their sum remains. The stiffness is nearly singular: check supports, hinges and badly shaped elements{other_causes}."
+                ),
+            });
+        }
+        let total =
+            |f: fn(&ContactSummary) -> f64| contacts.values().map(f).fold(0.0, |sum, x| sum + x);
+        let energy = recovered.strain_energy - self.work_of_loads(system)
+            + friction_energy(system, finished);
+        Summary {
+            outcome,
+            converged: outcome == Outcome::Converged,
+            normal_force: total(|c| c.normal_force),
+            tangential_force: total(|c| c.tangential_force),
+            friction_force: total(|c| c.friction_force),
+            contacts,
+            iterations: finished.history.len() as u32,
+            stage: finished.stage,
+            contraction: finished.contraction,
+            residuals: Residuals {
+                equilibrium,
+                ..finished.residuals
+            },
+            energy: circumference * energy,
+            friction_work: circumference * system.work(&finished.state.v, &finished.bound),
+            accuracy: None,
+            strain_energy: Some(circumference * recovered.strain_energy),
+            increments: 1,
+            cut_backs: 0,
+            uniqueness: None,
+            doubled_increments: None,
+            refinements: Vec::new(),
+            warnings,
+            dofs: system.body.map.unknowns as u64,
+            contact_dofs: system.load.len() as u64,
+        }
+    }
+
+    /// Whether all results are numbers.
+    fn is_finite(&self, summary: &Summary) -> bool {
+        let numbers = [
+            summary.normal_force,
+            summary.tangential_force,
+            summary.energy,
+            summary.residuals.equilibrium,
+        ];
+        let displacements = self.displacements.iter().flatten();
+        let stresses = self.recovered.stress.iter().flatten();
+        let mut all = numbers.iter().chain(displacements).chain(stresses);
+        all.all(|x| x.is_finite())
+    }
+
+    /// The work of the loads, without 2π.
+    fn work_of_loads(&self, system: &System<'_>) -> f64 {
+        let forces = system.body.nodal_loads.iter().zip(&self.displacements);
+        let work: f64 = forces.map(|(f, u)| f[0] * u[0] + f[1] * u[1]).sum();
+        work * system.level.loads + self.recovered.work_on_bubbles
+    }
+
+    /// The imbalance |Σ forces| / Σ|forces| of loads, contact, friction and the supports' reactions, the last computed
+    /// from the stresses in the body. In axisymmetry only the axial sum is a balance. Forces below [`FORCE_FLOOR`] are
+    /// rounding of larger ones.
+    fn equilibrium(&self, state: &FinalState<'_>) -> f64 {
+        let system = state.system;
+        let (model, body, loads) = (system.model, system.body, system.level.loads);
+        let contact_force = contact_force(system, state.finished, &state.forces);
+        let contact_force = body.nodal_forces(&contact_force);
+        let floor = FORCE_FLOOR * system.reference_force;
+        let first = usize::from(model.section.axisymmetric());
+        let (mut sum, mut size) = ([0.0; 2], 0.0);
+        let interior = body.map.unknowns - contact_force.len();
+        for (node, dofs) in body.map.dofs.iter().enumerate() {
+            let load = body
+                .map
+                .to_axes(node, body.nodal_loads[node].map(|f| loads * f));
+            let internal = body.map.to_axes(node, self.recovered.internal_force[node]);
+            let external: [f64; 2] = std::array::from_fn(|a| match dofs[a] {
+                Dof::Free(i) if i >= interior => load[a] + contact_force[i - interior],
+                Dof::Free(_) => load[a],
+                Dof::Fixed(_) => internal[a], // the reaction of the support, load included
+            });
+            let [fx, fy] = match body.map.axes[node] {
+                None => external,
+                Some(axes) => {
+                    let [n, t] = axes.along;
+                    [
+                        n[0] * external[0] + t[0] * external[1],
+                        n[1] * external[0] + t[1] * external[1],
+                    ]
+                }
+            };
+            for (a, f) in [fx, fy].into_iter().enumerate().skip(first) {
+                sum[a] += f;
+                size += f.abs();
+            }
+        }
+        // a body in rigid motion has only rounding errors as forces: they must not count as an imbalance
+        let moved = self
+            .displacements
+            .iter()
+            .flatten()
+            .fold(0.0f64, |most, u| most.max(u.abs()));
+        let depth = model
+            .mesh
+            .nodes
+            .iter()
+            .map(|x| model.section.depth(x[0]))
+            .fold(0.0, f64::max);
+        let of_rigid_motion = FORCE_FLOOR * model.section.modulus() * moved * depth;
+        let sum = sum[0].hypot(sum[1]);
+        if sum == 0.0 {
+            0.0
+        } else {
+            sum / size.max(floor).max(of_rigid_motion)
+        }
+    }
+
+    fn fields(self, model: &Model, contact_state: Vec<i8>) -> Fields {
+        let mesh = &model.mesh;
+        let circumference = model.section.circumference().sqrt();
+        let stresses = &self.recovered.stress;
+        let stress = |component: usize| stresses.iter().map(|s| s[component]).collect();
+        let [x, y] = self.recovered.points;
+        let [stress_xx, stress_yy, stress_xy, stress_zz] = self.recovered.point_stress;
+        Fields {
+            x: mesh.nodes.iter().map(|x| x[0]).collect(),
+            y: mesh.nodes.iter().map(|x| x[1]).collect(),
+            ux: self.displacements.iter().map(|u| u[0]).collect(),
+            uy: self.displacements.iter().map(|u| u[1]).collect(),
+            stress_xx: stress(0),
+            stress_yy: stress(1),
+            stress_xy: stress(2),
+            stress_zz: stress(3),
+            contact_state,
+            elements: mesh.elements.clone(),
+            element_error: self.errors.iter().map(|e| circumference * e).collect(),
+            gauss: GaussFields {
+                order: model.quadrature,
+                x,
+                y,
+                stress_xx,
+                stress_yy,
+                stress_xy,
+                stress_zz,
+            },
+        }
     }
 }
 

@@ -14,23 +14,23 @@ const LARGE_STRAIN: f64 = 0.25;
 /// Displacements above this part of the body's size are not small.
 const LARGE_DISPLACEMENT: f64 = 0.1;
 
-/// Warns once: about the contact with the largest strain, or else about displacements relative to the size of the body.
+/// A warning about the contact with the largest strain, or else about displacements relative to the size of the body.
 /// A body that `slides` too far has a warning already.
-pub(super) fn warn_of_large_strain(
-    model: &Model,
+pub(super) fn large_strain(
     system: &System<'_>,
     active: &[bool],
     recovered: &Recovered,
-    (displacements, slides): (&[[f64; 2]], bool),
-    warnings: &mut Vec<Warning>,
-) {
+    displacements: &[[f64; 2]],
+    slides: bool,
+) -> Option<Warning> {
+    let model = system.model;
     let strains = system
         .patches
         .iter()
         .map(|patch| (patch, mean_strain(model, patch, active, recovered)));
     let largest = strains.max_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((patch, strain)) = largest.filter(|(_, strain)| *strain > LARGE_STRAIN) {
-        warnings.push(Warning {
+        return Some(Warning {
             code: WarningCode::LargeStrain,
             pointer: patch.contact.pointer.clone(),
             message: format!(
@@ -38,21 +38,18 @@ pub(super) fn warn_of_large_strain(
                 100.0 * strain
             ),
         });
-        return;
     }
     let size = model.mesh.extent(0).hypot(model.mesh.extent(1));
     let lengths = displacements.iter().map(|[x, y]| x.hypot(*y));
     let largest = lengths.fold(0.0, f64::max);
-    if largest > LARGE_DISPLACEMENT * size && !slides {
-        warnings.push(Warning {
-            code: WarningCode::LargeDisplacement,
-            pointer: String::new(),
-            message: format!(
-                "The largest displacement, {largest:.4}, is {:.0} % of the body's size: linear elasticity is no longer accurate.",
-                100.0 * largest / size
-            ),
-        });
-    }
+    (largest > LARGE_DISPLACEMENT * size && !slides).then(|| Warning {
+        code: WarningCode::LargeDisplacement,
+        pointer: String::new(),
+        message: format!(
+            "The largest displacement, {largest:.4}, is {:.0} % of the body's size: linear elasticity is no longer accurate.",
+            100.0 * largest / size
+        ),
+    })
 }
 
 /// The largest principal strain in size, averaged over the volume of the elements with a side in contact.

@@ -106,6 +106,16 @@ pub struct Oblique {
     pub shared: bool,
 }
 
+impl Oblique {
+    /// Of a node that follows another contact: slip is continued to it, as to a common end that both touch.
+    const OF_FOLLOWING: Self = Oblique {
+        other: Dof::Fixed(0.0),
+        part: [0.0; 2],
+        symmetric: false,
+        shared: true,
+    };
+}
+
 /// The point of the load path that increments have reached.
 pub struct Path {
     /// The anchor g of every friction point.
@@ -231,7 +241,7 @@ impl<'a> System<'a> {
             model,
         };
         for contact in &model.contacts {
-            system.add(model, contact, averages, observe)?;
+            system.add(contact, averages, observe)?;
         }
         system.set_level(Level::FULL);
         let most =
@@ -249,49 +259,59 @@ impl<'a> System<'a> {
 
     fn add(
         &mut self,
-        model: &Model,
         contact: &'a ContactModel,
         averages: &mut Averages,
         observe: &mut Observer<'_>,
     ) -> Result<(), SolveError> {
         let (first, boundary) = (self.nodes.len(), &contact.boundary);
+        let axis = &self.model.axis;
+        self.add_nodes(contact);
+        let on_axis = |i: usize| axis.holds(boundary.positions[i]);
+        let symmetric = |i: usize| on_axis(i) || self.nodes[first + i].symmetric();
+        let chain = Chain {
+            s: boundary.s.clone(),
+            positions: boundary.positions.clone(),
+            mirror_start: symmetric(0),
+            mirror_end: symmetric(boundary.nodes.len() - 1),
+        };
+        let friction = contact.friction.as_ref().filter(|law| law.bound.acts());
+        let law = friction.map(|law| averages.law(self.patches.len(), law, chain));
+        if let Some(law) = &law {
+            self.add_points(contact, first, law, observe)?;
+        }
+        self.patches.push(Patch {
+            contact,
+            first,
+            law,
+        });
+        Ok(())
+    }
+
+    fn add_nodes(&mut self, contact: &ContactModel) {
+        let (model, body) = (self.model, self.body);
+        let (first, boundary) = (self.nodes.len(), &contact.boundary);
         let count = boundary.nodes.len();
-        let on_axis = |i: usize| model.axis.holds(boundary.positions[i]);
         self.nodes.reserve(count);
         for i in 0..count {
-            let [normal, tangent] = self.body.contact_dofs[first + i];
-            if let Some(node) = self.following(model, contact, i, [normal, tangent]) {
-                self.nodes.push(node);
-                continue;
-            }
-            let oblique = self.body.tangents[first + i].map(|part| {
-                let node = boundary.nodes[i];
-                let with_it = |contact: &&ContactModel| contact.boundary.nodes.contains(&node);
-                let shared = model.contacts.iter().filter(with_it).count() > 1;
-                let held = matches!(tangent, Dof::Fixed(value) if value == 0.0);
-                Oblique {
-                    other: tangent,
-                    part,
-                    symmetric: held
-                        && !shared
-                        && contact.held_along_surface(i, &model.oblique[&node]),
-                    shared,
-                }
-            });
+            let [normal, tangent] = body.contact_dofs[first + i];
+            let follows = follows(model, contact, i, [normal, tangent]);
+            let oblique = match (&follows, body.tangents[first + i]) {
+                (Some(_), _) => Some(Oblique::OF_FOLLOWING),
+                (None, part) => part.map(|part| oblique(model, contact, i, tangent, part)),
+            };
+            let held = Dof::Fixed(0.0);
+            let is_own = follows.is_none();
             self.nodes.push(ContactNode {
-                normal,
-                tangent: match oblique {
-                    None => tangent,
-                    Some(_) => Dof::Fixed(0.0),
-                },
+                normal: if is_own { normal } else { held },
+                tangent: if oblique.is_none() { tangent } else { held },
                 oblique,
-                follows: None,
+                follows,
                 gap: 0.0,
-                bonded: contact.condition == Condition::Bonded,
+                bonded: is_own && contact.condition == Condition::Bonded,
                 drag: 0.0,
                 held_tangent: None,
                 weight: boundary.weights[i],
-                on_axis: on_axis(i),
+                on_axis: is_own && model.axis.holds(boundary.positions[i]),
                 beside_axis: None,
             });
         }
@@ -302,19 +322,21 @@ impl<'a> System<'a> {
             let open = model.open_on_axis.contains(&boundary.nodes[end - first]);
             self.nodes[beside].beside_axis = (free == [true; 2] && !open).then_some(end);
         }
-        let symmetric = |i: usize| on_axis(i) || self.nodes[first + i].symmetric();
-        let chain = Chain {
-            s: boundary.s.clone(),
-            positions: boundary.positions.clone(),
-            mirror_start: symmetric(0),
-            mirror_end: symmetric(count - 1),
-        };
-        let friction = contact.friction.as_ref().filter(|law| law.bound.acts());
-        let law = friction.map(|law| averages.law(self.patches.len(), law, chain));
-        if let Some(law) = &law {
-            let patch = self.patches.len();
-            self.points.reserve(boundary.friction_points.len());
-            let point = |s: f64, nodes: [usize; 3], shape: [f64; 3], weight: f64| Point {
+    }
+
+    /// Adds the friction points of a contact, whose nodes begin at `first`.
+    fn add_points(
+        &mut self,
+        contact: &ContactModel,
+        first: usize,
+        law: &FrictionLaw,
+        observe: &mut Observer<'_>,
+    ) -> Result<(), SolveError> {
+        let (patch, boundary) = (self.patches.len(), &contact.boundary);
+        let own = &self.nodes[first..];
+        self.points.reserve(boundary.friction_points.len());
+        let mut add = |s: f64, nodes: [usize; 3], shape: [f64; 3], weight: f64| {
+            self.points.push(Point {
                 patch,
                 s,
                 nodes: nodes.map(|i| first + i),
@@ -322,91 +344,38 @@ impl<'a> System<'a> {
                 weight,
                 source: law.bound.source(s).shifted(first),
                 anchor: 0.0,
-            };
-            let mut add = |point: Point| {
-                self.points.push(point);
-                if observe(Progress::Pulse).is_break() {
-                    Err(SolveError::Stopped)
-                } else {
-                    Ok(())
+            });
+            if observe(Progress::Pulse).is_break() {
+                return Err(SolveError::Stopped);
+            }
+            Ok(())
+        };
+        match law.points {
+            FrictionPoints::Gauss3 => {
+                for p in &boundary.friction_points {
+                    let shape = shape_without_oblique(own, p.nodes, p.shape);
+                    add(p.s, p.nodes, shape, p.weight)?;
                 }
-            };
-            match law.points {
-                FrictionPoints::Gauss3 => {
-                    for p in &boundary.friction_points {
-                        let shape = shape_without_oblique(&self.nodes[first..], p.nodes, p.shape);
-                        add(point(p.s, p.nodes, shape, p.weight))?;
+            }
+            // a node on the axis has no weight, and no friction
+            FrictionPoints::Nodal => {
+                for (i, node) in own.iter().enumerate() {
+                    if self.model.axis.holds(boundary.positions[i]) {
+                        continue;
                     }
-                }
-                // a node on the axis has no weight, and no friction
-                FrictionPoints::Nodal => {
-                    for i in (0..count).filter(|&i| !on_axis(i)) {
-                        let (s, weight) = (boundary.s[i], boundary.weights[i]);
-                        let nodes = match self.nodes[first + i].oblique {
-                            None => [i; 3],
-                            Some(_) if i == 0 => [0, 2, 1],
-                            Some(_) => [i, i - 2, i - 1],
-                        };
-                        let shape = [1.0, 0.0, 0.0];
-                        let shape = if nodes[0] == nodes[1] {
-                            shape
-                        } else {
-                            shape_without_oblique(&self.nodes[first..], nodes, shape)
-                        };
-                        add(point(s, nodes, shape, weight))?;
-                    }
+                    let itself = [1.0, 0.0, 0.0];
+                    let (nodes, shape) = match node.oblique {
+                        None => ([i; 3], itself),
+                        Some(_) => {
+                            let nodes = if i == 0 { [0, 2, 1] } else { [i, i - 2, i - 1] };
+                            (nodes, shape_without_oblique(own, nodes, itself))
+                        }
+                    };
+                    add(boundary.s[i], nodes, shape, boundary.weights[i])?;
                 }
             }
         }
-        self.patches.push(Patch {
-            contact,
-            first,
-            law,
-        });
         Ok(())
-    }
-
-    /// A contact node that belongs to another contact alone. `dofs`: the displacements along the normal and the tangent
-    /// of that one.
-    fn following(
-        &self,
-        model: &Model,
-        contact: &ContactModel,
-        i: usize,
-        dofs: [Dof; 2],
-    ) -> Option<ContactNode> {
-        let node = contact.boundary.nodes[i];
-        let owner = &model.contacts[*model.alone.get(&node)?].boundary;
-        let there = owner.nodes.iter().position(|n| *n == node)?;
-        if model.contacts[model.alone[&node]].name == contact.name {
-            return None;
-        }
-        let axes = [owner.normals[there], owner.tangent(there)];
-        let by_axes = |[x, y]: [f64; 2]| axes.map(|[a, b]| x * a + y * b);
-        let held = Dof::Fixed(0.0);
-        Some(ContactNode {
-            normal: held,
-            tangent: held,
-            // slip is continued to it, as to a common end that both touch
-            oblique: Some(Oblique {
-                other: held,
-                part: [0.0; 2],
-                symmetric: false,
-                shared: true,
-            }),
-            follows: Some(Follows {
-                dofs,
-                normal: by_axes(contact.boundary.normals[i]),
-                tangent: by_axes(contact.boundary.tangent(i)),
-            }),
-            gap: 0.0,
-            bonded: false,
-            drag: 0.0,
-            held_tangent: None,
-            weight: contact.boundary.weights[i],
-            on_axis: false,
-            beside_axis: None,
-        })
     }
 
     /// A friction point without weight, for evaluating the law at any place.
@@ -798,6 +767,38 @@ impl<'a> System<'a> {
             reaction => reaction,
         };
         scale.max(f64::MIN_POSITIVE)
+    }
+}
+
+/// How a contact node follows another contact, if it belongs to that one alone. `dofs`: the displacements along the
+/// normal and the tangent of that one.
+fn follows(model: &Model, contact: &ContactModel, i: usize, dofs: [Dof; 2]) -> Option<Follows> {
+    let node = contact.boundary.nodes[i];
+    let owner = &model.contacts[*model.alone.get(&node)?];
+    let there = owner.boundary.nodes.iter().position(|n| *n == node)?;
+    if owner.name == contact.name {
+        return None;
+    }
+    let axes = [owner.boundary.normals[there], owner.boundary.tangent(there)];
+    let by_axes = |[x, y]: [f64; 2]| axes.map(|[a, b]| x * a + y * b);
+    Some(Follows {
+        dofs,
+        normal: by_axes(contact.boundary.normals[i]),
+        tangent: by_axes(contact.boundary.tangent(i)),
+    })
+}
+
+/// The axes of a contact node whose displacement along `other` is not perpendicular to the normal.
+fn oblique(model: &Model, contact: &ContactModel, i: usize, other: Dof, part: [f64; 2]) -> Oblique {
+    let node = contact.boundary.nodes[i];
+    let with_it = |contact: &&ContactModel| contact.boundary.nodes.contains(&node);
+    let shared = model.contacts.iter().filter(with_it).count() > 1;
+    let held = matches!(other, Dof::Fixed(value) if value == 0.0);
+    Oblique {
+        other,
+        part,
+        symmetric: held && !shared && contact.held_along_surface(i, &model.oblique[&node]),
+        shared,
     }
 }
 

@@ -54,115 +54,20 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
             "Mesh the surface, and save its elements (in Gmsh: put it in a physical group).",
         ));
     }
-    let mut notes = Vec::new();
-    let mut note = |code: WarningCode, message: String| {
-        notes.push(Warning {
-            code,
-            pointer: String::new(),
-            message,
-        })
-    };
-    if raw.without_centre > 0 {
-        note(
-            WarningCode::CentreNodesDropped,
-            format!(
-                "{} 9-node quadrilaterals became 8-node elements; their centre nodes were dropped.",
-                raw.without_centre
-            ),
-        );
-    }
     distinct(&raw, found)?;
-    let reversed = counter_clockwise(&mut raw);
-    if reversed > 0 {
-        note(
-            WarningCode::ElementsReversed,
-            format!("{reversed} elements were numbered clockwise and have been reversed."),
-        );
-    }
+    let mut notes = Vec::new();
     let of_file = raw.nodes.len();
-    let raised = second_order(&mut raw);
-    if raised > 0 {
-        note(
-            WarningCode::RaisedToSecondOrder,
-            format!(
-                "{raised} elements had only corners: midside nodes were added half-way between them. A curved side remains a polygon."
-            ),
-        );
-    }
+    let raised = normalize(&mut raw, &mut notes);
     let (of_file, nodes_left_out) = drop_unused(&mut raw, of_file);
-    let owners = Owners::new(&raw, found)?;
-    let surface = surface(&raw.elements, &owners.count);
-    let by_corners = by_corners(&surface, &owners, &raw, found)?;
-    let mut boundaries = BTreeMap::new();
-    // a name of which lines lie inside is not that of the others: a load on these is not one on all
-    let mut partial = BTreeSet::new();
-    for (name, lines) in std::mem::take(&mut raw.lines) {
-        let mut edges: Vec<Edge> = Vec::with_capacity(lines.len());
-        let mut inside = 0;
-        for [a, b] in lines {
-            match by_corners.binary_search_by_key(&key(a, b), |(corners, _)| *corners) {
-                Ok(place) => edges.push(surface[by_corners[place].1 as usize]),
-                Err(_) => inside += 1,
-            }
-        }
-        edges.sort_unstable();
-        edges.dedup();
-        if inside == 0 {
-            if !edges.is_empty() {
-                boundaries.insert(name, edges);
-            }
-            continue;
-        }
-        let outside = format!("{name} at the surface");
-        let rest = match edges.len() {
-            0 => "There is no boundary of that name.".to_owned(),
-            sides => format!(
-                "The boundary `{outside}` has the other {sides}; there is no boundary `{name}` with all of them."
-            ),
-        };
-        note(
-            WarningCode::LinesInside,
-            format!(
-                "{inside} lines of `{name}` are not sides of the body's surface and are left out. {rest}"
-            ),
-        );
-        if !edges.is_empty() {
-            boundaries.entry(outside).or_insert(edges);
-        }
-        partial.insert(name);
-    }
-    if raw.sets_span_boundaries {
-        // the place in `surface` of the side with this midside: sets are many, and each is gone through once
-        let mut sides = vec![NO_NODE; raw.nodes.len()];
-        for ([_, _, mid], place) in surface.iter().zip(0..) {
-            sides[*mid as usize] = place;
-        }
-        for (name, set) in raw
-            .node_sets
-            .iter()
-            .filter(|(name, _)| !partial.contains(*name))
-        {
-            let held = |node: &u32| set.binary_search(node).is_ok();
-            let side = |node: &u32| Some(sides[*node as usize]).filter(|place| *place != NO_NODE);
-            let mut places: Vec<u32> = set.iter().filter_map(side).collect();
-            places.retain(|place| surface[*place as usize].iter().all(held));
-            places.sort_unstable();
-            let edges: Vec<Edge> = places
-                .iter()
-                .map(|place| surface[*place as usize])
-                .collect();
-            if !edges.is_empty() {
-                boundaries.entry(name.clone()).or_insert(edges);
-            }
-        }
-    }
+    let surface = Surface::new(&raw, found)?;
+    let boundaries = surface.boundaries(&mut raw, &mut notes);
     let mesh = Mesh {
         nodes: raw.nodes,
         elements: raw.elements,
         boundaries,
         groups: raw.groups,
         node_sets: raw.node_sets,
-        added_midsides: (raised > 0).then_some(of_file),
+        added_midsides: raised.then_some(of_file),
         nodes_left_out,
         ..Mesh::default()
     };
@@ -180,6 +85,45 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
         ));
     }
     all.finish((mesh, notes))
+}
+
+fn note(code: WarningCode, message: String) -> Warning {
+    Warning {
+        code,
+        pointer: String::new(),
+        message,
+    }
+}
+
+/// Makes all elements counter-clockwise and of second order, with a note of what was changed; returns whether midsides
+/// were added.
+fn normalize(raw: &mut RawMesh, notes: &mut Vec<Warning>) -> bool {
+    if raw.without_centre > 0 {
+        notes.push(note(
+            WarningCode::CentreNodesDropped,
+            format!(
+                "{} 9-node quadrilaterals became 8-node elements; their centre nodes were dropped.",
+                raw.without_centre
+            ),
+        ));
+    }
+    let reversed = counter_clockwise(raw);
+    if reversed > 0 {
+        notes.push(note(
+            WarningCode::ElementsReversed,
+            format!("{reversed} elements were numbered clockwise and have been reversed."),
+        ));
+    }
+    let raised = second_order(raw);
+    if raised > 0 {
+        notes.push(note(
+            WarningCode::RaisedToSecondOrder,
+            format!(
+                "{raised} elements had only corners: midside nodes were added half-way between them. A curved side remains a polygon."
+            ),
+        ));
+    }
+    raised > 0
 }
 
 fn distinct(raw: &RawMesh, found: &mut Findings) -> Checked {
@@ -377,33 +321,117 @@ fn surface(elements: &[Element], count: &[u8]) -> Vec<Edge> {
         .collect()
 }
 
-/// The corners of the surface's sides with their places in it, in order. Two sides between the same corners are
-/// neighbours that do not share their midside.
-fn by_corners(
-    surface: &[Edge],
-    owners: &Owners,
-    raw: &RawMesh,
-    found: &mut Findings,
-) -> Checked<Vec<((u32, u32), u32)>> {
-    let mut sorted: Vec<((u32, u32), u32)> = surface
-        .iter()
-        .enumerate()
-        .map(|(i, [a, b, _])| (key(*a, *b), i as u32))
-        .collect();
-    sorted.sort_unstable();
-    let mut all = AllChecks::default();
-    for pair in sorted.windows(2) {
-        if pair[0].0 == pair[1].0 {
-            let owner = |i: u32| owners.first[surface[i as usize][2] as usize] as usize;
-            all.fail(nonconforming(
-                raw,
-                owner(pair[0].1),
-                owner(pair[1].1),
-                found,
-            ));
+/// The sides of the body's surface.
+struct Surface {
+    sides: Vec<Edge>,
+    /// The corners of the sides with their places in `sides`, in order.
+    by_corners: Vec<((u32, u32), u32)>,
+}
+
+impl Surface {
+    /// Two sides between the same corners are neighbours that do not share their midside.
+    fn new(raw: &RawMesh, found: &mut Findings) -> Checked<Self> {
+        let owners = Owners::new(raw, found)?;
+        let sides = surface(&raw.elements, &owners.count);
+        let corners = sides.iter().map(|[a, b, _]| key(*a, *b));
+        let mut by_corners: Vec<((u32, u32), u32)> = corners.zip(0..).collect();
+        by_corners.sort_unstable();
+        let mut all = AllChecks::default();
+        for pair in by_corners.windows(2) {
+            if pair[0].0 == pair[1].0 {
+                let owner = |i: u32| owners.first[sides[i as usize][2] as usize] as usize;
+                let [first, second] = [owner(pair[0].1), owner(pair[1].1)];
+                all.fail(nonconforming(raw, first, second, found));
+            }
+        }
+        all.finish(Surface { sides, by_corners })
+    }
+
+    fn side(&self, [a, b]: [u32; 2]) -> Option<Edge> {
+        let place = self
+            .by_corners
+            .binary_search_by_key(&key(a, b), |(corners, _)| *corners)
+            .ok()?;
+        Some(self.sides[self.by_corners[place].1 as usize])
+    }
+
+    /// The boundaries by the names of lines and of sets of nodes, with a note of lines that are not on the surface.
+    fn boundaries(
+        &self,
+        raw: &mut RawMesh,
+        notes: &mut Vec<Warning>,
+    ) -> BTreeMap<String, Vec<Edge>> {
+        let mut boundaries = BTreeMap::new();
+        // a name of which lines lie inside is not that of the others: a load on these is not one on all
+        let mut partial = BTreeSet::new();
+        for (name, lines) in std::mem::take(&mut raw.lines) {
+            let count = lines.len();
+            let mut edges: Vec<Edge> = Vec::with_capacity(count);
+            edges.extend(lines.into_iter().filter_map(|line| self.side(line)));
+            let inside = count - edges.len();
+            edges.sort_unstable();
+            edges.dedup();
+            if inside == 0 {
+                if !edges.is_empty() {
+                    boundaries.insert(name, edges);
+                }
+                continue;
+            }
+            let at_surface = format!("{name} at the surface");
+            notes.push(lines_inside(&name, inside, &at_surface, edges.len()));
+            if !edges.is_empty() {
+                boundaries.entry(at_surface).or_insert(edges);
+            }
+            partial.insert(name);
+        }
+        if raw.sets_span_boundaries {
+            self.add_sets(raw, &partial, &mut boundaries);
+        }
+        boundaries
+    }
+
+    /// Adds the sides of which a set has all nodes, for each set whose name is free.
+    fn add_sets(
+        &self,
+        raw: &RawMesh,
+        partial: &BTreeSet<String>,
+        boundaries: &mut BTreeMap<String, Vec<Edge>>,
+    ) {
+        // the place of the side with this midside: sets are many, and each is gone through once
+        let mut places = vec![NO_NODE; raw.nodes.len()];
+        for ([_, _, mid], place) in self.sides.iter().zip(0..) {
+            places[*mid as usize] = place;
+        }
+        let sets = raw.node_sets.iter();
+        for (name, set) in sets.filter(|(name, _)| !partial.contains(*name)) {
+            let held = |node: &u32| set.binary_search(node).is_ok();
+            let place = |node: &u32| Some(places[*node as usize]).filter(|place| *place != NO_NODE);
+            let mut own: Vec<u32> = set.iter().filter_map(place).collect();
+            own.retain(|place| self.sides[*place as usize].iter().all(held));
+            own.sort_unstable();
+            if !own.is_empty() {
+                let edges = own.iter().map(|place| self.sides[*place as usize]);
+                let edges = edges.collect();
+                boundaries.entry(name.clone()).or_insert(edges);
+            }
         }
     }
-    all.finish(sorted)
+}
+
+/// The note that `inside` lines of a name are no sides of the surface; `sides` of them are, under another name.
+fn lines_inside(name: &str, inside: usize, at_surface: &str, sides: usize) -> Warning {
+    let rest = match sides {
+        0 => "There is no boundary of that name.".to_owned(),
+        sides => format!(
+            "The boundary `{at_surface}` has the other {sides}; there is no boundary `{name}` with all of them."
+        ),
+    };
+    note(
+        WarningCode::LinesInside,
+        format!(
+            "{inside} lines of `{name}` are not sides of the body's surface and are left out. {rest}"
+        ),
+    )
 }
 
 fn nonconforming(raw: &RawMesh, first: usize, second: usize, found: &mut Findings) -> Refused {

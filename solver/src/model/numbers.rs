@@ -6,9 +6,49 @@ use crate::error::{AllChecks, Checked, MOST_LISTED, Reason, escape};
 use crate::finite::not_finite;
 use crate::mesh::Mesh;
 use crate::problem::{
-    Algorithm, Analysis, Condition, Friction, FrictionPoints, History, Measure, NormalOf, Problem,
-    Step, ThesisPressure, Units,
+    Algorithm, Analysis, Condition, Contact, Friction, FrictionPoints, History, Measure, NormalOf,
+    Problem, Step, ThesisOptions, ThesisPressure, Units,
 };
+
+/// What the thesis's own iteration does not support in a contact: how to find it, and the field, what it is, what is
+/// supported, and why.
+#[rustfmt::skip] // a table
+const NOT_OF_THE_THESIS: [(OfContact, [&str; 4]); 7] = [
+    (|contact| contact.condition != Condition::Unilateral, [
+        "condition", "a condition other than `unilateral`", "`unilateral`",
+        "The thesis's iteration supports no other condition",
+    ]),
+    (|contact| has_friction(contact, |f| f.measure == Measure::Surface), [
+        "friction/measure", "`surface`", "`line`",
+        "The thesis averages along the line of contact (3.4)",
+    ]),
+    (|contact| has_friction(contact, |f| f.history == History::Incremental), [
+        "friction/history", "`incremental`", "`total`",
+        "The thesis's law does not depend on the path",
+    ]),
+    (|contact| contact.normal == NormalOf::Obstacle, [
+        "normal", "`obstacle`", "`body`",
+        "The thesis uses the body's normal only",
+    ]),
+    (|contact| contact.direction.is_some(), [
+        "direction", "a direction", "none: against the body's normal",
+        "Obstacles of the thesis move against the body's normal",
+    ]),
+    (|contact| has_friction(contact, |f| f.bound.is_some()), [
+        "friction/bound", "a prescribed bound", "a coefficient and a nonlocal radius",
+        "The thesis's bound follows from the pressure",
+    ]),
+    (|contact| has_friction(contact, |f| f.points == FrictionPoints::Nodal), [
+        "friction/points", "`nodal`", "`gauss3`",
+        "The thesis evaluates friction at Gauss points",
+    ]),
+];
+
+type OfContact = fn(&Contact) -> bool;
+
+fn has_friction(contact: &Contact, such: fn(&Friction) -> bool) -> bool {
+    contact.friction.as_ref().is_some_and(such)
+}
 
 impl Checks {
     /// Checks for NaN and infinity, which cannot come from JSON, but from protobuf.
@@ -205,78 +245,26 @@ impl Checks {
             return Ok(());
         }
         for (i, contact) in problem.contacts.iter().enumerate() {
-            if contact.condition != Condition::Unilateral {
-                all.fail(self.report(
-                    format!("/contacts/{i}/condition"),
-                    Reason::NotUsed,
-                    "a condition other than `unilateral`",
-                    "`unilateral`",
-                    "The thesis's iteration supports no other condition; choose another algorithm.",
-                ));
-            }
-            let surface = |f: &Friction| f.measure == Measure::Surface;
-            if contact.friction.as_ref().is_some_and(surface) {
-                all.fail(self.report(
-                    format!("/contacts/{i}/friction/measure"),
-                    Reason::NotUsed,
-                    "`surface`",
-                    "`line`",
-                    "The thesis averages along the line of contact (3.4); choose another algorithm.",
-                ));
-            }
-            let incremental = |f: &Friction| f.history == History::Incremental;
-            if contact.friction.as_ref().is_some_and(incremental) {
-                all.fail(self.report(
-                    format!("/contacts/{i}/friction/history"),
-                    Reason::NotUsed,
-                    "`incremental`",
-                    "`total`",
-                    "The thesis's law does not depend on the path; choose another algorithm.",
-                ));
+            for (is_so, [field, got, expected, why]) in NOT_OF_THE_THESIS {
+                if is_so(contact) {
+                    all.fail(self.report(
+                        format!("/contacts/{i}/{field}"),
+                        Reason::NotUsed,
+                        got,
+                        expected,
+                        format!("{why}; choose another algorithm."),
+                    ));
+                }
             }
         }
-        for (i, contact) in problem.contacts.iter().enumerate() {
-            if contact.normal == NormalOf::Obstacle {
-                all.fail(self.report(
-                    format!("/contacts/{i}/normal"),
-                    Reason::NotUsed,
-                    "`obstacle`",
-                    "`body`",
-                    "The thesis uses the body's normal only; choose another algorithm.",
-                ));
-            }
-            if contact.direction.is_some() {
-                all.fail(self.report(
-                    format!("/contacts/{i}/direction"),
-                    Reason::NotUsed,
-                    "a direction",
-                    "none: against the body's normal",
-                    "Obstacles of the thesis move against the body's normal; choose another algorithm.",
-                ));
-            }
-            if contact.friction.as_ref().is_some_and(|f| f.bound.is_some()) {
-                all.fail(self.report(
-                    format!("/contacts/{i}/friction/bound"),
-                    Reason::NotUsed,
-                    "a prescribed bound",
-                    "a coefficient and a nonlocal radius",
-                    "The thesis's bound follows from the pressure; choose another algorithm.",
-                ));
-            }
-            let nodal = |f: &Friction| f.points == FrictionPoints::Nodal;
-            if contact.friction.as_ref().is_some_and(nodal) {
-                all.fail(self.report(
-                    format!("/contacts/{i}/friction/points"),
-                    Reason::NotUsed,
-                    "`nodal`",
-                    "`gauss3`",
-                    "The thesis evaluates friction at Gauss points; choose another algorithm.",
-                ));
-            }
+        if let Some(options) = &controls.thesis {
+            all.check(self.thesis_options(options, &problem.contacts));
         }
-        let Some(options) = &controls.thesis else {
-            return all.finish(());
-        };
+        all.finish(())
+    }
+
+    fn thesis_options(&mut self, options: &ThesisOptions, contacts: &[Contact]) -> Checked {
+        let mut all = AllChecks::default();
         all.check(self.require(
             options.relaxation > 0.0 && options.relaxation <= 1.0,
             "/solver/thesis/relaxation",
@@ -309,7 +297,7 @@ impl Checks {
         }
         for (name, [s0, s1]) in &options.contact_guess {
             let pointer = format!("/solver/thesis/contact_guess/{}", escape(name));
-            if !problem.contacts.iter().any(|c| c.boundary == *name) {
+            if !contacts.iter().any(|c| c.boundary == *name) {
                 all.fail(self.report(
                     &pointer,
                     Reason::UnknownBoundary,

@@ -1,5 +1,6 @@
 //! The generated conversions: the list of types is `server/rpc/build/mirrors.rs`, the generator `conversions.rs` beside
 //! it.
+#![allow(clippy::too_many_lines)] // generated: a line for each member
 
 use std::collections::BTreeMap;
 

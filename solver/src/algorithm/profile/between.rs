@@ -86,7 +86,11 @@ impl PatchView<'_> {
     /// Places where the obstacle reaches into the body between the nodes or recedes from it, at most one for each edge,
     /// the deepest first. Only what the nodes do not see counts: a smooth obstacle is a parabola between them, and its
     /// error at the ends of contact belongs to the errors of the mesh.
-    pub(in crate::algorithm) fn missed(&self) -> Vec<Missed> {
+    pub(in crate::algorithm) fn missed(&self) -> &[Missed] {
+        self.missed.get_or_init(|| self.find_missed())
+    }
+
+    fn find_missed(&self) -> Vec<Missed> {
         let contact = self.patch.contact;
         let mut found: Vec<(usize, Missed)> = Vec::new();
         if contact.condition != Condition::Unilateral || self.finished.outcome != Outcome::Converged

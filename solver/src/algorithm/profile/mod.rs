@@ -54,6 +54,8 @@ pub(super) struct PatchView<'a> {
     worst_junction: OnceCell<Option<Junction>>,
     /// The gaps of an obstacle that is pushed along a direction, computed when first needed.
     displaced_gaps: OnceCell<DisplacedGaps>,
+    /// The places between nodes where a node is needed, found when first needed.
+    missed: OnceCell<Vec<Missed>>,
     /// Called with the work done (multiplications). If it returns false, the results will not be used and may be
     /// anything.
     go_on: &'a dyn Fn(f64) -> bool,
@@ -138,6 +140,7 @@ impl<'a> PatchView<'a> {
             anchors: Vec::new(),
             worst_junction: OnceCell::new(),
             displaced_gaps: OnceCell::new(),
+            missed: OnceCell::new(),
             go_on,
             tractions: None,
         };

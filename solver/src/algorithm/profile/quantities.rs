@@ -35,7 +35,7 @@ pub struct Quantity {
     /// length that is left out, else the quantity times that length divided by the length of the contact.
     pub truncation: f64,
     /// The error of an indentation along a direction, in the unit of the value, in addition to that by `gradient` and
-    /// [`Reported::displaced`](crate::algorithm::Reported).
+    /// [`AlongContacts::displaced`](crate::algorithm::AlongContacts).
     pub displaced: f64,
     /// For a peak: the pressure of a shape of the obstacle between the nodes that they do not see; else 0.
     pub unseen: f64,

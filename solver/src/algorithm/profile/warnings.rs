@@ -2,7 +2,7 @@
 
 use super::PatchView;
 use crate::contact::edge_nodes;
-use crate::friction::{Average, BoundLaw, FrictionLaw};
+use crate::friction::BoundLaw;
 use crate::problem::{Condition, Measure, Normalization};
 use crate::solution::{Outcome, Warning, WarningCode};
 
@@ -31,6 +31,9 @@ const MOST_EARLY: f64 = 0.01;
 /// With fewer edges than this across a contact, of which half may be modelled, its pressure is not reliable.
 const FEWEST_EDGES: usize = 6;
 
+/// Adds a warning about the contact.
+type Warn<'a> = dyn FnMut(WarningCode, String) + 'a;
+
 impl PatchView<'_> {
     pub(in crate::algorithm) fn warn(&self, warnings: &mut Vec<Warning>) {
         self.warn_of_oscillation(warnings);
@@ -43,74 +46,23 @@ impl PatchView<'_> {
 
     fn warn_of_contact(&self, warnings: &mut Vec<Warning>) {
         let contact = self.patch.contact;
-        let mut warn = |code: WarningCode, message: String| {
+        let warn = &mut |code: WarningCode, message: String| {
             warnings.push(Warning {
                 code,
                 pointer: contact.pointer.clone(),
                 message,
             });
         };
-        // the radius of a law whose bound jumps
-        let jumps = |law: &FrictionLaw<Average>| match &law.bound {
-            BoundLaw::Pressure {
-                cohesion, average, ..
-            } => (*cohesion > 0.0).then_some(average.radius),
-            BoundLaw::Prescribed(_) => None,
-        };
-        let settled = matches!(
-            self.finished.outcome,
-            Outcome::Converged | Outcome::Canceled
-        );
-        if let Some(radius) = contact
-            .friction
-            .as_ref()
-            .and_then(jumps)
-            .filter(|_| !settled)
-        {
-            warn(
-                WarningCode::CohesionJumps,
-                match radius {
-                    0.0 => "The friction bound jumps by the cohesion where the pressure ends; without a nonlocal radius the nodes there may enter and leave contact endlessly. Give a radius of at least one element.".to_owned(),
-                    _ => "The friction bound jumps by the cohesion where the averaged pressure ends, and from nothing as soon as the body touches at all: where that friction lifts it off again, there is no equilibrium. Press it further, or give less cohesion.".to_owned(),
-                },
-            );
-        }
-        let touching = (0..self.count()).filter(|&i| self.active(i)).count();
+        self.warn_of_jumps(warn);
         if contact.condition != Condition::Unilateral {
             return;
         }
-        if touching == 0 {
-            let opening = |i: usize| {
-                contact.gap(i, self.system.level.indentation)
-                    - self
-                        .system
-                        .normal_displacement(self.v, self.patch.first + i)
-            };
-            let nearest = (0..self.count()).min_by(|&a, &b| opening(a).total_cmp(&opening(b)));
-            let smallest = nearest.map_or(f64::INFINITY, opening);
-            // without contact the obstacle does not deform the body: the missing indentation is the gap
-            let engages = |i: usize| {
-                let moved = self
-                    .system
-                    .normal_displacement(self.v, self.patch.first + i);
-                (contact.profile[i] - moved) / contact.push[i][0]
-            };
-            // a push in a direction of its own may lead away from some nodes
-            let nearer = |i: &usize| contact.push[*i][0] > 0.0;
-            let nodes = (0..self.count()).filter(nearer);
-            let needed = nodes.map(engages).fold(f64::INFINITY, f64::min);
-            let message = if self.missed().is_empty() {
-                format!(
-                    "The body never touches the obstacle: the smallest gap is {smallest:.6e}. There is contact if the indentation is above {needed:.6e}."
-                )
-            } else {
-                format!(
-                    "No node touches the obstacle, although it reaches into the body between two nodes: the smallest gap at a node is {smallest:.6e}. A node touches if the indentation is above {needed:.6e}."
-                )
-            };
-            warn(WarningCode::NoContact, message);
+        let mut touching = (0..self.count()).filter(|&i| self.active(i));
+        let Some(first) = touching.next() else {
+            warn(WarningCode::NoContact, self.without_contact());
             return;
-        }
+        };
+        let last = touching.next_back().unwrap_or(first);
         if let Some(tau) = self.bound_beyond_contact() {
             warn(
                 WarningCode::BoundBeyondContact,
@@ -119,6 +71,64 @@ impl PatchView<'_> {
                 ),
             );
         }
+        self.warn_of_coarse_mesh(warn);
+        self.warn_of_ends(first, last, warn);
+    }
+
+    /// Warns of a friction bound that jumps, where the iterations do not come to rest.
+    fn warn_of_jumps(&self, warn: &mut Warn<'_>) {
+        let settled = matches!(
+            self.finished.outcome,
+            Outcome::Converged | Outcome::Canceled
+        );
+        let law = self.patch.contact.friction.as_ref().map(|law| &law.bound);
+        if let Some(BoundLaw::Pressure {
+            cohesion, average, ..
+        }) = law
+            && *cohesion > 0.0
+            && !settled
+        {
+            let message = match average.radius {
+                0.0 => {
+                    "The friction bound jumps by the cohesion where the pressure ends; without a nonlocal radius the nodes there may enter and leave contact endlessly. Give a radius of at least one element."
+                }
+                _ => {
+                    "The friction bound jumps by the cohesion where the averaged pressure ends, and from nothing as soon as the body touches at all: where that friction lifts it off again, there is no equilibrium. Press it further, or give less cohesion."
+                }
+            };
+            warn(WarningCode::CohesionJumps, message.to_owned());
+        }
+    }
+
+    /// How far the obstacle is from a body that no node of which touches it.
+    fn without_contact(&self) -> String {
+        let contact = self.patch.contact;
+        let moved = |i: usize| {
+            self.system
+                .normal_displacement(self.v, self.patch.first + i)
+        };
+        let opening = |i: usize| contact.gap(i, self.system.level.indentation) - moved(i);
+        let nearest = (0..self.count()).min_by(|&a, &b| opening(a).total_cmp(&opening(b)));
+        let smallest = nearest.map_or(f64::INFINITY, opening);
+        // without contact the obstacle does not deform the body: the missing indentation is the gap
+        let engages = |i: usize| (contact.profile[i] - moved(i)) / contact.push[i][0];
+        // a push in a direction of its own may lead away from some nodes
+        let nearer = |i: &usize| contact.push[*i][0] > 0.0;
+        let nodes = (0..self.count()).filter(nearer);
+        let needed = nodes.map(engages).fold(f64::INFINITY, f64::min);
+        if self.missed().is_empty() {
+            format!(
+                "The body never touches the obstacle: the smallest gap is {smallest:.6e}. There is contact if the indentation is above {needed:.6e}."
+            )
+        } else {
+            format!(
+                "No node touches the obstacle, although it reaches into the body between two nodes: the smallest gap at a node is {smallest:.6e}. A node touches if the indentation is above {needed:.6e}."
+            )
+        }
+    }
+
+    /// Warns of a mesh that is too coarse for the nonlocal radius, the contact or the gap at the axis.
+    fn warn_of_coarse_mesh(&self, warn: &mut Warn<'_>) {
         if let Some((length, radius)) = self.unresolved_radius() {
             warn(
                 WarningCode::MeshTooCoarseForRadius,
@@ -127,7 +137,7 @@ impl PatchView<'_> {
                 ),
             );
         }
-        let edges = (0..contact.boundary.edge_count())
+        let edges = (0..self.patch.contact.boundary.edge_count())
             .filter(|k| edge_nodes(*k).iter().all(|&i| self.active(i)))
             .count();
         // with those beyond lines of symmetry
@@ -149,13 +159,20 @@ impl PatchView<'_> {
                 ),
             );
         }
+    }
+
+    /// Warns of the ends of the obstacle, and of averages that reach beyond ends. `first` and `last`: the outermost
+    /// nodes in contact.
+    fn warn_of_ends(&self, first: usize, last: usize, warn: &mut Warn<'_>) {
+        let contact = self.patch.contact;
         let s = &contact.boundary.s;
-        let ends = [0, self.count() - 1].map(|i| (s[i], self.active(i) && self.may_be_sharp(i)));
-        for (s, _) in ends.into_iter().filter(|(_, pressed)| *pressed) {
+        let sharp = |i: &usize| self.active(*i) && self.may_be_sharp(*i);
+        for end in [0, self.count() - 1].into_iter().filter(sharp) {
             warn(
                 WarningCode::ContactReachesObstacleEnd,
                 format!(
-                    "The body presses against the end of the obstacle, s = {s:.4}. At a sharp edge the pressure grows without limit as the mesh is refined: forces converge, and σ_t does for nonlocal_radius > 0, but the peak of σ_n does not. If the obstacle continues there, extend it."
+                    "The body presses against the end of the obstacle, s = {:.4}. At a sharp edge the pressure grows without limit as the mesh is refined: forces converge, and σ_t does for nonlocal_radius > 0, but the peak of σ_n does not. If the obstacle continues there, extend it.",
+                    s[end]
                 ),
             );
         }
@@ -171,22 +188,16 @@ impl PatchView<'_> {
             );
         }
         let radius = contact.friction.as_ref().and_then(|f| f.bound.radius());
-        let first = (0..self.count()).find(|&i| self.active(i));
-        let last = (0..self.count()).rfind(|&i| self.active(i));
-        if let (Some(first), Some(last)) = (first, last) {
-            let mirrored = [first, last]
-                .into_iter()
-                .filter(|&i| self.symmetric(i))
-                .count();
-            let width = (s[last] - s[first]) * (1 + mirrored) as f64;
-            if let Some(radius) = radius.filter(|radius| *radius > width && width > 0.0) {
-                warn(
-                    WarningCode::RadiusExceedsContact,
-                    format!(
-                        "The nonlocal radius {radius} is larger than the whole contact, {width:.4}: the averaged pressure, and friction with it, extends beyond the contact."
-                    ),
-                );
-            }
+        let ends = [first, last].into_iter();
+        let mirrored = ends.filter(|&i| self.symmetric(i)).count();
+        let width = (s[last] - s[first]) * (1 + mirrored) as f64;
+        if let Some(radius) = radius.filter(|radius| *radius > width && width > 0.0) {
+            warn(
+                WarningCode::RadiusExceedsContact,
+                format!(
+                    "The nonlocal radius {radius} is larger than the whole contact, {width:.4}: the averaged pressure, and friction with it, extends beyond the contact."
+                ),
+            );
         }
     }
 
