@@ -2,7 +2,6 @@
 
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
 
 use crate::algorithm::finished::Finished;
 use crate::algorithm::large_slip::warn_of_large_slip;
@@ -14,9 +13,10 @@ use crate::elasticity::{Dof, Recovered, StressDifference, recover};
 use crate::error::SolveError;
 use crate::linear::{Interrupt, Stopped};
 use crate::model::{Hold, Model};
+use crate::observer::Observer;
 use crate::solution::{
-    ContactProfile, ContactSummary, Fields, GaussFields, NodeState, Observer, Outcome, Phase,
-    Progress, Residuals, Summary, Warning, WarningCode, at_all_points,
+    ContactProfile, ContactSummary, Fields, GaussFields, NodeState, Outcome, Phase, Residuals,
+    Summary, Warning, WarningCode, at_all_points,
 };
 
 /// Forces with a larger relative imbalance than this have lost half of their digits: the result is not reliable.
@@ -65,11 +65,11 @@ pub fn numbers(
     model: &Model,
     system: &System<'_>,
     finished: &Finished,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<(BTreeMap<String, ContactSummary>, Vec<Warning>), SolveError> {
     let forces = Forces::new(system, finished);
-    let mut ask = || observe(Progress::Pulse);
-    let questions = Questions::new(&mut ask);
+    let mut stop = || observer.stop();
+    let questions = Questions::new(&mut stop);
     let go_on = &|work: f64| questions.worked(work).is_ok();
     let mut warnings = model.warnings.clone();
     let mut contacts = BTreeMap::new();
@@ -94,11 +94,11 @@ pub fn numbers(
 pub fn quantities(
     system: &System<'_>,
     finished: &Finished,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Vec<Quantity> {
     let forces = Forces::new(system, finished);
-    let mut ask = || observe(Progress::Pulse);
-    let questions = Questions::new(&mut ask);
+    let mut stop = || observer.stop();
+    let questions = Questions::new(&mut stop);
     let go_on = &|work: f64| questions.worked(work).is_ok();
     let mut found = Vec::new();
     for p in 0..system.patches.len() {
@@ -119,9 +119,9 @@ struct Questions<'a> {
 }
 
 impl<'a> Questions<'a> {
-    fn new(ask: &'a mut dyn FnMut() -> ControlFlow<()>) -> Self {
+    fn new(stop: &'a mut dyn FnMut() -> bool) -> Self {
         Questions {
-            interrupt: RefCell::new(Interrupt::new(ask)),
+            interrupt: RefCell::new(Interrupt::new(stop)),
             stopped: Cell::new(false),
         }
     }
@@ -150,17 +150,14 @@ pub fn report(
     body: &ElasticBody,
     system: &System<'_>,
     finished: &Finished,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<Reported, SolveError> {
-    let mut patience = PATIENCE;
-    let mut ask = || match observe(Progress::Pulse) {
-        ControlFlow::Break(()) if patience > 0 => {
-            patience -= 1;
-            ControlFlow::Continue(())
-        }
-        answer => answer,
+    let mut refusals = 0;
+    let mut stop = || {
+        refusals += u32::from(observer.stop());
+        refusals > PATIENCE
     };
-    let questions = Questions::new(&mut ask);
+    let questions = Questions::new(&mut stop);
     let go_on = &|work: f64| questions.worked(work).is_ok();
     let v = &finished.state.v;
     if system.semidefinite && finished.outcome != Outcome::Canceled {

@@ -7,8 +7,8 @@ use crate::error::SolveError;
 use crate::friction::{Average, Averaging, Chain, FrictionLaw, Source, largest_pressure};
 use crate::linear::Dense;
 use crate::model::{ContactModel, Level, Model};
+use crate::observer::{Observer, go_on};
 use crate::problem::{Condition, FrictionPoints};
-use crate::solution::{Observer, Progress};
 
 /// A friction point whose bound is below this part of the largest counts as open: its anchor follows it.
 const OPEN: f64 = 1e-12;
@@ -203,9 +203,9 @@ impl<'a> System<'a> {
     pub fn new(
         model: &'a Model,
         body: &'a ElasticBody,
-        observe: &mut Observer<'_>,
+        observer: &mut dyn Observer,
     ) -> Result<Self, SolveError> {
-        System::with_averages(model, body, &mut Averages::default(), observe)
+        System::with_averages(model, body, &mut Averages::default(), observer)
     }
 
     /// As [`System::new`], using the averages of earlier systems on this body and adding those of this one.
@@ -213,7 +213,7 @@ impl<'a> System<'a> {
         model: &'a Model,
         body: &'a ElasticBody,
         averages: &mut Averages,
-        observe: &mut Observer<'_>,
+        observer: &mut dyn Observer,
     ) -> Result<Self, SolveError> {
         let mut system = System {
             stiffness: &body.stiffness,
@@ -231,7 +231,7 @@ impl<'a> System<'a> {
             model,
         };
         for contact in &model.contacts {
-            system.add(model, contact, averages, observe)?;
+            system.add(model, contact, averages, observer)?;
         }
         system.set_level(Level::FULL);
         let most =
@@ -252,7 +252,7 @@ impl<'a> System<'a> {
         model: &Model,
         contact: &'a ContactModel,
         averages: &mut Averages,
-        observe: &mut Observer<'_>,
+        observer: &mut dyn Observer,
     ) -> Result<(), SolveError> {
         let (first, boundary) = (self.nodes.len(), &contact.boundary);
         let count = boundary.nodes.len();
@@ -325,11 +325,7 @@ impl<'a> System<'a> {
             };
             let mut add = |point: Point| {
                 self.points.push(point);
-                if observe(Progress::Pulse).is_break() {
-                    Err(SolveError::Stopped)
-                } else {
-                    Ok(())
-                }
+                go_on(observer)
             };
             match law.points {
                 FrictionPoints::Gauss3 => {
