@@ -2,7 +2,7 @@
 //!
 //!     cargo run --release --example friction -- tests/data/thesis/rectangular_punch.json
 
-use std::{env, error::Error, fs, ops::ControlFlow, process::ExitCode};
+use std::{env, error::Error, fs, process::ExitCode};
 
 use solver::{
     family::{Family, Start},
@@ -31,7 +31,7 @@ fn study() -> Result<(), Box<dyn Error>> {
         problem.mesh.refine = Refine::Times(0);
     }
     let external = files::external_mesh(&problem, None);
-    let mut family = Family::new(&problem, external, &mut |_| ControlFlow::Continue(()))?;
+    let mut family = Family::new(&problem, external, &mut ())?;
     println!("coefficient  normal force  tangential force  stick width");
     for coefficient in [0.1, 0.2, 0.3, 0.4] {
         for friction in problem
@@ -41,8 +41,7 @@ fn study() -> Result<(), Box<dyn Error>> {
         {
             friction.coefficient = Some(coefficient);
         }
-        let go_on = &mut |_: solver::solution::Progress<'_>| ControlFlow::Continue(());
-        let (member, _) = family.member(&problem, Start::Anew, go_on)?;
+        let (member, _) = family.member(&problem, Start::Anew, &mut ())?;
         println!(
             "{coefficient:11} {:13.4} {:17.4} {:12.4}",
             member.normal_force, member.tangential_force, member.stick_width

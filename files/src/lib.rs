@@ -2,8 +2,6 @@
 //! bytes out, never a path.
 //!
 //! ```
-//! use std::ops::ControlFlow;
-//!
 //! let text = r#"{
 //!     "analysis": {"kind": "plane_strain"},
 //!     "mesh": {"grid": {"x": [0, 0.5, 1, 2], "y": [-2, -1, 0]}},
@@ -12,7 +10,7 @@
 //!     "contacts": [{"boundary": "top", "obstacle": {"kind": "flat", "from": 0, "to": 1}, "indentation": 0.01}]
 //! }"#;
 //! let problem = files::parse(text).expect("a valid problem");
-//! let solution = solver::solve(&problem, &mut |_progress| ControlFlow::Continue(()))?;
+//! let solution = solver::solve(&problem, &mut ())?;
 //! println!("normal force {}", solution.summary.normal_force);
 //!
 //! // the stresses along the contact as CSV, a line for each point

@@ -17,7 +17,8 @@ use crate::linear::{
 };
 use crate::mesh::Mesh;
 use crate::model::{Alone, Held, Level, Model};
-use crate::solution::{Observer, Phase, Progress};
+use crate::observer::{Observer, Progress, notify, take};
+use crate::solution::Phase;
 
 /// A body, assembled, supported and condensed onto its contact boundaries.
 pub struct ElasticBody {
@@ -95,44 +96,39 @@ impl ElasticBody {
     /// [`SolveError::SingularSystem`] with the node and direction that nothing holds; [`SolveError::ResourceExhausted`]
     /// and [`SolveError::NonFinite`] if a matrix does not fit into memory or is not finite; [`SolveError::Stopped`] if
     /// the observer says so.
-    pub fn new(model: &Model, observe: &mut Observer<'_>) -> Result<Self, SolveError> {
-        notify(observe, Progress::Phase(Phase::Assemble))?;
+    pub fn new(model: &Model, observer: &mut dyn Observer) -> Result<Self, SolveError> {
+        notify(observer, Progress::Phase(Phase::Assemble))?;
         let nodal_loads =
             elasticity::assemble_loads(&model.mesh, &model.section, model.quadrature, &model.loads);
         let mut condensed = nodal_loads.clone();
         elasticity::condense_body_force(&model.mesh, &model.section, &model.loads, &mut condensed);
 
-        notify(observe, Progress::Phase(Phase::Order))?;
+        notify(observer, Progress::Phase(Phase::Order))?;
         let tables = ElementTables::new(&model.mesh, &model.section, model.quadrature);
         let elements = tables.elements(&model.mesh, &model.section);
         let (map, fronts) = number(model, elements)?;
         let mut of_loads = on_unknowns(&map, &condensed);
 
-        notify(observe, Progress::Phase(Phase::Factor))?;
+        notify(observer, Progress::Phase(Phase::Factor))?;
         let contact_unknowns = fronts.kept();
         let bytes = |threads| fronts.bytes(threads) + Dense::bytes(contact_unknowns);
-        let threads = match fronts.is_large()
-            && observe(Progress::SecondThread).is_continue()
-            && observe(Progress::Room { bytes: bytes(2) }).is_continue()
-        {
-            true => 2,
-            false => 1,
-        };
-        let needed = Progress::Needs {
-            bytes: bytes(threads),
-        };
-        notify(observe, needed)?;
+        let threads =
+            match fronts.is_large() && observer.threads() > 1 && observer.may_use(bytes(2)) {
+                true => 2,
+                false => 1,
+            };
+        take(observer, bytes(threads))?;
         let element_stiffness = ElementStiffness::new(elements, &map);
         let mut of_supports = element_stiffness.load_of_supports();
         let factored = Factor::new(
             fronts,
             &|e, matrix: &mut ElementMatrix| element_stiffness.put(e, matrix),
             threads,
-            &mut Interrupt::new(&mut || observe(Progress::Pulse)),
+            &mut Interrupt::new(&mut || observer.stop()),
         );
         let (factor, mut stiffness) = factored.map_err(|error| solve_error(error, &map))?;
 
-        notify(observe, Progress::Phase(Phase::Condense))?;
+        notify(observer, Progress::Phase(Phase::Condense))?;
         let non_finite = |phase| Err(SolveError::NonFinite { phase });
         if [&of_loads, &of_supports].iter().any(|f| !all_finite(f)) {
             return non_finite(Phase::Assemble);
@@ -239,8 +235,8 @@ impl ElasticBody {
 
     /// How many threads may work on the fields of this body: the observer is asked for a second one if that is worth
     /// it.
-    pub fn threads(&self, observe: &mut Observer<'_>) -> usize {
-        if self.factor.has_large_fields() && observe(Progress::SecondThread).is_continue() {
+    pub fn threads(&self, observer: &mut dyn Observer) -> usize {
+        if self.factor.has_large_fields() && observer.threads() > 1 {
             2
         } else {
             1
@@ -433,13 +429,5 @@ fn solve_error(error: FactorError, map: &DofMap) -> SolveError {
 impl From<Stopped> for SolveError {
     fn from(_: Stopped) -> Self {
         SolveError::Stopped
-    }
-}
-
-pub(crate) fn notify(observe: &mut Observer<'_>, progress: Progress<'_>) -> Result<(), SolveError> {
-    if observe(progress).is_break() {
-        Err(SolveError::Stopped)
-    } else {
-        Ok(())
     }
 }

@@ -7,10 +7,11 @@ use crate::body::ElasticBody;
 use crate::error::SolveError;
 use crate::mesh::{External, ExternalMesh};
 use crate::model::{Model, VariableModel};
+use crate::observer::Observer;
 use crate::prepared::{Prepared, prepare};
 use crate::problem::Problem;
 use crate::solution::{
-    ContactSummary, Observer, Outcome, Peak, Residuals, Solution, Summary, Warning, WarningCode,
+    ContactSummary, Outcome, Peak, Residuals, Solution, Summary, Warning, WarningCode,
 };
 use crate::steps::{self, Numbers, Shared};
 pub use crate::steps::{End, Start};
@@ -65,9 +66,9 @@ impl Family {
     pub fn new(
         problem: &Problem,
         external: Option<External>,
-        observe: &mut Observer<'_>,
+        observer: &mut dyn Observer,
     ) -> Result<Family, SolveError> {
-        Ok(Family::of(prepare(problem, external, observe)?, problem))
+        Ok(Family::of(prepare(problem, external, observer)?, problem))
     }
 
     /// The family of problems on the body of a prepared problem.
@@ -101,7 +102,7 @@ impl Family {
         &mut self,
         problem: &Problem,
         start: Start<'_>,
-        observe: &mut Observer<'_>,
+        observer: &mut dyn Observer,
     ) -> Result<(Member, Option<End>), SolveError> {
         let controls = &problem.solver;
         let whole = controls.check_uniqueness || controls.check_increments;
@@ -110,19 +111,19 @@ impl Family {
             Some(set) => {
                 set.map_err(SolveError::Invalid)?;
                 let (model, shared) = (self.model.model(), &mut self.shared);
-                steps::run_to_numbers(model, &self.body, shared, start, observe)?
+                steps::run_to_numbers(model, &self.body, shared, start, observer)?
             }
             None => {
                 let model = self.other_model(problem)?;
                 if whole || model.held_by_contact {
-                    let solution = steps::run(&model, &self.body, None, observe)?;
+                    let solution = steps::run(&model, &self.body, None, observer)?;
                     return match solution.summary.outcome {
                         Outcome::Canceled => Err(SolveError::Stopped),
                         _ => Ok((Member::of(&solution.summary), None)),
                     };
                 }
                 let shared = &mut Shared::default();
-                steps::run_to_numbers(&model, &self.body, shared, Start::Anew, observe)?
+                steps::run_to_numbers(&model, &self.body, shared, Start::Anew, observer)?
             }
         };
         Ok((Member::of_numbers(&numbers), end))
@@ -138,16 +139,16 @@ impl Family {
     pub fn whole_member(
         &self,
         problem: &Problem,
-        observe: &mut Observer<'_>,
+        observer: &mut dyn Observer,
     ) -> Result<Member, SolveError> {
         let controls = &problem.solver;
         if controls.check_uniqueness || !problem.steps.is_empty() {
-            let solution = self.solution(problem, observe)?;
+            let solution = self.solution(problem, observer)?;
             return Ok(Member::of(&solution.summary));
         }
         // the errors of its numbers are no part of a member
         let model = self.other_model(problem)?;
-        let reported = steps::run_to_compare(&model, &self.body, observe)?;
+        let reported = steps::run_to_compare(&model, &self.body, observer)?;
         Ok(Member::of(&reported.summary))
     }
 
@@ -159,10 +160,10 @@ impl Family {
     pub fn solution(
         &self,
         problem: &Problem,
-        observe: &mut Observer<'_>,
+        observer: &mut dyn Observer,
     ) -> Result<Solution, SolveError> {
         let model = self.other_model(problem)?;
-        steps::run(&model, &self.body, None, observe)
+        steps::run(&model, &self.body, None, observer)
     }
 
     /// The model of a problem on this body.
@@ -254,10 +255,7 @@ impl std::fmt::Debug for Family {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use std::ops::ControlFlow;
-
     use super::*;
-    use crate::solution::Progress;
 
     fn problem(coefficient: f64, indentation: f64) -> Problem {
         serde_json::from_value(serde_json::json!({
@@ -274,14 +272,14 @@ mod tests {
 
     #[test]
     fn members_have_the_numbers_of_their_own_solutions() {
-        let go_on = &mut |_: Progress<'_>| ControlFlow::Continue(());
-        let mut family = Family::new(&problem(0.3, 0.05), None, go_on).unwrap();
+        let quiet = &mut ();
+        let mut family = Family::new(&problem(0.3, 0.05), None, quiet).unwrap();
         let mut end: Option<End> = None;
         for (coefficient, indentation) in [(0.3, 0.05), (0.1, 0.1), (0.6, 0.02)] {
             let start = end.as_ref().map_or(Start::Anew, Start::Next);
             let problem = problem(coefficient, indentation);
-            let alone = crate::solve(&problem, go_on).unwrap();
-            let (member, own_end) = family.member(&problem, start, go_on).unwrap();
+            let alone = crate::solve(&problem, quiet).unwrap();
+            let (member, own_end) = family.member(&problem, start, quiet).unwrap();
             end = own_end;
             assert!(end.is_some());
             let expected = Member::of(&alone.summary);
@@ -310,21 +308,21 @@ mod tests {
             }
             assert!((member.stick_width + member.slip_width - member.contact_width).abs() < 1e-12);
             assert!(member.peak_normal_stress < 0.0 && member.contact_width > 0.0);
-            assert_eq!(family.solution(&problem, go_on).unwrap(), alone);
+            assert_eq!(family.solution(&problem, quiet).unwrap(), alone);
         }
     }
 
     #[test]
     fn an_invalid_member_is_reported_and_another_body_is_refused() {
-        let go_on = &mut |_: Progress<'_>| ControlFlow::Continue(());
-        let mut family = Family::new(&problem(0.3, 0.05), None, go_on).unwrap();
-        let invalid = family.member(&problem(-1.0, 0.05), Start::Anew, go_on);
+        let quiet = &mut ();
+        let mut family = Family::new(&problem(0.3, 0.05), None, quiet).unwrap();
+        let invalid = family.member(&problem(-1.0, 0.05), Start::Anew, quiet);
         assert!(
             matches!(invalid, Err(SolveError::Invalid(list)) if list[0].pointer.ends_with("coefficient"))
         );
         let mut other = problem(0.3, 0.05);
         other.quadrature = 2;
-        let refused = family.member(&other, Start::Anew, go_on);
+        let refused = family.member(&other, Start::Anew, quiet);
         assert_eq!(refused.err(), Some(SolveError::OtherBody));
     }
 
@@ -350,12 +348,12 @@ mod tests {
     /// a wide one.
     #[test]
     fn every_member_of_a_sweep_has_the_numbers_of_its_own_solution() {
-        let go_on = &mut |_: Progress<'_>| ControlFlow::Continue(());
+        let quiet = &mut ();
         let even = |from: f64, to: f64, count: u32| {
             let at = move |k: u32| from + (to - from) * f64::from(k) / f64::from(count - 1);
             (0..count).map(at).collect::<Vec<f64>>()
         };
-        let mut family = Family::new(&pressed(0.02, 0.05, 1e-4, 0.06), None, go_on).unwrap();
+        let mut family = Family::new(&pressed(0.02, 0.05, 1e-4, 0.06), None, quiet).unwrap();
         let (mut checked, mut steps, mut sweeps) = (0, 0, 0);
         let mut first: Option<End> = None;
         for radius in even(0.02, 0.04, 5) {
@@ -369,12 +367,12 @@ mod tests {
                             (None, Some(end)) => Start::Near(end),
                             (None, None) => Start::Anew,
                         };
-                        let (member, end) = family.member(&problem, start, go_on).unwrap();
+                        let (member, end) = family.member(&problem, start, quiet).unwrap();
                         if last.is_none() {
                             first.clone_from(&end);
                         }
                         last = end;
-                        let alone = family.solution(&problem, go_on).unwrap();
+                        let alone = family.solution(&problem, quiet).unwrap();
                         let own = Member::of(&alone.summary);
                         assert_eq!(
                             (member.outcome, &member.warnings),
@@ -427,7 +425,7 @@ mod tests {
     /// or without friction.
     #[test]
     fn the_bits_of_a_member_depend_on_where_it_begins_and_on_nothing_else() {
-        let go_on = &mut |_: Progress<'_>| ControlFlow::Continue(());
+        let quiet = &mut ();
         let chain = [0.05, 0.06, 0.07, 0.2].map(|d| pressed(0.03, 0.3, 1e-4, d));
         let others = [
             pressed(0.2, 0.5, 1e-3, 0.4),
@@ -436,12 +434,12 @@ mod tests {
         ];
         let mut found = Vec::new();
         for with_others in [false, true] {
-            let mut family = Family::new(&chain[0], None, go_on).unwrap();
+            let mut family = Family::new(&chain[0], None, quiet).unwrap();
             if with_others {
                 let mut end: Option<End> = None;
                 for other in &others {
                     let start = end.as_ref().map_or(Start::Anew, Start::Next);
-                    let (member, own) = family.member(other, start, go_on).unwrap();
+                    let (member, own) = family.member(other, start, quiet).unwrap();
                     assert_eq!(member.outcome, Outcome::Converged);
                     end = own;
                 }
@@ -449,7 +447,7 @@ mod tests {
             let (mut members, mut end) = (Vec::new(), None::<End>);
             for problem in &chain {
                 let start = end.as_ref().map_or(Start::Anew, Start::Next);
-                let (member, own) = family.member(problem, start, go_on).unwrap();
+                let (member, own) = family.member(problem, start, quiet).unwrap();
                 members.push(member);
                 end = own;
             }

@@ -3,13 +3,10 @@
 //! as "formulation 4.3".
 //!
 //! A library of pure functions: no clock, file or network; the same problem gives the same bits. A large body is
-//! factored on two threads if the observer lets it ([`solution::Progress::SecondThread`]), with the same bits as on
-//! one. Reading and writing of any format is left to the crate `files`. The modules are listed from the ground up; each
+//! factored on two threads if the observer lets it ([`observer::Observer::threads`]), with the same bits as on one. Reading and writing of any format is left to the crate `files`. The modules are listed from the ground up; each
 //! uses only those above it.
 //!
 //! ```
-//! use std::ops::ControlFlow;
-//!
 //! // a block that is pressed by a rigid punch, as JSON: `files::parse` reads it with all violations at once
 //! let problem = serde_json::from_str(r#"{
 //!     "analysis": {"kind": "plane_strain"},
@@ -23,7 +20,7 @@
 //!         "friction": {"coefficient": 0.3, "nonlocal_radius": 0.1, "elastic_slip": 1e-4}
 //!     }]
 //! }"#)?;
-//! let solution = solver::solve(&problem, &mut |_progress| ControlFlow::Continue(()))?;
+//! let solution = solver::solve(&problem, &mut ())?;
 //! println!("normal force {}", solution.summary.normal_force);
 //! assert!(solution.summary.converged && solution.summary.normal_force > 0.0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -55,6 +52,7 @@
 //! | 5 a law that depends on the load path | `friction`, `steps.rs` |
 //! | codes of violations | `error/reason.rs` |
 //! | codes of warnings | `solution` |
+//! | what is told while it solves; stopping it, its memory and threads | `observer.rs` |
 //! | summary, profiles and fields of a result: their fields | `solution` |
 //! | summary, profiles and fields of a result: how they are computed | `algorithm/report.rs`, `algorithm/profile` |
 //! | stated errors by estimation, and the verdict | `accuracy` |
@@ -80,6 +78,9 @@ pub mod spline;
 // Plain data: the question and the answer.
 pub mod problem;
 pub mod solution;
+
+// What is told and asked on the way from one to the other.
+pub mod observer;
 
 // Nodes, elements and named boundaries.
 pub mod mesh;
@@ -120,15 +121,16 @@ mod prepared;
 use error::{SolveError, Violation};
 use mesh::{External, Mesh};
 use model::Model;
+use observer::{Observer, Progress};
 use origins::Origins;
 use problem::{Problem, Refine};
-use solution::{Observer, Phase, Progress, Solution, Warning};
+use solution::{Phase, Solution, Warning};
 use verify::Verification;
 
 /// Solves a problem.
 ///
-/// `observe` is called with every phase and iteration, and again and again in long work, and may stop the solution: the
-/// result is then the last state as `Outcome::Canceled`. A method that does not converge is an
+/// `observer` is told every phase and iteration, and asked again and again in long work whether to stop (`&mut ()` looks
+/// away): the result is then the last state as `Outcome::Canceled`. A method that does not converge is an
 /// [`Outcome`](solution::Outcome) too, with its history.
 ///
 /// # Errors
@@ -137,8 +139,8 @@ use verify::Verification;
 /// (see [`solve_on`]). The other kinds of [`SolveError`] mean that no state could be computed: the body is not held,
 /// memory does not suffice, a number is not finite, or the observer stopped before there was a state, or while its
 /// stresses and profiles were much work.
-pub fn solve(problem: &Problem, observe: &mut Observer<'_>) -> Result<Solution, SolveError> {
-    solve_on(problem, None, observe)
+pub fn solve(problem: &Problem, observer: &mut dyn Observer) -> Result<Solution, SolveError> {
+    solve_on(problem, None, observer)
 }
 
 /// Solves a problem like [`solve`]; if the problem only names or quotes its mesh, `external` is that mesh
@@ -150,9 +152,9 @@ pub fn solve(problem: &Problem, observe: &mut Observer<'_>) -> Result<Solution, 
 pub fn solve_on(
     problem: &Problem,
     external: Option<External>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<Solution, SolveError> {
-    solve_with_mesh(problem, external, observe).map(|(solution, _)| solution)
+    solve_with_mesh(problem, external, observer).map(|(solution, _)| solution)
 }
 
 /// Solves a problem like [`solve_on`], and also returns the refined mesh, on which the solution is.
@@ -163,28 +165,28 @@ pub fn solve_on(
 pub fn solve_with_mesh(
     problem: &Problem,
     external: Option<External>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<(Solution, Mesh), SolveError> {
     let mut verification = Verification::of(problem, &external);
     let (mut solution, mesh) = match problem.mesh.refine {
         Refine::Times(_) => {
-            let prepared = prepare(problem, external, observe)?;
-            (prepared.solve(observe)?, prepared.model.mesh)
+            let prepared = prepare(problem, external, observer)?;
+            (prepared.solve(observer)?, prepared.model.mesh)
         }
         Refine::Adaptive(goal) => {
             let first = Model::new(problem, external).map_err(SolveError::Invalid)?;
             verification = verification.map(|verification| verification.limited(&first));
-            let solve = |model: Model, origins: &mut Origins, observe: &mut Observer<'_>| {
-                body::notify(observe, Progress::Phase(Phase::Mesh))?;
-                prepared::tell_warnings(&model, observe)?;
-                let Prepared { model, body } = Prepared::new(model, observe)?;
-                steps::run(&model, &body, Some(origins), observe)
+            let solve = |model: Model, origins: &mut Origins, observer: &mut dyn Observer| {
+                observer::notify(observer, Progress::Phase(Phase::Mesh))?;
+                prepared::tell_warnings(&model, observer)?;
+                let Prepared { model, body } = Prepared::new(model, observer)?;
+                steps::run(&model, &body, Some(origins), observer)
             };
-            adapt::run(problem, &goal, first, &solve, observe)?
+            adapt::run(problem, &goal, first, &solve, observer)?
         }
     };
     if let Some(verification) = verification {
-        verification.verify(problem, &mesh, &mut solution, observe);
+        verification.verify(problem, &mesh, &mut solution, observer);
     }
     Ok((solution, mesh))
 }
@@ -218,10 +220,40 @@ pub use model::estimate::{Estimate, MeshSize, estimate};
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use std::ops::ControlFlow;
-
     use super::*;
     use solution::Outcome;
+
+    /// An observer that counts the questions whether to stop, and stops after some.
+    struct StopsAfter {
+        most: usize,
+        asked: usize,
+        /// The iterations since then.
+        iterations: usize,
+    }
+
+    impl StopsAfter {
+        fn new(most: usize) -> StopsAfter {
+            StopsAfter {
+                most,
+                asked: 0,
+                iterations: 0,
+            }
+        }
+    }
+
+    impl Observer for StopsAfter {
+        fn event(&mut self, progress: Progress<'_>) {
+            if let (true, Progress::Iteration(row)) = (self.asked > self.most, progress) {
+                self.iterations += 1;
+                assert!(finite::is_finite(row), "{row:?} after {}", self.most);
+            }
+        }
+
+        fn stop(&mut self) -> bool {
+            self.asked += 1;
+            self.asked > self.most
+        }
+    }
 
     /// The problem of a strip one element wide whose long side is in contact: most of the work is dense.
     fn wall(lines: u32, algorithm: &str) -> Problem {
@@ -242,41 +274,22 @@ mod tests {
         serde_json::from_value(problem).unwrap()
     }
 
-    /// A solution stops at any call of the observer: after that it starts nothing large, and calls only a few times
-    /// more.
+    /// A solution stops whenever it is told to: after that it starts nothing large, and asks only a few times more.
     #[test]
     fn a_solution_stops_at_any_question() {
         for algorithm in ["auto", "fixed_point", "newton", "thesis"] {
             let problem = wall(120, algorithm);
-            let mut questions = 0;
-            let whole = solve(&problem, &mut |_| {
-                questions += 1;
-                ControlFlow::Continue(())
-            });
-            assert!(whole.is_ok() && questions > 100, "{algorithm}: {questions}");
-            for stop_at in (0..questions).step_by(1 + questions / 60) {
-                let (mut asked, mut after) = (0, 0);
-                let mut steps_after = 0;
-                let stopped = solve(&problem, &mut |progress| {
-                    asked += 1;
-                    if asked <= stop_at {
-                        return ControlFlow::Continue(());
-                    }
-                    after += 1;
-                    if let Progress::Iteration(row) = progress {
-                        steps_after += 1;
-                        assert!(
-                            finite::is_finite(row),
-                            "{algorithm}: {row:?} after {stop_at}"
-                        );
-                    }
-                    ControlFlow::Break(())
-                });
-                assert!(
-                    after <= 60,
-                    "{algorithm}: {after} questions after {stop_at}"
-                );
-                assert!(steps_after <= 3, "{algorithm}: {steps_after} iterations");
+            let mut whole = StopsAfter::new(usize::MAX);
+            assert!(solve(&problem, &mut whole).is_ok());
+            let questions = whole.asked;
+            assert!(questions > 100, "{algorithm}: {questions}");
+            for most in (0..questions).step_by(1 + questions / 60) {
+                let mut observer = StopsAfter::new(most);
+                let stopped = solve(&problem, &mut observer);
+                let after = observer.asked.saturating_sub(most);
+                assert!(after <= 60, "{algorithm}: {after} questions after {most}");
+                let iterations = observer.iterations;
+                assert!(iterations <= 3, "{algorithm}: {iterations} iterations");
                 match stopped {
                     Err(error) => assert_eq!(error, SolveError::Stopped),
                     // a stop during the comparisons at the end leaves the solution
@@ -296,14 +309,18 @@ mod tests {
     /// Large matrices are announced before they are allocated: the factor with Ŝ, then the matrices of the iterations.
     #[test]
     fn large_matrices_are_announced() {
-        let mut needs = Vec::new();
-        let solution = solve(&wall(120, "auto"), &mut |progress| {
-            if let Progress::Needs { bytes } = progress {
-                needs.push(bytes);
+        struct Needs(Vec<u64>);
+        impl Observer for Needs {
+            fn event(&mut self, _: Progress<'_>) {}
+
+            fn may_use(&mut self, bytes: u64) -> bool {
+                self.0.push(bytes);
+                true
             }
-            ControlFlow::Continue(())
-        });
-        let m = solution.unwrap().summary.contact_dofs;
+        }
+        let mut needs = Needs(Vec::new());
+        let solution = solve(&wall(120, "auto"), &mut needs).unwrap();
+        let (m, needs) = (solution.summary.contact_dofs, needs.0);
         assert!(needs[0] > 8 * m * m, "{needs:?}");
         assert!(needs.len() > 3 && needs[1..].iter().all(|bytes| *bytes <= 8 * m * m));
     }

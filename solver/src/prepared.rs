@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
-use crate::body::{ElasticBody, notify};
+use crate::body::ElasticBody;
 use crate::error::SolveError;
 use crate::mesh::{External, Mesh};
 use crate::model::Model;
+use crate::observer::{Observer, Progress, notify};
 use crate::problem::Problem;
-use crate::solution::{Observer, Phase, Progress, Solution};
+use crate::solution::{Phase, Solution};
 use crate::steps;
 
 /// A problem that is ready for its iterations: checked, and its body factored and condensed onto its contacts.
@@ -33,9 +34,9 @@ pub struct Prepared {
 pub fn prepare(
     problem: &Problem,
     external: Option<External>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<Prepared, SolveError> {
-    Prepared::new(checked(problem, external, observe)?, observe)
+    Prepared::new(checked(problem, external, observer)?, observer)
 }
 
 /// Checks a problem, and passes its warnings to the observer: the part of [`prepare`] before the body.
@@ -46,11 +47,11 @@ pub fn prepare(
 pub fn checked(
     problem: &Problem,
     external: Option<External>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<Model, SolveError> {
-    notify(observe, Progress::Phase(Phase::Mesh))?;
+    notify(observer, Progress::Phase(Phase::Mesh))?;
     let model = Model::new(problem, external).map_err(SolveError::Invalid)?;
-    tell_warnings(&model, observe)?;
+    tell_warnings(&model, observer)?;
     Ok(model)
 }
 
@@ -63,17 +64,17 @@ pub fn checked(
 pub fn prepare_on_mesh(
     problem: &Problem,
     mesh: Mesh,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<Prepared, SolveError> {
-    notify(observe, Progress::Phase(Phase::Mesh))?;
+    notify(observer, Progress::Phase(Phase::Mesh))?;
     let model = Model::on_mesh(problem, mesh.into()).map_err(SolveError::Invalid)?;
-    tell_warnings(&model, observe)?;
-    Prepared::new(model, observe)
+    tell_warnings(&model, observer)?;
+    Prepared::new(model, observer)
 }
 
-pub(crate) fn tell_warnings(model: &Model, observe: &mut Observer<'_>) -> Result<(), SolveError> {
+pub(crate) fn tell_warnings(model: &Model, observer: &mut dyn Observer) -> Result<(), SolveError> {
     let mut warnings = model.warnings.iter();
-    warnings.try_for_each(|warning| notify(observe, Progress::Warning(warning)))
+    warnings.try_for_each(|warning| notify(observer, Progress::Warning(warning)))
 }
 
 impl Prepared {
@@ -83,8 +84,8 @@ impl Prepared {
     ///
     /// [`SolveError::SingularSystem`], `ResourceExhausted` or `NonFinite` if the body cannot be factored;
     /// [`SolveError::Stopped`] if the observer says so.
-    pub fn new(model: Model, observe: &mut Observer<'_>) -> Result<Prepared, SolveError> {
-        let body = Arc::new(ElasticBody::new(&model, observe)?);
+    pub fn new(model: Model, observer: &mut dyn Observer) -> Result<Prepared, SolveError> {
+        let body = Arc::new(ElasticBody::new(&model, observer)?);
         Ok(Prepared { model, body })
     }
 
@@ -94,8 +95,8 @@ impl Prepared {
     ///
     /// [`SolveError::Unheld`] if nothing holds the body in its final state; `ResourceExhausted` or `NonFinite` if a
     /// state cannot be computed; [`SolveError::Stopped`] if the observer says so before there is a state.
-    pub fn solve(&self, observe: &mut Observer<'_>) -> Result<Solution, SolveError> {
-        steps::run(&self.model, &self.body, None, observe)
+    pub fn solve(&self, observer: &mut dyn Observer) -> Result<Solution, SolveError> {
+        steps::run(&self.model, &self.body, None, observer)
     }
 
     /// Solves another problem on this body, or returns `None` if its body is not the same.
@@ -106,9 +107,9 @@ impl Prepared {
     pub fn solve_other(
         &self,
         model: &Model,
-        observe: &mut Observer<'_>,
+        observer: &mut dyn Observer,
     ) -> Option<Result<Solution, SolveError>> {
-        ElasticBody::same(&self.model, model).then(|| steps::run(model, &self.body, None, observe))
+        ElasticBody::same(&self.model, model).then(|| steps::run(model, &self.body, None, observer))
     }
 }
 

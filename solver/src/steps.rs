@@ -12,11 +12,12 @@ use crate::algorithm::{
 use crate::body::ElasticBody;
 use crate::error::SolveError;
 use crate::model::{Alone, Level, Model};
+use crate::observer::{Filtered, Observer, Progress};
 use crate::origins::Origins;
 use crate::problem::{Algorithm, Spacing, Step};
 use crate::solution::{
-    ContactSummary, Fields, Iteration, Observer, Outcome, Phase, Progress, Solution, StepSolution,
-    Summary, Warning, WarningCode,
+    ContactSummary, Fields, Iteration, Outcome, Phase, Solution, StepSolution, Summary, Warning,
+    WarningCode,
 };
 
 /// An increment that does not converge is halved this often before the step ends there.
@@ -28,32 +29,35 @@ pub fn run(
     model: &Model,
     body: &ElasticBody,
     mut origins: Option<&mut Origins>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<Solution, SolveError> {
     if !has_uncertain_ends(model) {
-        let load_history = LoadHistory::new(model, System::new(model, body, observe)?);
-        let (solution, _) = run_steps(load_history, body, origins, observe)?;
+        let load_history = LoadHistory::new(model, System::new(model, body, observer)?);
+        let (solution, _) = run_steps(load_history, body, origins, observer)?;
         return Ok(solution);
     }
     let solved = with_corners(
         (model, body),
         |solution: &Solution| solution.summary.converged,
-        observe,
-        &mut |load_history, body, observe| {
+        observer,
+        &mut |load_history, body, observer| {
             if let Some(origins) = origins.as_deref_mut() {
                 origins.forget();
             }
             // which contacts the nodes are of may change, and which are open, and with it the solution
-            let tentative: &mut Observer<'_> = &mut |progress| match progress {
-                Progress::Iteration(row) => observe(Progress::Tentative(row)),
-                Progress::Step(_) => observe(Progress::Pulse),
-                other => observe(other),
+            let tentative = &mut Filtered {
+                observer,
+                seen: |progress| match progress {
+                    Progress::Iteration(row) => Some(Progress::Tentative(row)),
+                    Progress::Step(_) => None,
+                    other => Some(other),
+                },
             };
             run_steps(load_history, body, origins.as_deref_mut(), tentative)
         },
     )?;
     for row in &solved.history {
-        let _ = observe(Progress::Iteration(row));
+        observer.event(Progress::Iteration(row));
     }
     Ok(solved)
 }
@@ -62,7 +66,7 @@ pub fn run(
 type SolveOn<'s, T> = dyn for<'a> FnMut(
         LoadHistory<'a>,
         &ElasticBody,
-        &mut Observer<'_>,
+        &mut dyn Observer,
     ) -> Result<(T, LoadHistory<'a>), SolveError>
     + 's;
 
@@ -78,7 +82,7 @@ fn has_uncertain_ends(model: &Model) -> bool {
 fn with_corners<T>(
     (model, body): (&Model, &ElasticBody),
     converged: impl Fn(&T) -> bool,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
     solve: &mut SolveOn<'_, T>,
 ) -> Result<T, SolveError> {
     let mut tried = vec![model.alone.clone()];
@@ -91,8 +95,8 @@ fn with_corners<T>(
             None => (model, body),
         };
         let (solved, next, open) = {
-            let load_history = LoadHistory::new(model, System::new(model, body, observe)?);
-            let solved = solve(load_history, body, observe);
+            let load_history = LoadHistory::new(model, System::new(model, body, observer)?);
+            let solved = solve(load_history, body, observer);
             let fails = solved
                 .as_ref()
                 .map_or(true, |(solved, _)| !converged(solved));
@@ -130,7 +134,7 @@ fn with_corners<T>(
             }
             (None, None) => return Ok(solved),
         };
-        let body = ElasticBody::new(&next, observe)?;
+        let body = ElasticBody::new(&next, observer)?;
         other = Some((next, body));
     }
 }
@@ -139,7 +143,7 @@ fn run_steps<'a>(
     mut load_history: LoadHistory<'a>,
     body: &ElasticBody,
     mut origins: Option<&mut Origins>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<(Solution, LoadHistory<'a>), SolveError> {
     let model = load_history.model;
     let steps = &steps_of(model);
@@ -148,20 +152,20 @@ fn run_steps<'a>(
     let mut fields = Fields::default();
     for (number, step) in steps.iter().enumerate() {
         if let Some(solution) = &so_far {
-            let _ = observe(Progress::Step(solution));
+            observer.event(Progress::Step(solution));
         }
-        let _ = observe(Progress::Phase(Phase::Iterate));
-        let (finished, rows) = load_history.step(number as u32, step, observe);
+        observer.event(Progress::Phase(Phase::Iterate));
+        let (finished, rows) = load_history.step(number as u32, step, observer);
         // a stopped solution is reported too, if that is little work
-        let _ = observe(Progress::Phase(Phase::Recover));
-        load_history.system.threads = body.threads(observe);
-        let reported = report(&load_history.system, &finished, observe)?;
+        observer.event(Progress::Phase(Phase::Recover));
+        load_history.system.threads = body.threads(observer);
+        let reported = report(&load_history.system, &finished, observer)?;
         let outcome = reported.summary.outcome;
         let last = number + 1 == steps.len() || !can_continue(outcome);
         let assessed = last && !model.contacts.is_empty();
         if last && outcome == Outcome::Converged && model.depends_on_path() {
             let finer = Increments::more(steps);
-            (load_history, more) = again_in(load_history, &finer, observe);
+            (load_history, more) = again_in(load_history, &finer, observer);
         }
         let accuracy = assessed.then(|| {
             let (system, mut origins) = (&load_history.system, origins.take());
@@ -174,13 +178,13 @@ fn run_steps<'a>(
                 Increments::new(steps, &Increments::more(steps), quantities)
             });
             let known = (&finished, &reported, increments.as_ref());
-            accuracy::assess(model, body, system, known, origins, observe)
+            accuracy::assess(model, body, system, known, origins, observer)
         });
         let mut summary = reported.summary;
         summary.accuracy = accuracy;
         if model.controls.check_uniqueness && summary.converged {
             let (system, controls) = (&load_history.system, &model.controls);
-            let second = algorithm::other_solution(system, controls, &finished, observe);
+            let second = algorithm::other_solution(system, controls, &finished, observer);
             algorithm::note_uniqueness(&mut summary, second);
         }
         summary.increments = load_history.increments;
@@ -227,7 +231,7 @@ fn run_steps<'a>(
     }
     if model.controls.check_increments && solution.summary.converged {
         let summary = &mut solution.summary;
-        load_history = note_doubled(model, load_history, steps, summary, observe);
+        load_history = note_doubled(model, load_history, steps, summary, observer);
     }
     tell_of_earlier_steps(&mut solution);
     let summary = &mut solution.summary;
@@ -288,18 +292,20 @@ pub fn run_to_numbers(
     body: &ElasticBody,
     shared: &mut Shared,
     start: Start<'_>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<(Numbers, Option<End>), SolveError> {
     if has_uncertain_ends(model) {
         let numbers = with_corners(
             (model, body),
             |numbers: &Numbers| numbers.finished.outcome == Outcome::Converged,
-            observe,
-            &mut |mut load_history, _, observe| Ok((load_history.numbers(observe)?, load_history)),
+            observer,
+            &mut |mut load_history, _, observer| {
+                Ok((load_history.numbers(observer)?, load_history))
+            },
         )?;
         return Ok((numbers, None));
     }
-    let system = System::with_averages(model, body, &mut shared.averages, observe)?;
+    let system = System::with_averages(model, body, &mut shared.averages, observer)?;
     let mut load_history = LoadHistory::new(model, system);
     let region = &mut shared.region;
     let (end, next) = match start {
@@ -319,13 +325,13 @@ pub fn run_to_numbers(
             return None;
         }
         let before = end.before.as_deref().filter(|_| next);
-        follow_neighbour(system, &model.controls, (last, before), region, observe)
+        follow_neighbour(system, &model.controls, (last, before), region, observer)
     });
     let (finished, iterations) = match near {
         Some(near) => near,
         None => {
             std::mem::swap(&mut load_history.region, region);
-            let followed = load_history.follow(&steps_of(model), observe);
+            let followed = load_history.follow(&steps_of(model), observer);
             std::mem::swap(&mut load_history.region, region);
             let Some(finished) = followed else {
                 unreachable!("there is at least one step: a problem without steps is one step")
@@ -336,7 +342,7 @@ pub fn run_to_numbers(
     if finished.outcome == Outcome::Canceled {
         return Err(SolveError::Stopped);
     }
-    let (contacts, warnings) = algorithm::numbers(&load_history.system, &finished, observe)?;
+    let (contacts, warnings) = algorithm::numbers(&load_history.system, &finished, observer)?;
     let others_begin = finished.outcome == Outcome::Converged && model.steps.is_empty();
     let left = others_begin.then(|| End {
         finished: Finished {
@@ -393,18 +399,18 @@ fn tell_of_earlier_steps(solution: &mut Solution) {
 pub fn run_to_compare(
     model: &Model,
     body: &ElasticBody,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<Reported, SolveError> {
     with_corners(
         (model, body),
         |reported: &Reported| reported.summary.converged,
-        observe,
-        &mut |mut load_history, body, observe| {
+        observer,
+        &mut |mut load_history, body, observer| {
             let model = load_history.model;
-            match load_history.follow(&steps_of(model), observe) {
+            match load_history.follow(&steps_of(model), observer) {
                 Some(finished) if finished.outcome != Outcome::Canceled => {
-                    load_history.system.threads = body.threads(observe);
-                    let reported = report(&load_history.system, &finished, observe)?;
+                    load_history.system.threads = body.threads(observer);
+                    let reported = report(&load_history.system, &finished, observer)?;
                     Ok((reported, load_history))
                 }
                 _ => Err(SolveError::Stopped),
@@ -437,9 +443,9 @@ struct Again {
 fn again_in<'a>(
     first: LoadHistory<'a>,
     steps: &[Step],
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> (LoadHistory<'a>, Again) {
-    let quiet: &mut Observer<'_> = &mut algorithm::quiet(observe);
+    let quiet = &mut algorithm::quiet(observer);
     let mut system = first.system;
     let path = system.restart();
     let mut second = LoadHistory::new(first.model, system);
@@ -466,7 +472,7 @@ fn note_doubled<'a>(
     first: LoadHistory<'a>,
     steps: &[Step],
     summary: &mut Summary,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> LoadHistory<'a> {
     let twice = |step: &Step| Step {
         increments: 2 * step.increments,
@@ -474,7 +480,7 @@ fn note_doubled<'a>(
     };
     let twice: Vec<Step> = steps.iter().map(twice).collect();
     let rounding = first.rounding;
-    let (first, second) = again_in(first, &twice, observe);
+    let (first, second) = again_in(first, &twice, observer);
     let rounding = algorithm::rounding_of_forces([rounding, second.rounding]);
     let tolerance = model.controls.tolerance.max(rounding);
     if let Some(forces) = second.forces.last() {
@@ -531,12 +537,12 @@ impl<'a> LoadHistory<'a> {
     }
 
     /// Solves all steps for the numbers at their end.
-    fn numbers(&mut self, observe: &mut Observer<'_>) -> Result<Numbers, SolveError> {
-        let finished = self.follow(&steps_of(self.model), observe);
+    fn numbers(&mut self, observer: &mut dyn Observer) -> Result<Numbers, SolveError> {
+        let finished = self.follow(&steps_of(self.model), observer);
         let Some(finished) = finished.filter(|end| end.outcome != Outcome::Canceled) else {
             return Err(SolveError::Stopped);
         };
-        let (contacts, warnings) = algorithm::numbers(&self.system, &finished, observe)?;
+        let (contacts, warnings) = algorithm::numbers(&self.system, &finished, observer)?;
         Ok(Numbers {
             finished,
             contacts,
@@ -546,10 +552,10 @@ impl<'a> LoadHistory<'a> {
     }
 
     /// Solves one step after another until one does not converge; returns the last end.
-    fn follow(&mut self, steps: &[Step], observe: &mut Observer<'_>) -> Option<Finished> {
+    fn follow(&mut self, steps: &[Step], observer: &mut dyn Observer) -> Option<Finished> {
         let mut last = None;
         for (number, step) in steps.iter().enumerate() {
-            let (finished, _) = self.step(number as u32, step, observe);
+            let (finished, _) = self.step(number as u32, step, observer);
             let hopeful = can_continue(finished.outcome);
             last = Some(finished);
             if !hopeful {
@@ -564,7 +570,7 @@ impl<'a> LoadHistory<'a> {
         &mut self,
         number: u32,
         step: &Step,
-        observe: &mut Observer<'_>,
+        observer: &mut dyn Observer,
     ) -> (Finished, Vec<Iteration>) {
         let path = StepPath {
             from: self.level,
@@ -579,7 +585,7 @@ impl<'a> LoadHistory<'a> {
                 f64::from(k) / f64::from(count),
             );
             let place = (number, &mut increment);
-            let finished = self.advance(&path, place, from, to, 0, observe);
+            let finished = self.advance(&path, place, from, to, 0, observer);
             if !can_continue(finished.outcome) || k == count {
                 let finished = Finished {
                     rounding: self.rounding,
@@ -599,9 +605,9 @@ impl<'a> LoadHistory<'a> {
         from: f64,
         to: f64,
         halvings: u32,
-        observe: &mut Observer<'_>,
+        observer: &mut dyn Observer,
     ) -> Finished {
-        let finished = self.increment(path, (step, *increment), to, observe);
+        let finished = self.increment(path, (step, *increment), to, observer);
         let hopeful = !self.model.steps.is_empty()
             && self.model.controls.algorithm != Algorithm::Thesis
             // in half an increment displacements are as large
@@ -613,12 +619,18 @@ impl<'a> LoadHistory<'a> {
             Outcome::NotConverged | Outcome::ContactCycling if hopeful => {
                 self.cut_backs += 1;
                 let middle = 0.5 * (from + to);
-                let half =
-                    self.advance(path, (step, increment), from, middle, halvings + 1, observe);
+                let half = self.advance(
+                    path,
+                    (step, increment),
+                    from,
+                    middle,
+                    halvings + 1,
+                    observer,
+                );
                 if !can_continue(half.outcome) {
                     return half;
                 }
-                self.advance(path, (step, increment), middle, to, halvings + 1, observe)
+                self.advance(path, (step, increment), middle, to, halvings + 1, observer)
             }
             _ => {
                 *increment += 1;
@@ -633,7 +645,7 @@ impl<'a> LoadHistory<'a> {
         path: &StepPath<'_>,
         (step, increment): (u32, u32),
         to: f64,
-        observe: &mut Observer<'_>,
+        observer: &mut dyn Observer,
     ) -> Finished {
         if let (Some(last), false) = (&self.last, self.anchors_moved) {
             self.system.move_anchors(&last.state.v, &last.bound);
@@ -654,7 +666,7 @@ impl<'a> LoadHistory<'a> {
             place,
             last,
             &mut self.region,
-            observe,
+            observer,
         );
         self.row_count += finished.history.len() as u32;
         self.rows.extend(finished.history.iter().cloned());

@@ -2,16 +2,15 @@
 //! two, with all load steps, and on the mesh one refinement coarser, if there is one. The differences show how far the
 //! solution can be trusted. They never change the solution itself.
 
-use std::ops::ControlFlow;
-
 use crate::accuracy::{self, OnOtherMesh};
 use crate::body::ElasticBody;
 use crate::error::SolveError;
 use crate::mesh::{External, ExternalMesh, Mesh, refine};
 use crate::model::Model;
 use crate::model::estimate::MostElements;
+use crate::observer::{Observer, Progress};
 use crate::problem::{Problem, Refine};
-use crate::solution::{Accuracy, Observer, Outcome, Phase, Progress, Solution};
+use crate::solution::{Accuracy, Outcome, Phase, Solution};
 use crate::steps;
 
 /// The data that verifying a solution needs in addition to its problem and its mesh.
@@ -49,7 +48,7 @@ impl Verification {
         problem: &Problem,
         mesh: &Mesh,
         solution: &mut Solution,
-        observe: &mut Observer<'_>,
+        observer: &mut dyn Observer,
     ) {
         let converged = solution.summary.outcome == Outcome::Converged;
         let summary = &mut solution.summary;
@@ -60,7 +59,7 @@ impl Verification {
             estimated.verified = Some(false);
             return;
         }
-        *estimated = match self.compared(problem, mesh, estimated, observe) {
+        *estimated = match self.compared(problem, mesh, estimated, observer) {
             Ok(verified) => verified,
             Err(why) => accuracy::unverified(estimated.clone(), &why),
         };
@@ -73,13 +72,14 @@ impl Verification {
         problem: &Problem,
         mesh: &Mesh,
         estimated: &Accuracy,
-        observe: &mut Observer<'_>,
+        observer: &mut dyn Observer,
     ) -> Result<Accuracy, String> {
+        observer.event(Progress::Phase(Phase::Verify));
         let mut observer = QuietObserver {
-            observe,
+            observer,
             stopped: None,
         };
-        if observer.observe(Progress::Phase(Phase::Verify)).is_break() {
+        if observer.stop() {
             return Err(observer.why_not(&SolveError::Stopped));
         }
         let model = self.finer(problem, mesh)?;
@@ -142,11 +142,10 @@ impl Verification {
 /// The quantities of a problem on another mesh; `Err` inside: the iterations did not converge.
 fn solved(
     model: &Model,
-    observer: &mut QuietObserver<'_, '_>,
+    observer: &mut QuietObserver<'_>,
 ) -> Result<Result<Vec<OnOtherMesh>, String>, SolveError> {
-    let observe: &mut Observer<'_> = &mut |progress| observer.observe(progress);
-    let body = ElasticBody::new(model, observe)?;
-    let reported = steps::run_to_compare(model, &body, observe)?;
+    let body = ElasticBody::new(model, observer)?;
+    let reported = steps::run_to_compare(model, &body, observer)?;
     if reported.summary.outcome != Outcome::Converged {
         return Ok(Err(
             "the iterations did not converge on the refined mesh".to_owned()
@@ -161,39 +160,40 @@ fn solved(
         .collect()))
 }
 
-/// An observer that is asked whether to continue but shown no iterations, and a record of what it refused.
-struct QuietObserver<'a, 'b> {
-    observe: &'a mut Observer<'b>,
+/// Asks the observer of the solution, but shows it nothing; records why the other solution was stopped.
+struct QuietObserver<'a> {
+    observer: &'a mut dyn Observer,
     stopped: Option<Stop>,
 }
 
-/// A refusal of the observer.
+/// Why the other solution was stopped.
 enum Stop {
-    /// The caller refused this many more bytes.
+    /// It needed this many more bytes.
     Memory(u64),
-    /// The caller refused to continue.
-    Going,
+    /// The observer wants it.
+    Asked,
 }
 
-impl QuietObserver<'_, '_> {
-    fn observe(&mut self, progress: Progress<'_>) -> ControlFlow<()> {
-        // these ask for more than going on: a no is an answer, and does not stop the solution
-        if matches!(progress, Progress::SecondThread | Progress::Room { .. }) {
-            return (self.observe)(progress);
+impl Observer for QuietObserver<'_> {
+    fn event(&mut self, progress: Progress<'_>) {
+        if let Progress::OutOfMemory { bytes } = progress {
+            self.stopped.get_or_insert(Stop::Memory(bytes));
         }
-        let (progress, stop) = match progress {
-            Progress::Needs { bytes } => (progress, Stop::Memory(bytes)),
-            Progress::OutOfMemory { bytes } => (progress, Stop::Memory(bytes)),
-            Progress::Phase(Phase::Verify) => (progress, Stop::Going),
-            _ => (Progress::Pulse, Stop::Going),
-        };
-        let answer = (self.observe)(progress);
-        if answer.is_break() {
-            self.stopped.get_or_insert(stop);
-        }
-        answer
     }
 
+    fn stop(&mut self) -> bool {
+        if self.stopped.is_none() && self.observer.stop() {
+            self.stopped = Some(Stop::Asked);
+        }
+        self.stopped.is_some()
+    }
+
+    fn behind(&mut self) -> Option<&mut dyn Observer> {
+        Some(self.observer)
+    }
+}
+
+impl QuietObserver<'_> {
     /// The reason why there is no solution on the refined mesh.
     fn why_not(&self, error: &SolveError) -> String {
         match (&self.stopped, error) {
@@ -203,7 +203,7 @@ impl QuietObserver<'_, '_> {
                     *bytes as f64 / f64::from(1 << 20)
                 )
             }
-            (Some(Stop::Going), _) | (None, SolveError::Stopped) => {
+            (Some(Stop::Asked), _) | (None, SolveError::Stopped) => {
                 "verification on the refined mesh was stopped (canceled, or out of time or memory)"
                     .to_owned()
             }
@@ -217,25 +217,30 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
+    /// Refuses memory, and must not be shown anything.
+    struct Refuses;
+
+    impl Observer for Refuses {
+        fn event(&mut self, progress: Progress<'_>) {
+            panic!("{progress:?}");
+        }
+
+        fn may_use(&mut self, _: u64) -> bool {
+            false
+        }
+    }
+
     #[test]
-    fn a_no_to_a_second_thread_is_an_answer_and_does_not_stop() {
-        let mut asked = 0;
-        let mut refuse = |progress: Progress<'_>| {
-            asked += 1;
-            match progress {
-                Progress::SecondThread | Progress::Room { .. } => ControlFlow::Break(()),
-                _ => ControlFlow::Continue(()),
-            }
-        };
+    fn memory_that_is_refused_stops_only_what_cannot_go_on_without() {
         let mut observer = QuietObserver {
-            observe: &mut refuse,
+            observer: &mut Refuses,
             stopped: None,
         };
-        assert!(observer.observe(Progress::SecondThread).is_break());
-        assert!(observer.observe(Progress::Room { bytes: 1 }).is_break());
-        assert!(observer.observe(Progress::Needs { bytes: 1 }).is_continue());
-        assert!(observer.stopped.is_none());
-        assert_eq!(asked, 3);
+        assert!(!observer.may_use(1) && observer.threads() == 1 && !observer.stop());
+        observer.event(Progress::OutOfMemory { bytes: 1 << 20 });
+        assert!(observer.stop());
+        let why = observer.why_not(&SolveError::Stopped);
+        assert!(why.contains("more memory than there is, 1 MiB"), "{why}");
     }
 
     /// After adaptive refinement, a mesh for which no memory was estimated is not solved on.
@@ -261,19 +266,23 @@ mod tests {
             }),
         };
         let refused = |verification: Verification| {
-            let mut solution = crate::solve(&problem, &mut |_| ControlFlow::Continue(())).unwrap();
+            let mut solution = crate::solve(&problem, &mut ()).unwrap();
             assert_eq!(
                 solution.summary.accuracy.as_ref().unwrap().verified,
                 Some(true)
             );
             let before = solution.summary.accuracy.clone().unwrap();
-            verification.verify(&problem, &model.mesh, &mut solution, &mut |progress| {
-                assert!(
-                    matches!(progress, Progress::Phase(Phase::Verify)),
-                    "{progress:?}"
-                );
-                ControlFlow::Continue(())
-            });
+            verification.verify(
+                &problem,
+                &model.mesh,
+                &mut solution,
+                &mut |progress: Progress<'_>| {
+                    assert!(
+                        matches!(progress, Progress::Phase(Phase::Verify)),
+                        "{progress:?}"
+                    );
+                },
+            );
             let accuracy = solution.summary.accuracy.unwrap();
             assert_eq!(accuracy.verified, Some(false));
             assert_eq!(accuracy.quantities, before.quantities);

@@ -3,7 +3,6 @@
 //!     reference dense SIZE        CPU seconds of one dense Cholesky factorisation of so many unknowns
 //!     reference factor PROBLEM    unknowns, and entries of the solver's factor; then the unknowns of each element
 
-use std::ops::ControlFlow;
 use std::process::ExitCode;
 
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -60,8 +59,8 @@ fn factor(file: &str) -> Result<(), String> {
     let text = std::fs::read_to_string(file).map_err(|error| error.to_string())?;
     let problem = files::parse(&text).map_err(|violations| format!("{violations:?}"))?;
     let external = files::external_mesh(&problem, None);
-    let go_on = &mut |_: solver::solution::Progress<'_>| ControlFlow::Continue(());
-    let prepared = solver::prepare(&problem, external, go_on).map_err(|error| error.to_string())?;
+    let prepared =
+        solver::prepare(&problem, external, &mut ()).map_err(|error| error.to_string())?;
     let (model, body) = (&prepared.model, &prepared.body);
     println!("{} {}", body.map.unknowns, body.factor_entries());
     let mut lines = String::new();

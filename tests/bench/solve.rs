@@ -5,12 +5,12 @@
 //! benchmark library would see them.
 #![allow(clippy::unwrap_used)]
 
-use std::ops::ControlFlow;
 use std::time::Duration;
 
 use rustix::time::{ClockId, clock_gettime};
+use solver::observer::Progress;
 use solver::problem::{Problem, Refine};
-use solver::solution::{Phase, Progress, Solution};
+use solver::solution::{Phase, Solution};
 
 fn main() {
     println!("One example of 56 elements, from JSON text to solution ({RUNS} runs):\n");
@@ -125,11 +125,10 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
 fn solve(text: &str, refine: u32, phases: &mut Vec<(Phase, f64)>) -> Solution {
     let mut problem: Problem = serde_json::from_str(text).unwrap();
     problem.mesh.refine = Refine::Times(refine);
-    let solution = solver::solve(&problem, &mut |progress| {
+    let solution = solver::solve(&problem, &mut |progress: Progress<'_>| {
         if let Progress::Phase(phase) = progress {
             phases.push((phase, now()));
         }
-        ControlFlow::Continue(())
     });
     phases.push((Phase::Recover, now()));
     let solution = solution.unwrap();

@@ -24,7 +24,7 @@ pub(crate) fn example(name: &str) -> Problem {
 }
 
 pub(crate) fn solve(problem: &Problem) -> Solution {
-    solver::solve(problem, &mut |_| std::ops::ControlFlow::Continue(())).unwrap()
+    solver::solve(problem, &mut ()).unwrap()
 }
 
 pub(crate) fn refined(name: &str, problem: &Problem) -> Problem {

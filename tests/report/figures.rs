@@ -6,7 +6,6 @@
 #![allow(clippy::unwrap_used)] // a tool of ours: it stops where it stands
 
 use std::fmt::Write;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use files::plot::{Parts, Plot, Theme, draw};
@@ -72,7 +71,7 @@ fn main() {
     let mut text = String::from(INTRODUCTION);
     for (name, seen) in EXAMPLES {
         let problem = files::parse(&suite::shipped_example(name)).unwrap();
-        let solution = solver::solve(&problem, &mut |_| ControlFlow::Continue(())).unwrap();
+        let solution = solver::solve(&problem, &mut ()).unwrap();
         let parts = Parts {
             history: &solution.history,
             summary: Some(&solution.summary),

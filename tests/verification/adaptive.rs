@@ -1,14 +1,13 @@
 //! Adaptive refinement: the mesh-converged values of formulation 5.3 without a hand on the mesh.
 
-use std::ops::ControlFlow;
-
 use serde_json::json;
 use solver::error::SolveError;
+use solver::observer::Progress;
 use solver::problem::{AdaptiveRefine, Problem, Refine};
-use solver::solution::{Progress, Summary, WarningCode};
+use solver::solution::{Summary, WarningCode};
 
 use crate::record::{held, keep_table};
-use crate::support::{example, problem, quiet, solve};
+use crate::support::{example, problem, quiet, solve, watching};
 
 /// The error of the peak is below the tolerance.
 #[test]
@@ -159,7 +158,7 @@ fn a_kink_of_the_obstacle_stands_in_the_way_and_is_named() {
 fn every_mesh_is_named_while_it_is_solved() {
     let mut told = Vec::new();
     let problem = to(0.02, example("cylinder"));
-    let solution = solver::solve(&problem, &mut |progress| {
+    let solution = solver::solve(&problem, &mut |progress: Progress<'_>| {
         if let Progress::Refinement {
             number,
             elements,
@@ -168,7 +167,6 @@ fn every_mesh_is_named_while_it_is_solved() {
         {
             told.push((number, elements, error));
         }
-        ControlFlow::Continue(())
     });
     let solution = solution.unwrap();
     // and each time they are the same, to the last bit
@@ -189,21 +187,20 @@ fn every_mesh_is_named_while_it_is_solved() {
 fn adaptive_refinement_stops_at_any_question() {
     let problem = to(0.03, example("cylinder"));
     let mut questions = 0;
-    let whole = solver::solve(&problem, &mut |_| {
-        questions += 1;
-        ControlFlow::Continue(())
+    let mut counts = watching(|progress| {
+        questions += usize::from(progress.is_none());
+        false
     });
+    let whole = solver::solve(&problem, &mut counts);
     assert!(whole.unwrap().summary.refinements.len() > 2);
     for stop_at in (0..questions).step_by(1 + questions / 40) {
         let (mut asked, mut after) = (0, 0);
-        let stopped = solver::solve(&problem, &mut |_| {
-            asked += 1;
-            after += u32::from(asked > stop_at);
-            match asked > stop_at {
-                true => ControlFlow::Break(()),
-                false => ControlFlow::Continue(()),
-            }
+        let mut stops = watching(|progress| {
+            asked += usize::from(progress.is_none());
+            after += u32::from(progress.is_none() && asked > stop_at);
+            asked > stop_at
         });
+        let stopped = solver::solve(&problem, &mut stops);
         // what is told at the end, once a last mesh is known, is told to whoever stops, too
         assert!(after <= 60, "{after} questions after {stop_at}");
         if let Err(error) = stopped {

@@ -1,12 +1,11 @@
 //! Adaptive refinement that cannot go on, for memory or because a later mesh has no solution: the mesh before is the
 //! result, with its errors and the reason.
 
-use std::ops::ControlFlow::{self, Break, Continue};
-
 use serde_json::json;
 use solver::mesh::Mesh;
+use solver::observer::{Observer, Progress};
 use solver::problem::{AdaptiveRefine, Algorithm, History, Problem, Refine, ThesisOptions};
-use solver::solution::{Outcome, Progress, Solution, WarningCode};
+use solver::solution::{Outcome, Solution, WarningCode};
 
 use crate::support::example;
 
@@ -16,7 +15,7 @@ fn cylinder() -> Problem {
     problem
 }
 
-/// What was seen of a solution, and the bytes of every question for room.
+/// What was seen of a solution, and the bytes of every question for memory.
 struct Seen {
     solution: Solution,
     mesh: Mesh,
@@ -26,25 +25,45 @@ struct Seen {
     rows: usize,
 }
 
-/// Solves with an observer that grants room by the number of the question and its bytes.
-fn solve(problem: &Problem, room: impl Fn(usize, u64) -> bool) -> Seen {
-    let (mut asked, mut meshes, mut rows) = (Vec::new(), Vec::new(), 0);
-    let (solution, mesh) = solver::solve_with_mesh(problem, None, &mut |progress| {
+/// An observer that grants memory by the number of the question and its bytes.
+struct Grants<F> {
+    room: F,
+    asked: Vec<u64>,
+    meshes: Vec<u32>,
+    rows: usize,
+}
+
+impl<F: Fn(usize, u64) -> bool> Observer for Grants<F> {
+    fn event(&mut self, progress: Progress<'_>) {
         match progress {
-            Progress::Room { bytes } => {
-                asked.push(bytes);
-                return match room(asked.len() - 1, bytes) {
-                    true => Continue(()),
-                    false => Break(()),
-                };
-            }
-            Progress::Refinement { number, .. } => meshes.push(number),
-            Progress::Iteration(_) => rows += 1,
+            Progress::Refinement { number, .. } => self.meshes.push(number),
+            Progress::Iteration(_) => self.rows += 1,
             _ => {}
         }
-        Continue(())
-    })
-    .unwrap();
+    }
+
+    fn may_use(&mut self, bytes: u64) -> bool {
+        self.asked.push(bytes);
+        (self.room)(self.asked.len() - 1, bytes)
+    }
+}
+
+/// Solves with an observer that grants memory by the number of the question and its bytes.
+fn solve(problem: &Problem, room: impl Fn(usize, u64) -> bool) -> Seen {
+    let mut observer = Grants {
+        room,
+        asked: Vec::new(),
+        meshes: Vec::new(),
+        rows: 0,
+    };
+    let solved = solver::solve_with_mesh(problem, None, &mut observer);
+    let (solution, mesh) = solved.unwrap();
+    let Grants {
+        asked,
+        meshes,
+        rows,
+        ..
+    } = observer;
     Seen {
         solution,
         mesh,
@@ -121,14 +140,21 @@ fn room_that_is_refused_on_the_way_leaves_the_mesh_before_too() {
 /// A stop is no lack of room.
 #[test]
 fn an_observer_that_stops_is_obeyed_at_a_question_for_room() {
-    let mut stopped = false;
-    let ended = solver::solve(&cylinder(), &mut |progress| -> ControlFlow<()> {
-        stopped |= matches!(progress, Progress::Room { .. });
-        match stopped {
-            true => Break(()),
-            false => Continue(()),
+    /// Refuses memory, and stops from then on.
+    struct Stops(bool);
+    impl Observer for Stops {
+        fn event(&mut self, _: Progress<'_>) {}
+
+        fn stop(&mut self) -> bool {
+            self.0
         }
-    });
+
+        fn may_use(&mut self, _: u64) -> bool {
+            self.0 = true;
+            false
+        }
+    }
+    let ended = solver::solve(&cylinder(), &mut Stops(false));
     assert_eq!(ended.err(), Some(solver::error::SolveError::Stopped));
 }
 

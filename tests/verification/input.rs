@@ -1,10 +1,11 @@
 //! What `Model::new` refuses, all at once, and what the solver says of what it accepts.
 
 use solver::error::{SolveError, Violation};
+use solver::observer::Progress;
 use solver::problem::{Contact, Elasticity, MeshSource, Problem};
 use solver::solution::WarningCode;
 
-use crate::support::{example, problem, solve};
+use crate::support::{example, problem, solve, watching};
 
 pub(crate) fn violations(problem: &Problem) -> Vec<(String, String)> {
     pairs(solver::check(problem, None).expect_err("a faulty problem was accepted"))
@@ -177,7 +178,7 @@ fn a_body_not_held_by_its_contacts_is_an_error_with_its_motion() {
         // a load along the motion may press or pull, as may those of some load steps: this one pulls
         p.loads = serde_json::from_value(serde_json::json!([{"body_force": [0, -1]}])).unwrap();
         assert!(solver::check(&p, None).is_ok(), "{name}");
-        match solver::solve(&p, &mut |_| std::ops::ControlFlow::Continue(())) {
+        match solver::solve(&p, &mut ()) {
             Err(SolveError::Unheld { motion: found, .. }) => assert_eq!(found, motion, "{name}"),
             other => panic!("{name}: {:?}", other.map(|s| s.summary)),
         }
@@ -219,10 +220,7 @@ fn a_block_held_only_by_friction_sticks_or_slides_away() {
                 "contacts": [{{"boundary": "bottom", "obstacle": {{"kind": "flat"}},
                     "friction": {{"coefficient": 0.5, "nonlocal_radius": 0, "elastic_slip": 1e-4}}}}]}}"#
         );
-        solver::solve(
-            &problem(&json),
-            &mut |_| std::ops::ControlFlow::Continue(()),
-        )
+        solver::solve(&problem(&json), &mut ())
     };
     let held = solve(1.0).unwrap().summary;
     assert!(held.converged, "{held:#?}");
@@ -363,7 +361,7 @@ fn a_contact_that_never_engages_is_reported_with_its_smallest_gap() {
 fn an_iteration_limit_is_an_outcome_with_its_history() {
     let mut p = example("cylinder");
     p.solver.max_iterations = 2;
-    let solution = solver::solve(&p, &mut |_| std::ops::ControlFlow::Continue(())).unwrap();
+    let solution = solver::solve(&p, &mut ()).unwrap();
     assert_eq!(
         solution.summary.outcome,
         solver::solution::Outcome::NotConverged
@@ -381,17 +379,11 @@ fn an_iteration_limit_is_an_outcome_with_its_history() {
 #[test]
 fn an_observer_that_stops_gets_the_last_state() {
     let mut rows = 0;
-    let solution = solver::solve(&example("cylinder"), &mut |progress| {
-        if matches!(progress, solver::solution::Progress::Iteration(_)) {
-            rows += 1;
-        }
-        if rows == 3 {
-            std::ops::ControlFlow::Break(())
-        } else {
-            std::ops::ControlFlow::Continue(())
-        }
-    })
-    .unwrap();
+    let mut third = watching(|progress| {
+        rows += u32::from(matches!(progress, Some(Progress::Iteration(_))));
+        rows == 3
+    });
+    let solution = solver::solve(&example("cylinder"), &mut third).unwrap();
     assert_eq!(
         (solution.summary.outcome, solution.history.len()),
         (solver::solution::Outcome::Canceled, 3)
@@ -400,9 +392,7 @@ fn an_observer_that_stops_gets_the_last_state() {
 
 #[test]
 fn an_observer_that_stops_before_the_first_state_gets_an_error() {
-    let end = solver::solve(&example("cylinder"), &mut |_| {
-        std::ops::ControlFlow::Break(())
-    });
+    let end = solver::solve(&example("cylinder"), &mut watching(|_| true));
     assert_eq!(end, Err(solver::error::SolveError::Stopped));
 }
 
@@ -418,11 +408,10 @@ fn an_observer_gets_the_solution_so_far_after_every_step_but_the_last() {
     };
     p.steps = vec![step(0.3, 2), step(0.6, 1), step(1.0, 1)];
     let mut received = Vec::new();
-    let solution = solver::solve(&p, &mut |progress| {
-        if let solver::solution::Progress::Step(so_far) = progress {
+    let solution = solver::solve(&p, &mut |progress: Progress<'_>| {
+        if let Progress::Step(so_far) = progress {
             received.push(so_far.clone());
         }
-        std::ops::ControlFlow::Continue(())
     })
     .unwrap();
     assert_eq!(received.len(), 2);
@@ -445,9 +434,8 @@ fn an_observer_gets_the_solution_so_far_after_every_step_but_the_last() {
     let mut received = 0;
     for steps in [vec![], vec![step(1.0, 3)]] {
         p.steps = steps;
-        solver::solve(&p, &mut |progress| {
-            received += u32::from(matches!(progress, solver::solution::Progress::Step(_)));
-            std::ops::ControlFlow::Continue(())
+        solver::solve(&p, &mut |progress: Progress<'_>| {
+            received += u32::from(matches!(progress, Progress::Step(_)));
         })
         .unwrap();
     }
@@ -489,11 +477,8 @@ fn friction_that_never_acts_changes_nothing() {
 #[test]
 fn a_solution_stopped_at_its_first_row_is_the_state_of_that_row() {
     for name in ["rectangular_punch", "sheet"] {
-        let solution = solver::solve(&example(name), &mut |progress| match progress {
-            solver::solution::Progress::Iteration(_) => std::ops::ControlFlow::Break(()),
-            _ => std::ops::ControlFlow::Continue(()),
-        })
-        .unwrap();
+        let mut first = watching(|progress| matches!(progress, Some(Progress::Iteration(_))));
+        let solution = solver::solve(&example(name), &mut first).unwrap();
         assert_eq!(solution.history.len(), 1);
         assert_eq!(
             solution.history[0].force.normal, solution.summary.normal_force,

@@ -5,15 +5,15 @@
 //! several runs the best counts, since the machine may pause. Where the stated errors and the averages at the points of
 //! profiles were computed without a question, that part was a third and more.
 
-use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use solver::error::SolveError;
+use solver::observer::Progress;
 use solver::problem::Problem;
-use solver::solution::{Phase, Progress};
+use solver::solution::Phase;
 
-use crate::support::problem;
+use crate::support::{problem, watching};
 
 /// A strip with so many contacts in a row on its top.
 fn many_contacts(count: usize) -> Value {
@@ -59,11 +59,12 @@ fn wide_averages(edges: usize, accuracy: &str) -> Value {
 fn longest_pause(problem: &Problem) -> f64 {
     let start = Instant::now();
     let (mut last, mut longest) = (start, Duration::ZERO);
-    let solution = solver::solve(problem, &mut |_| {
+    let mut timed = watching(|_| {
         longest = longest.max(last.elapsed());
         last = Instant::now();
-        ControlFlow::Continue(())
+        false
     });
+    let solution = solver::solve(problem, &mut timed);
     assert!(solution.unwrap().summary.converged);
     longest.max(last.elapsed()).as_secs_f64() / start.elapsed().as_secs_f64()
 }
@@ -95,14 +96,12 @@ fn results_of_a_stopped_solution_are_not_waited_for() {
     ] {
         let problem = problem(&value.to_string());
         let (mut stopped, mut after) = (false, 0);
-        let solution = solver::solve(&problem, &mut |progress| {
-            stopped |= matches!(progress, Progress::Phase(Phase::Recover));
-            after += u32::from(stopped);
-            match stopped {
-                true => ControlFlow::Break(()),
-                false => ControlFlow::Continue(()),
-            }
+        let mut recovers = watching(|progress| {
+            stopped |= matches!(progress, Some(Progress::Phase(Phase::Recover)));
+            after += u32::from(stopped && progress.is_none());
+            stopped
         });
+        let solution = solver::solve(&problem, &mut recovers);
         assert!(after < 20, "{after} questions after the stop");
         match solution {
             Ok(_) => assert!(whole),

@@ -1,7 +1,6 @@
 //! What the verification tests share.
 
-use std::ops::ControlFlow;
-
+use solver::observer::{Observer, Progress};
 use solver::problem::Problem;
 use solver::solution::Solution;
 
@@ -25,8 +24,31 @@ pub(crate) fn solve(problem: &Problem) -> Solution {
 }
 
 /// An observer that lets everything go on.
-pub(crate) fn quiet(_: solver::solution::Progress<'_>) -> ControlFlow<()> {
-    ControlFlow::Continue(())
+pub(crate) fn quiet(_: Progress<'_>) {}
+
+/// An observer made of one function, which is called with all progress, and without at each question whether to stop;
+/// it answers whether to stop from then on.
+pub(crate) fn watching<F: FnMut(Option<Progress<'_>>) -> bool>(watch: F) -> Watching<F> {
+    Watching {
+        watch,
+        stopped: false,
+    }
+}
+
+pub(crate) struct Watching<F> {
+    watch: F,
+    stopped: bool,
+}
+
+impl<F: FnMut(Option<Progress<'_>>) -> bool> Observer for Watching<F> {
+    fn event(&mut self, progress: Progress<'_>) {
+        self.stopped |= (self.watch)(Some(progress));
+    }
+
+    fn stop(&mut self) -> bool {
+        self.stopped |= (self.watch)(None);
+        self.stopped
+    }
 }
 
 /// The problems of the catalogue that the environment asks for, as `from..to`.

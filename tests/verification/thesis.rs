@@ -12,7 +12,7 @@ fn by_thesis(problem: &Problem, options: ThesisOptions, most: u32) -> Solution {
     problem.solver.algorithm = Algorithm::Thesis;
     problem.solver.max_iterations = most;
     problem.solver.thesis = Some(options);
-    solver::solve(&problem, &mut |_| std::ops::ControlFlow::Continue(())).unwrap()
+    solver::solve(&problem, &mut ()).unwrap()
 }
 
 fn extrapolated(friction_force: u32, local_points: u32) -> ThesisOptions {

@@ -1,14 +1,12 @@
 //! What a verdict promises: contacts that never touch, obstacles that end inside edges, materials that meet under a contact,
 //! other solutions, and halves of symmetric problems.
 
-use std::ops::ControlFlow;
-
 use fastrand::Rng;
 use serde_json::{Value, json};
 use solver::family::{End, Family, Member, Start};
 use solver::problem::Problem;
 use solver::solution::{
-    ErrorMethod, EstimatedQuantity, Progress, QuantityName, Solution, Verdict, WarningCode,
+    ErrorMethod, EstimatedQuantity, QuantityName, Solution, Verdict, WarningCode,
 };
 
 use crate::support::{Lattice, problem, solve};
@@ -387,7 +385,7 @@ fn beside_the_warning_of_a_coarse_mesh_no_verdict_is_good() {
 /// Across the fold, from either side, every row is its member's own solution.
 #[test]
 fn rows_of_a_sweep_do_not_depend_on_the_order_of_members() {
-    let go_on = &mut |_: Progress<'_>| ControlFlow::Continue(());
+    let quiet = &mut ();
     let up: Vec<f64> = (-6..=2).map(|i| 0.01 * f64::from(i)).collect();
     let down: Vec<f64> = up.iter().rev().copied().collect();
     let mut jammed = 0;
@@ -397,13 +395,13 @@ fn rows_of_a_sweep_do_not_depend_on_the_order_of_members() {
                 .iter()
                 .map(|d| problem(&sheet(*d, coefficient).to_string()))
                 .collect();
-            let mut family = Family::new(&problems[0], None, go_on).unwrap();
+            let mut family = Family::new(&problems[0], None, quiet).unwrap();
             let mut end: Option<End> = None;
             for (problem, d) in problems.iter().zip(order) {
                 let start = end.as_ref().map_or(Start::Anew, Start::Next);
-                let (member, own_end) = family.member(problem, start, go_on).unwrap();
+                let (member, own_end) = family.member(problem, start, quiet).unwrap();
                 end = own_end.or(end);
-                let own = Member::of(&solver::solve(problem, go_on).unwrap().summary);
+                let own = Member::of(&solver::solve(problem, quiet).unwrap().summary);
                 assert_eq!(member.outcome, own.outcome);
                 let off = (member.normal_force - own.normal_force).abs();
                 assert!(

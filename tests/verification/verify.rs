@@ -1,15 +1,14 @@
 //! `"accuracy": "verify"`: what the mesh split in two says of the errors.
 
-use std::ops::ControlFlow;
-
 use serde_json::{Value, json};
+use solver::observer::{Observer, Progress};
 use solver::problem::{AccuracyMode, Problem, Refine};
 use solver::solution::{
-    Accuracy, ErrorMethod, EstimatedQuantity, Phase, Progress, QuantityName, Solution, Verdict,
+    Accuracy, ErrorMethod, EstimatedQuantity, Phase, QuantityName, Solution, Verdict,
 };
 
 use crate::catalogue;
-use crate::support::{close, example, graded, problem, quiet, solve, union};
+use crate::support::{close, example, graded, problem, quiet, solve, union, watching};
 
 /// A Hertz cylinder, R = 8 and E* = 1000/0.91, on a block of 40; `h`: element size in the contact.
 fn cylinder(h: f64, refine: u32) -> Problem {
@@ -263,33 +262,32 @@ fn a_stop_while_verifying_leaves_the_solution() {
     };
     let mut questions = 0;
     let mut begun = None;
-    solver::solve(&problem, &mut |progress| {
-        questions += 1;
+    let mut counts = watching(|progress| {
+        let Some(progress) = progress else {
+            questions += 1;
+            return false;
+        };
         if let Progress::Phase(Phase::Verify) = progress {
             assert!(
-                begun.replace(questions).is_none(),
+                begun.replace(questions + 1).is_none(),
                 "one phase, in which all else is hidden"
             );
+        } else {
+            assert!(begun.is_none(), "{progress:?}");
         }
-        assert!(
-            begun.is_none() || !matches!(progress, Progress::Iteration(_) | Progress::Warning(_))
-        );
-        ControlFlow::Continue(())
-    })
-    .unwrap();
+        false
+    });
+    solver::solve(&problem, &mut counts).unwrap();
     let begun = begun.unwrap();
     assert!(questions > begun + 40, "{begun} of {questions}");
     for stop_at in (begun..questions).step_by(1 + (questions - begun) / 30) {
         let (mut asked, mut after) = (0, 0);
-        let mut solution = solver::solve(&problem, &mut |_| {
-            asked += 1;
-            after += usize::from(asked > stop_at);
-            match asked >= stop_at {
-                true => ControlFlow::Break(()),
-                false => ControlFlow::Continue(()),
-            }
-        })
-        .unwrap();
+        let mut stops = watching(|progress| {
+            asked += usize::from(progress.is_none());
+            after += usize::from(progress.is_none() && asked > stop_at);
+            asked >= stop_at
+        });
+        let mut solution = solver::solve(&problem, &mut stops).unwrap();
         assert!(after <= 60, "{after} questions after {stop_at}");
         let left = solution.summary.accuracy.take().unwrap();
         let estimates = own.summary.accuracy.clone().unwrap();
@@ -315,16 +313,28 @@ fn a_stop_while_verifying_leaves_the_solution() {
 #[test]
 fn a_finer_mesh_that_cannot_be_solved_leaves_the_solution_and_says_why() {
     let problem = cylinder(0.3, 0);
-    let mut largest = 0;
-    let own = solver::solve(&problem, &mut |progress| match progress {
-        Progress::Phase(Phase::Verify) => ControlFlow::Break(()),
-        Progress::Needs { bytes } => {
-            largest = bytes.max(largest);
-            ControlFlow::Continue(())
+    /// Stops when the verification begins; the most memory that was asked for before.
+    #[derive(Default)]
+    struct Estimates {
+        largest: u64,
+        verifies: bool,
+    }
+    impl Observer for Estimates {
+        fn event(&mut self, progress: Progress<'_>) {
+            self.verifies |= matches!(progress, Progress::Phase(Phase::Verify));
         }
-        _ => ControlFlow::Continue(()),
-    })
-    .unwrap();
+
+        fn stop(&mut self) -> bool {
+            self.verifies
+        }
+
+        fn may_use(&mut self, bytes: u64) -> bool {
+            self.largest = self.largest.max(bytes);
+            true
+        }
+    }
+    let mut estimates = Estimates::default();
+    let own = solver::solve(&problem, &mut estimates).unwrap();
     let reason = |solution: &Solution| {
         assert_eq!(accuracy(solution).verified, Some(false));
         assert_eq!(accuracy(solution).quantities, accuracy(&own).quantities);
@@ -336,10 +346,16 @@ fn a_finer_mesh_that_cannot_be_solved_leaves_the_solution_and_says_why() {
         "{}",
         reason(&own)
     );
-    let outgrown = solver::solve(&problem, &mut |progress| match progress {
-        Progress::Needs { bytes } if bytes > largest => ControlFlow::Break(()),
-        _ => ControlFlow::Continue(()),
-    });
+    /// Allows no more memory than was needed without a verification.
+    struct Limited(u64);
+    impl Observer for Limited {
+        fn event(&mut self, _: Progress<'_>) {}
+
+        fn may_use(&mut self, bytes: u64) -> bool {
+            bytes <= self.0
+        }
+    }
+    let outgrown = solver::solve(&problem, &mut Limited(estimates.largest));
     let outgrown = reason(&outgrown.unwrap());
     assert!(outgrown.contains("more memory than there is"), "{outgrown}");
 

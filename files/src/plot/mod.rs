@@ -126,8 +126,6 @@ pub fn draw(
 
 #[cfg(test)]
 mod tests {
-    use std::ops::ControlFlow;
-
     use super::*;
     use solver::solution::Solution;
 
@@ -151,7 +149,7 @@ mod tests {
     }
 
     pub(super) fn solution(problem: &Problem) -> Solution {
-        solver::solve(problem, &mut |_| ControlFlow::Continue(())).unwrap()
+        solver::solve(problem, &mut ()).unwrap()
     }
 
     #[test]

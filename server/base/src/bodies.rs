@@ -176,12 +176,10 @@ impl Bodies {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use std::ops::ControlFlow;
-
     use super::*;
 
     fn body() -> Prepared {
-        let prepared = solver::prepare(&fake::problem(), None, &mut |_| ControlFlow::Continue(()));
+        let prepared = solver::prepare(&fake::problem(), None, &mut ());
         prepared.unwrap()
     }
 

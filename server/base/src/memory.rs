@@ -6,7 +6,6 @@
 use parking_lot::{Mutex, MutexGuard};
 use std::{
     cell::Cell,
-    ops::ControlFlow,
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
@@ -220,17 +219,26 @@ impl Meter {
     }
 
     /// Whether the job may continue, which is about to allocate `needed` more bytes.
-    pub fn check(&self, needed: u64) -> ControlFlow<Outgrown> {
-        let used = self.used();
-        if used.saturating_add(needed) > self.share {
-            ControlFlow::Break(Outgrown {
+    pub fn check(&self, needed: u64) -> Result<(), Outgrown> {
+        let (used, share) = (self.used(), self.share);
+        match used.saturating_add(needed) > share {
+            true => Err(Outgrown {
                 used,
                 needed,
-                share: self.share,
-            })
-        } else {
-            ControlFlow::Continue(())
+                share,
+            }),
+            false => Ok(()),
         }
+    }
+
+    /// The lack of memory of a job that was refused `needed` more bytes. If that is within its share, the machine has
+    /// less than the share: more than it is needed, whatever is used.
+    pub fn refused(&self, needed: u64) -> Outgrown {
+        self.check(needed).err().unwrap_or_else(|| Outgrown {
+            used: self.used(),
+            needed: needed.max(self.share),
+            share: self.share,
+        })
     }
 
     /// Runs work whose memory is passed to another thread and no longer counts for the job.
@@ -282,8 +290,7 @@ mod tests {
     }
 
     fn body() -> Prepared {
-        let go_on = &mut |_: solver::solution::Progress<'_>| ControlFlow::Continue(());
-        solver::prepare(&fake::problem(), None, go_on).unwrap()
+        solver::prepare(&fake::problem(), None, &mut ()).unwrap()
     }
 
     #[test]
@@ -357,25 +364,25 @@ mod tests {
     #[test]
     fn a_meter_counts_what_its_thread_holds_and_has_not_handed_over() {
         let meter = Meter::new(10_000);
-        assert!(meter.check(9_000).is_continue());
+        assert!(meter.check(9_000).is_ok());
         let held = std::hint::black_box(vec![0u8; 6_000]);
         let outgrown = Outgrown {
             used: 6_000,
             needed: 5_000,
             share: 10_000,
         };
-        assert_eq!(meter.check(5_000), ControlFlow::Break(outgrown));
+        assert_eq!(meter.check(5_000), Err(outgrown));
         let given = meter.hand_over(|| std::hint::black_box(vec![0u8; 50_000]));
-        assert!(meter.check(4_000).is_continue());
+        assert!(meter.check(4_000).is_ok());
         let there = std::thread::spawn(move || drop(given));
         there.join().unwrap();
-        assert!(meter.check(3_500).is_continue());
+        assert!(meter.check(3_500).is_ok());
         drop(held);
-        assert!(meter.check(9_000).is_continue());
+        assert!(meter.check(9_000).is_ok());
         meter.lend(5_000);
-        assert!(meter.used() >= 5_000 && meter.check(6_000).is_break());
+        assert!(meter.used() >= 5_000 && meter.check(6_000).is_err());
         meter.lend(u64::MAX);
-        assert!(meter.check(0).is_break());
-        assert!(meter.check(u64::MAX).is_break());
+        assert!(meter.check(0).is_err());
+        assert!(meter.check(u64::MAX).is_err());
     }
 }

@@ -4,17 +4,12 @@ use std::{
     fmt::Display,
     fs::File,
     io::{BufReader, Read, Seek},
-    ops::ControlFlow,
     path::{Path, PathBuf},
     time::Instant,
 };
 
 use anyhow::Context;
-use base::{
-    digest,
-    mesh::MeshInfo,
-    run::{self, Update},
-};
+use base::{digest, mesh::MeshInfo, run::Run};
 use clap::Args;
 use files::ReadError;
 use service::{config::MemoryBudget, error::ApiError};
@@ -23,8 +18,9 @@ use solver::{
     Estimate,
     error::{Reason, SolveError, Violation},
     mesh::Mesh,
+    observer::{Observer, Progress},
     problem::Problem,
-    solution::{Observer, Warning},
+    solution::Warning,
 };
 
 use super::{
@@ -69,13 +65,10 @@ pub(super) struct Threads {
 }
 
 impl Threads {
-    /// Whether a second thread may be used.
-    pub(super) fn second(self) -> ControlFlow<()> {
+    /// How many threads may be used.
+    pub(super) fn count(self) -> usize {
         let processors = || std::thread::available_parallelism().map_or(1, usize::from);
-        match self.threads.map_or_else(processors, usize::from) {
-            1 => ControlFlow::Break(()),
-            _ => ControlFlow::Continue(()),
-        }
+        self.threads.map_or_else(processors, usize::from)
     }
 }
 
@@ -101,36 +94,22 @@ pub(super) fn run(
     let estimate = solver::estimate(&problem, size.as_ref());
     let estimate = estimate.map_err(|violation| invalid(file, &[violation]))?;
     check_memory(estimate, memory, file.display())?;
-    let solve = |observe: &mut Observer<'_>| {
+    let solve = |observer: &mut dyn Observer| {
         let mut external = files::external_mesh(&problem, stored.clone());
         if let Some(Ok(external)) = &mut external {
             external.warnings.extend(told.iter().cloned());
         }
-        solver::solve_on(&problem, external, observe)
+        solver::solve_on(&problem, external, observer)
     };
     let mut view = View::new(To::Error);
-    let solved = run::run(&problem, parse_s, solve, &mut |update| {
-        let told = match update {
-            Update::SecondThread => return threads.second(),
-            Update::Phase(phase) => view.phase(phase),
-            Update::Mesh {
-                number,
-                elements,
-                error,
-            } => view.line(&report::mesh(number, elements, error)),
-            Update::Iteration(timed) => view.iteration(&timed.row),
-            Update::Warning(warning) => view.warning(warning),
-            // Ctrl-C ends the process
-            Update::Step(_)
-            | Update::Pulse
-            | Update::Needs { .. }
-            | Update::Room { .. }
-            | Update::OutOfMemory { .. } => Ok(()),
-        };
-        // who no longer reads what is told still wants the result
-        let _ = told;
-        ControlFlow::Continue(())
-    });
+    let run = Run::new(&problem, parse_s);
+    let solved = run.solve(
+        solve,
+        &mut Shown {
+            view: &mut view,
+            threads,
+        },
+    );
     view.end();
     let document = match solved {
         Ok(document) => document,
@@ -160,6 +139,35 @@ pub(super) fn run(
     } else {
         Exit::NotConverged
     })
+}
+
+/// Shows a solution in the terminal. Nothing stops it: Ctrl-C ends the process.
+struct Shown<'a> {
+    view: &'a mut View,
+    threads: &'a Threads,
+}
+
+impl Observer for Shown<'_> {
+    fn event(&mut self, progress: Progress<'_>) {
+        let view = &mut *self.view;
+        let shown = match progress {
+            Progress::Phase(phase) => view.phase(phase),
+            Progress::Refinement {
+                number,
+                elements,
+                error,
+            } => view.line(&report::mesh(number, elements, error)),
+            Progress::Iteration(row) => view.iteration(row),
+            Progress::Warning(warning) => view.warning(warning),
+            Progress::Tentative(_) | Progress::Step(_) | Progress::OutOfMemory { .. } => Ok(()),
+        };
+        // who no longer reads what is shown still wants the result
+        let _ = shown;
+    }
+
+    fn threads(&mut self) -> usize {
+        self.threads.count()
+    }
 }
 
 /// Refuses what needs more memory than there is; `what` names it.

@@ -2,17 +2,12 @@
 
 use std::{
     borrow::Cow,
-    ops::ControlFlow,
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
 use anyhow::Context;
-use base::{
-    job::Status,
-    run::members::{Members, Step},
-    sweep::MemberRow,
-};
+use base::{job::Status, run::members::Members, sweep::MemberRow};
 use clap::Args;
 use files::{
     body::{Body, Embedded},
@@ -28,7 +23,7 @@ use service::{
 };
 use solver::{
     error::{Reason, Violation},
-    solution::Progress,
+    observer::{Observer, Progress},
 };
 
 use super::{
@@ -118,21 +113,13 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
     for group in &groups {
         let external = |problem: &_| files::external_mesh(problem, None);
         let mut members = Members::new(plan, group, &base.mesh, &external, &solver::prepare, None);
-        let solved = members.solve(group, &mut |step| {
-            match step {
-                Step::Row(row) => {
-                    rows.push(*row);
-                    if told.elapsed() >= PAUSE || rows.len() == count {
-                        eprintln!("{} of {count} members", rows.len());
-                        told = Instant::now();
-                    }
-                }
-                Step::Progress(Progress::SecondThread) => return threads.second(),
-                Step::Progress(_) => {}
+        for number in group {
+            rows.push(members.row(*number, &mut Unseen(*threads))?);
+            if told.elapsed() >= PAUSE || rows.len() == count {
+                eprintln!("{} of {count} members", rows.len());
+                told = Instant::now();
             }
-            ControlFlow::Continue(())
-        });
-        solved?;
+        }
     }
     rows.sort_unstable_by_key(|row: &MemberRow| row.number);
     for row in &mut rows {
@@ -169,6 +156,17 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
             Exit::NotConverged
         }
     })
+}
+
+/// Observes members whose iterations are not shown.
+struct Unseen(Threads);
+
+impl Observer for Unseen {
+    fn event(&mut self, _: Progress<'_>) {}
+
+    fn threads(&mut self) -> usize {
+        self.0.count()
+    }
 }
 
 /// The format of a table by the name of its file; the error says why there is none.

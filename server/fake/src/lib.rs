@@ -1,15 +1,15 @@
 //! A problem and solvers for the unit tests of the service: plausible and quick; the solvers stop when asked.
 
-use std::{ops::ControlFlow, sync::LazyLock};
+use std::sync::LazyLock;
 
 use base::event::TimedIteration;
 use solver::{
     error::SolveError,
     mesh::External,
+    observer::{Observer, Progress},
     problem::Problem,
     solution::{
-        ContactCount, ForcePair, FrictionCount, Iteration, Observer, Outcome, Phase, Progress,
-        Solution, Stage,
+        ContactCount, ForcePair, FrictionCount, Iteration, Outcome, Phase, Solution, Stage,
     },
 };
 
@@ -34,7 +34,7 @@ pub fn problem() -> Problem {
 /// The solution of [`problem`], with a history of three rows.
 pub fn solution() -> Solution {
     static SOLVED: LazyLock<Solution> = LazyLock::new(|| {
-        solver::solve(&problem(), &mut |_| ControlFlow::Continue(()))
+        solver::solve(&problem(), &mut ())
             .unwrap_or_else(|error| unreachable!("the fake problem is solved: {error}"))
     });
     let mut solution = SOLVED.clone();
@@ -85,21 +85,23 @@ pub fn timed(k: u32) -> TimedIteration {
 pub fn solve(
     _: &Problem,
     _: Option<External>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<Solution, SolveError> {
-    iterate(observe)
+    iterate(observer)
 }
 
 /// Reports the iterations and returns the solution, for any problem.
-pub fn iterate(observe: &mut Observer<'_>) -> Result<Solution, SolveError> {
+pub fn iterate(observer: &mut dyn Observer) -> Result<Solution, SolveError> {
     let mut solution = solution();
     for phase in [Phase::Mesh, Phase::Factor, Phase::Iterate] {
-        if observe(Progress::Phase(phase)).is_break() {
+        observer.event(Progress::Phase(phase));
+        if observer.stop() {
             return Err(SolveError::Stopped);
         }
     }
     for row in &solution.history {
-        if observe(Progress::Iteration(row)).is_break() {
+        observer.event(Progress::Iteration(row));
+        if observer.stop() {
             solution.summary.outcome = Outcome::Canceled;
             solution.summary.converged = false;
             return Ok(solution);
@@ -112,11 +114,12 @@ pub fn iterate(observe: &mut Observer<'_>) -> Result<Solution, SolveError> {
 pub fn solve_until_stopped(
     _: &Problem,
     _: Option<External>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<Solution, SolveError> {
     let mut solution = solution();
     for k in 1.. {
-        if observe(Progress::Iteration(&iteration(k))) == ControlFlow::Break(()) {
+        observer.event(Progress::Iteration(&iteration(k)));
+        if observer.stop() {
             break;
         }
         std::thread::sleep(std::time::Duration::from_millis(1));
@@ -130,7 +133,7 @@ pub fn solve_until_stopped(
 pub fn solve_with_a_panic(
     _: &Problem,
     _: Option<External>,
-    _: &mut Observer<'_>,
+    _: &mut dyn Observer,
 ) -> Result<Solution, SolveError> {
     unreachable!("the fake solver panics on purpose")
 }

@@ -27,10 +27,9 @@ use crate::elasticity::Dof;
 use crate::element::edge3;
 use crate::linear::{Interrupt, Stopped};
 use crate::model::Model;
+use crate::observer::Observer;
 use crate::origins::{Added, Origins};
-use crate::solution::{
-    Accuracy, ErrorMethod, EstimatedQuantity, Observer, Outcome, Progress, QuantityName,
-};
+use crate::solution::{Accuracy, ErrorMethod, EstimatedQuantity, Outcome, QuantityName};
 use singular::Surroundings;
 use verdict::{Doubt, conclude, length, relative, scale};
 
@@ -146,11 +145,11 @@ pub fn assess(
     system: &System<'_>,
     (finished, reported, increments): (&Finished, &Reported, Option<&Increments>),
     origins: Option<&mut Origins>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Accuracy {
     let quantities = &reported.along.quantities;
     let bounds = match reported.summary.outcome {
-        Outcome::Converged => bounds(model, body, system, finished, reported, origins, observe),
+        Outcome::Converged => bounds(model, body, system, finished, reported, origins, observer),
         _ => None,
     };
     let mut found = Vec::with_capacity(quantities.len());
@@ -235,7 +234,7 @@ fn bounds(
     finished: &Finished,
     reported: &Reported,
     mut origins: Option<&mut Origins>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Option<Vec<Bounds>> {
     let quantities = &reported.along.quantities;
     let influencing: Vec<&Quantity> = quantities.iter().filter(|q| q.gradient.is_some()).collect();
@@ -243,15 +242,15 @@ fn bounds(
         .iter()
         .filter_map(|q| q.gradient.as_ref())
         .collect();
-    let influences = influences(system, &finished.state, &gradients, observe)?;
-    let errors = weighted_errors(model, body, reported, &influences, observe)?;
+    let influences = influences(system, &finished.state, &gradients, observer)?;
+    let errors = weighted_errors(model, body, reported, &influences, observer)?;
     let mut duals = influences.iter().zip(errors);
     let smoothing = smoothing_of_reactions(system, finished);
     let reactions = system.reactions(&finished.state);
     let surroundings = Surroundings::new(model);
     let away = surroundings.away_from(touching(system, finished));
-    let mut go_on = || observe(Progress::Pulse);
-    let interrupt = &mut Interrupt::new(&mut go_on);
+    let mut stop = || observer.stop();
+    let interrupt = &mut Interrupt::new(&mut stop);
     let work = WORK_OF_AN_ELEMENT * away.len() + WORK_OF_A_PLACE * 3 * system.nodes.len();
     let mut bounds = Vec::with_capacity(quantities.len());
     for quantity in quantities {
@@ -335,14 +334,14 @@ fn weighted_errors(
     body: &ElasticBody,
     reported: &Reported,
     influences: &[Vec<f64>],
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Option<Vec<Vec<f64>>> {
     /// Dual solutions that are treated together: eight numbers fill a cache line, but many problems have few.
     const MANY: usize = 8;
     const FEW: usize = 4;
-    let threads = body.threads(observe);
-    let mut go_on = || observe(Progress::Pulse);
-    let interrupt = &mut Interrupt::new(&mut go_on);
+    let threads = body.threads(observer);
+    let mut stop = || observer.stop();
+    let interrupt = &mut Interrupt::new(&mut stop);
     let mut errors = Vec::with_capacity(influences.len());
     for some in influences.chunks(MANY) {
         let of_some = match some.len() {

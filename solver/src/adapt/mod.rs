@@ -9,15 +9,14 @@
 mod mesh_results;
 mod stopping;
 
-use std::ops::ControlFlow;
-
 use crate::error::SolveError;
 use crate::mesh::{self, ExternalMesh, GradedMesh, Mesh};
 use crate::model::estimate::{MOST_ADAPTIVE_CONTACT_ELEMENTS, MOST_ADAPTIVE_ELEMENTS};
 use crate::model::{ContactModel, Model};
+use crate::observer::{Observer, Progress, notify};
 use crate::origins::Origins;
 use crate::problem::{AdaptiveRefine, Algorithm, Problem};
-use crate::solution::{Observer, Outcome, Progress, Refinement, Solution, Warning};
+use crate::solution::{Outcome, Refinement, Solution, Warning};
 use mesh_results::{MeshResults, largest_error};
 use stopping::{StopReason, given_up, unfinished};
 
@@ -32,7 +31,7 @@ const PART_OF_RADIUS: f64 = 0.25;
 
 /// Solves one model, and notes where the errors of its results come from.
 pub type Solve<'a> =
-    dyn Fn(Model, &mut Origins, &mut Observer<'_>) -> Result<Solution, SolveError> + 'a;
+    dyn Fn(Model, &mut Origins, &mut dyn Observer) -> Result<Solution, SolveError> + 'a;
 
 /// Solves on finer and finer meshes; returns the solution on the finest, with the sequence of meshes, and that mesh.
 ///
@@ -44,7 +43,7 @@ pub fn run(
     goal: &AdaptiveRefine,
     first: Model,
     solve: &Solve<'_>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<(Solution, Mesh), SolveError> {
     // what the mesh itself was warned of is told again with each
     let of_mesh = |warning: &&Warning| warning.pointer.starts_with("/mesh");
@@ -57,26 +56,30 @@ pub fn run(
     let mut before: Option<Solved> = None;
     loop {
         let elements = model.mesh.elements.len() as u64;
-        let answer = observe(Progress::Refinement {
+        let begins = Progress::Refinement {
             number: sequence.len() as u32 + 1,
             elements,
             error: sequence.last().and_then(|row| row.error),
-        });
-        if answer.is_break() {
-            return Err(SolveError::Stopped);
-        }
+        };
+        notify(observer, begins)?;
         let mut origins = Origins::new(&model, goal.tolerance);
         let (mesh, contacts) = (model.mesh.clone(), model.contacts.clone());
         let unknowns = model.estimate_of_mesh().dofs;
-        let (solved, mut on_mesh) = solve_on(model, &mut origins, solve, before.is_some(), observe);
+        let mut on_this_mesh = MeshObserver {
+            observer: &mut *observer,
+            later: before.is_some(),
+            on_mesh: OnMesh::default(),
+        };
+        let solved = solve(model, &mut origins, &mut on_this_mesh);
+        let mut on_mesh = on_this_mesh.on_mesh;
         if let (Some(reason), Some(before)) = (on_mesh.failed(&solved, unknowns), before.take()) {
             let of_before = sequence.iter().rev().nth(1);
-            let _ = observe(Progress::Refinement {
+            observer.event(Progress::Refinement {
                 number: sequence.len() as u32,
                 elements: before.mesh.elements.len() as u64,
                 error: of_before.and_then(|row| row.error),
             });
-            return Ok(before.ended(problem, goal, sequence, Some(reason), observe));
+            return Ok(before.ended(problem, goal, sequence, Some(reason), observer));
         }
         let solution = solved?;
         let truncation = cut_edges(&contacts, &solution, &mesh, goal.tolerance);
@@ -105,7 +108,7 @@ pub fn run(
                     let warnings = notes.clone();
                     let given = ExternalMesh { mesh, warnings };
                     let model = Model::on_mesh(problem, given).map_err(SolveError::Invalid)?;
-                    let too_large = too_large(&model, &most_at_contacts, observe)?;
+                    let too_large = too_large(&model, &most_at_contacts, observer)?;
                     next = too_large.is_none().then_some(model);
                     too_large
                 }
@@ -120,7 +123,7 @@ pub fn run(
         };
         match next {
             Some(finer) => (model, before) = (finer, Some(here)),
-            None => return Ok(here.ended(problem, goal, sequence, reason, observe)),
+            None => return Ok(here.ended(problem, goal, sequence, reason, observer)),
         }
     }
 }
@@ -144,7 +147,7 @@ impl Solved {
         goal: &AdaptiveRefine,
         sequence: Vec<Refinement>,
         reason: Option<StopReason>,
-        observe: &mut Observer<'_>,
+        observer: &mut dyn Observer,
     ) -> (Solution, Mesh) {
         let solution = &mut self.solution;
         let warning = reason.and_then(|reason| {
@@ -156,16 +159,16 @@ impl Solved {
         }
         solution.summary.refinements = sequence;
         for warning in &self.warnings {
-            let _ = observe(Progress::Warning(warning));
+            observer.event(Progress::Warning(warning));
         }
         for row in &solution.history {
-            let _ = observe(Progress::Iteration(row));
+            observer.event(Progress::Iteration(row));
         }
         (self.solution, self.mesh)
     }
 }
 
-/// The questions to the observer while one mesh was solved, and its answers.
+/// What was told and answered while one mesh was solved.
 #[derive(Default)]
 struct OnMesh {
     warnings: Vec<Warning>,
@@ -173,6 +176,41 @@ struct OnMesh {
     stopped: bool,
     /// The memory that was needed and not available (bytes).
     short: Option<u64>,
+}
+
+/// Observes the solution on one mesh, which may not be the last.
+struct MeshObserver<'a> {
+    observer: &'a mut dyn Observer,
+    /// Whether this is not the first mesh: if it needs too much memory, the solution before remains, and that is no
+    /// error.
+    later: bool,
+    on_mesh: OnMesh,
+}
+
+impl Observer for MeshObserver<'_> {
+    fn event(&mut self, progress: Progress<'_>) {
+        match progress {
+            Progress::Iteration(row) => self.observer.event(Progress::Tentative(row)),
+            Progress::Step(_) => {}
+            Progress::Warning(warning) => self.on_mesh.warnings.push(warning.clone()),
+            Progress::OutOfMemory { bytes } if self.later => {
+                if !self.stop() {
+                    self.on_mesh.short = Some(bytes);
+                }
+            }
+            other => self.observer.event(other),
+        }
+    }
+
+    fn stop(&mut self) -> bool {
+        let on_mesh = &mut self.on_mesh;
+        on_mesh.stopped |= on_mesh.short.is_none() && self.observer.stop();
+        on_mesh.stopped || on_mesh.short.is_some()
+    }
+
+    fn behind(&mut self) -> Option<&mut dyn Observer> {
+        Some(self.observer)
+    }
 }
 
 impl OnMesh {
@@ -203,63 +241,11 @@ fn unsolved(outcome: Outcome) -> Option<&'static str> {
     }
 }
 
-/// Solves on one mesh. `later`: this is not the first mesh, and if it needs too much memory the solution before
-/// remains; the observer is then asked whether the memory is available, and its refusal is no error.
-fn solve_on(
-    model: Model,
-    origins: &mut Origins,
-    solve: &Solve<'_>,
-    later: bool,
-    observe: &mut Observer<'_>,
-) -> (Result<Solution, SolveError>, OnMesh) {
-    let mut on_mesh = OnMesh::default();
-    let solved = solve(model, origins, &mut |progress| {
-        if on_mesh.short.is_some() {
-            return ControlFlow::Break(());
-        }
-        let answer = match progress {
-            Progress::Iteration(row) => observe(Progress::Tentative(row)),
-            Progress::Step(_) => observe(Progress::Pulse),
-            Progress::Warning(warning) => {
-                on_mesh.warnings.push(warning.clone());
-                ControlFlow::Continue(())
-            }
-            Progress::Needs { bytes } if later => match has_room(bytes, observe) {
-                Ok(true) => ControlFlow::Continue(()),
-                Ok(false) => {
-                    on_mesh.short = Some(bytes);
-                    return ControlFlow::Break(());
-                }
-                Err(_) => ControlFlow::Break(()),
-            },
-            Progress::OutOfMemory { bytes } if later => {
-                on_mesh.short = Some(bytes);
-                return ControlFlow::Break(());
-            }
-            other => observe(other),
-        };
-        on_mesh.stopped |= answer.is_break();
-        answer
-    });
-    (solved, on_mesh)
-}
-
-/// Asks the observer whether this much memory is available; an error if it stops the solution.
-fn has_room(bytes: u64, observe: &mut Observer<'_>) -> Result<bool, SolveError> {
-    match observe(Progress::Room { bytes }) {
-        ControlFlow::Continue(()) => Ok(true),
-        ControlFlow::Break(()) => match observe(Progress::Pulse) {
-            ControlFlow::Continue(()) => Ok(false),
-            ControlFlow::Break(()) => Err(SolveError::Stopped),
-        },
-    }
-}
-
 /// Why a mesh is not solved: too many elements at a contact, or too much memory.
 fn too_large(
     model: &Model,
     most_at_contacts: &[usize],
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<Option<StopReason>, SolveError> {
     let at_contacts = model.contacts.iter().zip(most_at_contacts);
     let too_many = at_contacts
@@ -270,8 +256,11 @@ fn too_large(
     }
     let estimate = model.estimate_of_mesh();
     let (unknowns, bytes) = (estimate.dofs, estimate.memory_bytes);
-    let fits = has_room(bytes, observe)?;
-    Ok((!fits).then_some(StopReason::Memory { unknowns, bytes }))
+    match observer.may_use(bytes) {
+        true => Ok(None),
+        false if observer.stop() => Err(SolveError::Stopped),
+        false => Ok(Some(StopReason::Memory { unknowns, bytes })),
+    }
 }
 
 /// The largest number of elements at a contact, as the estimate of the memory assumes.

@@ -15,7 +15,7 @@ use crate::algorithm::newton::jacobian;
 use crate::algorithm::system::{Point, State, System};
 use crate::elasticity::Dof;
 use crate::linear::Interrupt;
-use crate::solution::{Observer, Progress};
+use crate::observer::Observer;
 
 /// The derivatives of a quantity by the contact unknowns and reactions.
 #[derive(Clone, Debug)]
@@ -85,7 +85,7 @@ pub fn influences(
     system: &System<'_>,
     state: &State,
     gradients: &[&Gradient],
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Option<Vec<Vec<f64>>> {
     let free = free_dofs(system, |i| state.active[i]);
     let mut place = vec![usize::MAX; system.load.len()];
@@ -94,8 +94,8 @@ pub fn influences(
     let bound = system.friction_bound(&pressures);
     let mut rhs = Vec::with_capacity(free.len() * gradients.len());
     let mut fixed = Vec::new();
-    let mut go_on = || observe(Progress::Pulse);
-    let interrupt = &mut Interrupt::new(&mut go_on);
+    let mut stop = || observer.stop();
+    let interrupt = &mut Interrupt::new(&mut stop);
     for gradient in gradients {
         let mut z = vec![0.0; system.load.len()];
         for (i, node) in system.nodes.iter().enumerate() {
@@ -115,15 +115,15 @@ pub fn influences(
         );
         fixed.push(z);
     }
-    let solved = dense(free.len(), observe, |interrupt| {
+    let solved = dense(free.len(), observer, |interrupt| {
         let known = (&bound[..], &pressures[..]);
         let mut h = jacobian(system, state, known, &free, &place, 0.0, interrupt)?;
         h.transpose(interrupt)?;
         h.solve(&rhs, interrupt)
     })?;
     let mut influences = fixed;
-    let mut go_on = || observe(Progress::Pulse);
-    let interrupt = &mut Interrupt::new(&mut go_on);
+    let mut stop = || observer.stop();
+    let interrupt = &mut Interrupt::new(&mut stop);
     for (k, z) in influences.iter_mut().enumerate() {
         let own = &solved[k * free.len()..(k + 1) * free.len()];
         free.iter()
@@ -158,13 +158,11 @@ pub fn influences(
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use std::ops::ControlFlow;
-
     use super::*;
     use crate::algorithm::{Place, Quantity, report, run};
 
     fn solve(system: &System<'_>) -> (State, Vec<Quantity>) {
-        let quiet: &mut Observer<'_> = &mut |_| ControlFlow::Continue(());
+        let quiet: &mut dyn Observer = &mut ();
         let controls = &system.model.controls;
         let finished = run(system, controls, Place::default(), None, quiet);
         // small forces that are none of the model's loads are missing in the balance of the result
@@ -199,7 +197,7 @@ mod tests {
                 problem["contacts"][0]["friction"] = friction;
             }
             let problem = serde_json::from_value(problem).unwrap();
-            let quiet: &mut Observer<'_> = &mut |_| ControlFlow::Continue(());
+            let quiet: &mut dyn Observer = &mut ();
             let prepared = crate::prepare(&problem, None, quiet).unwrap();
             let mut system = System::new(&prepared.model, &prepared.body, quiet).unwrap();
             let (state, quantities) = solve(&system);

@@ -3,7 +3,7 @@
 use crate::algorithm::system::System;
 use crate::elasticity::Dof;
 use crate::linear::{Cholesky, Dense, Interrupt, Unsolved};
-use crate::solution::{Observer, Progress};
+use crate::observer::{Observer, Progress, take};
 
 /// The free unknowns: normal ones of nodes that are not `held`, and tangential ones.
 pub(super) fn free_dofs(system: &System<'_>, held: impl Fn(usize) -> bool) -> Vec<usize> {
@@ -34,18 +34,15 @@ pub(super) fn semidefinite_shift(system: &System<'_>) -> f64 {
 /// observer stops.
 pub(super) fn dense<T>(
     size: usize,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
     solve: impl FnOnce(&mut Interrupt<'_>) -> Result<T, Unsolved>,
 ) -> Option<T> {
     let bytes = Dense::bytes(size);
-    if observe(Progress::Needs { bytes }).is_break() {
-        return None;
-    }
-    match solve(&mut Interrupt::new(&mut || observe(Progress::Pulse))) {
+    take(observer, bytes).ok()?;
+    match solve(&mut Interrupt::new(&mut || observer.stop())) {
         Ok(x) => Some(x),
         Err(Unsolved::TooLarge { bytes }) => {
-            // the answer is given again at the next question
-            let _ = observe(Progress::OutOfMemory { bytes });
+            observer.event(Progress::OutOfMemory { bytes });
             None
         }
         Err(Unsolved::Singular | Unsolved::Stopped) => None,
@@ -69,14 +66,14 @@ impl Factors {
         bound: &[f64],
         v: &[f64],
         free: &[usize],
-        observe: &mut Observer<'_>,
+        observer: &mut dyn Observer,
     ) -> Option<bool> {
         let serves = |(unknowns, _): &(Vec<usize>, Cholesky)| unknowns == free && !self.old;
         if self.last.as_ref().is_some_and(serves) {
             return Some(false);
         }
         let room = self.last.take().map(|(_, factor)| factor);
-        let factor = factor(system, bound, v, free, room, observe)?;
+        let factor = factor(system, bound, v, free, room, observer)?;
         self.last = Some((free.to_vec(), factor));
         self.old = false;
         Some(true)
@@ -107,7 +104,7 @@ fn factor(
     v: &[f64],
     free: &[usize],
     room: Option<Cholesky>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Option<Cholesky> {
     let mut place = vec![usize::MAX; system.load.len()];
     free.iter().enumerate().for_each(|(k, &dof)| place[dof] = k);
@@ -137,7 +134,7 @@ fn factor(
         let shift = if i == j { shift } else { 0.0 };
         system.stiffness.at(free[i], free[j]) + shift
     };
-    dense(free.len(), observe, |interrupt| {
+    dense(free.len(), observer, |interrupt| {
         Cholesky::new(free.len(), elastic, &friction, room, interrupt)
     })
 }

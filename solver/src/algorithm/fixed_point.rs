@@ -2,8 +2,6 @@
 //! problem, take the bound that its pressure implies, and repeat. Where the sweeps contract slowly,
 //! the next bound is extrapolated from the last few (Anderson acceleration).
 
-use std::ops::ControlFlow;
-
 use crate::algorithm::convex::{Minimum, minimise_with};
 use crate::algorithm::finished::End;
 use crate::algorithm::recorder::{Measured, Recorder, Row};
@@ -12,7 +10,8 @@ use crate::algorithm::system::{State, System};
 use crate::elasticity::Dof;
 use crate::friction::Source;
 use crate::linear::least_squares;
-use crate::solution::{Observer, Outcome, Stage};
+use crate::observer::Observer;
+use crate::solution::{Outcome, Stage};
 
 /// The contraction q above which sweeps are accelerated.
 const SLOW: f64 = 0.7;
@@ -29,15 +28,15 @@ const STEADY: f64 = 0.5;
 /// Sweeps in a row that leave only rounding, after which no better one is expected: each has tried several steps.
 const SETTLED: u32 = 3;
 
-/// Solves one convex problem; its solution is measured and reported.
+/// Solves one convex problem; its solution is measured and reported. Also returns whether to stop.
 pub(super) fn sweep(
     recorder: &mut Recorder<'_, '_>,
     stage: Stage,
     bound: Vec<f64>,
     start: &State,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
     contraction: impl FnOnce(&Measured) -> Option<f64>,
-) -> (Measured, ControlFlow<()>) {
+) -> (Measured, bool) {
     let tolerance = recorder.controls.tolerance;
     let Minimum {
         state,
@@ -51,7 +50,7 @@ pub(super) fn sweep(
         start,
         tolerance,
         &mut recorder.factors,
-        observe,
+        observer,
     );
     let measured = Measured::with_force(recorder.system, state, elastic_force, bound);
     let row = Row {
@@ -64,8 +63,8 @@ pub(super) fn sweep(
             .tractions(&measured.state.v, &measured.bound),
         own_r_f: None,
     };
-    let answer = recorder.record(&measured, row, observe);
-    (measured, answer)
+    let stopped = recorder.record(&measured, row, observer);
+    (measured, stopped)
 }
 
 /// Sweeps from a state and the bound it implies until state and bound no longer change.
@@ -76,7 +75,7 @@ pub(super) fn run(
     recorder: &mut Recorder<'_, '_>,
     start: Measured,
     give_up_early: bool,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> End {
     let given = |source: &Source| matches!(source, Source::Given(_));
     let prescribed = recorder.system.points.iter().all(|p| given(&p.source));
@@ -103,7 +102,7 @@ pub(super) fn run(
             Some(m.bound_change / before)
         };
         let start = swept.measured.state.clone();
-        let (measured, answer) = sweep(recorder, stage, next, &start, observe, quotient);
+        let (measured, stopped) = sweep(recorder, stage, next, &start, observer, quotient);
         let q = quotient(&measured);
         swept.contraction = q.or(swept.contraction);
         let (change, friction) = (measured.bound_change, measured.residuals.friction);
@@ -115,7 +114,7 @@ pub(super) fn run(
             swept.cycle = None;
             return swept;
         }
-        if answer.is_break() {
+        if stopped {
             swept.outcome = Outcome::Canceled;
             return swept;
         }

@@ -19,8 +19,9 @@ use crate::algorithm::system::{ContactNode, Follows, Oblique, Patch, State, Syst
 use crate::elasticity::Dof;
 use crate::friction::{BoundLaw, FrictionLaw, Source};
 use crate::linear::{Dense, Eliminated};
+use crate::observer::Observer;
 use crate::problem::{Algorithm, Condition, FrictionPoints, SolverControls};
-use crate::solution::{Iteration, Observer, Outcome};
+use crate::solution::{Iteration, Outcome};
 
 /// Below this number of unknowns the whole system costs next to nothing.
 const LEAST: usize = 64;
@@ -85,7 +86,7 @@ pub fn run_reduced(
     place: Place,
     before: Option<&Finished>,
     region: &mut Region,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Finished {
     let mut history: Vec<Iteration> = Vec::new();
     let mut last = before.cloned();
@@ -94,17 +95,17 @@ pub fn run_reduced(
             rows: place.rows + history.len() as u32,
             ..place
         };
-        region.prepare(system, controls, last.as_ref(), observe);
+        region.prepare(system, controls, last.as_ref(), observer);
         let start = last.as_ref();
         let (mut finished, outside) = match &region.near {
             None => {
-                let finished = super::run(system, controls, place, start, observe);
+                let finished = super::run(system, controls, place, start, observer);
                 (finished, Vec::new())
             }
             Some(near) => {
                 let (part, load) = near.part(system);
                 let start = start.map(|start| near.on_part(start));
-                let found = super::run(&part, controls, place, start.as_ref(), observe);
+                let found = super::run(&part, controls, place, start.as_ref(), observer);
                 near.on_whole(system, controls, load, found)
             }
         };
@@ -138,12 +139,12 @@ pub fn follow_neighbour(
     controls: &SolverControls,
     (neighbour, before): (&Finished, Option<&[f64]>),
     region: &mut Region,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Option<(Finished, u32)> {
     if controls.algorithm != Algorithm::Auto || system.semidefinite {
         return None;
     }
-    region.prepare(system, controls, Some(neighbour), observe);
+    region.prepare(system, controls, Some(neighbour), observer);
     let (near, factors) = (&region.near, &mut region.factors);
     let mut start = neighbour.state.clone();
     if let Some(before) = before {
@@ -151,11 +152,11 @@ pub fn follow_neighbour(
         pairs.for_each(|(v, before)| *v += *v - before);
     }
     let Some(near) = near else {
-        return follow_as_alone(system, controls, &start, factors, observe);
+        return follow_as_alone(system, controls, &start, factors, observer);
     };
     let (part, load) = near.part(system);
     let start = near.state_on_part(&start);
-    let (found, steps) = follow_as_alone(&part, controls, &start, factors, observe)?;
+    let (found, steps) = follow_as_alone(&part, controls, &start, factors, observer)?;
     let (finished, outside) = near.on_whole(system, controls, load, found);
     let settled = outside.is_empty()
         && finished.rounding.is_none()
@@ -170,18 +171,18 @@ fn follow_as_alone(
     controls: &SolverControls,
     start: &State,
     factors: &mut Factors,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Option<(Finished, u32)> {
     /// Friction bounds of one solution agree to this part, far above the error that the tolerance permits.
     const AGREES: f64 = 1e-5;
-    let (found, steps) = follow(system, controls, start, factors, observe)?;
+    let (found, steps) = follow(system, controls, start, factors, observer)?;
     let given = |source: &Source| matches!(source, Source::Given(_));
     // a convex problem has one solution
     if system.points.iter().all(|point| given(&point.source)) {
         return Some((found, steps));
     }
     let none = vec![0.0; system.points.len()];
-    let free = minimise(system, &none, &found.state, controls.tolerance, observe);
+    let free = minimise(system, &none, &found.state, controls.tolerance, observer);
     let pressures = system.pressures(&system.reactions_of(&free.state, &free.elastic_force));
     let implied = system.friction_bound(&pressures);
     // without a pressure there is no friction: that is the solution
@@ -189,7 +190,7 @@ fn follow_as_alone(
         implied
     } else {
         let start = all_sticking(system, &free.state);
-        let own = follow(system, controls, &start, &mut Factors::default(), observe)?;
+        let own = follow(system, controls, &start, &mut Factors::default(), observer)?;
         own.0.bound
     };
     let most = own
@@ -235,7 +236,7 @@ impl Region {
         system: &System<'_>,
         controls: &SolverControls,
         last: Option<&Finished>,
-        observe: &mut Observer<'_>,
+        observer: &mut dyn Observer,
     ) {
         // the thesis's own iteration is kept as printed, and a body that only contact holds has no factor of its own
         let whole = controls.algorithm == Algorithm::Thesis || system.semidefinite;
@@ -266,7 +267,7 @@ impl Region {
         if self.near.is_some() {
             return;
         }
-        match MayTouch::new(system, wanted.clone(), observe) {
+        match MayTouch::new(system, wanted.clone(), observer) {
             Some(near) => {
                 let near = Arc::new(near);
                 let bytes = near.bytes() + self.made.iter().map(|near| near.bytes()).sum::<u64>();
@@ -363,7 +364,7 @@ fn rubbed(system: &System<'_>, touches: &[bool]) -> Vec<bool> {
 
 impl MayTouch {
     /// Eliminates the unknowns of all nodes but `kept`. None if that is not worth it, or the observer stops.
-    fn new(system: &System<'_>, kept: Vec<bool>, observe: &mut Observer<'_>) -> Option<Self> {
+    fn new(system: &System<'_>, kept: Vec<bool>, observer: &mut dyn Observer) -> Option<Self> {
         let size = system.load.len();
         let mut keeps = vec![false; size];
         for (node, _) in system.nodes.iter().zip(&kept).filter(|(_, kept)| **kept) {
@@ -379,7 +380,7 @@ impl MayTouch {
         let count = order.len();
         order.extend(rest);
         let entry = |i: usize, j: usize| system.stiffness.at(order[i], order[j]);
-        let (eliminated, stiffness) = dense(size, observe, |interrupt| {
+        let (eliminated, stiffness) = dense(size, observer, |interrupt| {
             Eliminated::new(size, count, entry, interrupt)
         })?;
         // a node of two contacts is kept with either of them

@@ -60,10 +60,9 @@ pub use uniqueness::{
     warn_of_increments,
 };
 
-use std::ops::ControlFlow;
-
+use crate::observer::{Filtered, Observer, Progress};
 use crate::problem::{Algorithm, SolverControls};
-use crate::solution::{Observer, Outcome, Progress, Stage};
+use crate::solution::{Outcome, Stage};
 use finished::{End, finish};
 use fixed_point::{all_sticking, sweep};
 use recorder::{Measured, Recorder, Row};
@@ -78,14 +77,14 @@ pub fn run(
     controls: &SolverControls,
     place: Place,
     before: Option<&Finished>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Finished {
     if system.semidefinite
         && let Some(slide) = slides::certain(system)
     {
-        return away(Recorder::new(system, controls, place), slide, observe);
+        return away(Recorder::new(system, controls, place), slide, observer);
     }
-    let finished = iterate(system, controls, place, before, observe);
+    let finished = iterate(system, controls, place, before, observer);
     let slide = match finished.outcome {
         Outcome::Converged | Outcome::Canceled => None,
         _ if system.semidefinite => slides::found(system, &finished.state),
@@ -95,8 +94,8 @@ pub fn run(
 }
 
 /// The end for a body that slides away: the bonded state with all the friction that its pressure permits.
-fn away(mut recorder: Recorder<'_, '_>, slide: Slide, observe: &mut Observer<'_>) -> Finished {
-    let (bonded, answer) = bonded_state(recorder.system, recorder.controls, observe);
+fn away(mut recorder: Recorder<'_, '_>, slide: Slide, observer: &mut dyn Observer) -> Finished {
+    let (bonded, stopped) = bonded_state(recorder.system, recorder.controls, observer);
     let measured = slides::slid(recorder.system, bonded, &slide);
     let row = Row {
         stage: Stage::Bonded,
@@ -108,8 +107,8 @@ fn away(mut recorder: Recorder<'_, '_>, slide: Slide, observe: &mut Observer<'_>
             .tractions(&measured.state.v, &measured.bound),
         own_r_f: None,
     };
-    let answers = [answer, recorder.record(&measured, row, observe)];
-    let outcome = if answers.iter().any(ControlFlow::is_break) {
+    let stopped = recorder.record(&measured, row, observer) || stopped;
+    let outcome = if stopped {
         Outcome::Canceled
     } else {
         Outcome::NotConverged
@@ -125,32 +124,32 @@ fn iterate(
     controls: &SolverControls,
     place: Place,
     before: Option<&Finished>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Finished {
     let mut recorder = Recorder::new(system, controls, place);
     if controls.algorithm == Algorithm::Thesis {
-        let (end, tractions) = thesis::run(&mut recorder, observe);
+        let (end, tractions) = thesis::run(&mut recorder, observer);
         return Finished {
             tractions,
             own_tractions: true,
             ..finish(recorder, end)
         };
     }
-    let (start, answer) = start(&mut recorder, before, observe);
+    let (start, stopped) = start(&mut recorder, before, observer);
     // without friction, or if friction never acts, the first solution is final
     let solved = start.within(controls.tolerance) && before.is_none();
-    if system.points.is_empty() || solved || answer.is_break() {
-        let outcome = match answer {
+    if system.points.is_empty() || solved || stopped {
+        let outcome = match stopped {
             _ if start.within(controls.tolerance) => Outcome::Converged,
-            ControlFlow::Break(()) => Outcome::Canceled,
-            ControlFlow::Continue(()) => Outcome::NotConverged,
+            true => Outcome::Canceled,
+            false => Outcome::NotConverged,
         };
         return finish(recorder, End::new(start, Stage::Frictionless, outcome));
     }
     let end = match controls.algorithm {
-        Algorithm::FixedPoint => fixed_point::run(&mut recorder, start, false, observe),
-        Algorithm::Newton => newton::run(&mut recorder, &start, controls.max_iterations, observe),
-        Algorithm::Auto | Algorithm::Thesis => return auto(recorder, start, observe),
+        Algorithm::FixedPoint => fixed_point::run(&mut recorder, start, false, observer),
+        Algorithm::Newton => newton::run(&mut recorder, &start, controls.max_iterations, observer),
+        Algorithm::Auto | Algorithm::Thesis => return auto(recorder, start, observer),
     };
     finish(recorder, end)
 }
@@ -160,8 +159,8 @@ fn iterate(
 fn start(
     recorder: &mut Recorder<'_, '_>,
     before: Option<&Finished>,
-    observe: &mut Observer<'_>,
-) -> (Measured, ControlFlow<()>) {
+    observer: &mut dyn Observer,
+) -> (Measured, bool) {
     let system = recorder.system;
     if let (Some(before), false) = (before, system.points.is_empty()) {
         let (state, bound) = (before.state.clone(), before.bound.clone());
@@ -170,74 +169,70 @@ fn start(
             implied_bound: bound.clone(),
             ..Measured::new(system, state, bound)
         };
-        return (measured, ControlFlow::Continue(()));
+        return (measured, false);
     }
     let none = vec![0.0; system.points.len()];
     let rest = before.map_or_else(|| system.rest(), |before| before.state.clone());
     let stage = Stage::Frictionless;
-    let (mut measured, answer) = sweep(recorder, stage, none, &rest, observe, |_| None);
+    let (mut measured, stopped) = sweep(recorder, stage, none, &rest, observer, |_| None);
     let solved = measured.within(recorder.controls.tolerance);
-    if system.points.is_empty() || solved || answer.is_break() {
-        return (measured, answer);
+    if system.points.is_empty() || solved || stopped {
+        return (measured, stopped);
     }
     let tolerance = recorder.controls.tolerance;
     let rounded = || rounding::limit(system, &measured, tolerance).is_some();
     if system.semidefinite && measured.residuals.kkt > tolerance && !rounded() {
         // only friction holds this body: without it, it slides away
-        let (bonded, answer) = bonded_state(system, recorder.controls, observe);
-        return (bonded, answer);
+        let (bonded, stopped) = bonded_state(system, recorder.controls, observer);
+        return (bonded, stopped);
     }
     measured.state = all_sticking(system, &measured.state);
     measured.elastic_force = system.elastic_force(&measured.state.v);
-    (measured, answer)
+    (measured, stopped)
 }
 
 /// The bonded state, u_t = d throughout, and the friction bound that it implies.
 fn bonded_state(
     system: &System<'_>,
     controls: &SolverControls,
-    observe: &mut Observer<'_>,
-) -> (Measured, ControlFlow<()>) {
+    observer: &mut dyn Observer,
+) -> (Measured, bool) {
     let bonded = system.bonded();
     let mut recorder = Recorder::new(&bonded, controls, Place::default());
-    let (found, answer) = sweep(
+    let (found, stopped) = sweep(
         &mut recorder,
         Stage::Bonded,
         Vec::new(),
         &bonded.rest(),
-        &mut quiet(observe),
+        &mut quiet(observer),
         |_| None,
     );
     let none = vec![0.0; system.points.len()];
-    (Measured::new(system, found.state, none), answer)
+    (Measured::new(system, found.state, none), stopped)
 }
 
-/// An observer that sees iterations as plain signs of work: it may stop a solution whose iterations are not shown to
-/// it.
-pub fn quiet(observe: &mut Observer<'_>) -> impl FnMut(Progress<'_>) -> ControlFlow<()> {
-    |progress| match progress {
-        Progress::Iteration(_) | Progress::Pulse => observe(Progress::Pulse),
-        Progress::Needs { bytes } => observe(Progress::Needs { bytes }),
-        Progress::OutOfMemory { bytes } => observe(Progress::OutOfMemory { bytes }),
-        Progress::SecondThread => observe(Progress::SecondThread),
-        _ => ControlFlow::Continue(()),
+/// The observer of iterations that are not shown to it: it may still stop them.
+pub(crate) fn quiet(observer: &mut dyn Observer) -> Filtered<'_> {
+    Filtered {
+        observer,
+        seen: |progress| matches!(progress, Progress::OutOfMemory { .. }).then_some(progress),
     }
 }
 
 /// Sweeps; where they do not converge, Newton's method from the best sweep; where that fails too, both
 /// again from the bonded state: beyond a fold the free branch ends, and only a jammed state exists.
-fn auto(mut recorder: Recorder<'_, '_>, start: Measured, observe: &mut Observer<'_>) -> Finished {
-    let first = both(&mut recorder, start, observe);
+fn auto(mut recorder: Recorder<'_, '_>, start: Measured, observer: &mut dyn Observer) -> Finished {
+    let first = both(&mut recorder, start, observer);
     if first.ended() {
         return finish(recorder, first);
     }
-    let (bonded, answer) = bonded_state(recorder.system, recorder.controls, observe);
-    if answer.is_break() {
+    let (bonded, stopped) = bonded_state(recorder.system, recorder.controls, observer);
+    if stopped {
         let outcome = Outcome::Canceled;
         return finish(recorder, End { outcome, ..first });
     }
     recorder.forget();
-    let second = both(&mut recorder, bonded, observe);
+    let second = both(&mut recorder, bonded, observer);
     let nearer = second.outcome == Outcome::Converged
         || second.rounding.is_some()
         || second.outcome == Outcome::Canceled
@@ -251,15 +246,15 @@ fn auto(mut recorder: Recorder<'_, '_>, start: Measured, observe: &mut Observer<
 }
 
 /// Sweeps, then Newton's method from the best of them.
-fn both(recorder: &mut Recorder<'_, '_>, start: Measured, observe: &mut Observer<'_>) -> End {
+fn both(recorder: &mut Recorder<'_, '_>, start: Measured, observer: &mut dyn Observer) -> End {
     let (system, tolerance) = (recorder.system, recorder.controls.tolerance);
-    let swept = fixed_point::run(recorder, start, true, observe);
+    let swept = fixed_point::run(recorder, start, true, observer);
     let swept = swept.settled(system, tolerance, &recorder.history);
     if swept.ended() {
         return swept;
     }
     recorder.forget();
-    let newton = newton::run(recorder, &swept.measured, NEWTON_STEPS, observe);
+    let newton = newton::run(recorder, &swept.measured, NEWTON_STEPS, observer);
     let newton = newton.settled(system, tolerance, &recorder.history);
     let nearer = newton.outcome == Outcome::Converged
         || newton.rounding.is_some()

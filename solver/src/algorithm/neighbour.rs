@@ -8,8 +8,9 @@ use crate::algorithm::convex::{close, least_along, update_active};
 use crate::algorithm::factors::{Factors, free_dofs};
 use crate::algorithm::finished::Finished;
 use crate::algorithm::system::{State, System};
+use crate::observer::Observer;
 use crate::problem::SolverControls;
-use crate::solution::{Observer, Outcome, Progress, Residuals, Stage};
+use crate::solution::{Outcome, Residuals, Stage};
 
 /// The largest number of steps; eight to twelve are usual.
 const MOST_STEPS: u32 = 40;
@@ -32,7 +33,7 @@ pub(super) fn follow(
     controls: &SolverControls,
     start: &State,
     factors: &mut Factors,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Option<(Finished, u32)> {
     let (tolerance, most) = (controls.tolerance, controls.max_iterations.min(MOST_STEPS));
     let mut state = start.clone();
@@ -71,7 +72,7 @@ pub(super) fn follow(
         }
         let stalls = residual > SLOW * residual_before;
         slow += u32::from(stalls);
-        if slow > PATIENCE || observe(Progress::Pulse).is_break() {
+        if slow > PATIENCE || observer.stop() {
             return None;
         }
         if residual > SERVES * residual_before {
@@ -79,7 +80,7 @@ pub(super) fn follow(
         }
         residual_before = residual;
         let free = free_dofs(system, |i| state.active[i]);
-        let renewed = factors.prepare(system, &bound, &state.v, &free, observe)?;
+        let renewed = factors.prepare(system, &bound, &state.v, &free, observer)?;
         let sums = force.iter_mut().zip(&elastic_force);
         sums.for_each(|(force, elastic)| *force += elastic);
         let direction = factors.direction(&force)?;

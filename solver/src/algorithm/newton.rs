@@ -19,7 +19,8 @@ use crate::algorithm::rounding;
 use crate::algorithm::system::{Point, State, System};
 use crate::elasticity::Dof;
 use crate::linear::{Dense, General, Interrupt, Unsolved};
-use crate::solution::{Observer, Outcome, Progress, Stage};
+use crate::observer::Observer;
+use crate::solution::{Outcome, Stage};
 
 /// Steps without progress after which the method gives up.
 const PATIENCE: u32 = 20;
@@ -29,7 +30,7 @@ pub(super) fn run(
     recorder: &mut Recorder<'_, '_>,
     start: &Measured,
     most_steps: u32,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> End {
     let system = recorder.system;
     let tolerance = recorder.controls.tolerance;
@@ -39,8 +40,8 @@ pub(super) fn run(
     let (mut since_best, mut rounded) = (0, 0);
     for _ in 0..most_steps {
         close(system, &mut state);
-        let Some((measured, changed)) = next(system, &state, residual_before, observe) else {
-            if observe(Progress::Pulse).is_break() {
+        let Some((measured, changed)) = next(system, &state, residual_before, observer) else {
+            if observer.stop() {
                 end.outcome = Outcome::Canceled;
             }
             return end;
@@ -56,7 +57,7 @@ pub(super) fn run(
             tractions: system.tractions(&measured.state.v, &measured.bound),
             own_r_f: None,
         };
-        let answer = recorder.record(&measured, row, observe);
+        let stopped = recorder.record(&measured, row, observer);
         let converged = !changed && measured.within(tolerance);
         since_best += 1;
         if residual < 0.9 * best || converged {
@@ -71,7 +72,7 @@ pub(super) fn run(
             Some(_) => rounded + 1,
             None => 0,
         };
-        if answer.is_break() {
+        if stopped {
             end.outcome = Outcome::Canceled;
             return end;
         }
@@ -97,9 +98,9 @@ fn next(
     system: &System<'_>,
     state: &State,
     residual: f64,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Option<(Measured, bool)> {
-    let target = step(system, state, observe)?;
+    let target = step(system, state, observer)?;
     let reach = |part: f64| {
         let moved = state.v.iter().zip(&target).map(|(a, b)| a + part * (b - a));
         let mut reached = State {
@@ -127,7 +128,7 @@ fn implied_bound(system: &System<'_>, state: &State, force: &[f64]) -> Vec<f64> 
 }
 
 /// v after one Newton step; active nodes stay on the obstacle.
-fn step(system: &System<'_>, state: &State, observe: &mut Observer<'_>) -> Option<Vec<f64>> {
+fn step(system: &System<'_>, state: &State, observer: &mut dyn Observer) -> Option<Vec<f64>> {
     let free = free_dofs(system, |i| state.active[i]);
     let mut place = vec![usize::MAX; system.load.len()];
     free.iter().enumerate().for_each(|(k, &dof)| place[dof] = k);
@@ -141,7 +142,7 @@ fn step(system: &System<'_>, state: &State, observe: &mut Observer<'_>) -> Optio
         0.0
     };
     let rhs: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
-    let delta = dense(free.len(), observe, |interrupt| {
+    let delta = dense(free.len(), observer, |interrupt| {
         let h = jacobian(
             system,
             state,

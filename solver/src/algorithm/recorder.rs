@@ -1,14 +1,12 @@
 //! Measures, records and reports the states of every algorithm.
 
 use std::collections::HashMap;
-use std::ops::ControlFlow;
 
 use crate::algorithm::factors::Factors;
 use crate::algorithm::system::{State, System};
+use crate::observer::{Observer, Progress};
 use crate::problem::SolverControls;
-use crate::solution::{
-    ContactCount, ForcePair, FrictionCount, Iteration, Observer, Progress, Residuals, Stage,
-};
+use crate::solution::{ContactCount, ForcePair, FrictionCount, Iteration, Residuals, Stage};
 
 /// The place of the iterations in the load history.
 #[derive(Clone, Copy, Debug, Default)]
@@ -147,13 +145,13 @@ impl<'s, 'a> Recorder<'s, 'a> {
         }
     }
 
-    /// Adds a row to the history and shows it to the observer.
+    /// Adds a row to the history and shows it to the observer; whether to stop.
     pub(super) fn record(
         &mut self,
         measured: &Measured,
         row: Row,
-        observe: &mut Observer<'_>,
-    ) -> ControlFlow<()> {
+        observer: &mut dyn Observer,
+    ) -> bool {
         let (system, active) = (self.system, &measured.state.active);
         let none = vec![false; active.len()];
         let previous = self.before.as_ref().map_or(&none, |(active, _)| active);
@@ -200,11 +198,11 @@ impl<'s, 'a> Recorder<'s, 'a> {
             contraction: row.contraction,
             inner: row.inner,
         };
-        let answer = observe(Progress::Iteration(&iteration));
+        observer.event(Progress::Iteration(&iteration));
         self.history.push(iteration);
         self.contact_changed = contact.entered + contact.left > 0;
         self.before = Some((active.clone(), measured.pressures.clone()));
-        answer
+        observer.stop()
     }
 
     /// Records contact and slip of a state. Returns a cycle if the same state occurred before, with others since then

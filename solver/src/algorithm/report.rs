@@ -2,7 +2,6 @@
 
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
 
 use crate::algorithm::finished::Finished;
 use crate::algorithm::large_slip::large_slip;
@@ -13,9 +12,10 @@ use crate::elasticity::{Dof, Recovered, StressDifference, recover};
 use crate::error::SolveError;
 use crate::linear::{Interrupt, Stopped};
 use crate::model::{Hold, Model};
+use crate::observer::Observer;
 use crate::solution::{
-    ContactProfile, ContactSummary, Fields, GaussFields, NodeState, Observer, Outcome, Phase,
-    Progress, Residuals, Summary, Warning, WarningCode, at_all_points,
+    ContactProfile, ContactSummary, Fields, GaussFields, NodeState, Outcome, Phase, Residuals,
+    Summary, Warning, WarningCode, at_all_points,
 };
 
 /// Forces with a larger relative imbalance than this have lost half of their digits: the result is not reliable.
@@ -73,10 +73,10 @@ pub struct AlongContacts {
 pub fn numbers(
     system: &System<'_>,
     finished: &Finished,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<(BTreeMap<String, ContactSummary>, Vec<Warning>), SolveError> {
-    let mut ask = || observe(Progress::Pulse);
-    let state = FinalState::new(system, finished, &mut ask);
+    let mut stop = || observer.stop();
+    let state = FinalState::new(system, finished, &mut stop);
     let mut warnings = system.model.warnings.clone();
     let mut contacts = BTreeMap::new();
     state.view(|patch, view| {
@@ -92,10 +92,10 @@ pub fn numbers(
 pub fn quantities(
     system: &System<'_>,
     finished: &Finished,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Vec<Quantity> {
-    let mut ask = || observe(Progress::Pulse);
-    let state = FinalState::new(system, finished, &mut ask);
+    let mut stop = || observer.stop();
+    let state = FinalState::new(system, finished, &mut stop);
     let mut found = Vec::new();
     match state.view(|_, view| found.extend(view.quantities())) {
         Ok(()) => found,
@@ -111,9 +111,9 @@ struct Questions<'a> {
 }
 
 impl<'a> Questions<'a> {
-    fn new(ask: &'a mut dyn FnMut() -> ControlFlow<()>) -> Self {
+    fn new(stop: &'a mut dyn FnMut() -> bool) -> Self {
         Questions {
-            interrupt: RefCell::new(Interrupt::new(ask)),
+            interrupt: RefCell::new(Interrupt::new(stop)),
             stopped: Cell::new(false),
         }
     }
@@ -140,13 +140,13 @@ impl<'a> FinalState<'a> {
     fn new(
         system: &'a System<'a>,
         finished: &'a Finished,
-        ask: &'a mut dyn FnMut() -> ControlFlow<()>,
+        stop: &'a mut dyn FnMut() -> bool,
     ) -> Self {
         FinalState {
             system,
             finished,
             forces: Forces::new(system, finished),
-            questions: Questions::new(ask),
+            questions: Questions::new(stop),
         }
     }
 
@@ -221,20 +221,17 @@ impl AlongContacts {
 pub fn report(
     system: &System<'_>,
     finished: &Finished,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<Reported, SolveError> {
-    let mut patience = PATIENCE;
-    let mut ask = || match observe(Progress::Pulse) {
-        ControlFlow::Break(()) if patience > 0 => {
-            patience -= 1;
-            ControlFlow::Continue(())
-        }
-        answer => answer,
+    let mut refusals = 0;
+    let mut stop = || {
+        refusals += u32::from(observer.stop());
+        refusals > PATIENCE
     };
     if system.semidefinite && finished.outcome != Outcome::Canceled {
         held(system, finished)?;
     }
-    let state = FinalState::new(system, finished, &mut ask);
+    let state = FinalState::new(system, finished, &mut stop);
     let (inside, difference) = Inside::new(&state)?;
     let mut warnings = system.model.warnings.clone();
     let mut along = AlongContacts::new(&state, &mut warnings)?;

@@ -7,8 +7,8 @@ use crate::error::SolveError;
 use crate::friction::{Average, Averaging, Chain, FrictionLaw, Source, largest_pressure};
 use crate::linear::Dense;
 use crate::model::{ContactModel, Level, Model};
+use crate::observer::{Observer, go_on};
 use crate::problem::{Condition, FrictionPoints};
-use crate::solution::{Observer, Progress};
 
 /// A friction point whose bound is below this part of the largest counts as open: its anchor follows it.
 const OPEN: f64 = 1e-12;
@@ -213,9 +213,9 @@ impl<'a> System<'a> {
     pub fn new(
         model: &'a Model,
         body: &'a ElasticBody,
-        observe: &mut Observer<'_>,
+        observer: &mut dyn Observer,
     ) -> Result<Self, SolveError> {
-        System::with_averages(model, body, &mut Averages::default(), observe)
+        System::with_averages(model, body, &mut Averages::default(), observer)
     }
 
     /// As [`System::new`], using the averages of earlier systems on this body and adding those of this one.
@@ -223,7 +223,7 @@ impl<'a> System<'a> {
         model: &'a Model,
         body: &'a ElasticBody,
         averages: &mut Averages,
-        observe: &mut Observer<'_>,
+        observer: &mut dyn Observer,
     ) -> Result<Self, SolveError> {
         let mut system = System {
             stiffness: &body.stiffness,
@@ -241,7 +241,7 @@ impl<'a> System<'a> {
             model,
         };
         for contact in &model.contacts {
-            system.add(contact, averages, observe)?;
+            system.add(contact, averages, observer)?;
         }
         system.set_level(Level::FULL);
         let most =
@@ -261,7 +261,7 @@ impl<'a> System<'a> {
         &mut self,
         contact: &'a ContactModel,
         averages: &mut Averages,
-        observe: &mut Observer<'_>,
+        observer: &mut dyn Observer,
     ) -> Result<(), SolveError> {
         let (first, boundary) = (self.nodes.len(), &contact.boundary);
         let axis = &self.model.axis;
@@ -277,7 +277,7 @@ impl<'a> System<'a> {
         let friction = contact.friction.as_ref().filter(|law| law.bound.acts());
         let law = friction.map(|law| averages.law(self.patches.len(), law, chain));
         if let Some(law) = &law {
-            self.add_points(contact, first, law, observe)?;
+            self.add_points(contact, first, law, observer)?;
         }
         self.patches.push(Patch {
             contact,
@@ -330,7 +330,7 @@ impl<'a> System<'a> {
         contact: &ContactModel,
         first: usize,
         law: &FrictionLaw,
-        observe: &mut Observer<'_>,
+        observer: &mut dyn Observer,
     ) -> Result<(), SolveError> {
         let (patch, boundary) = (self.patches.len(), &contact.boundary);
         let own = &self.nodes[first..];
@@ -345,10 +345,7 @@ impl<'a> System<'a> {
                 source: law.bound.source(s).shifted(first),
                 anchor: 0.0,
             });
-            if observe(Progress::Pulse).is_break() {
-                return Err(SolveError::Stopped);
-            }
-            Ok(())
+            go_on(observer)
         };
         match law.points {
             FrictionPoints::Gauss3 => {

@@ -5,8 +5,9 @@ use crate::algorithm::recorder::{Measured, Recorder};
 use crate::algorithm::rounding::Rounding;
 use crate::algorithm::system::System;
 use crate::algorithm::{End, Finished, Place, bonded_state, both, fixed_point, quiet};
+use crate::observer::Observer;
 use crate::problem::SolverControls;
-use crate::solution::{Comparison, Observer, Outcome, StepSolution, Summary, Warning, WarningCode};
+use crate::solution::{Comparison, Outcome, StepSolution, Summary, Warning, WarningCode};
 
 /// Adds a comparison with a second solution to the summary, and a warning if the two differ.
 pub fn note_uniqueness(summary: &mut Summary, second: Comparison) {
@@ -153,9 +154,9 @@ pub fn other_solution(
     system: &System<'_>,
     controls: &SolverControls,
     first: &Finished,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Comparison {
-    let quiet: &mut Observer<'_> = &mut quiet(observe);
+    let quiet = &mut quiet(observer);
     let (start, _) = bonded_state(system, controls, quiet);
     let mut recorder = Recorder::new(system, controls, Place::default());
     let mut end = both(&mut recorder, start, quiet);

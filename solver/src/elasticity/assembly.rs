@@ -536,9 +536,7 @@ mod tests {
             "contacts": [{"boundary": "top", "obstacle": {"kind": "flat"}, "indentation": 0.1}]
         });
         let problem = serde_json::from_value(problem).unwrap();
-        let quiet: &mut crate::solution::Observer<'_> =
-            &mut |_| std::ops::ControlFlow::Continue(());
-        crate::prepare(&problem, None, quiet).unwrap().model
+        crate::prepare(&problem, None, &mut ()).unwrap().model
     }
 
     /// Elements assembled by shape have the same matrix as each element assembled by itself.

@@ -255,8 +255,6 @@ pub(super) fn find_runs(half: &[u32], local: &[u32], runs: &mut Vec<Run>) {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use std::ops::ControlFlow;
-
     use super::*;
 
     /// Large fronts are computed in blocks: one that is wide enough for blocks, and one whose reduction takes several
@@ -281,8 +279,8 @@ mod tests {
             columns: &mut columns,
             left: &mut left,
         };
-        let go_on = &mut || ControlFlow::Continue(());
-        let interrupt = &mut Interrupt::new(go_on);
+        let never = &mut || false;
+        let interrupt = &mut Interrupt::new(never);
         front.eliminate(1, interrupt).unwrap();
         front.reduce(Accum::Add, 1, interrupt).unwrap();
         let mut narrow: Vec<f64> = (0..own)

@@ -1,11 +1,9 @@
 //! Interruption points in long work, at which it may be stopped.
 
-use std::ops::ControlFlow;
-
 /// Calls a function whenever a portion of work is done; the function may stop the work. Work is counted in operations
 /// and not in seconds, since the solver has no clock.
 pub struct Interrupt<'a> {
-    ask: &'a mut dyn FnMut() -> ControlFlow<()>,
+    stop: &'a mut dyn FnMut() -> bool,
     done: f64,
 }
 
@@ -44,9 +42,9 @@ pub struct Stopped;
 pub(super) const PORTION: f64 = 5e7;
 
 impl<'a> Interrupt<'a> {
-    /// Interruption points that call `ask`, which answers whether to continue.
-    pub fn new(ask: &'a mut dyn FnMut() -> ControlFlow<()>) -> Self {
-        Interrupt { ask, done: 0.0 }
+    /// Interruption points that call `stop`, which answers whether to stop.
+    pub fn new(stop: &'a mut dyn FnMut() -> bool) -> Self {
+        Interrupt { stop, done: 0.0 }
     }
 
     /// Counts finished work (multiplications), and calls the function if a portion is complete.
@@ -61,9 +59,9 @@ impl<'a> Interrupt<'a> {
 
     /// Calls the function now.
     pub fn ask(&mut self) -> Result<(), Stopped> {
-        match (self.ask)() {
-            ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(Stopped),
+        match (self.stop)() {
+            true => Err(Stopped),
+            false => Ok(()),
         }
     }
 }

@@ -366,8 +366,6 @@ impl Assembly {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use std::ops::ControlFlow;
-
     use super::*;
     use crate::linear::dissection::tests::{grid, lines};
     use crate::linear::dissection::{Cells, Dissection};
@@ -491,9 +489,9 @@ mod tests {
 
         fn factor(&mut self, threads: usize) -> Result<(Factor, Dense), FactorError> {
             let fronts = self.fronts.take().unwrap();
-            let go_on = &mut || ControlFlow::Continue(());
+            let never = &mut || false;
             let element = |e: u32, matrix: &mut ElementMatrix| self.matrix(e, matrix);
-            Factor::new(fronts, &element, threads, &mut Interrupt::new(go_on))
+            Factor::new(fronts, &element, threads, &mut Interrupt::new(never))
         }
     }
 
@@ -576,7 +574,7 @@ mod tests {
         for (threads, bad) in [(1, 0.0), (1, -1.0), (1, f64::NAN), (2, 0.0), (2, f64::NAN)] {
             let mut body = Body::new(9, 7, &[5]);
             let fronts = body.fronts.take().unwrap();
-            let go_on = &mut || ControlFlow::Continue(());
+            let never = &mut || false;
             let element = |e: u32, matrix: &mut ElementMatrix| {
                 body.matrix(e, matrix);
                 for (i, unknown) in matrix.unknowns.iter().enumerate() {
@@ -587,7 +585,7 @@ mod tests {
                     }
                 }
             };
-            let refused = Factor::new(fronts, &element, threads, &mut Interrupt::new(go_on)).err();
+            let refused = Factor::new(fronts, &element, threads, &mut Interrupt::new(never)).err();
             let expected = if bad.is_nan() {
                 FactorError::NonFinite
             } else {
@@ -606,7 +604,7 @@ mod tests {
             let mut asked = 0;
             let mut stop = || {
                 asked += 1;
-                ControlFlow::Break(())
+                true
             };
             let element = |e: u32, matrix: &mut ElementMatrix| body.matrix(e, matrix);
             let stopped =

@@ -1,6 +1,5 @@
 //! Independent tasks on one thread or on several, with the same result.
 
-use std::ops::ControlFlow;
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::mpsc::sync_channel;
@@ -51,15 +50,11 @@ pub(super) fn for_each<T: Send, W: Send, E: From<Stopped> + PartialEq + Send>(
             // dropped when the thread ends, however it does
             let (ask, stopped, work_on) = (ask.clone(), &stopped, &work_on);
             let run = move || {
-                let mut go_on = || {
+                let mut stop = || {
                     let _ = ask.try_send(());
-                    if stopped.load(Relaxed) {
-                        ControlFlow::Break(())
-                    } else {
-                        ControlFlow::Continue(())
-                    }
+                    stopped.load(Relaxed)
                 };
-                work_on(workspace, &mut Interrupt::new(&mut go_on))
+                work_on(workspace, &mut Interrupt::new(&mut stop))
             };
             // where the system has no more threads, fewer do the work
             thread::Builder::new().spawn_scoped(scope, run).ok()
@@ -123,8 +118,8 @@ mod tests {
         }
     }
 
-    fn go_on() -> ControlFlow<()> {
-        ControlFlow::Continue(())
+    fn never() -> bool {
+        false
     }
 
     #[test]
@@ -144,7 +139,7 @@ mod tests {
                     Ok::<(), Error>(())
                 };
             let tasks = results.iter_mut().enumerate();
-            for_each(tasks, &mut counts, work, &mut Interrupt::new(&mut go_on)).unwrap();
+            for_each(tasks, &mut counts, work, &mut Interrupt::new(&mut never)).unwrap();
             assert!(results.into_iter().eq(1..=100));
             assert!(counts.iter().all(|count| *count > 0) && counts.iter().sum::<i32>() == 100);
         }
@@ -165,7 +160,7 @@ mod tests {
                 Err(Error::Bad(task))
             };
             let mut workspaces = vec![(); threads];
-            let failed = for_each(0..9, &mut workspaces, work, &mut Interrupt::new(&mut go_on));
+            let failed = for_each(0..9, &mut workspaces, work, &mut Interrupt::new(&mut never));
             assert_eq!(failed, Err(Error::Bad(0)));
         }
     }
@@ -188,10 +183,7 @@ mod tests {
         let mut asked = 0;
         let mut stop_at_third = || {
             asked += 1;
-            match asked {
-                3 => ControlFlow::Break(()),
-                _ => ControlFlow::Continue(()),
-            }
+            asked == 3
         };
         let mut interrupt = Interrupt::new(&mut stop_at_third);
         let stopped = for_each(0..2, &mut [true, false], work, &mut interrupt);
@@ -211,7 +203,7 @@ mod tests {
             0..2,
             &mut [true, false],
             work,
-            &mut Interrupt::new(&mut go_on),
+            &mut Interrupt::new(&mut never),
         );
     }
 }

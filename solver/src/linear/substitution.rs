@@ -1,7 +1,5 @@
 //! Solutions with a factor: upwards through the fronts for the forces, downwards for the displacements.
 
-use std::ops::ControlFlow;
-
 use super::fronts::{Front, Piece};
 use super::interrupt::{Interrupt, Stopped};
 use super::multifrontal::Factor;
@@ -56,7 +54,7 @@ impl Factor {
                     self.backward_in(fronts, own, (end, &*after), v);
                     Ok::<_, Stopped>(())
                 };
-            let never = &mut || ControlFlow::Continue(());
+            let never = &mut || false;
             let workspaces = &mut workspaces[..threads.min(tasks.len())];
             let tasks = tasks.into_iter();
             let _ = for_each(tasks, workspaces, work, &mut Interrupt::new(never));

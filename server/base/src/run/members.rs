@@ -1,31 +1,22 @@
 //! Solves members of a sweep that share a body, one after another, both for the worker and for `signorini sweep`. A
 //! later attempt does not store a row again, and solves its member again only if others start from it.
 
-use std::ops::ControlFlow;
-
 use files::sweep::{Group, Neighbour, Plan, Problems, has_own_meshes};
 use solver::{
     Prepared,
     error::SolveError,
     family::{End, Family, Member, Start},
     mesh::External,
+    observer::Observer,
     problem::{MeshInput, Problem},
-    solution::{Observer, Outcome, Progress},
+    solution::Outcome,
 };
 
 use crate::{job::Reason, sweep::MemberRow};
 
-/// A report while members are solved; the answer is whether to continue.
-pub enum Step<'a> {
-    /// Progress of the solver.
-    Progress(Progress<'a>),
-    /// The row of a member that is solved, or cannot be.
-    Row(Box<MemberRow>),
-}
-
 /// Checks a problem and prepares its body, which is made or reused: see [`solver::prepare`].
 pub type Prepare<'a> =
-    dyn Fn(&Problem, Option<External>, &mut Observer<'_>) -> Result<Prepared, SolveError> + 'a;
+    dyn Fn(&Problem, Option<External>, &mut dyn Observer) -> Result<Prepared, SolveError> + 'a;
 
 /// The members of a sweep that share a body, or may.
 pub struct Members<'a> {
@@ -41,6 +32,8 @@ pub struct Members<'a> {
     prepare: &'a Prepare<'a>,
     /// The common body, once a member that has one was solved.
     family: Option<Family>,
+    /// Why the common body cannot be factored, and so no member solved.
+    unsound: Option<SolveError>,
     /// By line: the last member that was solved on it, with its end, or that of its neighbour if it has none.
     lines: Vec<Option<(usize, Option<End>)>>,
 }
@@ -64,51 +57,39 @@ impl<'a> Members<'a> {
             external,
             prepare,
             family,
+            unsound: None,
             lines: (0..plan.lines()).map(|_| None).collect(),
         }
     }
 
-    /// Solves some of the members, and reports each row; a failure is a row, too. The error means that the solver was
-    /// stopped.
-    pub fn solve(
+    /// Solves one of the members; a failure is a row, too. They are solved in order. The error means that the solver
+    /// was stopped.
+    pub fn row(
         &mut self,
-        numbers: &[usize],
-        tell: &mut dyn FnMut(Step<'_>) -> ControlFlow<()>,
-    ) -> Result<(), SolveError> {
-        for (place, number) in numbers.iter().enumerate() {
-            let row = match self.member(*number, &mut |progress| tell(Step::Progress(progress))) {
-                Ok(member) if member.outcome == Outcome::Canceled => {
-                    return Err(SolveError::Stopped);
-                }
-                Ok(member) => MemberRow::solved(*number, member),
-                Err(Failed::Member(error)) => row_of(*number, error)?,
-                // the others have the same body
-                Err(Failed::Body(error)) => {
-                    for number in &numbers[place..] {
-                        let row = Box::new(row_of(*number, error.clone())?);
-                        if tell(Step::Row(row)).is_break() {
-                            return Err(SolveError::Stopped);
-                        }
-                    }
-                    return Ok(());
-                }
-            };
-            if tell(Step::Row(Box::new(row))).is_break() {
-                return Err(SolveError::Stopped);
-            }
+        number: usize,
+        observer: &mut dyn Observer,
+    ) -> Result<MemberRow, SolveError> {
+        if let Some(error) = &self.unsound {
+            return row_of(number, error.clone());
         }
-        Ok(())
+        match self.member(number, observer) {
+            Ok(member) if member.outcome == Outcome::Canceled => Err(SolveError::Stopped),
+            Ok(member) => Ok(MemberRow::solved(number, member)),
+            Err(Failed::Member(error)) => row_of(number, error),
+            // the others have the same body
+            Err(Failed::Body(error)) => row_of(number, self.unsound.insert(error).clone()),
+        }
     }
 
-    fn member(&mut self, number: usize, observe: &mut Observer<'_>) -> Result<Member, Failed> {
+    fn member(&mut self, number: usize, observer: &mut dyn Observer) -> Result<Member, Failed> {
         if self.family.is_some() {
             for ancestor in self.missing(number) {
                 // what is wrong with it is told in its own row
-                if let Err(SolveError::Stopped) = self.on_body(ancestor, observe) {
+                if let Err(SolveError::Stopped) = self.on_body(ancestor, observer) {
                     return Err(Failed::Member(SolveError::Stopped));
                 }
             }
-            match self.on_body(number, observe) {
+            match self.on_body(number, observer) {
                 Err(SolveError::OtherBody) => {}
                 solved => return Ok(solved?),
             }
@@ -117,10 +98,10 @@ impl<'a> Members<'a> {
         let problem = problem.map_err(SolveError::Invalid)?;
         let external = (self.external)(&problem);
         if self.family.is_some() || is_alone(&problem) {
-            let solution = solver::solve_on(&problem, external, observe)?;
+            let solution = solver::solve_on(&problem, external, observer)?;
             return Ok(Member::of(&solution.summary));
         }
-        let prepared = (self.prepare)(&problem, external, observe);
+        let prepared = (self.prepare)(&problem, external, observer);
         let prepared = prepared.map_err(|error| match error {
             SolveError::SingularSystem { .. } | SolveError::NonFinite { .. } => Failed::Body(error),
             error => Failed::Member(error),
@@ -128,10 +109,10 @@ impl<'a> Members<'a> {
         let family = self.family.insert(Family::of(prepared, &problem));
         if self.group.first() == Some(&number) {
             // it is solved whole, as in the service: its balance of forces tells whether the body is sound
-            return Ok(family.whole_member(&problem, observe)?);
+            return Ok(family.whole_member(&problem, observer)?);
         }
         // the first one was refused, or was solved before a restart
-        self.member(number, observe)
+        self.member(number, observer)
     }
 
     /// The members that a member starts from, directly or not, whose ends are not known, in the order in which they
@@ -157,7 +138,11 @@ impl<'a> Members<'a> {
     }
 
     /// Solves a member on the common body, from its neighbour, whose end is known.
-    fn on_body(&mut self, number: usize, observe: &mut Observer<'_>) -> Result<Member, SolveError> {
+    fn on_body(
+        &mut self,
+        number: usize,
+        observer: &mut dyn Observer,
+    ) -> Result<Member, SolveError> {
         let neighbour = self.neighbour(number);
         let Some(family) = &mut self.family else {
             return Err(SolveError::OtherBody);
@@ -174,7 +159,7 @@ impl<'a> Members<'a> {
             Some((_, end)) => Start::Near(end),
         };
         let solved = match self.problems.read(number) {
-            Ok(read) => family.member(read.problem, start, observe),
+            Ok(read) => family.member(read.problem, start, observer),
             Err(violations) => Err(SolveError::Invalid(violations)),
         };
         let (member, end) = match solved {
@@ -262,15 +247,8 @@ mod tests {
                     &solver::prepare,
                     None,
                 );
-                let mut rows = Vec::new();
-                let tell = &mut |step: Step<'_>| {
-                    if let Step::Row(row) = step {
-                        rows.push(*row);
-                    }
-                    ControlFlow::Continue(())
-                };
-                members.solve(numbers, tell).unwrap();
-                rows
+                let rows = numbers.iter().map(|n| members.row(*n, &mut ()).unwrap());
+                rows.collect::<Vec<_>>()
             };
             let all = solved(&group);
             assert_eq!(all.iter().filter(|row| row.reason.is_none()).count(), 18);

@@ -6,8 +6,8 @@ pub mod members;
 mod stopwatch;
 
 use std::{
+    cell::RefCell,
     collections::BTreeMap,
-    ops::ControlFlow,
     time::{Duration, Instant},
 };
 
@@ -15,59 +15,18 @@ use solver::{
     error::SolveError,
     finite::is_finite,
     mesh::External,
+    observer::{Observer, Progress},
     problem::Problem,
-    solution::{Fields, Observer, Outcome, Phase, Progress, Solution, StepSolution, Warning},
+    solution::{Fields, Outcome, Phase, Solution, StepSolution},
 };
 
-use crate::event::TimedIteration;
+use crate::event::Payload;
 pub use document::{Document, Step, Summary};
+use stopwatch::Stopwatch;
 pub use stopwatch::Timings;
-use stopwatch::{Stopwatch, Times};
 
 /// The solver, or its substitute in a test.
-pub type Solve = fn(&Problem, Option<External>, &mut Observer<'_>) -> Result<Solution, SolveError>;
-
-/// A report of a run while it is solved.
-#[derive(Debug)]
-pub enum Update<'a> {
-    /// A phase begins.
-    Phase(Phase),
-    /// Adaptive refinement begins to solve on a mesh, or returns to the one before.
-    Mesh {
-        /// The number of the mesh, from 1.
-        number: u32,
-        /// The number of its elements.
-        elements: u64,
-        /// The largest relative error on the mesh before.
-        error: Option<f64>,
-    },
-    /// An iteration of the solution.
-    Iteration(TimedIteration),
-    /// A warning about the problem or its solution.
-    Warning(&'a Warning),
-    /// A load step has ended, and others follow.
-    Step(PartialSolution<'a>),
-    /// No news: the solver is working, and asks whether to continue.
-    Pulse,
-    /// The solver is about to take more memory, and asks whether it may.
-    Needs {
-        /// The number of bytes.
-        bytes: u64,
-    },
-    /// The solver could continue with more memory, and asks whether it is available; if not, it ends with its results
-    /// so far.
-    Room {
-        /// The number of bytes.
-        bytes: u64,
-    },
-    /// The solver could share its next work with a second thread, and asks whether there is a processor for it.
-    SecondThread,
-    /// There was not enough memory.
-    OutOfMemory {
-        /// The number of bytes that the solver needed.
-        bytes: u64,
-    },
-}
+pub type Solve = fn(&Problem, Option<External>, &mut dyn Observer) -> Result<Solution, SolveError>;
 
 /// The size of a profile apart from its points, in points.
 const OF_A_PROFILE: usize = 5;
@@ -76,119 +35,137 @@ const OF_A_PROFILE: usize = 5;
 /// waits for.
 const WRITING: Duration = Duration::from_millis(250);
 
-/// A function that still returns true for `WRITING` after the first refusal.
-pub fn patient(mut asked: impl FnMut() -> ControlFlow<()>) -> impl FnMut() -> bool {
+/// Whether to go on writing: still true for `WRITING` after `stop` first was.
+pub fn patient(mut stop: impl FnMut() -> bool) -> impl FnMut() -> bool {
     let mut stopped: Option<Instant> = None;
-    move || asked().is_continue() || stopped.get_or_insert_with(Instant::now).elapsed() < WRITING
+    move || !stop() || stopped.get_or_insert_with(Instant::now).elapsed() < WRITING
 }
 
-/// The solution at the end of a load step that is not the last.
-#[derive(Debug)]
-pub struct PartialSolution<'a> {
-    problem: &'a Problem,
-    solution: &'a Solution,
-    times: Times,
+/// The number of points of all profiles of all load steps so far: the size of a document without fields.
+pub fn points(solution: &Solution) -> usize {
+    let of_step = |step: &StepSolution| -> usize {
+        let profiles = [&step.profiles, &step.node_profiles, &step.friction_profiles];
+        let profiles = profiles.into_iter().flat_map(BTreeMap::values);
+        profiles.map(|profile| OF_A_PROFILE + profile.s.len()).sum()
+    };
+    solution.steps.iter().map(of_step).sum()
 }
 
-impl PartialSolution<'_> {
-    /// The document of these results without fields. Making it costs as much as all its data, so it is not made for
-    /// every step.
-    pub fn document(&self) -> Result<Document, SolveError> {
-        Document::new(
-            self.problem,
-            self.solution.clone(),
-            &self.times,
-            &mut || true,
-        )
+/// The solution of one problem, with the times of its phases and iterations.
+pub struct Run<'a> {
+    /// The problem.
+    pub problem: &'a Problem,
+    watch: RefCell<Stopwatch>,
+}
+
+impl<'a> Run<'a> {
+    /// Begins now. `parse_s`: seconds for reading the problem, which the caller has done.
+    pub fn new(problem: &'a Problem, parse_s: f64) -> Run<'a> {
+        Run {
+            problem,
+            watch: RefCell::new(Stopwatch::new(parse_s)),
+        }
     }
 
-    /// The number of points of all profiles of all load steps: the size of the document.
-    pub fn points(&self) -> usize {
-        let of_step = |step: &StepSolution| -> usize {
-            let profiles = [&step.profiles, &step.node_profiles, &step.friction_profiles];
-            let profiles = profiles.into_iter().flat_map(BTreeMap::values);
-            profiles.map(|profile| OF_A_PROFILE + profile.s.len()).sum()
-        };
-        self.solution.steps.iter().map(of_step).sum()
-    }
-}
-
-/// Solves `problem` by `solve`, and records the time of each iteration and phase. `parse_s`: seconds for reading the
-/// problem, which the caller has done.
-///
-/// `solve` is [`solver::solve_on`] for a single problem; problems that share a condensed body are each solved by
-/// [`solver::Prepared::solve_other`]. The results of a stopped solution are given up if writing them takes too long.
-pub fn run(
-    problem: &Problem,
-    parse_s: f64,
-    solve: impl FnOnce(&mut Observer<'_>) -> Result<Solution, SolveError>,
-    report: &mut dyn FnMut(Update<'_>) -> ControlFlow<()>,
-) -> Result<Document, SolveError> {
-    let mut watch = Stopwatch::new(parse_s);
-    let mut non_finite = false;
-    // reading an external mesh is a part of meshing, which the solver begins with
-    watch.enter(Phase::Mesh);
-    let solved = solve(&mut |progress| {
-        let update = match progress {
-            Progress::Phase(phase) => {
-                watch.enter(phase);
-                Update::Phase(phase)
-            }
+    /// The event of a job that tells what the observer of this run was just told; none if clients are not told.
+    pub fn payload(&self, progress: Progress<'_>) -> Option<Payload> {
+        match progress {
+            Progress::Phase(stage) => Some(Payload::Stage { stage }),
             Progress::Refinement {
                 number,
                 elements,
                 error,
-            } => {
-                watch.on_mesh(number);
-                Update::Mesh {
-                    number,
-                    elements,
-                    error,
-                }
-            }
-            Progress::Tentative(row) => {
-                non_finite |= !is_finite(row);
-                watch.done_tentatively(row);
-                Update::Pulse
-            }
-            Progress::Iteration(row) => {
-                // JSON cannot write such a number, and going on is pointless
-                non_finite |= !is_finite(row);
-                let wall_s = watch.done(row);
-                let row = row.clone();
-                Update::Iteration(TimedIteration { row, wall_s })
-            }
-            Progress::Warning(warning) => Update::Warning(warning),
-            Progress::Step(solution) => Update::Step(PartialSolution {
-                problem,
-                solution,
-                times: watch.times(),
+            } => Some(Payload::Mesh {
+                number,
+                elements,
+                error,
             }),
-            Progress::Pulse => Update::Pulse,
-            Progress::Needs { bytes } => Update::Needs { bytes },
-            Progress::Room { bytes } => Update::Room { bytes },
-            Progress::SecondThread => Update::SecondThread,
-            Progress::OutOfMemory { bytes } => Update::OutOfMemory { bytes },
-        };
-        if non_finite {
-            ControlFlow::Break(())
-        } else {
-            report(update)
+            Progress::Iteration(row) => {
+                let row = self.watch.borrow().timed(row.clone());
+                Some(Payload::Iteration(row))
+            }
+            Progress::Warning(warning) => Some(Payload::Warning(warning.clone())),
+            Progress::Tentative(_) | Progress::Step(_) | Progress::OutOfMemory { .. } => None,
         }
-    });
-    if non_finite {
-        return Err(SolveError::NonFinite {
-            phase: Phase::Iterate,
-        });
     }
-    let mut solution = solved?;
-    if solution.summary.outcome == Outcome::Canceled {
-        // Who cancels wants the end, not fifty megabytes of it: a canceled job must be terminal
-        // within half a second, and writing the fields of a large one takes longer.
-        solution.fields = Fields::default();
+
+    /// The document of the solution at the end of a load step that is not the last, without fields. Making it costs as
+    /// much as all its data, so it is not made for every step.
+    pub fn document_so_far(&self, solution: &Solution) -> Result<Document, SolveError> {
+        let times = self.watch.borrow_mut().times();
+        Document::new(self.problem, solution.clone(), &times, &mut || true)
     }
-    let mut go_on = patient(|| report(Update::Pulse));
-    Document::new(problem, solution, &watch.times(), &mut go_on)
+
+    /// Solves the problem by `solve`, and records the times.
+    ///
+    /// `solve` is [`solver::solve_on`] for a single problem; problems that share a condensed body are each solved by
+    /// [`solver::Prepared::solve_other`]. The results of a stopped solution are given up if writing them takes too
+    /// long.
+    pub fn solve(
+        &self,
+        solve: impl FnOnce(&mut dyn Observer) -> Result<Solution, SolveError>,
+        observer: &mut dyn Observer,
+    ) -> Result<Document, SolveError> {
+        let watch = &self.watch;
+        // reading an external mesh is a part of meshing, which the solver begins with
+        watch.borrow_mut().enter(Phase::Mesh);
+        let mut timed = Timed {
+            observer: &mut *observer,
+            watch,
+            non_finite: false,
+        };
+        let solved = solve(&mut timed);
+        if timed.non_finite {
+            return Err(SolveError::NonFinite {
+                phase: Phase::Iterate,
+            });
+        }
+        let mut solution = solved?;
+        if solution.summary.outcome == Outcome::Canceled {
+            // Who cancels wants the end, not fifty megabytes of it: a canceled job must be terminal
+            // within half a second, and writing the fields of a large one takes longer.
+            solution.fields = Fields::default();
+        }
+        let mut go_on = patient(|| observer.stop());
+        let times = watch.borrow_mut().times();
+        Document::new(self.problem, solution, &times, &mut go_on)
+    }
+}
+
+/// Records the times of what an observer is told, and stops at a number that is not finite: JSON cannot write it, and
+/// going on is pointless.
+struct Timed<'a> {
+    observer: &'a mut dyn Observer,
+    watch: &'a RefCell<Stopwatch>,
+    non_finite: bool,
+}
+
+impl Observer for Timed<'_> {
+    fn event(&mut self, progress: Progress<'_>) {
+        let mut watch = self.watch.borrow_mut();
+        match &progress {
+            Progress::Phase(phase) => watch.enter(*phase),
+            Progress::Refinement { number, .. } => watch.on_mesh(*number),
+            Progress::Tentative(row) => watch.done_tentatively(row),
+            Progress::Iteration(row) => watch.done(row),
+            Progress::Warning(_) | Progress::Step(_) | Progress::OutOfMemory { .. } => {}
+        }
+        drop(watch);
+        if let Progress::Tentative(row) | Progress::Iteration(row) = &progress {
+            self.non_finite |= !is_finite(*row);
+        }
+        if !self.non_finite {
+            self.observer.event(progress);
+        }
+    }
+
+    fn stop(&mut self) -> bool {
+        self.non_finite || self.observer.stop()
+    }
+
+    fn behind(&mut self) -> Option<&mut dyn Observer> {
+        Some(self.observer)
+    }
 }
 
 #[cfg(test)]
@@ -201,13 +178,14 @@ mod tests {
     #[test]
     fn every_iteration_is_stamped_and_every_phase_has_a_time() {
         let mut stamps = vec![];
-        let document = run(&fake::problem(), 0.5, fake::iterate, &mut |update| {
-            if let Update::Iteration(row) = update {
+        let problem = fake::problem();
+        let run = Run::new(&problem, 0.5);
+        let document = run.solve(fake::iterate, &mut |progress: Progress<'_>| {
+            if let Some(Payload::Iteration(row)) = run.payload(progress) {
                 stamps.push(row.wall_s);
             }
-            ControlFlow::Continue(())
-        })
-        .unwrap();
+        });
+        let document = document.unwrap();
         assert_eq!(stamps.len(), 3);
         assert!(stamps.is_sorted() && stamps[0] > 0.0);
         assert_eq!(document.summary.timings.len(), 8);
@@ -228,20 +206,18 @@ mod tests {
             .into();
         let (start, mut recovers_s) = (Instant::now(), 0.0);
         let mut told = vec![];
-        let document = run(
-            &problem,
-            0.0,
-            |observe| solver::solve(&problem, observe),
-            &mut |update| {
-                match update {
-                    Update::Phase(Phase::Recover) => recovers_s = start.elapsed().as_secs_f64(),
-                    Update::Iteration(row) => told.push(row),
-                    _ => {}
-                }
-                ControlFlow::Continue(())
+        let run = Run::new(&problem, 0.0);
+        let document = run.solve(
+            |observer| solver::solve(&problem, observer),
+            &mut |progress: Progress<'_>| match run.payload(progress) {
+                Some(Payload::Stage {
+                    stage: Phase::Recover,
+                }) => recovers_s = start.elapsed().as_secs_f64(),
+                Some(Payload::Iteration(row)) => told.push(row),
+                _ => {}
             },
-        )
-        .unwrap();
+        );
+        let document = document.unwrap();
         let history = &document.history;
         assert!(document.summary.solution.refinements.len() > 1 && history.len() > 2);
         assert!(history.iter().zip(1..).all(|(row, k)| row.row.k == k));
@@ -253,35 +229,47 @@ mod tests {
         assert!(by_step.eq(history) && document.steps.len() == 2);
     }
 
+    /// An observer without more memory after the factor of the second mesh, Ŝ and matrices of some iterations.
+    struct Seen {
+        meshes: Vec<u32>,
+        /// When the second mesh began.
+        second: Option<Instant>,
+        /// How often memory was asked for on the second mesh.
+        asked: usize,
+    }
+
+    impl Observer for Seen {
+        fn event(&mut self, progress: Progress<'_>) {
+            if let Progress::Refinement { number, .. } = progress {
+                self.meshes.push(number);
+                if number == 2 {
+                    self.second = Some(Instant::now());
+                }
+            }
+        }
+
+        fn may_use(&mut self, _: u64) -> bool {
+            self.asked += usize::from(self.meshes == [1, 2]);
+            self.asked <= 5
+        }
+    }
+
     /// Rows of the mesh before keep their times if there is no memory for the next mesh.
     #[test]
     fn rows_of_the_mesh_before_keep_their_times() {
         let mut problem = fake::problem();
         problem.mesh.refine = Refine::Adaptive(AdaptiveRefine { tolerance: 0.05 });
-        let solve = |observe: &mut Observer<'_>| solver::solve(&problem, observe);
+        let mut seen = Seen {
+            meshes: vec![],
+            second: None,
+            asked: 0,
+        };
         let start = Instant::now();
-        let (mut meshes, mut second_s, mut asked) = (vec![], f64::INFINITY, 0);
-        let document = run(&problem, 0.0, solve, &mut |update| {
-            match update {
-                Update::Mesh { number, .. } => {
-                    meshes.push(number);
-                    if number == 2 {
-                        second_s = start.elapsed().as_secs_f64();
-                    }
-                }
-                // no more room after the factor of the second mesh, Ŝ and matrices of some iterations
-                Update::Room { .. } if meshes == [1, 2] => {
-                    asked += 1;
-                    if asked > 5 {
-                        return ControlFlow::Break(());
-                    }
-                }
-                _ => {}
-            }
-            ControlFlow::Continue(())
-        })
-        .unwrap();
-        assert_eq!(meshes, [1, 2, 1]);
+        let document = Run::new(&problem, 0.0)
+            .solve(|observer| solver::solve(&problem, observer), &mut seen)
+            .unwrap();
+        assert_eq!(seen.meshes, [1, 2, 1]);
+        let second_s = (seen.second.unwrap() - start).as_secs_f64();
         assert_eq!(document.summary.solution.refinements.len(), 1);
         assert!(!document.history.is_empty());
         let rows = document.history.iter();
@@ -297,18 +285,16 @@ mod tests {
         let mut problem = fake::problem();
         problem.steps = vec![Step::whole(); 2];
         let mut first = None;
-        let document = run(
-            &problem,
-            0.0,
-            |observe| solver::solve(&problem, observe),
-            &mut |update| {
-                if let Update::Step(partial) = update {
-                    first = Some(partial.document().unwrap());
+        let run = Run::new(&problem, 0.0);
+        let document = run.solve(
+            |observer| solver::solve(&problem, observer),
+            &mut |progress: Progress<'_>| {
+                if let Progress::Step(solution) = progress {
+                    first = Some(run.document_so_far(solution).unwrap());
                 }
-                ControlFlow::Continue(())
             },
-        )
-        .unwrap();
+        );
+        let document = document.unwrap();
         let first = first.unwrap().history;
         assert!(!first.is_empty() && document.history.starts_with(&first));
     }
@@ -344,14 +330,9 @@ mod tests {
     #[test]
     fn the_same_problem_has_the_same_digest_and_another_one_another() {
         let solved = |problem: &Problem| {
-            let go_on = &mut |_: Update<'_>| ControlFlow::Continue(());
-            let document = run(
-                problem,
-                0.0,
-                |observe| solver::solve(problem, observe),
-                go_on,
-            )
-            .unwrap();
+            let document = Run::new(problem, 0.0)
+                .solve(|observer| solver::solve(problem, observer), &mut ())
+                .unwrap();
             assert!(document.summary.solution.converged);
             document.summary
         };
@@ -368,19 +349,19 @@ mod tests {
 
     #[test]
     fn problems_that_share_a_body_are_solved_on_it_as_they_are_on_their_own() {
-        let go_on = &mut |_: Update<'_>| ControlFlow::Continue(());
         let problem = fake::problem();
-        let prepared = solver::prepare(&problem, None, &mut |_| ControlFlow::Continue(()));
+        let prepared = solver::prepare(&problem, None, &mut ());
         let prepared = prepared.unwrap();
         for coefficient in [0.1, 0.6] {
             let mut problem = problem.clone();
             let friction = problem.contacts[0].friction.as_mut().unwrap();
             friction.coefficient = Some(coefficient);
             let model = solver::model::Model::new(&problem, None).unwrap();
-            let solve = |observe: &mut Observer<'_>| prepared.solve_other(&model, observe).unwrap();
-            let shared = run(&problem, 0.0, solve, go_on).unwrap();
-            let alone = |observe: &mut Observer<'_>| solver::solve(&problem, observe);
-            let alone = run(&problem, 0.0, alone, go_on).unwrap();
+            let solve =
+                |observer: &mut dyn Observer| prepared.solve_other(&model, observer).unwrap();
+            let shared = Run::new(&problem, 0.0).solve(solve, &mut ()).unwrap();
+            let alone = |observer: &mut dyn Observer| solver::solve(&problem, observer);
+            let alone = Run::new(&problem, 0.0).solve(alone, &mut ()).unwrap();
             assert_eq!(shared.summary.digest, alone.summary.digest);
         }
         let mut other = problem;
@@ -389,8 +370,7 @@ mod tests {
             poissons_ratio: 0.3,
         };
         let model = solver::model::Model::new(&other, None).unwrap();
-        let go_on = &mut |_: solver::solution::Progress<'_>| ControlFlow::Continue(());
-        assert!(prepared.solve_other(&model, go_on).is_none());
+        assert!(prepared.solve_other(&model, &mut ()).is_none());
     }
 
     #[test]
@@ -402,11 +382,9 @@ mod tests {
 
     #[test]
     fn a_summary_is_read_back_as_it_was_written() {
-        let summary = run(&fake::problem(), 0.0, fake::iterate, &mut |_| {
-            ControlFlow::Continue(())
-        })
-        .unwrap()
-        .summary;
+        let problem = fake::problem();
+        let document = Run::new(&problem, 0.0).solve(fake::iterate, &mut ());
+        let summary = document.unwrap().summary;
         let text = serde_json::to_string(&summary).unwrap();
         let back: Summary = serde_json::from_str(&text).unwrap();
         assert_eq!(serde_json::to_string(&back).unwrap(), text);

@@ -78,14 +78,18 @@ impl Stopwatch {
         self.done(row);
     }
 
-    /// Records an iteration; returns its time, which is now if it was not recorded before.
-    pub(super) fn done(&mut self, row: &Iteration) -> f64 {
-        let known = self.times.iterations.get(place(row));
-        known.copied().unwrap_or_else(|| {
-            let now = self.start.elapsed().as_secs_f64();
-            self.times.iterations.push(now);
-            now
-        })
+    /// Records an iteration, done now unless it was recorded before.
+    pub(super) fn done(&mut self, row: &Iteration) {
+        if self.times.iterations.len() <= place(row) {
+            self.times
+                .iterations
+                .push(self.start.elapsed().as_secs_f64());
+        }
+    }
+
+    /// A recorded iteration with its time.
+    pub(super) fn timed(&self, row: Iteration) -> TimedIteration {
+        self.times.timed(row)
     }
 
     /// The times so far.
@@ -100,14 +104,15 @@ impl Stopwatch {
 impl Times {
     /// Rows of the history with their times.
     pub(super) fn of(&self, rows: Vec<Iteration>) -> Vec<TimedIteration> {
-        let timed = |row: Iteration| {
-            let wall_s = self.iterations.get(place(&row)).copied();
-            TimedIteration {
-                row,
-                wall_s: wall_s.unwrap_or_default(),
-            }
-        };
-        rows.into_iter().map(timed).collect()
+        rows.into_iter().map(|row| self.timed(row)).collect()
+    }
+
+    fn timed(&self, row: Iteration) -> TimedIteration {
+        let wall_s = self.iterations.get(place(&row)).copied();
+        TimedIteration {
+            row,
+            wall_s: wall_s.unwrap_or_default(),
+        }
     }
 }
 

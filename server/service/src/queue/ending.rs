@@ -33,6 +33,8 @@ pub(super) struct Solved {
 pub(super) enum NoSolution {
     /// The solver was asked to stop before it had a state to return.
     Stopped,
+    /// The job needs more memory than its share.
+    OutOfMemory(Outgrown),
     /// The job fails, with this detail.
     Failed(Reason, String),
     /// An error of the service, not of the client.
@@ -107,8 +109,9 @@ fn gravity(code: WarningCode) -> u8 {
     }
 }
 
-/// The end of a job that follows from the outcome of its solution.
-pub(super) fn ending_of_solution(document: &Document) -> Ending {
+/// The end of a job that follows from the outcome of its solution; `outgrown`: the lack of memory for which it was
+/// stopped.
+pub(super) fn ending_of_solution(document: &Document, outgrown: Option<Outgrown>) -> Ending {
     let (summary, partial) = (&document.summary.solution, ResultAvailable::Partial);
     let failed = |reason| {
         let detail = without_solution(summary.outcome, summary.iterations, &summary.residuals);
@@ -132,7 +135,7 @@ pub(super) fn ending_of_solution(document: &Document) -> Ending {
         Outcome::FalseConvergence => failed(Reason::FalseConvergence),
         Outcome::Canceled => Ending {
             result: partial,
-            ..Ending::canceled()
+            ..outgrown.map_or_else(Ending::canceled, out_of_memory)
         },
     }
 }
@@ -170,6 +173,7 @@ pub(super) fn ending_of_attempt(
     };
     let ending = match no_solution {
         NoSolution::Stopped => stopped_for(job, stopped),
+        NoSolution::OutOfMemory(outgrown) => out_of_memory(outgrown),
         NoSolution::Failed(reason, detail) => Ending::failed(reason, detail),
         // (the worker requeues a job whose process was lost)
         NoSolution::Internal(cause) | NoSolution::Lost(cause) => internal(job, &cause),
@@ -181,7 +185,6 @@ pub(super) fn ending_of_attempt(
 fn stopped_for(job: &Job, reason: Option<StopReason>) -> Ending {
     match reason {
         Some(StopReason::OutOfTime) => timed_out(job),
-        Some(StopReason::OutOfMemory(outgrown)) => out_of_memory(&outgrown),
         Some(StopReason::Unwanted) | None => Ending::canceled(),
     }
 }
@@ -192,14 +195,14 @@ fn out_of_memory(
         used,
         needed,
         share,
-    }: &Outgrown,
+    }: Outgrown,
 ) -> Ending {
     let detail = format!(
         "the job used {} and needed {} more, but its share is {}: use a coarser mesh, above all along the contacts, or \
          fewer load steps",
-        size(*used),
-        size(*needed),
-        size(*share)
+        size(used),
+        size(needed),
+        size(share)
     );
     Ending::failed(Reason::ResourceExhausted, detail)
 }

@@ -7,11 +7,13 @@
 //! the store, together. No event travels through a channel to a watcher, so none is repeated, missed, or undone by a
 //! crash.
 //!
-//! The solver calls an observer at each phase and iteration, and repeatedly within long factorisations. The observer
-//! answers *stop* when the job was canceled, has reached its time limit, or needs more memory than its share: the
-//! solver announces large matrices before it makes them. On a later mesh of adaptive refinement the solver only asks
-//! whether there is room, and returns the result of the mesh before if there is none. After each load step but the last
-//! the observer receives the results so far, which are served while the job runs and kept if it does not finish.
+//! The solver tells an observer each phase and iteration, and asks it repeatedly, also within long factorisations. The
+//! observer of a job (`solving`) keeps it within its share of memory, and passes its events to a supervisor: the worker
+//! of the job, or, in a worker process, the connection to the service. The worker answers *stop* when the job was
+//! canceled or has reached its time limit. The solver asks for memory before it makes large matrices; where it cannot do
+//! without, the job ends; on a later mesh of adaptive refinement it returns the result of the mesh before. After each
+//! load step but the last the supervisor receives the results so far, which are served while the job runs and kept if it
+//! does not finish.
 //!
 //! A write to the store that fails is repeated until it succeeds, unless the job's own record is damaged.
 //!
@@ -28,7 +30,7 @@
 //! |---|---|
 //! | starting jobs when a slot is free; periodic tasks | `dispatch` |
 //! | one job: its worker, its solution on a blocking thread or in a process, its end | `worker`, `solving`, `process`, `ending` |
-//! | messages of a solver | `report` |
+//! | what a solver tells and asks, here or in a process | `supervisor` |
 //! | events committed in batches | `recorder` |
 //! | stopping solvers | `cancel`, `running` |
 //! | watchers: woken, and served from one reading of the store | `watchers`, `feed` |
@@ -44,7 +46,7 @@ mod running;
 mod watchers;
 
 mod phases;
-mod report;
+mod supervisor;
 
 mod ending;
 mod solving;

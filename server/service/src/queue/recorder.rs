@@ -19,7 +19,6 @@ use tracing::warn;
 use super::{
     backoff::Backoff,
     phases::Phases,
-    report::Report,
     running::{Running, StopReason},
     state::Queue,
 };
@@ -31,17 +30,18 @@ const MOST_MEMBERS: usize = 200;
 /// The longest time from the first event of a batch until it is stored.
 const LATENCY: Duration = Duration::from_millis(50);
 
-/// A batch of reports that are stored together.
+/// What a solver has told that is stored together; it is sent to the recorder piece by piece.
 #[derive(Debug, Default)]
-struct Batch {
-    events: Vec<(Time, Payload)>,
+pub(super) struct Batch {
+    pub(super) events: Vec<(Time, Payload)>,
     /// Members of a sweep.
-    members: Vec<(Time, MemberRow)>,
-    /// A partial result that was reported after the events.
-    partial: Option<Arc<Parts>>,
-    one_level: bool,
+    pub(super) members: Vec<(Time, MemberRow)>,
+    /// A partial result that came after the events.
+    pub(super) partial: Option<Arc<Parts>>,
+    /// Whether the end of the iterations will be that of the job.
+    pub(super) one_level: bool,
     /// Whether the solver has ended, so that this is the last batch.
-    last: bool,
+    pub(super) last: bool,
 }
 
 /// Stores the reports of the solver until it ends, and returns its last events: these are stored together with the end
@@ -51,7 +51,7 @@ pub(super) async fn record(
     queue: &Queue,
     job: &Job,
     running: &Running,
-    mut reports: mpsc::Receiver<Report>,
+    mut reports: mpsc::Receiver<Batch>,
 ) -> (FinalBatch, Phases) {
     let (mut progress, mut one_level) = (Progress::default(), false);
     let mut phases = Phases::default();
@@ -155,11 +155,11 @@ async fn store_batch(
     }
 }
 
-/// Receives the next batch of reports.
-async fn next_batch(reports: &mut mpsc::Receiver<Report>) -> Batch {
+/// Receives the next batch.
+async fn next_batch(reports: &mut mpsc::Receiver<Batch>) -> Batch {
     let mut batch = Batch::default();
     match reports.recv().await {
-        Some(report) => batch.add(report),
+        Some(more) => batch.add(more),
         None => batch.last = true,
     }
     let end = sleep_until(Instant::now() + LATENCY);
@@ -167,8 +167,8 @@ async fn next_batch(reports: &mut mpsc::Receiver<Report>) -> Batch {
     while batch.is_open() {
         tokio::select! {
             biased;
-            report = reports.recv() => match report {
-                Some(report) => batch.add(report),
+            more = reports.recv() => match more {
+                Some(more) => batch.add(more),
                 None => batch.last = true,
             },
             () = &mut end => break,
@@ -178,13 +178,11 @@ async fn next_batch(reports: &mut mpsc::Receiver<Report>) -> Batch {
 }
 
 impl Batch {
-    fn add(&mut self, report: Report) {
-        match report {
-            Report::Event(time, payload) => self.events.push((time, payload)),
-            Report::Member(time, row) => self.members.push((time, *row)),
-            Report::Partial(parts) => self.partial = Some(Arc::new(*parts)),
-            Report::OneLevel => self.one_level = true,
-        }
+    fn add(&mut self, more: Batch) {
+        self.events.extend(more.events);
+        self.members.extend(more.members);
+        self.partial = more.partial.or(self.partial.take());
+        self.one_level |= more.one_level;
     }
 
     fn is_open(&self) -> bool {
@@ -251,13 +249,12 @@ mod tests {
     async fn a_batch_ends_when_the_solver_ends_or_after_fifty_events() {
         let (sender, mut reports) = mpsc::channel(64);
         for k in 1..=51 {
-            sender
-                .send(Report::Event(
-                    Time::now(),
-                    Payload::Iteration(fake::timed(k)),
-                ))
-                .await
-                .unwrap();
+            let event = (Time::now(), Payload::Iteration(fake::timed(k)));
+            let batch = Batch {
+                events: vec![event],
+                ..Batch::default()
+            };
+            sender.send(batch).await.unwrap();
         }
         drop(sender);
         let batch = next_batch(&mut reports).await;

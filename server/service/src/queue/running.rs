@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use base::{job::JobId, memory::Outgrown};
+use base::job::JobId;
 
 /// The handle on a running solver.
 #[derive(Clone, Debug)]
@@ -27,8 +27,6 @@ impl Running {
 pub(super) enum StopReason {
     /// The job has reached its time limit.
     OutOfTime,
-    /// The job needs more memory than its share.
-    OutOfMemory(Outgrown),
     /// The result is not needed: the job was canceled or requeued.
     Unwanted,
 }

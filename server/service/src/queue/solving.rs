@@ -1,22 +1,19 @@
 //! Solves a problem on a blocking thread, and reports the progress.
 
 use std::{
-    ops::ControlFlow,
     sync::Arc,
     time::{Duration, Instant},
 };
 
 use base::{
     digest,
-    event::Payload,
     job::Reason,
-    memory::{Allowance, Budget, Meter},
+    memory::{Allowance, Budget, Meter, Outgrown},
     run::{
-        self, PartialSolution, Solve, Update,
-        members::{Members, Step as MemberStep, is_alone, row_of},
+        self, Run, Solve,
+        members::{Members, is_alone, row_of},
     },
     sweep::MemberRow,
-    time::Time,
 };
 use files::sweep::Plan;
 use solver::{
@@ -24,14 +21,15 @@ use solver::{
     error::SolveError,
     family::{Family, Member},
     mesh::{External, Mesh},
+    observer::{Observer, Progress},
     problem::{Problem, Refine, Step},
-    solution::{Observer, Outcome, Phase, Progress},
+    solution::{Outcome, Phase, Solution},
 };
 use store::{MembersTask, Parts, Store};
 
 use super::{
     ending::{NoSolution, Solved, ending_of_solution},
-    report::{Report, Told},
+    supervisor::Supervisor,
 };
 
 /// Reads the stored form of a mesh, which existed when the job was accepted. Call this on a blocking thread.
@@ -64,121 +62,91 @@ pub(super) fn solve_task(
     members: Option<&MembersTask>,
     solve: Solve,
     allowance: Allowance<'_>,
-    tell: impl FnMut(Told) -> ControlFlow<()>,
+    supervisor: &mut dyn Supervisor,
 ) -> Result<Solved, NoSolution> {
-    let solved = solve_and_store(
-        problem,
-        mesh,
-        members,
-        solve,
-        allowance,
-        Partials::paced(),
-        tell,
-    );
-    solved.map_err(|error| match (error, members) {
+    let partials = Partials::paced();
+    solve_with_partials(
+        problem, mesh, members, solve, allowance, partials, supervisor,
+    )
+}
+
+/// As [`solve_task`], with partial results as `partials` decides.
+pub(super) fn solve_with_partials(
+    problem: &str,
+    mesh: Option<Mesh>,
+    members: Option<&MembersTask>,
+    solve: Solve,
+    allowance: Allowance<'_>,
+    partials: Partials,
+    supervisor: &mut dyn Supervisor,
+) -> Result<Solved, NoSolution> {
+    let Allowance { share, bodies } = allowance;
+    let meter = Meter::new(share);
+    let no_solution = |error| match (error, members) {
         // members are not checked on their meshes before
         (SolveError::Invalid(violations), Some(_)) => {
             let detail = SolveError::Invalid(violations).to_string();
             NoSolution::Failed(Reason::InvalidProblem, detail)
         }
         (error, _) => NoSolution::from(error),
+    };
+    let start = Instant::now();
+    let problem = files::parse(problem);
+    let problem = problem.map_err(|violations| no_solution(SolveError::Invalid(violations)))?;
+    let run = Run::new(&problem, start.elapsed().as_secs_f64());
+    if members.is_none() && has_one_level(&problem) {
+        supervisor.one_level();
+    }
+    let mut metered = Metered {
+        supervisor,
+        meter: &meter,
+        run: Some(&run),
+        partials,
+        verifying: false,
+        outgrown: None,
+    };
+    let solved = solve_metered(&run, mesh, members, solve, bodies, &mut metered);
+    solved.map_err(|error| match (error, metered.outgrown) {
+        (SolveError::Stopped, Some(outgrown)) => NoSolution::OutOfMemory(outgrown),
+        (error, _) => no_solution(error),
     })
 }
 
-/// Reads the problem and solves it within its memory, with partial results as `partials` decides.
-pub(super) fn solve_and_store(
-    problem: &str,
-    mesh: Option<Mesh>,
-    members: Option<&MembersTask>,
-    solve: Solve,
-    allowance: Allowance<'_>,
-    mut partials: Partials,
-    mut tell: impl FnMut(Told) -> ControlFlow<()>,
-) -> Result<Solved, SolveError> {
-    let Allowance { share, bodies } = allowance;
-    let meter = Meter::new(share);
-    let start = Instant::now();
-    let problem: Problem = files::parse(problem).map_err(SolveError::Invalid)?;
-    let parse_s = start.elapsed().as_secs_f64();
+/// Whether a problem has one load level on one grid.
+fn has_one_level(problem: &Problem) -> bool {
     let single = |step: &Step| step.increments == 1;
-    if members.is_none()
-        && problem.steps.len() <= 1
+    problem.steps.len() <= 1
         && problem.steps.iter().all(single)
         && matches!(problem.mesh.refine, Refine::Times(_))
         && !problem.solver.verifies()
-    {
-        // the next report asks again whether to stop
-        let _ = tell(Told::Report(Report::OneLevel));
-    }
-    let event = |payload| Some(Report::Event(Time::now(), payload));
+}
+
+fn solve_metered(
+    run: &Run<'_>,
+    mesh: Option<Mesh>,
+    members: Option<&MembersTask>,
+    solve: Solve,
+    bodies: Option<&Budget>,
+    metered: &mut Metered<'_>,
+) -> Result<Solved, SolveError> {
+    let (problem, meter) = (run.problem, metered.meter);
     let stored = mesh.clone().filter(|_| members.is_some());
     let mut family = None;
-    let solve = |observe: &mut Observer<'_>| {
-        let external = files::external_mesh(&problem, mesh);
-        if is_alone(&problem) || (members.is_none() && bodies.is_none()) {
-            return solve(&problem, external, observe);
+    let solve = |observer: &mut dyn Observer| {
+        let external = files::external_mesh(problem, mesh);
+        if is_alone(problem) || (members.is_none() && bodies.is_none()) {
+            return solve(problem, external, observer);
         }
-        let prepared = prepare(&problem, external, bodies, &meter, observe)?;
+        let prepared = prepare(problem, external, bodies, meter, observer)?;
         match members {
             Some(_) => {
-                let family = family.insert(Family::of(prepared, &problem));
-                family.solution(&problem, observe)
+                let family = family.insert(Family::of(prepared, problem));
+                family.solution(problem, observer)
             }
-            None => prepared.solve(observe),
+            None => prepared.solve(observer),
         }
     };
-    let mut verifying = false;
-    let document = run::run(&problem, parse_s, solve, &mut |update| {
-        let (mut needed, mut room) = (0, 0);
-        if matches!(update, Update::SecondThread) {
-            return tell(Told::SecondThread);
-        }
-        verifying |= matches!(update, Update::Phase(Phase::Verify));
-        // what is reported belongs to the recorder then, whose thread frees it
-        let told = meter.hand_over(|| {
-            let report = match update {
-                Update::Phase(stage) => event(Payload::Stage { stage }),
-                Update::Mesh {
-                    number,
-                    elements,
-                    error,
-                } => event(Payload::Mesh {
-                    number,
-                    elements,
-                    error,
-                }),
-                Update::Iteration(row) => event(Payload::Iteration(row)),
-                Update::Warning(warning) => event(Payload::Warning(warning.clone())),
-                Update::Step(partial) => partials.next(&partial),
-                Update::Pulse | Update::SecondThread => None,
-                Update::Needs { bytes } => {
-                    needed = bytes;
-                    None
-                }
-                Update::Room { bytes } => {
-                    room = bytes;
-                    None
-                }
-                Update::OutOfMemory { bytes } => {
-                    // the machine has less than the share: more than it is needed, whatever is used
-                    needed = bytes.max(share);
-                    None
-                }
-            };
-            report.map_or(ControlFlow::Continue(()), |report| {
-                tell(Told::Report(report))
-            })
-        });
-        told?;
-        match meter.check(needed) {
-            // the solution is there, and stays
-            ControlFlow::Break(_) if verifying => return ControlFlow::Break(()),
-            ControlFlow::Break(outgrown) => tell(Told::OutOfMemory(outgrown))?,
-            ControlFlow::Continue(()) => tell(Told::Nothing)?,
-        }
-        // no room is an answer, and no reason to stop
-        meter.check(room).map_break(|_| ())
-    });
+    let document = run.solve(solve, metered);
     if let (Err(SolveError::ResourceExhausted { .. }), Some(bodies)) = (&document, bodies) {
         meter.hand_over(|| bodies.drop_bodies());
     }
@@ -195,21 +163,15 @@ pub(super) fn solve_and_store(
             Err(error) => Some(row_of(task.first, error.clone())?),
         };
         if let Some(first) = first {
-            solve_others(
-                &problem,
-                stored,
-                (task, first),
-                family,
-                (bodies, &meter),
-                &mut tell,
-            )?;
+            solve_others(problem, stored, (task, first), family, bodies, metered)?;
         }
     }
     let document = document?;
     let accuracy = document.summary.solution.accuracy.as_ref();
     let unverified = accuracy.and_then(|accuracy| accuracy.verified) == Some(false);
-    let (ending, iterations) = (ending_of_solution(&document), document.history.len());
-    let mut go_on = run::patient(|| tell(Told::Nothing));
+    let ending = ending_of_solution(&document, metered.outgrown);
+    let iterations = document.history.len();
+    let mut go_on = run::patient(|| metered.is_to_stop());
     let parts = Parts::of(document, &mut go_on).map_err(|_| SolveError::NonFinite {
         phase: Phase::Recover,
     })?;
@@ -222,6 +184,81 @@ pub(super) fn solve_and_store(
     })
 }
 
+/// Observes a solution for its supervisor, and keeps it within the memory of its job.
+struct Metered<'a> {
+    supervisor: &'a mut dyn Supervisor,
+    meter: &'a Meter,
+    /// The run whose events are told; none while other members of a sweep are solved.
+    run: Option<&'a Run<'a>>,
+    partials: Partials,
+    /// Whether the solution is there, and stays: lack of memory ends only its verification.
+    verifying: bool,
+    /// The lack of memory for which the solver stops.
+    outgrown: Option<Outgrown>,
+}
+
+impl Metered<'_> {
+    fn is_to_stop(&mut self) -> bool {
+        self.outgrown.is_some() || self.supervisor.stop()
+    }
+
+    /// Stops the solver for lack of memory, unless it is to stop anyway.
+    fn outgrow(&mut self, outgrown: Outgrown) {
+        if !self.is_to_stop() {
+            self.outgrown = Some(outgrown);
+        }
+    }
+
+    /// Tells a row; an error if the solver is to stop.
+    fn member(&mut self, row: MemberRow) -> Result<(), SolveError> {
+        self.meter.hand_over(|| self.supervisor.member(row));
+        match self.is_to_stop() {
+            true => Err(SolveError::Stopped),
+            false => Ok(()),
+        }
+    }
+}
+
+impl Observer for Metered<'_> {
+    fn event(&mut self, progress: Progress<'_>) {
+        if let Progress::OutOfMemory { bytes } = progress {
+            return self.outgrow(self.meter.refused(bytes));
+        }
+        let Some(run) = self.run else { return };
+        self.verifying |= matches!(progress, Progress::Phase(Phase::Verify));
+        // what is told belongs to the recorder then, whose thread frees it
+        self.meter.hand_over(|| match progress {
+            Progress::Step(solution) => {
+                if let Some(parts) = self.partials.next(run, solution) {
+                    self.supervisor.partial(parts);
+                }
+            }
+            progress => {
+                if let Some(payload) = run.payload(progress) {
+                    self.supervisor.event(payload);
+                }
+            }
+        });
+    }
+
+    fn stop(&mut self) -> bool {
+        match self.meter.check(0) {
+            Err(_) if self.verifying => return true,
+            Err(outgrown) => self.outgrow(outgrown),
+            Ok(()) => {}
+        }
+        self.is_to_stop()
+    }
+
+    fn may_use(&mut self, bytes: u64) -> bool {
+        self.meter.check(bytes).is_ok()
+    }
+
+    fn threads(&mut self) -> usize {
+        self.supervisor.threads()
+    }
+}
+
 /// Prepares a problem on its body, which is made and kept unless it is kept already. Two jobs that begin at the same
 /// time each make their own, since the first body is not finished yet.
 pub(super) fn prepare(
@@ -229,12 +266,12 @@ pub(super) fn prepare(
     external: Option<External>,
     bodies: Option<&Budget>,
     meter: &Meter,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<Prepared, SolveError> {
-    let model = solver::checked(problem, external, observe)?;
+    let model = solver::checked(problem, external, observer)?;
     let key = bodies.and_then(|bodies| Some((bodies, digest::of_body(&model).ok()?)));
     let Some((bodies, key)) = key else {
-        return Prepared::new(model, observe);
+        return Prepared::new(model, observer);
     };
     if let Some((body, bytes)) = bodies.kept_body(&key, &model) {
         // as if the job had made it
@@ -242,7 +279,7 @@ pub(super) fn prepare(
         return Ok(Prepared { model, body });
     }
     let before = meter.used();
-    let prepared = Prepared::new(model, observe)?;
+    let prepared = Prepared::new(model, observer)?;
     let made = |meter: &Meter| meter.used().saturating_sub(before);
     if made(meter) <= bodies.of_bodies() {
         let kept = prepared.clone();
@@ -253,14 +290,14 @@ pub(super) fn prepare(
     Ok(prepared)
 }
 
-/// Reports the row of the first member, and solves the others; an error if that was stopped.
+/// Tells the row of the first member, and solves the others; an error if that was stopped.
 fn solve_others(
     problem: &Problem,
     mesh: Option<Mesh>,
     (task, first): (&MembersTask, MemberRow),
     family: Option<Family>,
-    (bodies, meter): (Option<&Budget>, &Meter),
-    tell: &mut impl FnMut(Told) -> ControlFlow<()>,
+    bodies: Option<&Budget>,
+    metered: &mut Metered<'_>,
 ) -> Result<(), SolveError> {
     let MembersTask {
         definition,
@@ -268,40 +305,23 @@ fn solve_others(
         group,
         numbers,
     } = task;
+    let meter = metered.meter;
     let plan: Plan = serde_json::from_str(definition).map_err(|_| SolveError::OtherBody)?;
     let external = |problem: &Problem| files::external_mesh(problem, mesh.clone());
-    let prepare = |problem: &Problem, external: Option<External>, observe: &mut Observer<'_>| {
-        prepare(problem, external, bodies, meter, observe)
+    let prepare = |problem: &Problem, external: Option<External>, observer: &mut dyn Observer| {
+        prepare(problem, external, bodies, meter, observer)
     };
     let mesh = &problem.mesh;
     let mut members = Members::new(&plan, group, mesh, &external, &prepare, family);
-    let mut report = |row: Box<MemberRow>| {
-        let report = Report::Member(Time::now(), row);
-        tell(Told::Report(report))
-    };
-    if numbers.contains(number) && report(Box::new(first)).is_break() {
-        return Err(SolveError::Stopped);
+    (metered.run, metered.verifying) = (None, false);
+    if numbers.contains(number) {
+        metered.member(first)?;
     }
-    let others: Vec<usize> = numbers.iter().copied().filter(|n| n != number).collect();
-    members.solve(&others, &mut |step| {
-        let (needed, room) = match step {
-            MemberStep::Row(row) => {
-                let report = Report::Member(Time::now(), row);
-                return meter.hand_over(|| tell(Told::Report(report)));
-            }
-            MemberStep::Progress(Progress::Needs { bytes } | Progress::OutOfMemory { bytes }) => {
-                (bytes, 0)
-            }
-            MemberStep::Progress(Progress::Room { bytes }) => (0, bytes),
-            MemberStep::Progress(Progress::SecondThread) => return tell(Told::SecondThread),
-            MemberStep::Progress(_) => (0, 0),
-        };
-        match meter.check(needed) {
-            ControlFlow::Break(outgrown) => tell(Told::OutOfMemory(outgrown))?,
-            ControlFlow::Continue(()) => tell(Told::Nothing)?,
-        }
-        meter.check(room).map_break(|_| ())
-    })
+    for other in numbers.iter().filter(|other| *other != number) {
+        let row = members.row(*other, metered)?;
+        metered.member(row)?;
+    }
+    Ok(())
 }
 
 /// Decides when the results of finished load steps are stored as a partial result: not after each step, since
@@ -337,7 +357,7 @@ impl Partials {
     }
 
     /// The partial result, if it is time to store one.
-    fn next(&mut self, partial: &PartialSolution<'_>) -> Option<Report> {
+    fn next(&mut self, run: &Run<'_>, solution: &Solution) -> Option<Parts> {
         /// The largest partial result: it is written in one transaction, which occupies the single writer for some 40
         /// ms.
         const MOST_BYTES: usize = 4 << 20;
@@ -347,12 +367,12 @@ impl Partials {
         if self.next.is_none_or(|next| start < next) {
             return None;
         }
-        if partial.points() > MOST_POINTS {
+        if run::points(solution) > MOST_POINTS {
             self.next = None;
             return None;
         }
         // numbers that are not finite, and so have no JSON, are reported at the end
-        let document = partial.document().ok();
+        let document = run.document_so_far(solution).ok();
         let parts = document.and_then(|mut document| {
             document.history = vec![]; // its events tell that, up to now
             Parts::of(document, &mut || true).ok()?
@@ -361,7 +381,6 @@ impl Partials {
             Some(parts) if parts.bytes() > MOST_BYTES => None,
             _ => Some(start + (start.elapsed() * self.part).max(self.pause)),
         };
-        let parts = parts.filter(|parts| parts.bytes() <= MOST_BYTES)?;
-        Some(Report::Partial(Box::new(parts)))
+        parts.filter(|parts| parts.bytes() <= MOST_BYTES)
     }
 }

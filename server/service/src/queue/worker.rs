@@ -1,11 +1,13 @@
 //! A worker: solves a claimed job, and ends it.
 
-use std::{ops::ControlFlow, sync::Arc, time::Duration};
+use std::{sync::Arc, time::Duration};
 
 use base::{
     event::Payload,
     failpoint::{self, Point},
     job::{Job, JobId, Status},
+    sweep::MemberRow,
+    time::Time,
 };
 use store::{Claim, Ending, FinalBatch, Parts, StoreError};
 use tokio::sync::mpsc;
@@ -16,14 +18,14 @@ use super::{
     backoff::Backoff,
     ending::{NoSolution, ending_of_attempt, internal, panicked, timed_out},
     process::Task,
-    recorder,
-    report::{Report, Told, go_on_if},
+    recorder::{self, Batch},
     running::{Running, StopReason},
     solving::{members_of, read_mesh, solve_task, stored_mesh},
     state::{Queue, Slot, Solver},
+    supervisor::Supervisor,
 };
 
-/// The largest number of reports of a solver that are not recorded yet; after that the solver waits.
+/// How many events of a solver may wait to be recorded; after that the solver waits.
 const MOST_UNRECORDED: usize = 256;
 
 /// How long the solver of a job that has reached its time limit may take to return its last state (see `Limits`).
@@ -61,15 +63,20 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Ar
     let (queue, id) = (&queue, job.id);
     failpoint::pass(Point::Begun, id);
     let (sender, reports) = mpsc::channel(MOST_UNRECORDED);
-    let stop = running.clone();
-    let queue_of_solver = queue.clone();
+    let mut worker = Worker {
+        queue: queue.clone(),
+        id,
+        running: running.clone(),
+        recorder: sender,
+    };
     let (key, in_sweep) = (job.key, job.sweep.is_some());
     let solving = tokio::task::spawn_blocking(move || {
         // given back when the solver has returned, or panicked, in this order: another job may have them then
         let _slot = slot;
         let mut memory = memory;
         memory.free_dropped();
-        let Queue { store, solver, .. } = &*queue_of_solver;
+        let queue = worker.queue.clone();
+        let Queue { store, solver, .. } = &*queue;
         let mesh = mesh.map(|hash| stored_mesh(store, &hash)).transpose()?;
         let members = if in_sweep {
             Some(members_of(store, key)?)
@@ -79,32 +86,12 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Ar
         if failpoint::fails(Point::MeshRead, id) {
             return Err(NoSolution::Internal("a test wants it".into()));
         }
-        let queue = &*queue_of_solver;
-        let tell = |told| {
-            pass_failpoint(&told, id);
-            if matches!(told, Told::SecondThread) {
-                return go_on_if(queue.has_spare_processor());
-            }
-            // an error means that the recorder has ended: the result is not needed
-            let recording = match told {
-                Told::Report(report) => sender.blocking_send(report).is_ok(),
-                Told::OutOfMemory(outgrown) => {
-                    stop.stop(StopReason::OutOfMemory(outgrown));
-                    true
-                }
-                Told::Nothing | Told::SecondThread => true,
-            };
-            if recording && stop.stop.get().is_none() {
-                ControlFlow::Continue(())
-            } else {
-                ControlFlow::Break(())
-            }
-        };
         match solver {
             Solver::Threads(solve) => {
                 let mesh = mesh.as_deref().map(read_mesh).transpose()?;
                 let allowance = memory.allowance();
-                solve_task(&problem, mesh, members.as_ref(), *solve, allowance, tell)
+                let members = members.as_ref();
+                solve_task(&problem, mesh, members, *solve, allowance, &mut worker)
             }
             Solver::Processes(processes) => {
                 let task = Task {
@@ -112,9 +99,9 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Ar
                     members,
                     mesh,
                     share: memory.share(),
-                    second_thread: queue.has_spare_processor(),
+                    threads: worker.threads(),
                 };
-                processes.solve(task, tell)
+                processes.solve(task, &mut worker)
             }
         }
     });
@@ -146,15 +133,53 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Ar
     failpoint::pass(Point::Done, id);
 }
 
-/// Passes the failpoints at which a solver sends a message.
-fn pass_failpoint(told: &Told, id: JobId) {
-    let point = match told {
-        Told::Report(Report::OneLevel) => Some(Point::Parsed),
-        Told::Report(Report::Event(_, Payload::Stage { stage })) => Point::beginning_of(*stage),
-        _ => None,
-    };
-    if let Some(point) = point {
-        failpoint::pass(point, id);
+/// The worker as the supervisor of its solver, on a blocking thread.
+struct Worker {
+    queue: Arc<Queue>,
+    id: JobId,
+    running: Running,
+    recorder: mpsc::Sender<Batch>,
+}
+
+impl Worker {
+    fn record(&mut self, put: impl FnOnce(&mut Batch)) {
+        let mut batch = Batch::default();
+        put(&mut batch);
+        if self.recorder.blocking_send(batch).is_err() {
+            self.running.stop(StopReason::Unwanted); // the recorder has ended: the result is not needed
+        }
+    }
+}
+
+impl Supervisor for Worker {
+    fn one_level(&mut self) {
+        failpoint::pass(Point::Parsed, self.id);
+        self.record(|batch| batch.one_level = true);
+    }
+
+    fn event(&mut self, payload: Payload) {
+        if let Payload::Stage { stage } = &payload
+            && let Some(point) = Point::beginning_of(*stage)
+        {
+            failpoint::pass(point, self.id);
+        }
+        self.record(|batch| batch.events.push((Time::now(), payload)));
+    }
+
+    fn member(&mut self, row: MemberRow) {
+        self.record(|batch| batch.members.push((Time::now(), row)));
+    }
+
+    fn partial(&mut self, parts: Parts) {
+        self.record(|batch| batch.partial = Some(Arc::new(parts)));
+    }
+
+    fn stop(&mut self) -> bool {
+        self.running.stop.get().is_some()
+    }
+
+    fn threads(&mut self) -> usize {
+        1 + usize::from(self.queue.has_spare_processor())
     }
 }
 

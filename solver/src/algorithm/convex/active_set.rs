@@ -6,7 +6,7 @@ use crate::algorithm::factors::{Factors, free_dofs};
 use crate::algorithm::rounding::{PATIENCE, is_rounding};
 use crate::algorithm::system::{State, System};
 use crate::elasticity::Dof;
-use crate::solution::{Observer, Progress};
+use crate::observer::Observer;
 
 /// A reaction below this part of the problem's own force counts as zero.
 const NO_FORCE: f64 = 1e-30;
@@ -24,7 +24,7 @@ pub(super) fn run(
     start: &State,
     tolerance: f64,
     factors: &mut Factors,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Minimum {
     let mut state = start.clone();
     close(system, &mut state);
@@ -39,7 +39,7 @@ pub(super) fn run(
         }
         let newton = (system, bound, &mut *factors);
         let from = (&state, &elastic_force[..]);
-        let Some(next) = step_from(newton, from, residual_before, stalled, observe) else {
+        let Some(next) = step_from(newton, from, residual_before, stalled, observer) else {
             break;
         };
         stalled = next.residual > STALLED * residual_before;
@@ -70,7 +70,7 @@ pub(super) fn run(
                 break;
             }
         }
-        if arrived || observe(Progress::Pulse).is_break() {
+        if arrived || observer.stop() {
             break;
         }
     }
@@ -101,7 +101,7 @@ fn step_from(
     (state, elastic_force): (&State, &[f64]),
     residual_before: f64,
     damped: bool,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Option<Next> {
     /// The part of the residual that a step with an older factor may leave. A step with a new factor costs as much as
     /// several.
@@ -109,7 +109,7 @@ fn step_from(
     let free: Vec<usize> = free_dofs(system, |i| state.active[i]);
     let force = gradient(system, &state.v, elastic_force, bound);
     loop {
-        let renewed = factors.prepare(system, bound, &state.v, &free, observe)?;
+        let renewed = factors.prepare(system, bound, &state.v, &free, observer)?;
         let direction = factors.direction(&force)?;
         let part = if damped {
             least_along(system, bound, &state.v, &direction)

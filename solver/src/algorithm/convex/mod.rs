@@ -17,7 +17,7 @@ pub(super) use step::close;
 
 use crate::algorithm::factors::Factors;
 use crate::algorithm::system::{State, System};
-use crate::solution::{Observer, Progress};
+use crate::observer::Observer;
 
 /// Minimises J from `start` until the KKT residual is below `tolerance`, and somewhat further where that is cheap. The
 /// observer is called at every Newton step, and within long ones, and may stop the iterations.
@@ -26,7 +26,7 @@ pub fn minimise(
     bound: &[f64],
     start: &State,
     tolerance: f64,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Minimum {
     minimise_with(
         system,
@@ -34,7 +34,7 @@ pub fn minimise(
         start,
         tolerance,
         &mut Factors::default(),
-        observe,
+        observer,
     )
 }
 
@@ -45,13 +45,13 @@ pub(super) fn minimise_with(
     start: &State,
     tolerance: f64,
     factors: &mut Factors,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Minimum {
-    let mut by_active_set = active_set::run(system, bound, start, tolerance, factors, observe);
+    let mut by_active_set = active_set::run(system, bound, start, tolerance, factors, observer);
     if by_active_set.residual <= tolerance || by_active_set.rounded {
         return by_active_set;
     }
-    if observe(Progress::Pulse).is_break() {
+    if observer.stop() {
         if by_active_set.steps == 0 {
             // stopped within the first step: its residual is infinite, which would be taken for an overflow
             let (state, force) = (&by_active_set.state, &by_active_set.elastic_force);
@@ -65,7 +65,7 @@ pub(super) fn minimise_with(
         &by_active_set.state,
         tolerance,
         factors,
-        observe,
+        observer,
     );
     fallback.steps += by_active_set.steps;
     if fallback.residual <= by_active_set.residual {

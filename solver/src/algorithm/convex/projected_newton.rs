@@ -6,7 +6,7 @@ use crate::algorithm::rounding::{PATIENCE, is_rounding};
 use crate::algorithm::system::{ContactNode, State, System};
 use crate::elasticity::Dof;
 use crate::friction::FrictionLaw;
-use crate::solution::{Observer, Progress};
+use crate::observer::Observer;
 
 /// The largest number of steps; a dozen are usual.
 const PROJECTED_STEPS: u32 = 300;
@@ -19,7 +19,7 @@ pub(super) fn run(
     start: &State,
     tolerance: f64,
     factors: &mut Factors,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Minimum {
     let mut best = Minimum {
         state: start.clone(),
@@ -59,7 +59,7 @@ pub(super) fn run(
         let arrived = best.residual <= AIM * tolerance
             || best.residual <= tolerance && !patient
             || best.rounded;
-        if arrived || observe(Progress::Pulse).is_break() {
+        if arrived || observer.stop() {
             break;
         }
         steps += 1;
@@ -76,7 +76,7 @@ pub(super) fn run(
         let free = free_dofs(system, |i| held[i]);
         // J decreases along the direction of a new factor
         factors.renew();
-        let prepared = factors.prepare(system, bound, &v, &free, observe);
+        let prepared = factors.prepare(system, bound, &v, &free, observer);
         let Some(d) = prepared.and_then(|_| factors.direction(&force)) else {
             break;
         };

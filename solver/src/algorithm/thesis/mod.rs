@@ -22,8 +22,9 @@ use crate::algorithm::recorder::{Measured, Recorder, Row, relative_change};
 use crate::algorithm::system::{ContactNode, State, System};
 use crate::elasticity::Dof;
 use crate::linear::solve_positive_definite;
+use crate::observer::Observer;
 use crate::problem::{ThesisOptions, ThesisPressure};
-use crate::solution::{Observer, Outcome, Progress, Stage};
+use crate::solution::{Outcome, Stage};
 use friction::{Friction, relax, signed_ratio};
 use rows::Rows;
 
@@ -34,7 +35,7 @@ use rows::Rows;
 const STILL_FALLING: f64 = 0.1;
 
 /// Runs the iteration; returns the final state with the tractions used for it.
-pub(super) fn run(recorder: &mut Recorder<'_, '_>, observe: &mut Observer<'_>) -> (End, Vec<f64>) {
+pub(super) fn run(recorder: &mut Recorder<'_, '_>, observer: &mut dyn Observer) -> (End, Vec<f64>) {
     let system = recorder.system;
     let options = recorder.controls.thesis.clone().unwrap_or_default();
     let rows = Rows::new(system);
@@ -49,8 +50,8 @@ pub(super) fn run(recorder: &mut Recorder<'_, '_>, observe: &mut Observer<'_>) -
     let (mut stopped, mut residual_before) = (false, f64::INFINITY);
     for _ in 0..recorder.controls.max_iterations {
         // steps 1 and 2; the iteration ends where the system cannot be solved
-        let Some(v) = solve(system, &state.active, &friction.traction, observe) else {
-            stopped = observe(Progress::Pulse).is_break();
+        let Some(v) = solve(system, &state.active, &friction.traction, observer) else {
+            stopped = observer.stop();
             break;
         };
         state.v = v;
@@ -77,7 +78,7 @@ pub(super) fn run(recorder: &mut Recorder<'_, '_>, observe: &mut Observer<'_>) -
             tractions: friction.traction.clone(),
             own_r_f: r_f,
         };
-        let answer = recorder.record(&measured, row, observe);
+        let told_to_stop = recorder.record(&measured, row, observer);
         // with relaxation the same states recur on the way to a solution; only full steps cycle
         let cycle = if options.relaxation == 1.0 {
             recorder.note(&state, r_f.unwrap_or(1.0))
@@ -87,7 +88,7 @@ pub(super) fn run(recorder: &mut Recorder<'_, '_>, observe: &mut Observer<'_>) -
         let residual = measured.residuals.monolithic;
         let falling = residual <= (1.0 - STILL_FALLING * options.relaxation) * residual_before;
         residual_before = residual;
-        let outcome = match (settled, answer.is_break(), &cycle) {
+        let outcome = match (settled, told_to_stop, &cycle) {
             (true, _, _) if residual <= recorder.controls.tolerance => Outcome::Converged,
             (true, false, None) if falling => Outcome::NotConverged,
             (true, _, _) => Outcome::FalseConvergence,
@@ -142,7 +143,7 @@ fn solve(
     system: &System<'_>,
     active: &[bool],
     traction: &[f64],
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Option<Vec<f64>> {
     let mut state = State {
         v: vec![0.0; system.load.len()],
@@ -154,7 +155,7 @@ fn solve(
     system.add_traction_force(traction, &mut force);
     let rhs: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
     let entry = |i: usize, j: usize| system.stiffness.at(free[i], free[j]);
-    let solved = dense(free.len(), observe, |interrupt| {
+    let solved = dense(free.len(), observer, |interrupt| {
         solve_positive_definite(free.len(), entry, &rhs, interrupt)
     })?;
     free.iter()

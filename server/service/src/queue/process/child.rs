@@ -2,7 +2,6 @@
 
 use std::{
     io::{self, Read},
-    ops::ControlFlow,
     os::{fd::AsFd, unix::net::UnixStream},
     panic::{AssertUnwindSafe, catch_unwind},
     process::exit,
@@ -14,15 +13,15 @@ use std::{
     thread,
 };
 
-use base::{memory::Allowance, run::Solve};
+use base::{event::Payload, memory::Allowance, run::Solve, sweep::MemberRow};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use store::Parts;
 
 use super::{
     super::{
         ending::{NoSolution, panicked},
-        report::{Report, Told, go_on_if},
         solving::{read_mesh, solve_task as solve_task_of},
+        supervisor::Supervisor,
     },
     Order, Reply, Task, send, take,
 };
@@ -83,18 +82,11 @@ fn solve_task(
     stop: &AtomicBool,
     service: &mut UnixStream,
 ) -> io::Result<()> {
-    let mut sent = Ok(());
-    let mut tell = |told| {
-        if matches!(told, Told::SecondThread) {
-            return go_on_if(task.second_thread);
-        }
-        let must_stop = matches!(told, Told::OutOfMemory(_));
-        sent = pass_on(told, service);
-        if must_stop || sent.is_err() || stop.load(Relaxed) {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
+    let mut connection = Connection {
+        service,
+        stop,
+        threads: task.threads,
+        sent: Ok(()),
     };
     let solving = || {
         let mesh = task.mesh.as_deref().map(read_mesh).transpose()?;
@@ -103,11 +95,12 @@ fn solve_task(
             share: task.share,
             bodies: None,
         };
-        solve_task_of(&task.problem, mesh, members, solve, allowance, &mut tell)
+        let connection = &mut connection;
+        solve_task_of(&task.problem, mesh, members, solve, allowance, connection)
     };
     // what a panic leaves behind is not used again
     let solved = catch_unwind(AssertUnwindSafe(solving));
-    sent?;
+    connection.sent?;
     match solved.unwrap_or_else(|panic| Err(NoSolution::Internal(panicked("the solver", &*panic))))
     {
         Ok(solved) => {
@@ -123,17 +116,50 @@ fn solve_task(
     }
 }
 
-fn pass_on(told: Told, service: &mut UnixStream) -> io::Result<()> {
-    match told {
-        Told::Nothing | Told::SecondThread => Ok(()),
-        Told::OutOfMemory(outgrown) => send(service, &Reply::OutOfMemory(outgrown), &[]),
-        Told::Report(Report::OneLevel) => send(service, &Reply::OneLevel, &[]),
-        Told::Report(Report::Event(_, payload)) => send(service, &Reply::Event(payload), &[]),
-        Told::Report(Report::Member(_, row)) => send(service, &Reply::Member(row), &[]),
-        Told::Report(Report::Partial(parts)) => {
-            send_parts(*parts, service)?;
-            send(service, &Reply::Partial, &[])
+/// The connection to the service, which supervises the task.
+struct Connection<'a> {
+    service: &'a mut UnixStream,
+    /// Set when the service has asked to stop.
+    stop: &'a AtomicBool,
+    threads: usize,
+    /// The first error of sending; after it nothing is sent.
+    sent: io::Result<()>,
+}
+
+impl Connection<'_> {
+    fn send(&mut self, reply: &Reply) {
+        if self.sent.is_ok() {
+            self.sent = send(self.service, reply, &[]);
         }
+    }
+}
+
+impl Supervisor for Connection<'_> {
+    fn one_level(&mut self) {
+        self.send(&Reply::OneLevel);
+    }
+
+    fn event(&mut self, payload: Payload) {
+        self.send(&Reply::Event(payload));
+    }
+
+    fn member(&mut self, row: MemberRow) {
+        self.send(&Reply::Member(Box::new(row)));
+    }
+
+    fn partial(&mut self, parts: Parts) {
+        if self.sent.is_ok() {
+            self.sent = send_parts(parts, self.service);
+        }
+        self.send(&Reply::Partial);
+    }
+
+    fn stop(&mut self) -> bool {
+        self.sent.is_err() || self.stop.load(Relaxed)
+    }
+
+    fn threads(&mut self) -> usize {
+        self.threads
     }
 }
 

@@ -3,15 +3,14 @@
 //! A worker process is the same program (`signorini worker`), started in advance and kept for many jobs. It
 //! communicates with the service over a socket, which is its standard input, so that printed text cannot get in
 //! between. It ends when the service closes that socket, or dies. In the service, the blocking task of a worker serves
-//! the process: it passes on the reports as if it solved the job itself, and kills a process that does not stop when
-//! asked.
+//! the process: it passes on what the process tells its supervisor, and kills a process that does not stop when asked.
 
 mod child;
 mod parent;
 
 use std::io::{self, Write};
 
-use base::{event::Payload, memory::Outgrown, sweep::MemberRow};
+use base::{event::Payload, sweep::MemberRow};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use store::{Ending, MembersTask, Part};
 
@@ -40,11 +39,11 @@ pub(super) struct Task {
     pub(super) mesh: Option<Vec<u8>>,
     /// The memory that it may use (bytes).
     pub(super) share: u64,
-    /// Whether a processor for a second thread was free when the task began.
-    pub(super) second_thread: bool,
+    /// How many threads may share its work, by the processors that were free when the task began.
+    pub(super) threads: usize,
 }
 
-/// A message from a worker process.
+/// A message from a worker process: what it tells its supervisor, and the end of its task.
 #[derive(Debug, Serialize, Deserialize)]
 enum Reply {
     /// The process has started, and waits for a task.
@@ -55,8 +54,6 @@ enum Reply {
     Member(Box<MemberRow>),
     /// The problem has one load level on one grid.
     OneLevel,
-    /// The task needs more memory than its share, and stops.
-    OutOfMemory(Outgrown),
     /// A part of a result; its content follows.
     Part(Part),
     /// The parts so far are a partial result.

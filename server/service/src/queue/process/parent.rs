@@ -3,7 +3,6 @@
 use parking_lot::{Mutex, MutexGuard};
 use std::{
     io::{self, BufRead, BufReader, Read},
-    ops::ControlFlow,
     os::unix::{
         net::UnixStream,
         process::{CommandExt, ExitStatusExt},
@@ -13,14 +12,13 @@ use std::{
     time::{Duration, Instant},
 };
 
-use base::time::Time;
 use store::Parts;
 use tracing::{info, warn};
 
 use super::{
     super::{
         ending::{NoSolution, Solved, refused_memory},
-        report::{Report, Told},
+        supervisor::Supervisor,
     },
     Order, Reply, Task, send, take,
 };
@@ -71,15 +69,15 @@ impl Processes {
         }
     }
 
-    /// Solves a task in a process; `tell` is called as by `solve_and_report`. Call this on a blocking thread.
+    /// Solves a task in a process, as `solve_task` does on this thread. Call this on a blocking thread.
     pub(in crate::queue) fn solve(
         &self,
         task: Task,
-        mut tell: impl FnMut(Told) -> ControlFlow<()>,
+        supervisor: &mut dyn Supervisor,
     ) -> Result<Solved, NoSolution> {
-        let mut process = self.take(&mut tell)?;
+        let mut process = self.take(supervisor)?;
         let share = task.share;
-        match process.solve(task, tell) {
+        match process.solve(task, supervisor) {
             Ok(solved) => {
                 self.idle().push(process);
                 solved
@@ -95,7 +93,7 @@ impl Processes {
 
     /// A waiting process, or a new one. The machine may temporarily have no process, file or memory left: starting is
     /// retried until the job is to stop.
-    fn take(&self, tell: &mut impl FnMut(Told) -> ControlFlow<()>) -> Result<Process, NoSolution> {
+    fn take(&self, supervisor: &mut dyn Supervisor) -> Result<Process, NoSolution> {
         loop {
             let idle = self.idle().pop();
             let process = match idle {
@@ -111,7 +109,7 @@ impl Processes {
             }
             let end = Instant::now() + START_PAUSE;
             while Instant::now() < end {
-                if tell(Told::Nothing).is_break() {
+                if supervisor.stop() {
                     return Err(NoSolution::Stopped);
                 }
                 thread::sleep(PULSE);
@@ -192,7 +190,7 @@ impl Process {
     fn solve(
         &mut self,
         mut task: Task,
-        mut tell: impl FnMut(Told) -> ControlFlow<()>,
+        supervisor: &mut dyn Supervisor,
     ) -> Result<Result<Solved, NoSolution>, Unusable> {
         // no part of its result is larger than what it may use
         let longest = task.share.saturating_add(LONGEST_MESSAGE);
@@ -203,22 +201,18 @@ impl Process {
         let mut asked: Option<Instant> = None;
         let mut parts = vec![];
         loop {
-            let told = match self.next(longest) {
-                Ok(None) => Told::Nothing,
+            match self.next(longest) {
+                Ok(None) => {}
                 Ok(Some((reply, content))) => match reply {
-                    Reply::Event(payload) => Told::Report(Report::Event(Time::now(), payload)),
-                    Reply::Member(row) => Told::Report(Report::Member(Time::now(), row)),
-                    Reply::OneLevel => Told::Report(Report::OneLevel),
-                    Reply::OutOfMemory(outgrown) => Told::OutOfMemory(outgrown),
+                    Reply::OneLevel => supervisor.one_level(),
+                    Reply::Event(payload) => supervisor.event(payload),
+                    Reply::Member(row) => supervisor.member(*row),
                     Reply::Part(mut part) => {
                         part.body = content;
                         parts.push(part);
                         continue;
                     }
-                    Reply::Partial => {
-                        let parts = Parts::new(std::mem::take(&mut parts));
-                        Told::Report(Report::Partial(Box::new(parts)))
-                    }
+                    Reply::Partial => supervisor.partial(Parts::new(std::mem::take(&mut parts))),
                     Reply::Solved {
                         ending,
                         unverified,
@@ -237,8 +231,8 @@ impl Process {
                 // its end is known, whatever it died of
                 Err(_) if asked.is_some() => return Err(Unusable::Unwilling),
                 Err(error) => return Err(Unusable::Dead(error)),
-            };
-            if tell(told).is_break() && asked.is_none() {
+            }
+            if asked.is_none() && supervisor.stop() {
                 asked = Some(Instant::now());
                 // if that fails, it is dead: so the next reply says
                 let _ = send(&mut self.socket, &Order::Stop, &[]);

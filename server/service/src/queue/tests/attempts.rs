@@ -143,19 +143,28 @@ async fn a_canceled_running_job_keeps_its_last_state() {
 fn verify_until_stopped(
     problem: &Problem,
     mesh: Option<External>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> std::result::Result<Solution, SolveError> {
     let mut problem = problem.clone();
     problem.solver.accuracy = Some(AccuracyMode::Verify);
-    solver::solve_on(&problem, mesh, &mut |progress| {
+    solver::solve_on(&problem, mesh, &mut Verifies(observer))
+}
+
+/// An observer that does not let a verification get anywhere.
+struct Verifies<'a>(&'a mut dyn Observer);
+
+impl Observer for Verifies<'_> {
+    fn event(&mut self, progress: Progress<'_>) {
         let verifies = matches!(progress, Progress::Phase(Phase::Verify));
-        let mut answer = observe(progress);
-        while verifies && answer.is_continue() {
+        self.0.event(progress);
+        while verifies && !self.0.stop() {
             std::thread::sleep(Duration::from_millis(1));
-            answer = observe(Progress::Pulse);
         }
-        answer
-    })
+    }
+
+    fn stop(&mut self) -> bool {
+        self.0.stop()
+    }
 }
 
 /// A job that is stopped while it verifies keeps its solution with the estimated errors: a time limit applies to the
@@ -202,7 +211,7 @@ async fn a_job_that_is_stopped_while_it_verifies_keeps_its_solution() {
 fn unbalanced(
     _: &Problem,
     _: Option<External>,
-    _: &mut Observer<'_>,
+    _: &mut dyn Observer,
 ) -> std::result::Result<Solution, SolveError> {
     let mut solution = fake::solution();
     solution.summary.outcome = Outcome::FalseConvergence;
@@ -241,9 +250,9 @@ async fn a_job_whose_forces_do_not_balance_fails_and_keeps_its_result() {
 fn busy(
     _: &Problem,
     _: Option<External>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> std::result::Result<Solution, SolveError> {
-    while observe(Progress::Pulse).is_continue() {
+    while !observer.stop() {
         std::thread::sleep(Duration::from_millis(1));
     }
     Err(SolveError::Stopped)
@@ -269,10 +278,10 @@ async fn a_pulse_is_answered_and_not_recorded() {
 fn unresponsive(
     problem: &Problem,
     _: Option<External>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> std::result::Result<Solution, SolveError> {
     std::thread::sleep(Duration::from_secs(1));
-    fake::solve(problem, None, observe)
+    fake::solve(problem, None, observer)
 }
 
 #[tokio::test]
@@ -445,7 +454,7 @@ async fn a_job_that_times_out_is_ended_by_force_if_its_solver_does_not_react() {
     fn very_unresponsive(
         _: &Problem,
         _: Option<External>,
-        _: &mut Observer<'_>,
+        _: &mut dyn Observer,
     ) -> std::result::Result<Solution, SolveError> {
         std::thread::sleep(Duration::from_secs(4));
         Err(SolveError::Stopped)
@@ -472,15 +481,16 @@ async fn partial_results_of_many_quick_steps_are_not_stored_after_each() {
     fn quick_steps(
         _: &Problem,
         _: Option<External>,
-        observe: &mut Observer<'_>,
+        observer: &mut dyn Observer,
     ) -> std::result::Result<Solution, SolveError> {
         let mut solution = fake::solution();
         for _ in 0..8 {
-            if observe(Progress::Step(&solution)).is_break() {
+            observer.event(Progress::Step(&solution));
+            if observer.stop() {
                 return Err(SolveError::Stopped);
             }
         }
-        while observe(Progress::Pulse).is_continue() {
+        while !observer.stop() {
             std::thread::sleep(Duration::from_millis(1));
         }
         solution.summary.outcome = Outcome::Canceled;

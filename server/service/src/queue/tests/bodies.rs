@@ -1,9 +1,6 @@
 //! Tests of jobs on kept bodies: when a body is reused, and that reuse changes no bit of a result.
 
-use std::{
-    ops::ControlFlow,
-    panic::{AssertUnwindSafe, catch_unwind},
-};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use base::{
     memory::{Allowance, Meter},
@@ -15,7 +12,6 @@ use solver::solution::Phase;
 use super::*;
 use crate::queue::{
     ending::NoSolution,
-    report::{Report, Told},
     solving::{prepare, solve_task},
 };
 
@@ -189,14 +185,13 @@ fn solved(problem: &Value, budget: Option<&Budget>) -> Result<Summary, String> {
         share: u64::MAX,
         bodies: budget,
     };
-    let go_on = |_| ControlFlow::Continue(());
     let solved = solve_task(
         &problem.to_string(),
         None,
         None,
         solver::solve_on,
         allowance,
-        go_on,
+        &mut looking(|_| false),
     );
     let solved = solved.map_err(|error| format!("{error:?}"))?;
     let mut parts = solved.parts.into_parts();
@@ -259,22 +254,17 @@ fn every_change_of_a_problem_finds_the_body_or_not_and_has_the_result_of_its_own
     }
 }
 
-/// Solves a problem until its solver reports this phase; then runs the action.
-fn until(
-    phase: Phase,
-    budget: &Budget,
-    mut then: impl FnMut() -> ControlFlow<()>,
-) -> Result<(), NoSolution> {
+/// Solves a problem until its solver reports this phase; then runs the action, which answers whether to stop.
+fn until(phase: Phase, budget: &Budget, mut then: impl FnMut() -> bool) -> Result<(), NoSolution> {
     let allowance = Allowance {
         share: u64::MAX,
         bodies: Some(budget),
     };
-    let tell = |told| match told {
-        Told::Report(Report::Event(_, Payload::Stage { stage })) if stage == phase => then(),
-        _ => ControlFlow::Continue(()),
-    };
+    let supervisor = &mut looking(|event| {
+        matches!(event, Payload::Stage { stage } if *stage == phase) && then()
+    });
     let text = sheet().to_string();
-    solve_task(&text, None, None, solver::solve_on, allowance, tell).map(|_| ())
+    solve_task(&text, None, None, solver::solve_on, allowance, supervisor).map(|_| ())
 }
 
 #[test]
@@ -282,7 +272,7 @@ fn a_preparation_that_is_stopped_or_panics_leaves_nothing_behind() {
     let alone = solved(&sheet(), None).unwrap();
     for phase in [Phase::Mesh, Phase::Assemble, Phase::Factor, Phase::Condense] {
         let budget = budget();
-        let stopped = until(phase, &budget, || ControlFlow::Break(()));
+        let stopped = until(phase, &budget, || true);
         assert!(matches!(stopped, Err(NoSolution::Stopped)), "{phase:?}");
         let panicked = catch_unwind(AssertUnwindSafe(|| {
             until(phase, &budget, || panic!("the test wants it"))
@@ -301,7 +291,7 @@ fn a_preparation_that_is_stopped_or_panics_leaves_nothing_behind() {
 #[test]
 fn the_body_of_a_job_that_is_canceled_in_its_iterations_is_kept() {
     let budget = budget();
-    let _ = until(Phase::Iterate, &budget, || ControlFlow::Break(()));
+    let _ = until(Phase::Iterate, &budget, || true);
     assert!(solved(&sheet(), Some(&budget)).unwrap().body_reused);
 }
 
@@ -327,8 +317,7 @@ fn prepared(problem: &Value, budget: &Budget) -> (u64, u64) {
     elsewhere(|| {
         let problem = files::parse(&problem.to_string()).unwrap();
         let meter = Meter::new(u64::MAX);
-        let go_on = &mut |_: Progress<'_>| ControlFlow::Continue(());
-        let prepared = prepare(&problem, None, Some(budget), &meter, go_on).unwrap();
+        let prepared = prepare(&problem, None, Some(budget), &meter, &mut ()).unwrap();
         let used = meter.used();
         drop(prepared);
         (used, budget.body_cache().bytes)
@@ -378,17 +367,13 @@ fn least_share(problem: &Value, bodies: impl Fn() -> Option<Arc<Budget>> + Sync)
                 share,
                 bodies: budget.as_deref(),
             };
-            let mut fits = true;
-            let tell = |told| match told {
-                Told::OutOfMemory(_) => {
-                    fits = false;
-                    ControlFlow::Break(())
-                }
-                _ => ControlFlow::Continue(()),
-            };
-            let solved = solve_task(&text, None, None, solver::solve_on, allowance, tell);
-            assert!(solved.is_ok() || !fits);
-            fits
+            let supervisor = &mut looking(|_| false);
+            let solved = solve_task(&text, None, None, solver::solve_on, allowance, supervisor);
+            match solved {
+                Ok(solved) => solved.ending.status == Status::Succeeded,
+                Err(NoSolution::OutOfMemory(_)) => false,
+                Err(error) => panic!("{error:?}"),
+            }
         })
     };
     let (mut none, mut enough) = (0, 1 << 30);

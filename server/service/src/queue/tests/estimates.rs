@@ -3,15 +3,12 @@
 
 use serde_json::{Value, json};
 
-use std::ops::ControlFlow;
-
 use base::memory::Allowance;
 
 use super::*;
 use crate::queue::{
     ending::NoSolution,
-    report::Told,
-    solving::{Partials, solve_and_store, solve_task},
+    solving::{Partials, solve_task, solve_with_partials},
 };
 
 /// Problems of different shapes, named by what is large in them.
@@ -198,19 +195,15 @@ fn taken_and_told(problem: &Value) -> (u64, u64) {
     let told = checked.unwrap_or_else(|v| panic!("{v:?}")).estimate;
     let before = allocator::held();
     allocator::forget_highest();
-    let go_on = |told| {
-        drop(told);
-        ControlFlow::Continue(())
-    };
     let partials = Partials::every_step();
-    let solved = solve_and_store(
+    let solved = solve_with_partials(
         &text,
         None,
         None,
         solver::solve_on,
         within(u64::MAX),
         partials,
-        go_on,
+        &mut looking(|_| false),
     );
     let taken = allocator::highest() - before;
     drop(solved.map(|solved| solved.parts));
@@ -256,28 +249,16 @@ fn estimates_of_long_contacts_are_upper_bounds() {
     compare(lines.iter().map(named).collect());
 }
 
-/// A job that needs more memory than its share is stopped at the next check: its solver sees a stop, and the worker the
-/// reason.
+/// A job that needs more memory than its share is stopped at the next check, with the reason.
 #[test]
 fn a_job_that_needs_more_than_its_share_is_stopped() {
     let text = wall(300, 2.0).to_string();
-    let mut stopped_for = None;
-    let solved = solve_task(
-        &text,
-        None,
-        None,
-        solver::solve_on,
-        within(16 << 20),
-        |told| match told {
-            Told::OutOfMemory(outgrown) => {
-                stopped_for = Some(outgrown);
-                ControlFlow::Break(())
-            }
-            _ => ControlFlow::Continue(()),
-        },
-    );
-    assert!(matches!(solved.err(), Some(NoSolution::Stopped)));
-    let outgrown = stopped_for.unwrap();
+    let supervisor = &mut looking(|_| false);
+    let allowance = within(16 << 20);
+    let solved = solve_task(&text, None, None, solver::solve_on, allowance, supervisor);
+    let Some(NoSolution::OutOfMemory(outgrown)) = solved.err() else {
+        panic!("it was not out of memory")
+    };
     assert_eq!(outgrown.share, 16 << 20);
     // the factor alone is larger
     assert!(
@@ -304,10 +285,7 @@ fn a_verification_that_needs_more_than_the_share_leaves_the_solution() {
         None,
         solver::solve_on,
         within(share),
-        |told| {
-            assert!(!matches!(told, Told::OutOfMemory(_)));
-            ControlFlow::Continue(())
-        },
+        &mut looking(|_| false),
     );
     let solved = solved.unwrap();
     assert_eq!(solved.ending.status, Status::Succeeded);

@@ -15,12 +15,13 @@ const PATIENCE: Duration = Duration::from_secs(30);
 fn solve_with_a_step(
     problem: &Problem,
     mesh: Option<External>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> std::result::Result<Solution, SolveError> {
     let mut problem = problem.clone();
     problem.solver.accuracy = Some(AccuracyMode::Verify);
-    let solution = solver::solve_on(&problem, mesh, observe)?;
-    if observe(Progress::Step(&solution)).is_break() {
+    let solution = solver::solve_on(&problem, mesh, observer)?;
+    observer.event(Progress::Step(&solution));
+    if observer.stop() {
         Err(SolveError::Stopped)
     } else {
         Ok(solution)

@@ -75,14 +75,15 @@ async fn a_job_of_more_than_the_budget_runs_alone() {
 fn solve_greedily(
     _: &Problem,
     _: Option<External>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<Solution, SolveError> {
     let bytes = 1 << 40;
-    if observe(Progress::Needs { bytes }).is_break() {
-        Err(SolveError::Stopped)
-    } else {
-        Ok(fake::solution())
+    if observer.may_use(bytes) {
+        return Ok(fake::solution());
     }
+    observer.event(Progress::OutOfMemory { bytes });
+    assert!(observer.stop());
+    Err(SolveError::Stopped)
 }
 
 #[tokio::test]
@@ -106,12 +107,11 @@ async fn a_job_that_outgrows_its_share_fails_with_figures_and_its_worker_goes_on
 fn solve_with_what_there_is(
     _: &Problem,
     _: Option<External>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<Solution, SolveError> {
-    let mut room = |bytes| observe(Progress::Room { bytes }).is_continue();
-    let asked = [room(MIB), room(1 << 40), room(MIB)];
+    let asked = [MIB, 1 << 40, MIB].map(|bytes| observer.may_use(bytes));
     // no answer stops it
-    if asked == [true, false, true] && observe(Progress::Pulse).is_continue() {
+    if asked == [true, false, true] && !observer.stop() {
         Ok(fake::solution())
     } else {
         Err(SolveError::Stopped)

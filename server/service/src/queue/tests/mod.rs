@@ -23,20 +23,22 @@ use base::{
     job::{Cache, Job, JobId, Limits, Reason, ResultAvailable, Status, Waiting},
     memory::Budget,
     run::Solve,
+    sweep::MemberRow,
     time::Time,
 };
 use solver::{
     error::SolveError,
     mesh::External,
+    observer::{Observer, Progress},
     problem::Problem,
-    solution::{Observer, Outcome, Progress, Solution},
+    solution::{Outcome, Solution},
 };
 use store::{
     Accepted, CancelOutcome, Edit, Ending, Filter, FinalBatch, GroupBy, NewJob, Order, Parts,
     QueueLimits, RequestKey, Store, StoreError, Submission,
 };
 
-use super::{cancel::CANCEL_GRACE, running::StopReason, *};
+use super::{cancel::CANCEL_GRACE, running::StopReason, supervisor::Supervisor, *};
 
 /// The owner of the jobs.
 const OWNER: &str = "ada";
@@ -162,6 +164,39 @@ impl Rig {
             },
             other => unreachable!("{other:?} after done"),
         }
+    }
+}
+
+/// A supervisor that records nothing. A function sees each event, and answers whether to stop from then on.
+struct Looking<F> {
+    see: F,
+    stopped: bool,
+}
+
+fn looking<F: FnMut(&Payload) -> bool>(see: F) -> Looking<F> {
+    Looking {
+        see,
+        stopped: false,
+    }
+}
+
+impl<F: FnMut(&Payload) -> bool> Supervisor for Looking<F> {
+    fn one_level(&mut self) {}
+
+    fn event(&mut self, payload: Payload) {
+        self.stopped |= (self.see)(&payload);
+    }
+
+    fn member(&mut self, _: MemberRow) {}
+
+    fn partial(&mut self, _: Parts) {}
+
+    fn stop(&mut self) -> bool {
+        self.stopped
+    }
+
+    fn threads(&mut self) -> usize {
+        1
     }
 }
 

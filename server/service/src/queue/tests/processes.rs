@@ -31,7 +31,7 @@ const POISONS: [&str; 8] = [
 fn poisoned(
     problem: &Problem,
     external: Option<External>,
-    observe: &mut Observer<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<Solution, SolveError> {
     let modulus = serde_json::to_value(problem).unwrap()["materials"][0]["youngs_modulus"].as_f64();
     match POISONS.get(modulus.unwrap() as usize).copied() {
@@ -46,7 +46,7 @@ fn poisoned(
         },
         _ => {}
     }
-    fake::solve(problem, external, observe)
+    fake::solve(problem, external, observer)
 }
 
 #[allow(unconditional_recursion)]
