@@ -15,7 +15,7 @@ fn cylinder() -> Problem {
     problem
 }
 
-/// What was seen of a solution, and the bytes of every question for memory.
+/// What was seen of a solution, and the bytes of every question for memory beyond the first mesh.
 struct Seen {
     solution: Solution,
     mesh: Mesh,
@@ -28,6 +28,8 @@ struct Seen {
 /// An observer that grants memory by the number of the question and its bytes.
 struct Grants<F> {
     room: F,
+    /// Questions that come before those, and are granted.
+    first: usize,
     asked: Vec<u64>,
     meshes: Vec<u32>,
     rows: usize,
@@ -43,15 +45,33 @@ impl<F: Fn(usize, u64) -> bool> Observer for Grants<F> {
     }
 
     fn may_use(&mut self, bytes: u64) -> bool {
+        if self.first > 0 {
+            self.first -= 1;
+            return true;
+        }
         self.asked.push(bytes);
         (self.room)(self.asked.len() - 1, bytes)
     }
 }
 
-/// Solves with an observer that grants memory by the number of the question and its bytes.
+/// Solves with an observer that grants memory by the number of the question and its bytes. What the first mesh needs is
+/// granted in any case: without it there is no solution.
 fn solve(problem: &Problem, room: impl Fn(usize, u64) -> bool) -> Seen {
+    seen(problem, questions_on_the_first_mesh(problem), room)
+}
+
+fn questions_on_the_first_mesh(problem: &Problem) -> usize {
+    let mut once = problem.clone();
+    once.mesh.refine = Refine::Times(0);
+    let count = seen(&once, 0, |_, _| true).asked.len();
+    assert!(count > 0);
+    count
+}
+
+fn seen(problem: &Problem, first: usize, room: impl Fn(usize, u64) -> bool) -> Seen {
     let mut observer = Grants {
         room,
+        first,
         asked: Vec::new(),
         meshes: Vec::new(),
         rows: 0,
@@ -140,22 +160,34 @@ fn room_that_is_refused_on_the_way_leaves_the_mesh_before_too() {
 /// A stop is no lack of room.
 #[test]
 fn an_observer_that_stops_is_obeyed_at_a_question_for_room() {
-    /// Refuses memory, and stops from then on.
-    struct Stops(bool);
+    /// Grants some questions, then refuses, and stops from then on.
+    struct Stops {
+        granted: usize,
+        stopped: bool,
+    }
     impl Observer for Stops {
         fn event(&mut self, _: Progress<'_>) {}
 
         fn stop(&mut self) -> bool {
-            self.0
+            self.stopped
         }
 
         fn may_use(&mut self, _: u64) -> bool {
-            self.0 = true;
-            false
+            self.stopped = self.granted == 0;
+            self.granted = self.granted.saturating_sub(1);
+            !self.stopped
         }
     }
-    let ended = solver::solve(&cylinder(), &mut Stops(false));
-    assert_eq!(ended.err(), Some(solver::error::SolveError::Stopped));
+    let first = questions_on_the_first_mesh(&cylinder());
+    // the factor of the first mesh, the second mesh as a whole, its factor
+    for granted in [0, first, first + 1] {
+        let mut stops = Stops {
+            granted,
+            stopped: false,
+        };
+        let ended = solver::solve(&cylinder(), &mut stops);
+        assert_eq!(ended.err(), Some(solver::error::SolveError::Stopped));
+    }
 }
 
 #[test]
