@@ -189,7 +189,6 @@ pub fn figure(
 }
 
 fn draw_panel(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
-    let palette = style.palette();
     let curves: Vec<Vec<(f64, f64)>> = panel
         .curves
         .iter()
@@ -205,27 +204,22 @@ fn draw_panel(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
     };
     let (head, body) = area.split_vertically(px(LEGEND * rows(style, panel)));
     let fit = ((style.width() - LEFT - RIGHT) / 66).clamp(4, 9) as usize;
-    let mut chart = axes(&body, style, panel, &across, fit)?;
-    let frame = Frame::of(&body, &chart, across, up(panel));
+    let mut axes = Axes::draw(&body, style, panel, across, fit)?;
     for shade in &panel.shades {
-        draw_shade(&body, &palette, &frame, shade)?;
+        axes.draw_shade(shade)?;
     }
-    if frame.up.start < 0.0 && frame.up.end > 0.0 && !whole {
-        let zero = LineSeries::new(
-            [(frame.across.start, 0.0), (frame.across.end, 0.0)],
-            palette.axis.mix(0.5).stroke_width(6),
-        );
-        chart.draw_series(zero)?;
+    if !whole {
+        axes.draw_zero()?;
     }
-    draw_marks(&mut chart, style, &frame, &panel.marks)?;
+    axes.draw_marks(&panel.marks)?;
     for (curve, points) in panel.curves.iter().zip(&curves) {
-        draw_curve(&mut chart, &palette, &frame, curve.style, points)?;
+        axes.draw_curve(curve.style, points)?;
     }
     if panel.scale == Scale::Peaked {
-        draw_cuts(&body, style, &frame, panel)?;
+        axes.draw_cuts(panel)?;
     }
     if let Some(above) = &panel.above {
-        draw_above(&body, style, &frame, above, fit)?;
+        axes.draw_above(above, fit)?;
     }
     legend(&head, style, panel)
 }
@@ -242,133 +236,12 @@ fn shown(scale: Scale, curve: &Curve) -> Vec<(f64, f64)> {
     }
 }
 
-/// Draws the axes of a panel with at most `fit` numbers on the horizontal one.
-fn axes<'a, 'b>(
-    body: &'a Area<'b>,
+/// The axes of a panel, and what is drawn on them. Places are in the units of the drawing.
+struct Axes<'a, 'b> {
+    area: &'a Area<'b>,
     style: Style,
-    panel: &Panel,
-    across: &Range<f64>,
-    fit: usize,
-) -> Fallible<Chart<'a, 'b>> {
-    let palette = style.palette();
-    let up = up(panel);
-    let name = if panel.x.is_empty() { 0 } else { NAME };
-    let mut chart: Chart<'a, 'b> = ChartBuilder::on(body)
-        .margin_top(px(panel.room_above()))
-        .margin_right(px(RIGHT))
-        .margin_bottom(px(MARGIN))
-        .margin_left(px(EDGE))
-        .x_label_area_size(px(NUMBERS + name))
-        .y_label_area_size(px(LEFT - EDGE))
-        .build_cartesian_2d(across.clone(), up.clone())?;
-    let whole = panel.scale.is_whole();
-    let whole_number = |value: f64| match value.round() {
-        round if (value - round).abs() < 1e-6 => number(round),
-        _ => String::new(),
-    };
-    let x_label = |value: &f64| {
-        if whole {
-            whole_number(*value)
-        } else {
-            tick(*value, across.end - across.start)
-        }
-    };
-    let y_label = |value: &f64| match panel.scale {
-        Scale::Log => power_of_ten(*value),
-        Scale::Count => whole_number(*value),
-        Scale::Peaked | Scale::Linear => tick(*value, up.end - up.start),
-    };
-    let (x_labels, y_labels) = if whole {
-        (ticks(across).min(fit + 3), ticks(&up).min(7))
-    } else {
-        (fit, 7)
-    };
-    chart
-        .configure_mesh()
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(palette.grid.stroke_width(px(1) as u32))
-        .axis_style(palette.axis.stroke_width(px(1) as u32))
-        .set_all_tick_mark_size(px(4))
-        .x_desc(&panel.x)
-        .y_desc(&panel.y)
-        .x_labels(x_labels)
-        .y_labels(y_labels)
-        .x_label_formatter(&x_label)
-        .y_label_formatter(&y_label)
-        .label_style(page::text(style, LETTERS))
-        .axis_desc_style(page::text(style, LETTERS))
-        .draw()?;
-    Ok(chart)
-}
-
-/// Draws vertical lines, each with its word where there is room.
-fn draw_marks(
-    chart: &mut Chart<'_, '_>,
-    style: Style,
-    frame: &Frame,
-    marks: &[(f64, String)],
-) -> Fallible<()> {
-    let Range { start, end: top } = frame.up;
-    let thin = style.palette().faint.stroke_width(px(1) as u32);
-    let mut free = i32::MIN; // where the next word may start
-    for (x, word) in marks {
-        chart.draw_series(LineSeries::new([(*x, start), (*x, top)], thin))?;
-        let place = frame.x(*x) + px(4);
-        let end = place + px(page::width(word));
-        if place >= free && end <= frame.right {
-            let text = Text::new(word.clone(), (px(4), px(3)), page::text(style, 13));
-            chart.draw_series([EmptyElement::at((*x, top)) + text])?;
-            free = end + px(6);
-        }
-    }
-    Ok(())
-}
-
-fn draw_curve(
-    chart: &mut Chart<'_, '_>,
-    palette: &Palette,
-    Frame { across, up, .. }: &Frame,
-    style: LineStyle,
-    points: &[(f64, f64)],
-) -> Fallible<()> {
-    let line = stroke(palette, style);
-    let inside = || {
-        let points = points.iter().copied();
-        points.filter(|p| up.start <= p.1 && p.1 <= up.end)
-    };
-    match style {
-        LineStyle::Points(_) => {
-            chart.draw_series(inside().map(|p| Circle::new(p, px(3), line)))?;
-        }
-        LineStyle::Dashed => {
-            // from edge to edge: also one iteration has a limit
-            let first = inside().next().map(|p| (across.start, p.1));
-            let last = inside().next_back().map(|p| (across.end, p.1));
-            let points: Vec<_> = first.into_iter().chain(inside()).chain(last).collect();
-            chart.draw_series(DashedLineSeries::new(points, px(7), px(5), line))?;
-        }
-        LineStyle::Bound => {
-            for part in within(points, up) {
-                chart.draw_series(DashedLineSeries::new(part, px(4), px(3), line))?;
-            }
-        }
-        LineStyle::Line(_) | LineStyle::Reference | LineStyle::Marked(_) => {
-            for part in within(points, up) {
-                chart.draw_series(LineSeries::new(part, line))?;
-            }
-            if let LineStyle::Marked(k) = style {
-                let mark = |p| EmptyElement::at(p) + dot((0, 0), k, line);
-                chart.draw_series(inside().map(mark))?;
-            }
-        }
-    }
-    Ok(())
-}
-
-type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
-
-/// The position of the axes of a panel, in the units of the drawing, and their ranges.
-struct Frame {
+    palette: Palette,
+    chart: ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>,
     left: i32,
     right: i32,
     top: i32,
@@ -377,36 +250,232 @@ struct Frame {
     up: Range<f64>,
 }
 
-impl Frame {
-    fn of(body: &Area<'_>, chart: &Chart<'_, '_>, across: Range<f64>, up: Range<f64>) -> Frame {
+impl<'a, 'b> Axes<'a, 'b> {
+    /// Draws the axes of a panel with at most `fit` numbers on the horizontal one.
+    fn draw(
+        area: &'a Area<'b>,
+        style: Style,
+        panel: &Panel,
+        across: Range<f64>,
+        fit: usize,
+    ) -> Fallible<Self> {
+        let palette = style.palette();
+        let up = up(panel);
+        let name = if panel.x.is_empty() { 0 } else { NAME };
+        let mut chart = ChartBuilder::on(area)
+            .margin_top(px(panel.room_above()))
+            .margin_right(px(RIGHT))
+            .margin_bottom(px(MARGIN))
+            .margin_left(px(EDGE))
+            .x_label_area_size(px(NUMBERS + name))
+            .y_label_area_size(px(LEFT - EDGE))
+            .build_cartesian_2d(across.clone(), up.clone())?;
+        let whole = panel.scale.is_whole();
+        let whole_number = |value: f64| match value.round() {
+            round if (value - round).abs() < 1e-6 => number(round),
+            _ => String::new(),
+        };
+        let x_label = |value: &f64| {
+            if whole {
+                whole_number(*value)
+            } else {
+                tick(*value, across.end - across.start)
+            }
+        };
+        let y_label = |value: &f64| match panel.scale {
+            Scale::Log => power_of_ten(*value),
+            Scale::Count => whole_number(*value),
+            Scale::Peaked | Scale::Linear => tick(*value, up.end - up.start),
+        };
+        let (x_labels, y_labels) = if whole {
+            (ticks(&across).min(fit + 3), ticks(&up).min(7))
+        } else {
+            (fit, 7)
+        };
+        chart
+            .configure_mesh()
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(palette.grid.stroke_width(px(1) as u32))
+            .axis_style(palette.axis.stroke_width(px(1) as u32))
+            .set_all_tick_mark_size(px(4))
+            .x_desc(&panel.x)
+            .y_desc(&panel.y)
+            .x_labels(x_labels)
+            .y_labels(y_labels)
+            .x_label_formatter(&x_label)
+            .y_label_formatter(&y_label)
+            .label_style(page::text(style, LETTERS))
+            .axis_desc_style(page::text(style, LETTERS))
+            .draw()?;
         let (x, y) = chart.plotting_area().get_pixel_range();
-        let (left, top) = body.get_base_pixel();
-        Frame {
+        let (left, top) = area.get_base_pixel();
+        Ok(Axes {
+            area,
+            style,
+            palette,
+            chart,
             left: x.start - left,
             right: x.end - left,
             top: y.start - top,
             bottom: y.end - top,
             across,
             up,
-        }
+        })
     }
 
     fn x(&self, x: f64) -> i32 {
         let part = (x - self.across.start) / (self.across.end - self.across.start);
         self.left + (part * f64::from(self.right - self.left)).round() as i32
     }
-}
 
-/// Draws a shaded part of the axis, hatched where the contact slips.
-fn draw_shade(area: &Area<'_>, palette: &Palette, frame: &Frame, shade: &Shade) -> Fallible<()> {
-    let [from, to] = shade
-        .extent
-        .map(|x| frame.x(x).clamp(frame.left, frame.right));
-    if to <= from {
-        return Ok(());
+    /// Draws a shaded part of the axis, hatched where the contact slips.
+    fn draw_shade(&self, shade: &Shade) -> Fallible<()> {
+        let [from, to] = shade.extent.map(|x| self.x(x).clamp(self.left, self.right));
+        if to <= from {
+            return Ok(());
+        }
+        let place = [(from, self.top), (to, self.bottom)];
+        fill(self.area, place, shade.kind, &self.palette)
     }
-    let place = [(from, frame.top), (to, frame.bottom)];
-    fill(area, place, shade.kind, palette)
+
+    fn draw_zero(&mut self) -> Fallible<()> {
+        if self.up.start < 0.0 && self.up.end > 0.0 {
+            let ends = [(self.across.start, 0.0), (self.across.end, 0.0)];
+            let line = self.palette.axis.mix(0.5).stroke_width(6);
+            self.chart.draw_series(LineSeries::new(ends, line))?;
+        }
+        Ok(())
+    }
+
+    /// Draws vertical lines, each with its word where there is room.
+    fn draw_marks(&mut self, marks: &[(f64, String)]) -> Fallible<()> {
+        let Range { start, end: top } = self.up;
+        let thin = self.palette.faint.stroke_width(px(1) as u32);
+        let mut free = i32::MIN; // where the next word may start
+        for (x, word) in marks {
+            self.chart
+                .draw_series(LineSeries::new([(*x, start), (*x, top)], thin))?;
+            let place = self.x(*x) + px(4);
+            let end = place + px(page::width(word));
+            if place >= free && end <= self.right {
+                let text = Text::new(word.clone(), (px(4), px(3)), page::text(self.style, 13));
+                self.chart
+                    .draw_series([EmptyElement::at((*x, top)) + text])?;
+                free = end + px(6);
+            }
+        }
+        Ok(())
+    }
+
+    fn draw_curve(&mut self, style: LineStyle, points: &[(f64, f64)]) -> Fallible<()> {
+        let line = stroke(&self.palette, style);
+        let (across, up, chart) = (&self.across, &self.up, &mut self.chart);
+        let inside = || {
+            let points = points.iter().copied();
+            points.filter(|p| up.start <= p.1 && p.1 <= up.end)
+        };
+        match style {
+            LineStyle::Points(_) => {
+                chart.draw_series(inside().map(|p| Circle::new(p, px(3), line)))?;
+            }
+            LineStyle::Dashed => {
+                // from edge to edge: also one iteration has a limit
+                let first = inside().next().map(|p| (across.start, p.1));
+                let last = inside().next_back().map(|p| (across.end, p.1));
+                let points: Vec<_> = first.into_iter().chain(inside()).chain(last).collect();
+                chart.draw_series(DashedLineSeries::new(points, px(7), px(5), line))?;
+            }
+            LineStyle::Bound => {
+                for part in within(points, up) {
+                    chart.draw_series(DashedLineSeries::new(part, px(4), px(3), line))?;
+                }
+            }
+            LineStyle::Line(_) | LineStyle::Reference | LineStyle::Marked(_) => {
+                for part in within(points, up) {
+                    chart.draw_series(LineSeries::new(part, line))?;
+                }
+                if let LineStyle::Marked(k) = style {
+                    let mark = |p| EmptyElement::at(p) + dot((0, 0), k, line);
+                    chart.draw_series(inside().map(mark))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Draws two strokes through the axis wherever a curve leaves the panel, and the value of the largest peak; a peak
+    /// that is not cut off is also named if there is a remark about it.
+    fn draw_cuts(&self, panel: &Panel) -> Fallible<()> {
+        let (area, up, palette) = (self.area, &self.up, &self.palette);
+        let edge = |over: bool| if over { self.top } else { self.bottom };
+        for curve in panel.curves.iter().filter(|curve| decides(curve.style)) {
+            let line = stroke(palette, curve.style)
+                .color
+                .to_rgba()
+                .stroke_width(px(1) as u32 + 6);
+            for (x, _, over) in peaks(&curve.points, up) {
+                let (x_at, y_at) = (self.x(x), edge(over));
+                let back = [(x_at - px(7), y_at - px(4)), (x_at + px(7), y_at + px(4))];
+                area.draw(&Rectangle::new(back, palette.background.filled()))?;
+                for off in [-px(3), px(3)] {
+                    let wave = [(-7, 2), (-3, -1), (3, 1), (7, -2)];
+                    let wave = wave.map(|(dx, dy)| (x_at + px(dx), y_at + off + px(dy)));
+                    area.draw(&PathElement::new(wave, line))?;
+                }
+            }
+        }
+        let Some((x, peak, over)) = named_peak(&deciding(panel), up, &panel.of_peak) else {
+            return Ok(());
+        };
+        let words = format!("peak {}{}", rounded(peak), panel.of_peak);
+        let x_at = self.x(x);
+        let (side, gap) = if x_at > (self.left + self.right) / 2 {
+            (HPos::Right, -px(12))
+        } else {
+            (HPos::Left, px(12))
+        };
+        let (vertical, lift) = if over {
+            (VPos::Top, px(6))
+        } else {
+            (VPos::Bottom, -px(6))
+        };
+        let place = (x_at + gap, edge(over) + lift);
+        let text = page::text(self.style, 13).pos(Pos::new(side, vertical));
+        area.draw(&Text::new(words, place, text))?;
+        Ok(())
+    }
+
+    /// Draws the second axis.
+    fn draw_above(&self, above: &Above, fit: usize) -> Fallible<()> {
+        let (area, top) = (self.area, self.top);
+        let axis = self.palette.axis.stroke_width(px(1) as u32);
+        let text = page::text(self.style, LETTERS).pos(Pos::new(HPos::Center, VPos::Bottom));
+        area.draw(&PathElement::new(
+            [(self.left, top), (self.right, top)],
+            axis,
+        ))?;
+        // what of it is shown
+        let inside = |c: f64| {
+            place_of(&above.places, c).filter(|s| self.across.contains(s) || *s == self.across.end)
+        };
+        let own = |s: f64| interpolated(above.places.iter().copied(), s);
+        let ends = [self.across.start, self.across.end].map(own);
+        let [Some(a), Some(b)] = ends else {
+            return Ok(());
+        };
+        let range: RangedCoordf64 = (a.min(b)..a.max(b)).into();
+        for value in range.key_points(fit) {
+            let Some(s) = inside(value) else { continue };
+            let x = self.x(s);
+            area.draw(&PathElement::new([(x, top), (x, top - px(4))], axis))?;
+            let number = tick(value, b - a);
+            area.draw(&Text::new(number, (x, top - px(7)), text.clone()))?;
+        }
+        let middle = (self.left + self.right) / 2;
+        let place = (middle, top - px(NUMBERS));
+        area.draw(&Text::new(above.name.clone(), place, text))?;
+        Ok(())
+    }
 }
 
 /// Fills a rectangle as the shaded parts of the axis.
@@ -444,94 +513,6 @@ fn hatch(
         }
         start += APART;
     }
-    Ok(())
-}
-
-/// Draws two strokes through the axis wherever a curve leaves the panel, and the value of the largest peak; a peak that
-/// is not cut off is also named if there is a remark about it.
-fn draw_cuts(area: &Area<'_>, style: Style, frame: &Frame, panel: &Panel) -> Fallible<()> {
-    let up = &frame.up;
-    let palette = style.palette();
-    for curve in panel.curves.iter().filter(|curve| decides(curve.style)) {
-        let line = stroke(&palette, curve.style)
-            .color
-            .to_rgba()
-            .stroke_width(px(1) as u32 + 6);
-        for (x, _, over) in peaks(&curve.points, up) {
-            let (x_at, y_at) = (frame.x(x), if over { frame.top } else { frame.bottom });
-            let back = [(x_at - px(7), y_at - px(4)), (x_at + px(7), y_at + px(4))];
-            area.draw(&Rectangle::new(back, palette.background.filled()))?;
-            for off in [-px(3), px(3)] {
-                let wave = [(-7, 2), (-3, -1), (3, 1), (7, -2)];
-                let wave = wave.map(|(dx, dy)| (x_at + px(dx), y_at + off + px(dy)));
-                area.draw(&PathElement::new(wave, line))?;
-            }
-        }
-    }
-    let Some((x, peak, over)) = named_peak(&deciding(panel), up, &panel.of_peak) else {
-        return Ok(());
-    };
-    let words = format!("peak {}{}", rounded(peak), panel.of_peak);
-    let x_at = frame.x(x);
-    let (side, gap) = if x_at > (frame.left + frame.right) / 2 {
-        (HPos::Right, -px(12))
-    } else {
-        (HPos::Left, px(12))
-    };
-    let (vertical, lift) = if over {
-        (VPos::Top, px(6))
-    } else {
-        (VPos::Bottom, -px(6))
-    };
-    let place = (
-        x_at + gap,
-        if over { frame.top } else { frame.bottom } + lift,
-    );
-    let text = page::text(style, 13).pos(Pos::new(side, vertical));
-    area.draw(&Text::new(words, place, text))?;
-    Ok(())
-}
-
-/// Draws the second axis.
-fn draw_above(
-    area: &Area<'_>,
-    style: Style,
-    frame: &Frame,
-    above: &Above,
-    fit: usize,
-) -> Fallible<()> {
-    let axis = style.palette().axis.stroke_width(px(1) as u32);
-    area.draw(&PathElement::new(
-        [(frame.left, frame.top), (frame.right, frame.top)],
-        axis,
-    ))?;
-    // what of it is shown
-    let inside = |c: f64| {
-        place_of(&above.places, c).filter(|s| frame.across.contains(s) || *s == frame.across.end)
-    };
-    let own = |s: f64| interpolated(above.places.iter().copied(), s);
-    let ends = [frame.across.start, frame.across.end].map(own);
-    let [Some(a), Some(b)] = ends else {
-        return Ok(());
-    };
-    let range: RangedCoordf64 = (a.min(b)..a.max(b)).into();
-    for value in range.key_points(fit) {
-        let Some(s) = inside(value) else { continue };
-        let x = frame.x(s);
-        area.draw(&PathElement::new(
-            [(x, frame.top), (x, frame.top - px(4))],
-            axis,
-        ))?;
-        let text = page::text(style, LETTERS).pos(Pos::new(HPos::Center, VPos::Bottom));
-        area.draw(&Text::new(tick(value, b - a), (x, frame.top - px(7)), text))?;
-    }
-    let text = page::text(style, LETTERS).pos(Pos::new(HPos::Center, VPos::Bottom));
-    let middle = (frame.left + frame.right) / 2;
-    area.draw(&Text::new(
-        above.name.clone(),
-        (middle, frame.top - px(NUMBERS)),
-        text,
-    ))?;
     Ok(())
 }
 
