@@ -4,7 +4,7 @@
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::accuracy::{self, Increments};
+use crate::accuracy::{self, Increments, Solved};
 use crate::algorithm::{
     self, Averages, EndForces, Extent, Finished, Place, Quantity, Region, Reported, Rounding,
     System, follow_neighbour, report, run_reduced,
@@ -177,8 +177,12 @@ fn run_steps<'a>(
                 let quantities = std::mem::take(&mut more.quantities);
                 Increments::new(steps, &Increments::more(steps), quantities)
             });
-            let known = (&finished, &reported, increments.as_ref());
-            accuracy::assess(model, body, system, known, origins, observer)
+            let solved = Solved {
+                system,
+                finished: &finished,
+                reported: &reported,
+            };
+            accuracy::assess(solved, increments.as_ref(), origins, observer)
         });
         let mut summary = reported.summary;
         summary.accuracy = accuracy;

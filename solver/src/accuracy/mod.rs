@@ -21,12 +21,11 @@ pub use verdict::limit_by;
 use crate::algorithm::{
     DisplacedNode, Estimable, Finished, Quantity, Reported, System, influences,
 };
-use crate::body::{AXIS_SHARE, ElasticBody};
+use crate::body::AXIS_SHARE;
 use crate::contact::edge_nodes;
 use crate::elasticity::Dof;
 use crate::element::edge3;
 use crate::linear::{Interrupt, Stopped};
-use crate::model::Model;
 use crate::observer::Observer;
 use crate::origins::{Added, Origins};
 use crate::solution::{Accuracy, ErrorMethod, EstimatedQuantity, Outcome, QuantityName};
@@ -137,19 +136,31 @@ fn truncation_factor(name: QuantityName) -> f64 {
 /// Friction acts in one direction if its sum equals the sum of its sizes up to this part.
 const ONE_WAY: f64 = 1e-9;
 
+/// A final state with what is reported of it.
+#[derive(Clone, Copy)]
+pub struct Solved<'a> {
+    /// The problem on Γ_C.
+    pub system: &'a System<'a>,
+    /// The state.
+    pub finished: &'a Finished,
+    /// Its results.
+    pub reported: &'a Reported,
+}
+
 /// Computes the errors of all quantities and the verdict. `increments`: the same solution in more increments, where the
 /// end depends on the path.
 pub fn assess(
-    model: &Model,
-    body: &ElasticBody,
-    system: &System<'_>,
-    (finished, reported, increments): (&Finished, &Reported, Option<&Increments>),
+    solved: Solved<'_>,
+    increments: Option<&Increments>,
     origins: Option<&mut Origins>,
     observer: &mut dyn Observer,
 ) -> Accuracy {
+    let Solved {
+        system, reported, ..
+    } = solved;
     let quantities = &reported.along.quantities;
     let bounds = match reported.summary.outcome {
-        Outcome::Converged => bounds(model, body, system, finished, reported, origins, observer),
+        Outcome::Converged => bounds(solved, origins, observer),
         _ => None,
     };
     let mut found = Vec::with_capacity(quantities.len());
@@ -228,14 +239,15 @@ const WORK_OF_A_PLACE: usize = 30;
 /// The bounds of the errors of all quantities; none if the linearised problem has no unique solution, or the observer
 /// stops.
 fn bounds(
-    model: &Model,
-    body: &ElasticBody,
-    system: &System<'_>,
-    finished: &Finished,
-    reported: &Reported,
+    solved: Solved<'_>,
     mut origins: Option<&mut Origins>,
     observer: &mut dyn Observer,
 ) -> Option<Vec<Bounds>> {
+    let Solved {
+        system,
+        finished,
+        reported,
+    } = solved;
     let quantities = &reported.along.quantities;
     let influencing: Vec<&Quantity> = quantities.iter().filter(|q| q.gradient.is_some()).collect();
     let gradients: Vec<_> = influencing
@@ -243,11 +255,11 @@ fn bounds(
         .filter_map(|q| q.gradient.as_ref())
         .collect();
     let influences = influences(system, &finished.state, &gradients, observer)?;
-    let errors = weighted_errors(model, body, reported, &influences, observer)?;
+    let errors = weighted_errors(solved, &influences, observer)?;
     let mut duals = influences.iter().zip(errors);
     let smoothing = smoothing_of_reactions(system, finished);
     let reactions = system.reactions(&finished.state);
-    let surroundings = Surroundings::new(model);
+    let surroundings = Surroundings::new(system.model);
     let away = surroundings.away_from(touching(system, finished));
     let mut stop = || observer.stop();
     let interrupt = &mut Interrupt::new(&mut stop);
@@ -330,23 +342,21 @@ fn bounds(
 
 /// ∫ (σ* − σ_h) : C⁻¹ (σ_z* − σ_z,h) of every element, for every dual; none if the observer stops.
 fn weighted_errors(
-    model: &Model,
-    body: &ElasticBody,
-    reported: &Reported,
+    solved: Solved<'_>,
     influences: &[Vec<f64>],
     observer: &mut dyn Observer,
 ) -> Option<Vec<Vec<f64>>> {
     /// Dual solutions that are treated together: eight numbers fill a cache line, but many problems have few.
     const MANY: usize = 8;
     const FEW: usize = 4;
-    let threads = body.threads(observer);
+    let threads = solved.system.body.threads(observer);
     let mut stop = || observer.stop();
     let interrupt = &mut Interrupt::new(&mut stop);
     let mut errors = Vec::with_capacity(influences.len());
     for some in influences.chunks(MANY) {
         let of_some = match some.len() {
-            ..=FEW => weighted_errors_of::<FEW>((model, body), reported, some, threads, interrupt),
-            _ => weighted_errors_of::<MANY>((model, body), reported, some, threads, interrupt),
+            ..=FEW => weighted_errors_of::<FEW>(solved, some, threads, interrupt),
+            _ => weighted_errors_of::<MANY>(solved, some, threads, interrupt),
         };
         errors.extend(of_some.ok()?);
     }
@@ -355,15 +365,16 @@ fn weighted_errors(
 
 /// [`weighted_errors`] for at most `DUALS` dual solutions.
 fn weighted_errors_of<const DUALS: usize>(
-    (model, body): (&Model, &ElasticBody),
-    reported: &Reported,
+    solved: Solved<'_>,
     influences: &[Vec<f64>],
     threads: usize,
     interrupt: &mut Interrupt<'_>,
 ) -> Result<Vec<Vec<f64>>, Stopped> {
     interrupt.ask()?;
+    let body = solved.system.body;
     let duals = body.displacements_without_loads::<DUALS>(influences, threads);
-    let (difference, elements) = (&reported.difference, body.elements(model));
+    let elements = body.elements(solved.system.model);
+    let difference = &solved.reported.difference;
     let products = difference.products_with_fields(elements, &duals, interrupt)?;
     Ok(products.into_iter().take(influences.len()).collect())
 }

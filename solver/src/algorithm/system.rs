@@ -38,8 +38,10 @@ pub struct System<'a> {
     pub reference_force: f64,
     /// How many threads may compute the fields of the whole body; 1 until more are free.
     pub threads: usize,
-    pub(super) body: &'a ElasticBody,
-    pub(super) model: &'a Model,
+    /// The body, condensed to Γ_C.
+    pub body: &'a ElasticBody,
+    /// The whole problem.
+    pub model: &'a Model,
 }
 
 /// One contact node: two unknowns and a bound on the first of them.

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::{LN_2, PI};
 
-use super::PatchView;
+use super::{Highest, PatchView};
 use crate::contact::edge_nodes;
 use crate::contact::obstacle::Place;
 use crate::elasticity::Dof;
@@ -80,6 +80,15 @@ pub(super) struct Kink {
     spacing: f64,
     /// Whether the kink is on a line of symmetry and due, at least in part, to the mirror image.
     mirrored: bool,
+}
+
+/// A corner of the body.
+struct Corner {
+    node: usize,
+    /// The angle by which the body's surface turns.
+    turn: f64,
+    /// Change of slope of the gap; < 0 where the corner points into the body.
+    change: f64,
 }
 
 impl PatchView<'_> {
@@ -309,7 +318,7 @@ impl PatchView<'_> {
             mirrored,
             edge: _,
         } = sharpest;
-        let (peak, _, _) = self.highest_pressure().unwrap_or((0.0, 0, 0.0));
+        let peak = self.highest_pressure().map_or(0.0, |highest| highest.value);
         let count = match kinks.len() {
             1 => String::new(),
             count => format!("; it is the sharpest of {count}"),
@@ -359,20 +368,20 @@ impl PatchView<'_> {
         });
     }
 
-    /// Corners of the body in contact or beside it where the obstacle has none: the node, the angle of the turn, and
-    /// the change of the slope of the gap. An obstacle that follows the body's surface has its corners.
-    fn body_corners(&self) -> Vec<(usize, f64, f64)> {
+    /// Corners of the body in contact or beside it where the obstacle has none. An obstacle that follows the body's
+    /// surface has its corners.
+    fn body_corners(&self) -> Vec<Corner> {
         let contact = self.patch.contact;
         if !contact.in_space || contact.condition != Condition::Unilateral {
             return Vec::new();
         }
         let near = |i: &usize| (i - 1..=i + 1).any(|i| self.active(i));
-        let corner = |i: usize| {
-            let turn = contact.boundary.corner(i);
+        let corner = |node: usize| {
+            let turn = contact.boundary.corner(node);
             let own = contact.places.iter();
-            let own = own.filter(|place| place.kink != 0.0 && self.beside(place) == [i; 2]);
+            let own = own.filter(|place| place.kink != 0.0 && self.beside(place) == [node; 2]);
             let change = 2.0 * (0.5 * turn).tan() + own.map(|place| place.kink).sum::<f64>();
-            (turn != 0.0).then_some((i, turn, change))
+            (turn != 0.0).then_some(Corner { node, turn, change })
         };
         let corners = (2..self.count() - 1).step_by(2).filter(near);
         corners.filter_map(corner).collect()
@@ -387,18 +396,20 @@ impl PatchView<'_> {
     /// the nodes show is really two, one on each side.
     fn warn_of_notches(&self, warnings: &mut Vec<Warning>) {
         let mut notches = self.body_corners();
-        notches.retain(|(_, _, change)| *change < 0.0);
+        notches.retain(|notch| notch.change < 0.0);
         let peak = match self.highest_pressure() {
-            Some((peak, _, _)) if !notches.is_empty() && peak > 0.0 => peak,
+            Some(Highest { value, .. }) if !notches.is_empty() && value > 0.0 => value,
             _ => return,
         };
         let moduli = self.contact_moduli();
-        notches
-            .retain(|(i, _, change)| Self::growth(&moduli, i / 2, change.abs()) > SHAPING * peak);
-        let Some((i, turn, _)) = notches.iter().min_by(|a, b| a.2.total_cmp(&b.2)) else {
+        notches.retain(|Corner { node, change, .. }| {
+            Self::growth(&moduli, node / 2, change.abs()) > SHAPING * peak
+        });
+        let sharpest = notches.iter().min_by(|a, b| a.change.total_cmp(&b.change));
+        let Some(Corner { node, turn, .. }) = sharpest else {
             return;
         };
-        let s = self.patch.contact.boundary.s[*i];
+        let s = self.patch.contact.boundary.s[*node];
         let count = match notches.len() {
             1 => String::new(),
             count => format!("; it is the sharpest of {count}"),
@@ -423,14 +434,15 @@ impl PatchView<'_> {
             return Vec::new();
         }
         let last = self.count() - 1;
-        let mut found: Vec<(Place, f64, f64)> = Vec::new();
+        // each with the turn of the body's surface; its kink is the whole change of slope
+        let mut found: Vec<(Place, f64)> = Vec::new();
         let corners = self.body_corners();
         for place in contact.places.iter().filter(|place| place.kink > 0.0) {
             let nodes = self.beside(place);
             let at_end = nodes == [0; 2] || nodes == [last; 2];
-            let at_corner = corners.iter().any(|(i, ..)| nodes == [*i; 2]);
+            let at_corner = corners.iter().any(|corner| nodes == [corner.node; 2]);
             if !at_end && !at_corner && nodes.iter().any(|&i| self.active(i)) {
-                found.push((*place, place.kink, 0.0));
+                found.push((*place, 0.0));
             }
         }
         let at = |node: usize, edge: usize, xi: f64, kink: f64| Place {
@@ -441,9 +453,9 @@ impl PatchView<'_> {
             kink,
             nearer: 0.0,
         };
-        for (node, turn, change) in corners {
+        for Corner { node, turn, change } in corners {
             if change > 0.0 {
-                found.push((at(node, node / 2, -1.0, change), change, turn));
+                found.push((at(node, node / 2, -1.0, change), turn));
             }
         }
         for (end, slope) in [(0, contact.end_slopes[0]), (last, -contact.end_slopes[1])] {
@@ -454,15 +466,16 @@ impl PatchView<'_> {
             });
             let change = 2.0 * slope + own.map(|place| place.kink).sum::<f64>();
             if change > 0.0 && self.symmetric(end) && self.active(end) {
-                found.push((at(end, edge, xi, change), change, 0.0));
+                found.push((at(end, edge, xi, change), 0.0));
             }
         }
         let peak = match self.highest_pressure() {
-            Some((peak, _, _)) if !found.is_empty() && peak > 0.0 => peak,
+            Some(Highest { value, .. }) if !found.is_empty() && value > 0.0 => value,
             _ => return Vec::new(),
         };
         let moduli = self.contact_moduli();
-        let kink = |(place, change, turn): (Place, f64, f64)| {
+        let kink = |(place, turn): (Place, f64)| {
+            let change = place.kink;
             let node = self.patch.first + self.beside(&place)[0];
             let on_axis = place.xi.abs() == 1.0 && self.system.nodes[node].on_axis;
             let growth = Self::growth(&moduli, place.edge, change);

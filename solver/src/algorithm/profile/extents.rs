@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::PatchView;
+use super::{Highest, PatchView};
 use crate::contact::edge_nodes;
 use crate::element::edge3;
 use crate::element::gauss::GAUSS_3;
@@ -144,7 +144,7 @@ impl PatchView<'_> {
         turns
     }
 
-    fn peak(&self, value: f64, edge: usize, xi: f64) -> Peak {
+    fn peak(&self, Highest { value, edge, xi }: Highest) -> Peak {
         let boundary = &self.patch.contact.boundary;
         let h = edge3::shape(xi);
         let at = |f: &dyn Fn(usize) -> f64| edge3::interpolate(&h, &edge_nodes(edge).map(f));
@@ -157,12 +157,15 @@ impl PatchView<'_> {
     }
 
     fn peak_normal_stress(&self) -> Option<Peak> {
-        let (value, edge, xi) = self.highest_pressure()?;
-        Some(self.peak(-value + 0.0, edge, xi))
+        let highest = self.highest_pressure()?;
+        Some(self.peak(Highest {
+            value: -highest.value + 0.0,
+            ..highest
+        }))
     }
 
-    /// The largest pressure, with its edge and its place there.
-    pub(super) fn highest_pressure(&self) -> Option<(f64, usize, f64)> {
+    /// The largest pressure.
+    pub(super) fn highest_pressure(&self) -> Option<Highest> {
         let edges = 0..self.patch.contact.boundary.edge_count();
         let in_contact = edges.filter(|edge| edge_nodes(*edge).iter().any(|&i| self.active(i)));
         in_contact
@@ -175,9 +178,13 @@ impl PatchView<'_> {
                 } else {
                     0.0
                 };
-                [-1.0, 1.0, vertex].map(|xi| (edge3::interpolate(&edge3::shape(xi), &p), edge, xi))
+                [-1.0, 1.0, vertex].map(|xi| Highest {
+                    value: edge3::interpolate(&edge3::shape(xi), &p),
+                    edge,
+                    xi,
+                })
             })
-            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .max_by(|a, b| a.value.total_cmp(&b.value))
     }
 
     /// The places on an edge at which σ_t is known: the nodes, and the points where friction acts.
@@ -191,12 +198,11 @@ impl PatchView<'_> {
     }
 
     fn peak_tangential_stress(&self) -> Option<Peak> {
-        let (value, edge, xi) = self.highest_traction()?;
-        Some(self.peak(value, edge, xi))
+        self.highest_traction().map(|highest| self.peak(highest))
     }
 
-    /// The σ_t that is largest in size, with its edge and its place there.
-    pub(super) fn highest_traction(&self) -> Option<(f64, usize, f64)> {
+    /// The σ_t that is largest in size.
+    pub(super) fn highest_traction(&self) -> Option<Highest> {
         if self.patch.law.is_none() && self.tractions.is_none() {
             return None;
         }
@@ -230,12 +236,16 @@ impl PatchView<'_> {
                 let seen = value == 0.0 || beside.iter().any(|i| signs[*i] == sign);
                 // the last of those that are equal but for rounding, as the two of a symmetric problem
                 if seen && (highest.is_none() || value.abs() >= (1.0 - EQUAL) * most) {
-                    highest = Some((value, edge, xi));
+                    highest = Some(Highest { value, edge, xi });
                     most = most.max(value.abs());
                 }
             }
         }
-        let (value, edge, centre) = highest?;
+        let Highest {
+            value,
+            edge,
+            xi: centre,
+        } = highest?;
         let size = |xi: f64| value.signum() * self.tangential_stress_at(edge, xi);
         let (low, high) = ((centre - step).max(-1.0), (centre + step).min(1.0));
         // a peak where stick ends is a kink, whose place is known
@@ -247,7 +257,8 @@ impl PatchView<'_> {
             _ => best,
         };
         let (_, xi) = places.fold((size(centre), centre), larger);
-        Some((self.tangential_stress_at(edge, xi), edge, xi))
+        let value = self.tangential_stress_at(edge, xi);
+        Some(Highest { value, edge, xi })
     }
 }
 

@@ -19,7 +19,10 @@ impl PatchView<'_> {
     /// The junction at which the pressure grows most, if it shapes the pressure.
     pub(super) fn junction(&self) -> Option<Junction> {
         *self.worst_junction.get_or_init(|| {
-            let (peak, _, _) = self.highest_pressure().filter(|(peak, ..)| *peak > 0.0)?;
+            let highest = self.highest_pressure();
+            let peak = highest
+                .map(|highest| highest.value)
+                .filter(|peak| *peak > 0.0)?;
             if self.patch.contact.condition == Condition::None
                 || self.system.model.section.materials().len() < 2
             {
@@ -41,7 +44,7 @@ impl PatchView<'_> {
         else {
             return;
         };
-        let (peak, _, _) = self.highest_pressure().unwrap_or((1.0, 0, 0.0));
+        let peak = self.highest_pressure().map_or(1.0, |highest| highest.value);
         let how = match exponent {
             Some(exponent) => format!("like the power {:.3} of the distance", exponent - 1.0),
             None => "like the logarithm of the distance".to_owned(),

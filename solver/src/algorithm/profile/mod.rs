@@ -64,6 +64,16 @@ pub(super) struct PatchView<'a> {
     tractions: Option<Vec<[f64; 3]>>,
 }
 
+/// The place where a stress is largest in size.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Highest {
+    /// The pressure, or σ_t with its sign (stress).
+    value: f64,
+    edge: usize,
+    /// The place on the edge, from −1 to 1.
+    xi: f64,
+}
+
 /// A point of the contact at which materials meet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Junction {
@@ -383,15 +393,15 @@ impl<'a> PatchView<'a> {
         let pressure = self.highest_pressure();
         let traction = self.highest_traction();
         let places = [pressure, traction].into_iter().flatten();
-        let arc = |(_, edge, xi): (f64, usize, f64)| {
+        let arc = |Highest { edge, xi, .. }| {
             let h = edge3::shape(xi);
             let s = edge3::interpolate(&h, &self.patch.contact.boundary.edge_arc(edge));
-            (s, edge, xi)
+            (s, (edge, xi))
         };
-        let mut places: Vec<(f64, usize, f64)> = places.map(arc).collect();
+        let mut places: Vec<(f64, (usize, f64))> = places.map(arc).collect();
         places.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut profile = ContactProfile::default();
-        for (s, edge, xi) in places {
+        for (s, (edge, xi)) in places {
             let stress = self.tangential_stress_at(edge, xi);
             self.push_place(&mut profile, nodal, (edge, xi), s, stress);
         }

@@ -1,7 +1,7 @@
 //! The quantities of a contact for which an error is stated, and their derivatives.
 
-use super::PatchView;
 use super::between::Wave;
+use super::{Highest, PatchView};
 use crate::algorithm::adjoint::Gradient;
 use crate::algorithm::system::Point;
 use crate::contact::edge_nodes;
@@ -304,7 +304,7 @@ impl PatchView<'_> {
     fn peaks(&self) -> Vec<Quantity> {
         let (system, state) = (self.system, &self.finished.state);
         let mut found = Vec::new();
-        if let Some((pressure, edge, xi)) = self.highest_pressure() {
+        if let Some(Highest { value, edge, xi }) = self.highest_pressure() {
             let mut gradient = Gradient::zero(system);
             for (i, shape) in edge_nodes(edge).into_iter().zip(edge3::shape(xi)) {
                 gradient.add_pressure(system, self.patch.first + i, -shape);
@@ -314,15 +314,20 @@ impl PatchView<'_> {
                 .map(|edge| (edge, self.jump_within(edge)))
                 .collect();
             found.push(Quantity {
-                spacing: self.off_smooth_pressure(pressure, edge, xi),
+                spacing: self.off_smooth_pressure(value, edge, xi),
                 spacing_at: vec![(edge, 1.0)],
                 between: jumps.iter().fold(0.0, |most, (_, jump)| most.max(*jump)),
                 between_at: jumps,
                 estimable: limited(!self.pressure_without_limit()),
-                ..self.quantity(QuantityName::PeakNormalStress, -pressure, Some(gradient))
+                ..self.quantity(QuantityName::PeakNormalStress, -value, Some(gradient))
             });
         }
-        if let (Some((stress, edge, xi)), Some(_)) = (self.highest_traction(), &self.patch.law) {
+        if let Some(Highest {
+            value: stress,
+            edge,
+            xi,
+        }) = self.highest_traction().filter(|_| self.patch.law.is_some())
+        {
             let point = self.point(edge, xi);
             let mut gradient = Gradient::zero(system);
             let bound = stress.abs() / system.law(&point).phi(system.slip(self.v, &point)).abs();
