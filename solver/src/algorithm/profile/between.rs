@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::{LN_2, PI};
 
-use super::{Highest, PatchView};
+use super::{Highest, Missed, PatchView};
 use crate::contact::edge_nodes;
 use crate::contact::obstacle::Place;
 use crate::elasticity::Dof;
@@ -12,23 +12,6 @@ use crate::element::edge3;
 use crate::friction::BoundLaw;
 use crate::problem::{Condition, NormalOf};
 use crate::solution::{Outcome, Warning, WarningCode};
-
-/// A place between nodes where a node is needed: either the obstacle reaches into the body without resistance, or it
-/// recedes from a body that touches it on both sides.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Missed {
-    /// The contact, by its place in the model.
-    pub patch: usize,
-    /// Arc length from the start of the named boundary.
-    pub s: f64,
-    /// How far the obstacle reaches into the body there (length); negative where it recedes.
-    pub penetration: f64,
-    /// Distance between the nodes on either side (length).
-    pub spacing: f64,
-    /// The force that would push a node to the obstacle there, divided by the largest nodal reaction; infinite where
-    /// nothing touches.
-    pub severity: f64,
-}
 
 /// Severity from which a place is reported. A kink that points at the body between the nodes of a contact that is
 /// resolved has up to 0.4, a smooth obstacle up to 0.11 (the random problems of `tests/verification`).

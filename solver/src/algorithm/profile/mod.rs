@@ -20,7 +20,6 @@ mod quantities;
 mod resolution;
 mod warnings;
 
-pub use between::Missed;
 pub use quantities::{Estimable, Quantity};
 
 use std::cell::OnceCell;
@@ -82,6 +81,23 @@ pub(super) struct Junction {
     exponent: Option<f64>,
     /// The pressure that each halving of the mesh adds there (stress).
     growth: f64,
+}
+
+/// A place between nodes where a node is needed: either the obstacle reaches into the body without resistance, or it
+/// recedes from a body that touches it on both sides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Missed {
+    /// The contact, by its place in the model.
+    pub patch: usize,
+    /// Arc length from the start of the named boundary.
+    pub s: f64,
+    /// How far the obstacle reaches into the body there (length); negative where it recedes.
+    pub penetration: f64,
+    /// Distance between the nodes on either side (length).
+    pub spacing: f64,
+    /// The force that would push a node to the obstacle there, divided by the largest nodal reaction; infinite where
+    /// nothing touches.
+    pub severity: f64,
 }
 
 /// The displaced obstacle at a contact node, compared with the linear one.
