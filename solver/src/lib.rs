@@ -129,8 +129,8 @@ use verify::Verification;
 
 /// Solves a problem.
 ///
-/// `observer` is told every phase and iteration, and asked again and again in long work whether to stop (`&mut ()` looks
-/// away): the result is then the last state as `Outcome::Canceled`. A method that does not converge is an
+/// `observer` is told every phase and iteration, and asked again and again in long work whether to stop; then the result
+/// is the last state, as `Outcome::Canceled`. Pass `&mut ()` to observe nothing. A method that does not converge is an
 /// [`Outcome`](solution::Outcome) too, with its history.
 ///
 /// # Errors

@@ -6,9 +6,9 @@ use crate::solution::{Iteration, Solution, Warning};
 
 /// Follows a solution: is told its progress, and answers the solver's questions.
 ///
-/// By default it lets the solver go on to the end on one thread, with all the memory it needs; so does `()`, which
-/// ignores all progress. A closure that takes [`Progress`] only looks on. An observer in front of another one passes on
-/// the questions that it does not answer itself.
+/// By default it lets the solver go on to the end on one thread, with all the memory it needs. So does a closure that
+/// takes [`Progress`], and `()`, which ignores it. An observer in front of another one ([`Observer::behind`]) passes on the
+/// questions that it does not answer itself.
 pub trait Observer {
     /// Is told the progress.
     fn event(&mut self, progress: Progress<'_>);
@@ -20,7 +20,7 @@ pub trait Observer {
     }
 
     /// Whether the solver may take this many bytes more at once. A solver that cannot go on without them tells
-    /// [`Progress::OutOfMemory`]; else the answer stops nothing: it does with less, or ends with the results so far.
+    /// [`Progress::OutOfMemory`]; otherwise a refusal stops nothing: it works with less, or ends with the results so far.
     fn may_use(&mut self, bytes: u64) -> bool {
         self.behind().is_none_or(|observer| observer.may_use(bytes))
     }
