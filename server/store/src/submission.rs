@@ -139,7 +139,7 @@ pub(super) struct Pending {
 #[derive(Debug)]
 pub(super) enum Answer {
     /// The jobs are accepted, and on the disk.
-    Accepted(Accepted),
+    Accepted(Box<Accepted>),
     /// An earlier result may answer one of its jobs, and has to be checked first, which would occupy the single writer.
     ToCheck(Submission),
 }

@@ -37,14 +37,14 @@ impl Store {
             self.check_result_for_next().await;
         }
         match self.send(submission, claim, false).await? {
-            Answer::Accepted(accepted) => Ok(accepted),
+            Answer::Accepted(accepted) => Ok(*accepted),
             Answer::ToCheck(submission) => {
                 let jobs = submission.jobs.iter();
                 for job in jobs.filter(|job| job.cache == Cache::Use) {
                     self.check_earlier_result(&job.input_hash).await;
                 }
                 match self.send(submission, claim, true).await? {
-                    Answer::Accepted(accepted) => Ok(accepted),
+                    Answer::Accepted(accepted) => Ok(*accepted),
                     Answer::ToCheck(_) => Err(StoreError::Unexpected("checked twice".into())),
                 }
             }
@@ -108,7 +108,7 @@ fn accept_together(
         match accept(&mut change, savepoint, submission, claim) {
             Ok(accepted) => {
                 change.release()?;
-                answers.push(Ok(Answer::Accepted(accepted)));
+                answers.push(Ok(Answer::Accepted(Box::new(accepted))));
             }
             Err(cause) => match change.roll_back_to(savepoint) {
                 Ok(()) => answers.push(Err(cause)),
