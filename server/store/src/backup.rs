@@ -1,12 +1,12 @@
 //! A backup: a folder with the database as it was at one point in time, and a manifest with its digest.
 //!
-//! `VACUUM INTO` from a connection that only reads: one statement sees one state, whatever is written beside it, the single
-//! writer never waits for it, and everything is in the database, meshes too. SQLite's interface for online backups would
-//! begin anew with every commit of another process, and needs `unsafe` here. Meanwhile the write-ahead log is not reused,
-//! and grows by what is written.
+//! `VACUUM INTO` makes the copy, on a connection that only reads: this statement sees one state of the database,
+//! whatever is written meanwhile, and the single writer never waits for it. The copy has everything, meshes too.
+//! SQLite's interface for online backups would begin anew with every commit of another process, and needs `unsafe`
+//! here. During the backup the write-ahead log is not reused, and grows by what is written.
 //!
-//! All of it is written to `TARGET.partial`, which gets its name when it is complete and on the disk: there is no half
-//! backup under the name of a whole one.
+//! The files are written to `TARGET.partial`, which is renamed to `TARGET` when all of them are complete and on the
+//! disk: a folder named `TARGET` is never half a backup.
 
 use std::{
     fs::{self, DirBuilder, File, OpenOptions},
@@ -32,13 +32,13 @@ use super::{
     sql::Sql,
 };
 
-/// The name of the manifest.
+/// The name of the manifest's file.
 pub(super) const MANIFEST: &str = "manifest.json";
-/// What is written to a backup, before the manifest and with it.
+/// The files that writing a backup may leave in its folder, even if it is interrupted.
 const FILES: [&str; 4] = [MANIFEST, DATABASE, JOURNAL, progress::FILE];
-/// The form of manifests that this version writes, and reads.
+/// The version of the manifest's form that this program writes, and the latest one that it reads.
 pub(super) const FORMAT: u32 = 1;
-/// What is left free on the disk of the backup, which may be that of the store.
+/// Bytes that stay free on the disk of the backup, which may be the disk of the store, too.
 const SPARE_BYTES: u64 = 64 << 20;
 
 /// What a backup contains.
@@ -50,33 +50,34 @@ pub struct Manifest {
     pub version: String,
     /// The version of the tables.
     pub tables: i64,
-    /// When it was begun. Everything that was acknowledged before is in it.
+    /// When the backup was begun. Everything that was acknowledged before that time is in it.
     pub created_at: Time,
-    /// Jobs.
+    /// The number of jobs.
     pub jobs: i64,
-    /// Jobs that waited or ran: they are solved after a restore.
+    /// The number of jobs that waited or ran: they are solved after a restore.
     pub unfinished: i64,
-    /// Stored meshes.
+    /// The number of stored meshes.
     pub meshes: i64,
-    /// Size of the database.
+    /// The size of the database (bytes).
     pub bytes: u64,
-    /// `sha256:…` of the database.
+    /// The SHA-256 of the database, as `sha256:…`.
     pub digest: String,
-    /// How many damaged records were found when it was checked, which the store had; `None`: it was not checked.
+    /// How many damaged records a check of the backup has found, all of them copied from the store; `None` if it was
+    /// not checked.
     pub damaged: Option<usize>,
 }
 
 /// A backup that was made.
 #[derive(Debug)]
 pub struct Backup {
-    /// What it contains.
+    /// The manifest, which tells what the backup contains.
     pub manifest: Manifest,
-    /// Each damage that was found in it: it was in the store before.
+    /// A text about each damaged record in the backup, which was damaged in the store before.
     pub findings: Vec<String>,
 }
 
-/// Writes a backup of the store in this folder, whether or not a server is using it, to a new folder. With `check`, reads
-/// everything in it as the service does.
+/// Writes a backup of the store in the folder `data` to the new folder `target`, whether or not a server is using the
+/// store. With `check`, reads everything in the backup as the service does.
 pub async fn back_up(data: &Path, target: &Path, check: bool) -> Result<Backup> {
     let (data, target) = (data.to_owned(), target.to_owned());
     blocking(move || write_backup(&data, &target, check)).await
@@ -146,7 +147,7 @@ fn fill(data: &Path, partial: &Partial, check: bool) -> Result<Backup> {
     Ok(Backup { manifest, findings })
 }
 
-/// The folder that becomes the backup.
+/// The folder `TARGET.partial`, which becomes the backup.
 struct Partial {
     target: PathBuf,
     path: PathBuf,
@@ -155,7 +156,7 @@ struct Partial {
 }
 
 impl Partial {
-    /// Creates it, or takes over what an earlier one that was killed has left.
+    /// Creates the folder, or takes over one that an earlier backup has left when it was killed.
     fn create(data: &Path, target: &Path) -> Result<Partial> {
         let refused = |why: &dyn std::fmt::Display| {
             StoreError::Folder(format!(
@@ -213,7 +214,7 @@ impl Partial {
         }
     }
 
-    /// An error of its files.
+    /// The error that the backup cannot be written.
     fn unwritable(&self, why: impl std::fmt::Display) -> StoreError {
         let target = self.target.display();
         StoreError::Folder(format!("cannot write a backup to {target}: {why}"))
@@ -223,7 +224,7 @@ impl Partial {
         done.map_err(|error| self.unwritable(error))
     }
 
-    /// An error if the disk does not have so many bytes and some to spare.
+    /// An error if the disk does not have this many bytes and [`SPARE_BYTES`] free.
     fn require_space(&self, bytes: u64) -> Result<()> {
         let found = statvfs(&self.path).map_err(|error| self.unwritable(error))?;
         let free = found.f_bavail.saturating_mul(found.f_frsize);
@@ -239,7 +240,7 @@ impl Partial {
         }
     }
 
-    /// Writes the manifest, and gives the folder its name once everything is on the disk.
+    /// Writes the manifest, and renames the folder to the target once everything is on the disk.
     fn complete(&self, manifest: &Manifest) -> Result<()> {
         let write = || -> io::Result<()> {
             File::open(self.path.join(DATABASE))?.sync_all()?;
@@ -256,7 +257,7 @@ impl Partial {
         self.named(write())
     }
 
-    /// Removes what was written of it, after an error.
+    /// Removes the files and the folder, after an error.
     fn remove(&self) {
         for file in FILES {
             let _ = fs::remove_file(self.path.join(file));
@@ -265,14 +266,14 @@ impl Partial {
     }
 }
 
-/// Whether this file is the one with this name.
+/// Whether `path` names the open file `file`.
 fn is_at(file: &File, path: &Path) -> bool {
     let id = |found: fs::Metadata| (found.dev(), found.ino());
     let (open, named) = (file.metadata().map(id), fs::metadata(path).map(id));
     matches!((open, named), (Ok(open), Ok(named)) if open == named)
 }
 
-/// A new file for its owner alone.
+/// Creates a file that only its owner can read and write.
 pub(super) fn new_file(path: &Path) -> io::Result<File> {
     OpenOptions::new()
         .write(true)
@@ -281,17 +282,17 @@ pub(super) fn new_file(path: &Path) -> io::Result<File> {
         .open(path)
 }
 
-/// Flushes the names of the files in a folder.
+/// Flushes a folder to the disk, and with it the names of its files.
 pub(super) fn sync_folder(path: &Path) -> io::Result<()> {
     File::open(path)?.sync_all()
 }
 
-/// `sha256:…` of a file, and its size.
+/// The SHA-256 of a file, as `sha256:…`, and its size (bytes).
 fn digest(path: &Path) -> io::Result<(String, u64)> {
     copy_and_digest(&mut File::open(path)?, &mut io::sink())
 }
 
-/// Copies everything; gives `sha256:…` and the number of bytes.
+/// Copies everything from `from` to `to`; returns the SHA-256 as `sha256:…`, and the number of bytes.
 pub(super) fn copy_and_digest(
     from: &mut impl Read,
     to: &mut impl Write,

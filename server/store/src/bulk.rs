@@ -1,4 +1,5 @@
-//! Changes of many jobs, some in one transaction: each commit waits for the disk, and so would each job.
+//! Cancels and deletions of many jobs, several in one transaction: each commit waits for the disk, and one for each job
+//! would take long.
 
 use std::{
     sync::Arc,
@@ -23,50 +24,51 @@ use super::{
 
 /// How long one transaction may occupy the single writer, so that other requests are answered meanwhile.
 const LONGEST: Duration = Duration::from_millis(20);
-/// One that discards, where others occupy the writer all the time: as long as it has waited for its turn, but no longer than
-/// this. So it has a fair share of the writer, and what is removed keeps pace with what is submitted.
+/// The longest that a transaction may occupy the single writer when it deletes jobs or fields, and other changes occupy
+/// the writer all the time: it takes as long as it has waited for its turn, up to this limit. It then has a fair share
+/// of the writer, and deletions keep pace with submissions.
 const LONGEST_LATE: Duration = Duration::from_millis(150);
 
-/// What one transaction has done to the first of some jobs.
+/// What one transaction has done: it deals with the first of the given jobs, as many as its time allows.
 #[derive(Debug, Default)]
 pub struct Batch {
-    /// How many jobs it has dealt with; the others were left for the next one.
+    /// How many of the given jobs the transaction has dealt with; the others are left for the next transaction.
     pub seen: usize,
-    /// How many of them it has canceled or deleted.
+    /// How many of the jobs seen were canceled or deleted.
     pub done: usize,
-    /// Jobs that run, and were left alone.
+    /// The keys of the jobs seen that are running, and were not canceled.
     pub running: Vec<i64>,
-    /// Jobs that were to be deleted and were not.
+    /// The keys of the jobs seen that were to be deleted, and were not.
     pub left: Vec<i64>,
-    /// Jobs that have changed, these or others, for their watchers.
+    /// The keys of all jobs that have changed, which may include jobs that were not given: their watchers are woken.
     pub changed: Vec<i64>,
 }
 
-/// Which jobs are discarded that have ended, and what of them.
+/// Which of the jobs that have ended are deleted, or lose their fields.
 #[derive(Clone, Debug)]
 pub(super) enum Discard {
-    /// The jobs of these owners.
+    /// Deletes the jobs of these owners.
     Jobs(Owners),
-    /// Jobs that ended before this time, unless they are pinned.
+    /// Deletes the jobs that ended before this time, unless they are pinned.
     OldJobs(Time),
-    /// The fields of those.
+    /// Deletes the fields of the jobs that ended before this time, unless they are pinned.
     OldFields(Time),
 }
 
 impl Store {
-    /// Cancels the first of these jobs, if they wait.
+    /// Cancels those of the given jobs that wait, as many as one transaction has time for.
     pub async fn cancel_queued(self: &Arc<Self>, keys: &[i64]) -> Result<Batch> {
         let keys = keys.to_vec();
         self.control(move |writer| cancel_queued(writer, &keys))
             .await
     }
 
-    /// Deletes the first of these jobs, if they have ended.
+    /// Deletes those of the given jobs that have ended, as many as one transaction has time for.
     pub async fn delete_ended(self: &Arc<Self>, owners: Owners, keys: &[i64]) -> Result<Batch> {
         self.try_to_discard(Discard::Jobs(owners), keys).await
     }
 
-    /// Discards the first of these jobs.
+    /// Discards the given jobs or their fields, as many as one transaction has time for.
     pub(super) async fn try_to_discard(
         self: &Arc<Self>,
         what: Discard,
@@ -127,7 +129,7 @@ fn discard_first(
     Ok(batch)
 }
 
-/// Discards a job; false if it is not one of those.
+/// Discards a job or its fields; false if `what` does not apply to the job.
 fn discard(change: &mut Change<'_>, what: &Discard, key: i64) -> Result<bool> {
     let (before, fields_alone) = match what {
         Discard::Jobs(owners) => {

@@ -1,9 +1,9 @@
 //! One transaction of the single writer, and its effects once it is committed.
 //!
-//! A job is changed by [`Change::update`] and in no other way: a function of its row, from which everything else follows. The
-//! row is written whole, with its checksum, before the next statement of the transaction or its commit; its version is
-//! counted, its events are appended, its line in the log is kept for after the commit, and its key, if the status has changed, is
-//! returned by the commit for those who wake its watchers.
+//! A job is changed by [`Change::update`] and in no other way: the caller gives a function that changes its row, and
+//! everything else follows from the row. The row is written whole, with its checksum, before the next statement of the
+//! transaction or its commit; its version is counted, its events are appended, its line in the log is kept for after
+//! the commit, and its key, if the status has changed, is returned by the commit for those who wake its watchers.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -33,7 +33,7 @@ use super::{
     sql::Sql,
 };
 
-/// Rows that a transaction keeps in memory. Some change all jobs that wait.
+/// The number of rows that a transaction keeps in memory: some transactions change all jobs that wait.
 const MOST_ROWS: usize = 256;
 
 /// An open transaction.
@@ -41,22 +41,22 @@ pub(super) struct Change<'a> {
     writer: &'a Writer<'a>,
     store: &'a Store,
     tx: Writing<'a>,
-    /// Rows of jobs as this transaction has changed them, by their keys.
+    /// The rows of jobs that this transaction has read or changed, by their keys.
     rows: BTreeMap<i64, Cached>,
     /// The keys of rows in `rows` that are not written yet.
     unwritten: BTreeSet<i64>,
     /// The key of the next job, once one was inserted.
     next_key: Option<i64>,
-    /// Jobs that have changed, for their watchers.
+    /// The keys of the jobs whose status has changed: their watchers are woken after the commit.
     changed: Vec<i64>,
-    /// What the log will tell of jobs that end or are deleted.
+    /// The lines about jobs that end or are deleted, which are logged after the commit.
     log_lines: Vec<(JobId, LogLine)>,
 }
 
-/// A row of a job.
+/// The row of a job, as the transaction keeps it in memory.
 struct Cached {
     row: JobRow,
-    /// The values of its columns, as they are in the database; none if it was not inserted yet.
+    /// The values of the row's columns, as they are in the database; `None` if the row is not inserted yet.
     stored: Option<Vec<Value>>,
     /// Events that are appended once the row is inserted.
     events: Vec<Events>,
@@ -104,7 +104,7 @@ impl Writer<'_> {
     }
 }
 
-/// Jobs, read and changed.
+/// Reading and changing jobs.
 impl Change<'_> {
     /// The job with this key, as this transaction has left it, if it exists.
     pub(super) fn find(&mut self, key: i64) -> Result<Option<Job>> {
@@ -123,7 +123,7 @@ impl Change<'_> {
         Ok(found.is_some_and(|job| job.status == Status::Running && job.attempt == attempt))
     }
 
-    /// Accepts a job; `new` makes its row from its key, which is returned.
+    /// Accepts a job: `new` makes its row from its key, which is returned.
     pub(super) fn insert(&mut self, new: impl FnOnce(i64) -> JobRow) -> Result<i64> {
         let key = match self.next_key {
             Some(key) => key,
@@ -148,8 +148,8 @@ impl Change<'_> {
         Ok(key)
     }
 
-    /// Changes a job, which must exist, by this step. All that follows from the change follows here. Returns the job as it
-    /// is now.
+    /// Changes a job, which must exist, by `step`. Everything that follows from the change is done here, too. Returns
+    /// the changed job.
     pub(super) fn update(
         &mut self,
         key: i64,
@@ -180,7 +180,7 @@ impl Change<'_> {
         Ok(job)
     }
 
-    /// Changes a job, which must exist, by a step that is allowed in every status. Returns the job as it is now.
+    /// Changes a job, which must exist, by a step that is allowed in every status. Returns the changed job.
     pub(super) fn set(&mut self, key: i64, step: impl FnOnce(&mut JobRow)) -> Result<Job> {
         let step = |row: &mut JobRow| {
             step(row);
@@ -189,7 +189,7 @@ impl Change<'_> {
         self.update(key, step)
     }
 
-    /// Appends events to those of a job, which must exist.
+    /// Appends events to a job, which must exist.
     pub(super) fn append(&mut self, key: i64, events: &[(Time, Payload)]) -> Result<()> {
         let cached = self.cached(key)?;
         let cached = cached.ok_or_else(|| rows::missing(key))?;
@@ -211,7 +211,7 @@ impl Change<'_> {
         Ok(())
     }
 
-    /// Appends events of the current attempt, with the progress after them.
+    /// Appends events of the current attempt, and sets the job's progress after these events.
     pub(super) fn append_with_progress(
         &mut self,
         key: i64,
@@ -225,7 +225,7 @@ impl Change<'_> {
         Ok(())
     }
 
-    /// Deletes a job that has ended, with what only this job has.
+    /// Deletes a job that has ended, and the data that no other job shares.
     pub(super) fn delete(&mut self, job: &Job) -> Result<()> {
         let now = self.now();
         rows::delete(self.sql()?, job, now)?;
@@ -235,7 +235,7 @@ impl Change<'_> {
         Ok(())
     }
 
-    /// The row with this key, if it exists.
+    /// The row with this key, as this transaction has left it, if it exists.
     fn cached(&mut self, key: i64) -> Result<Option<&mut Cached>> {
         if !self.rows.contains_key(&key) {
             let Some((row, stored)) = rows::find_row(&self.tx, key)? else {
@@ -263,7 +263,7 @@ impl Change<'_> {
         Ok(())
     }
 
-    /// Writes the rows that have changed.
+    /// Writes the rows that have changed to the database.
     fn write_rows(&mut self) -> Result<()> {
         for key in mem::take(&mut self.unwritten) {
             let Some(cached) = self.rows.get_mut(&key) else {
@@ -288,7 +288,7 @@ impl Change<'_> {
 }
 
 impl Change<'_> {
-    /// The connection, for statements: they find all jobs as they are now.
+    /// The connection, for statements that read jobs: it writes the changed rows first, so that they see every change.
     pub(super) fn sql(&mut self) -> Result<&Connection> {
         self.write_rows()?;
         Ok(&self.tx)
@@ -299,18 +299,18 @@ impl Change<'_> {
         self.store
     }
 
-    /// The connection, for statements on what a job has that neither read nor name jobs: rows that have changed are not written
-    /// for them, so that a job that is answered at once is written once.
+    /// The connection, for statements on a job's data that neither read nor name rows of jobs. It does not write the
+    /// changed rows first, so that the row of a job that is answered at once is written only once.
     pub(super) fn sql_beside_jobs(&self) -> &Connection {
         &self.tx
     }
 
-    /// What was found damaged.
+    /// The record of what was found damaged.
     pub(super) fn damages(&self) -> &Damages {
         &self.store.damages
     }
 
-    /// The newest result of this input is checked again before it answers a job.
+    /// Makes the newest result of this input be checked again before it answers a job.
     pub(super) fn forget_checked(&self, input_hash: &str) {
         self.store.intact.inputs.remove(input_hash);
     }
@@ -320,7 +320,7 @@ impl Change<'_> {
         self.store.budget()
     }
 
-    /// What was read, unless it is damaged, which is noted.
+    /// The value that was read; `None`, with a note of the damage, if a record is damaged.
     pub(super) fn unless_damaged<T>(&self, read: Result<T>) -> Result<Option<T>> {
         match self.store.damages.noting(read) {
             Ok(read) => Ok(Some(read)),
@@ -329,8 +329,8 @@ impl Change<'_> {
         }
     }
 
-    /// What was read of this job, unless a record of it is damaged, which is noted. If it is the database, it is an error:
-    /// the change may be half done.
+    /// The value that was read of this job; `None`, with a note of the damage, if a record of the job is damaged.
+    /// Damage of the database itself is an error: the change may be half done.
     pub(super) fn unless_damage_of<T>(&self, key: i64, read: Result<T>) -> Result<Option<T>> {
         match read {
             Err(error) if !error.is_damage_of(key) => Err(error),
@@ -338,7 +338,8 @@ impl Change<'_> {
         }
     }
 
-    /// The problem of a job. It is read beside the transaction first: a page that cannot be read would end that.
+    /// The problem of a job. It is read on a connection beside the transaction first, since a page that cannot be read
+    /// would end the transaction.
     pub(super) fn problem(&mut self, job: &Job) -> Result<String> {
         let holder = Holder::Job(job.key);
         match content::try_to_read_text(self.writer.beside(), holder, name::PROBLEM) {
@@ -350,7 +351,8 @@ impl Change<'_> {
         }
     }
 
-    /// Whether the result of a job that has ended is as it was written; checked once, and beside the transaction, as above.
+    /// Whether the result of a job that has ended is as it was written. Its content is read once, on a connection
+    /// beside the transaction, since a page that cannot be read would end the transaction.
     pub(super) fn has_intact_result(&mut self, job: &Job) -> Result<bool> {
         // this transaction may have attached it
         let attached = content::all(self.sql()?, Holder::Job(job.key));
@@ -366,7 +368,7 @@ impl Change<'_> {
         self.store.now()
     }
 
-    /// Jobs that have changed since a savepoint.
+    /// The keys of the jobs whose status has changed since a savepoint.
     pub(super) fn changed_since(&self, savepoint: Savepoint) -> Vec<i64> {
         self.changed
             .get(savepoint.changed..)
@@ -374,7 +376,7 @@ impl Change<'_> {
             .to_vec()
     }
 
-    /// Sets a point to roll back to. There is one at a time: it is released or rolled back to before the next is set.
+    /// Sets a savepoint. There is one at a time: it must be released or rolled back to before the next is set.
     pub(super) fn savepoint(&mut self) -> Result<Savepoint> {
         self.sql()?.run("savepoint submission", ())?;
         Ok(Savepoint {
@@ -401,7 +403,7 @@ impl Change<'_> {
         Ok(())
     }
 
-    /// Commits: the changes are on the disk when this returns. Returns the jobs that have changed.
+    /// Commits: the changes are on the disk when this returns. Returns the keys of the jobs whose status has changed.
     pub(super) fn commit(mut self) -> Result<Vec<i64>> {
         self.write_rows()?;
         let waiting = self.waiting()?;

@@ -1,8 +1,9 @@
-//! The checksum of a row: what a disk has changed is not served.
+//! The checksum of a row, by which data that a disk has changed are found and not served.
 //!
-//! CRC-32 and not SHA-256, which results have as well: it is for accidents, not for attackers, who could write a new
-//! checksum beside their data. It finds every change of up to 32 neighbouring bits and misses one in 4 · 10⁹ of the
-//! others, costs 4 bytes in each of many millions of events instead of 32, and is in the dependencies anyway, of `zip`.
+//! It is a CRC-32, not a SHA-256, which results have as well: it is for accidents, not for attackers, who could write a
+//! new checksum beside their data. It finds every change of up to 32 neighbouring bits and misses one in 4 · 10⁹ of the
+//! other changes. It costs 4 bytes in each of many millions of events instead of 32, and `zip` depends on its crate
+//! anyway.
 
 pub(super) use rusqlite::types::Value;
 use rusqlite::{Connection, Row, params};
@@ -12,11 +13,11 @@ use super::{
     sql::Sql,
 };
 
-/// The column that holds it.
+/// The name of the column with the checksum.
 const COLUMN: &str = "checksum";
 
-/// The checksum of a row, one column after the other. Each value is preceded by its position and type, and a text by
-/// its length, so that no two rows are the same bytes.
+/// The checksum of a row, taken over its columns in order. Each value is preceded by its type, position and length, so
+/// that no two rows give the same bytes.
 #[derive(Clone)]
 pub(super) struct Checksum {
     hash: crc32fast::Hasher,
@@ -24,7 +25,7 @@ pub(super) struct Checksum {
 }
 
 impl Checksum {
-    /// Of a row without columns.
+    /// The checksum of a row without columns, to which columns are added.
     pub(super) fn new() -> Self {
         Checksum {
             hash: crc32fast::Hasher::new(),
@@ -41,7 +42,7 @@ impl Checksum {
         self
     }
 
-    /// A column that is null is skipped: one that a later version adds does not change the checksum.
+    /// Skips a column that is null: a column that a later version adds does not change the checksum.
     fn null(mut self) -> Self {
         self.column += 1;
         self
@@ -70,13 +71,13 @@ impl Checksum {
         self.value(b'b', value)
     }
 
-    /// As it is stored.
+    /// The checksum in the form in which it is stored.
     pub(super) fn stored(self) -> i64 {
         i64::from(self.hash.finalize())
     }
 
-    /// Compares it with the one in the row; `what` names the row in the error. A row of an earlier version has none,
-    /// and is accepted.
+    /// Compares the checksum with the one in the row; `what` names the row in the error. A row of an earlier version
+    /// has no checksum, and is accepted.
     pub(super) fn verify(self, stored: Option<i64>, what: impl FnOnce() -> Record) -> Result<()> {
         match stored {
             Some(stored) if stored != self.stored() => {
@@ -87,7 +88,7 @@ impl Checksum {
     }
 }
 
-/// The values of a row that was read with `select *`, but for its checksum.
+/// The values of a row that was read with `select *`, without its checksum.
 pub(super) fn values(row: &Row<'_>) -> Result<Vec<Value>> {
     let statement: &rusqlite::Statement<'_> = row.as_ref();
     let places = 0..statement.column_count();
@@ -114,13 +115,13 @@ pub(super) fn of_row(row: &Row<'_>) -> Result<i64> {
     Ok(of_values(&values(row)?))
 }
 
-/// Whether a whole row is as it was written.
+/// Whether a whole row, as it was read with `select *`, has the checksum with which it was written.
 pub(super) fn row_is_intact(row: &Row<'_>) -> Result<bool> {
     let stored: Option<i64> = row.get(COLUMN)?;
     Ok(stored == Some(of_row(row)?))
 }
 
-/// Gives the row of a table with this key its checksum, once its other columns are written.
+/// Computes and writes the checksum of the row with this key, whose other columns are written.
 pub(super) fn seal(
     tx: &Connection,
     table: &str,

@@ -1,4 +1,4 @@
-//! The next job of the queue, claimed for a worker.
+//! Claims the next job of the queue for a worker.
 
 use std::{collections::BTreeSet, sync::Arc};
 
@@ -18,8 +18,8 @@ use super::{
 };
 
 impl Store {
-    /// Starts an attempt of the next job of the queue, in the order of `turns`. Jobs before it for which there is a
-    /// result by now are answered. Also returns all jobs that have changed.
+    /// Starts an attempt of the next job of the queue, in the order of `turns`. Jobs before it that an existing result
+    /// can answer are ended with that result. Also returns the keys of all jobs that have changed.
     pub async fn claim_next(self: &Arc<Self>) -> Result<(Option<Claim>, Vec<i64>)> {
         self.check_result_for_next().await;
         self.write(|writer| {
@@ -31,8 +31,8 @@ impl Store {
     }
 }
 
-/// The next job of the queue, but for damaged ones, of which nothing can be trusted: they wait until
-/// the operator removes them, and the others go on.
+/// The next job of the queue that is not damaged. Nothing in a damaged row can be trusted: such jobs wait until the
+/// operator removes them, and the others go on.
 fn next(change: &mut Change<'_>) -> Result<Option<Job>> {
     let mut damaged = BTreeSet::new();
     while let Some(key) = change.next(&damaged)? {
@@ -45,11 +45,11 @@ fn next(change: &mut Change<'_>) -> Result<Option<Job>> {
     Ok(None)
 }
 
-/// Claims within a transaction. The next job waits until it fits into the memory budget, and those after it wait with
-/// it, also if they would fit: the order is strict, so that no large job is overtaken for ever. Running jobs end within
-/// their time limits, and each of them alone fits.
+/// Claims a job within a transaction. If the next job does not fit into the memory budget, it waits, and all later jobs
+/// wait with it, even those that would fit: the order is strict, so that no large job is overtaken for ever. Running
+/// jobs end within their time limits, and each job fits alone.
 pub(super) fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
-    /// With more jobs than this, one transaction would take too long.
+    /// The largest number of jobs that are answered, coalesced or failed before one is claimed: more would take too long.
     const MOST_ANSWERED: usize = 100;
     for _ in 0..MOST_ANSWERED {
         let Some(waiting) = next(change)? else {

@@ -1,4 +1,5 @@
-//! The clock of the store, which is never behind the times that are in it; and the time that it has seen pass.
+//! The clock of the store, which is never behind the times in the store, and the pauses that the store has not seen
+//! pass.
 
 use std::{
     borrow::Cow,
@@ -17,24 +18,25 @@ use super::{
     sql::Sql,
 };
 
-/// The settings with the last moment that the store has seen, and with the pauses.
+/// The name of the setting with the last moment that the store has seen.
 const SEEN: &str = "seen_until";
+/// The name of the setting with the pauses.
 const PAUSES: &str = "pauses";
 
-/// How often the moment is noted.
+/// How often the present moment is stored (µs).
 pub(super) const NOTED_MICROS: i64 = 60 * 1_000_000;
 
-/// Shorter pauses are not kept: they are a small part of the shortest age that matters.
+/// Pauses shorter than this (µs) are not kept: they are a small part of the shortest age that matters.
 const LEAST_MICROS: i64 = 1_000_000;
-/// Longer ones do not count for what waits in the queue.
+/// Pauses from this length on (µs) do not count for jobs that may expire in the queue.
 const NOTABLE_MICROS: i64 = 60 * 1_000_000;
-/// Longer ones are told as a warning.
+/// Pauses from this length on (µs) are logged as a warning.
 const LONG_MICROS: i64 = 86_400 * 1_000_000;
 
 impl Store {
-    /// Compares the clock of the machine with the times in the store, when it is opened: it may have been set back since
-    /// then. Jobs are listed in the order of their times, so new ones must not be earlier than those that are there; and
-    /// the next event of a job that has not ended must not be earlier than its last one.
+    /// Compares the machine's clock with the times in the store, when the store is opened: the clock may have been set
+    /// back. Jobs are listed in the order of their times, so new jobs must not be earlier than existing ones; and the
+    /// next event of a job that has not ended must not be earlier than its last event.
     pub(super) async fn read_clock(self: &Arc<Self>) -> Result<()> {
         let latest = self.read(|_, connection| latest_time(connection)).await?;
         let ahead = latest.map_or(0, |latest| latest - Time::now().micros());
@@ -72,7 +74,8 @@ impl Store {
 }
 
 impl Store {
-    /// Compares the clock with the last moment that the store has seen, when it is opened; after `read_clock`.
+    /// Compares the clock with the last moment that the store has seen, when the store is opened, after `read_clock`;
+    /// records the pause between them.
     pub(super) async fn read_pauses(self: &Arc<Self>) -> Result<()> {
         let now = self.now().micros();
         let read = self.read(|_, connection| {
@@ -128,7 +131,8 @@ impl Store {
         Ok(())
     }
 
-    /// The store has seen this moment. On a full disk it is not noted: the space that is reserved there is for what users ask.
+    /// Stores the present moment as the last one that the store has seen. Not on a full disk: the space that is
+    /// reserved there is for requests of users.
     pub(super) async fn note_alive(self: &Arc<Self>) {
         if self.reserve.was_disk_full() {
             return;
@@ -146,7 +150,7 @@ impl Store {
     }
 }
 
-/// The latest time in the store, of records that are intact: a changed bit in a row or an index would set the clock.
+/// The latest time in the intact records of the store: a changed bit in a row or an index must not set the clock.
 fn latest_time(connection: &Connection) -> Result<Option<i64>> {
     // the first of each, and some more for those that are damaged
     const CREATED: &str = "select * from job order by created_at desc limit 10";
@@ -168,7 +172,7 @@ fn latest_time(connection: &Connection) -> Result<Option<i64>> {
     Ok(times.into_iter().max())
 }
 
-/// Jobs that would expire within as much time as was not seen may wait for that much longer.
+/// Extends the time that a job may wait, by `pause` (µs), for the jobs that would expire within `pause` from now.
 fn extend_waits(writer: &Writer<'_>, pause: i64) -> Result<()> {
     let mut change = writer.control_change()?;
     let until = change.now().micros().saturating_add(pause);
@@ -206,7 +210,7 @@ fn write_sealed(writer: &Writer<'_>, name: &str, text: &str) -> Result<()> {
     tx.commit()
 }
 
-/// A setting that has a checksum.
+/// What was read of a setting that has a checksum.
 enum Sealed {
     Absent,
     Intact(String),
@@ -217,7 +221,7 @@ fn checksum(text: &str) -> String {
     format!("{:08x}", crc32fast::hash(text.as_bytes()))
 }
 
-/// Damage and a full disk are told elsewhere, and prevent no start.
+/// Ignores errors of a damaged or full store: they are reported elsewhere, and do not prevent a start.
 fn unless_damaged(error: StoreError) -> Result<()> {
     match error {
         StoreError::Damaged(_) | StoreError::Broken(_) | StoreError::Full => Ok(()),

@@ -1,9 +1,9 @@
 //! Coalescing: jobs of the same input are solved once.
 //!
-//! A job is answered by the result of an earlier job, or coalesced into a job that waits or runs, its *primary*.
-//! A coalesced job is not solved itself: it waits until its primary has ended, and ends with the same result. If
-//! the end concerns the primary alone (if it was canceled, for example), the first of the jobs coalesced into it
-//! takes its place.
+//! A job is answered by the result of an earlier job, or coalesced into a job that waits or runs, its *primary*. A
+//! coalesced job is not solved itself: it waits until its primary has ended, and ends with the same result. If the
+//! primary ends for a reason that concerns no other job (if it was canceled, for example), the first of the jobs
+//! coalesced into it takes its place.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -28,8 +28,8 @@ use super::{
     turns,
 };
 
-/// Most jobs that are coalesced into one: they end in one transaction with it. Further ones wait for a worker, and
-/// are answered when it is their turn.
+/// The largest number of jobs that are coalesced into one primary: they end in one transaction with it. Further jobs
+/// wait for a worker, and are answered when it is their turn.
 const MOST_COALESCED: i64 = 100;
 
 pub(super) const EARLIER_RESULT: &str = "select id from job indexed by job_answer
@@ -42,10 +42,11 @@ pub(super) const PRIMARY: &str = "select id from job indexed by job_under_way
            and cancel_requested = 0 and (status = 'running' or (priority >= ? and owner = ?))
      order by id limit 1";
 
-/// A priority above that of any job: as the lowest priority of a waiting primary it excludes all but running ones.
+/// A priority above that of any job: as the lowest priority that a queued primary may have, it leaves running primaries
+/// only.
 const ONLY_RUNNING: i32 = i32::MAX;
 
-/// The newest job of this input whose final result, found by this version of the program, may answer others.
+/// The newest job of this input whose final result, found by this version of the program, may answer other jobs.
 pub(super) fn earlier_result(change: &mut Change<'_>, input_hash: &str) -> Result<Option<Job>> {
     let version = env!("CARGO_PKG_VERSION");
     let found: Vec<i64> = change
@@ -66,8 +67,8 @@ pub(super) fn earlier_result(change: &mut Change<'_>, input_hash: &str) -> Resul
 }
 
 impl Store {
-    /// Checks the result that may answer a job of this input, before the transaction that needs it, which would occupy the
-    /// single writer meanwhile. What is not found intact answers nobody.
+    /// Checks the result that may answer a job of this input, before the transaction that needs the result: in it, the
+    /// check would occupy the single writer. A result that is not intact answers no job.
     pub(super) async fn check_earlier_result(self: &Arc<Self>, input_hash: &str) {
         if self.intact.inputs.contains(input_hash) {
             return;
@@ -110,7 +111,7 @@ fn check_earlier_result(store: &Store, connection: &Connection, input_hash: &str
     Ok(())
 }
 
-/// Whether there is an earlier result for one of these jobs that was not checked since the store was opened.
+/// Whether an earlier result may answer one of these jobs and was not checked since the store was opened.
 pub(super) fn has_result_to_check(writer: &Writer<'_>, jobs: &[NewJob]) -> bool {
     let inputs = &writer.store.intact.inputs;
     let jobs = jobs.iter().filter(|job| job.cache == Cache::Use);
@@ -124,8 +125,8 @@ pub(super) fn has_result_to_check(writer: &Writer<'_>, jobs: &[NewJob]) -> bool 
     })
 }
 
-/// The job that a new one of this owner may be coalesced into. One that waits with a lower priority or for another owner's
-/// turn, or that is about to be canceled, would delay the new one.
+/// The primary that the new job of this owner may be coalesced into. Jobs that wait with a lower priority or belong to
+/// another owner, and jobs that are about to be canceled, are not primaries: they would delay the new job.
 pub(super) fn primary_for(
     change: &mut Change<'_>,
     owner: &str,
@@ -144,8 +145,8 @@ fn count_coalesced(change: &mut Change<'_>, primary: i64) -> Result<i64> {
     change.sql()?.value(count, [primary])
 }
 
-/// Coalesces a job whose turn it is into one that runs on the same input, and with it those coalesced into it;
-/// false if there is none, or if they were too many. Two such jobs arise where the later one had a higher priority.
+/// Coalesces a job whose turn it is, and the jobs coalesced into it, into a running job of the same input; false if
+/// none is running, or if they are too many. Two such jobs arise where the later one had a higher priority.
 pub(super) fn coalesce_into_running(change: &mut Change<'_>, job: &Job) -> Result<bool> {
     let same = (&job.input_hash, ONLY_RUNNING, &job.owner);
     let primary = change.sql()?.optional_value(PRIMARY, same)?;
@@ -166,7 +167,7 @@ pub(super) fn coalesce_into_running(change: &mut Change<'_>, job: &Job) -> Resul
     Ok(true)
 }
 
-/// The jobs coalesced into this one, in the order in which they would be started, but for damaged ones.
+/// The intact jobs coalesced into `primary`, in the order in which they would be started.
 pub(super) fn coalesced_jobs(change: &mut Change<'_>, primary: i64) -> Result<Vec<Job>> {
     let coalesced = "select * from job where coalesced_into = ? order by priority desc, id";
     let found = change
@@ -179,7 +180,7 @@ pub(super) fn coalesced_jobs(change: &mut Change<'_>, primary: i64) -> Result<Ve
     Ok(jobs)
 }
 
-/// Ends the jobs coalesced into one that has ended in the same way, or puts the first of them in its place.
+/// Ends the jobs coalesced into a job in the way in which it has ended, or makes the first of them the new primary.
 pub(super) fn end_coalesced(change: &mut Change<'_>, primary: i64) -> Result<()> {
     let coalesced = coalesced_jobs(change, primary)?;
     let Some(first) = coalesced.first() else {
@@ -195,7 +196,7 @@ pub(super) fn end_coalesced(change: &mut Change<'_>, primary: i64) -> Result<()>
     Ok(())
 }
 
-/// A primary waits: if a job coalesced into it has a higher priority, that job takes its place.
+/// Makes the first job coalesced into the queued job `primary` the primary, if its priority is higher.
 pub(super) fn replace_if_outranked(change: &mut Change<'_>, primary: i64) -> Result<()> {
     let coalesced = coalesced_jobs(change, primary)?;
     let Some(first) = coalesced.first() else {
@@ -208,8 +209,8 @@ pub(super) fn replace_if_outranked(change: &mut Change<'_>, primary: i64) -> Res
     }
 }
 
-/// Lets a job wait for a worker in place of its primary, and the first of every other owner in their own turn, each with the
-/// other jobs of that primary and of the same owner coalesced into it.
+/// Lets `job` wait for a worker in place of its primary, and the first coalesced job of every other owner wait in that
+/// owner's turn. The other jobs of each owner, and the primary's other jobs of the same owner, are coalesced into it.
 fn replace_primary(change: &mut Change<'_>, job: &Job, primary: i64) -> Result<()> {
     change.set(job.key, JobRow::waits_by_itself)?;
     let others = coalesced_jobs(change, primary)?;
@@ -226,13 +227,14 @@ fn replace_primary(change: &mut Change<'_>, job: &Job, primary: i64) -> Result<(
     Ok(())
 }
 
-/// Coalesces a job into this primary.
+/// Coalesces the job with this key into this primary.
 fn coalesce(change: &mut Change<'_>, key: i64, primary: i64) -> Result<()> {
     change.set(key, |row| row.job.coalesced_into = Some(primary))?;
     Ok(())
 }
 
-/// The priority of a coalesced job may have changed: if its primary waits with a lower one, it waits by itself.
+/// Lets a coalesced job, whose priority may have changed, wait by itself if its primary is queued with a lower
+/// priority.
 pub(super) fn detach_if_ahead(change: &mut Change<'_>, job: &Job, primary: i64) -> Result<()> {
     let primary = change.read(primary)?;
     if primary.status == Status::Queued && primary.priority < job.priority {
@@ -241,7 +243,7 @@ pub(super) fn detach_if_ahead(change: &mut Change<'_>, job: &Job, primary: i64) 
     Ok(())
 }
 
-/// Whether the end of a job is also that of the jobs coalesced into it.
+/// Whether the jobs coalesced into a job end together with it, given how it has ended.
 fn is_shared(status: Status, reason: Option<Reason>) -> bool {
     match status {
         Status::Succeeded => true,
@@ -252,7 +254,7 @@ fn is_shared(status: Status, reason: Option<Reason>) -> bool {
     }
 }
 
-/// Starts a queued job and ends it at once, with the result of another one of the same input.
+/// Starts a queued job and ends it at once, with the result of `source`, a job of the same input.
 pub(super) fn answer(change: &mut Change<'_>, key: i64, source: &Job) -> Result<()> {
     let now = change.now();
     let job = change.update(key, |row| row.start_with_answer(source, now))?;

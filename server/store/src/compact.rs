@@ -1,4 +1,4 @@
-//! A database without free pages, that can give back to the file system what becomes free later.
+//! Rebuilds a database so that it has no free pages, and can give later free pages back to the file system.
 
 use std::path::Path;
 
@@ -10,12 +10,13 @@ use super::{
     pages::Pages,
 };
 
-/// A database without the means to give space back is rebuilt when it is opened, if it is not larger than this: some seconds.
+/// The largest database (bytes) that is rebuilt when it is opened, if it cannot give space back: rebuilding takes some
+/// seconds.
 const REBUILT_BYTES: u64 = 256 << 20;
 
-/// Rebuilds a database of an earlier version, which cannot give space back, unless that takes long or there is no room. What
-/// `doctor --compact` does for large ones. It works without that as well: what stands in the way of it is told in the log,
-/// and it is tried again at the next start.
+/// Rebuilds a database of an earlier version, which cannot give space back, unless that takes long or there is no room;
+/// `doctor --compact` does it for large ones. The store also works without this: what prevents it is logged, and it is
+/// tried again at the next start.
 pub(super) fn enable_giving_back(connection: &Connection, folder: &Path) -> Result<()> {
     if gives_back(connection)? {
         return Ok(());
@@ -45,20 +46,20 @@ pub(super) fn enable_giving_back(connection: &Connection, folder: &Path) -> Resu
     Ok(())
 }
 
-/// Whether a database can give back to the file system what is free in it.
+/// Whether a database can give its free pages back to the file system.
 pub(super) fn gives_back(connection: &Connection) -> Result<bool> {
     // not prepared once: it is evaluated when it is prepared
     let mode: i64 = connection.pragma_query_value(None, "auto_vacuum", |row| row.get(0))?;
     Ok(mode != 0)
 }
 
-/// Whether there is room for a copy of so many bytes and for the journal that undoes it.
+/// Whether the disk has room for a copy of this many bytes and for the journal that undoes it.
 fn has_room(folder: &Path, bytes: u64) -> bool {
     rustix::fs::statvfs(folder)
         .is_ok_and(|found| found.f_bavail.saturating_mul(found.f_frsize) >= bytes.saturating_mul(2))
 }
 
-/// Rebuilds a database without free pages, and so that it can give space back later.
+/// Rebuilds a database without its free pages, and so that it can give space back later.
 pub(super) fn compact(connection: &Connection) -> Result<()> {
     // the mode of an existing database changes when it is rebuilt, and not in a write-ahead log
     let rebuilt = connection

@@ -1,4 +1,4 @@
-//! Connections to the database. Each is used by one thread at a time, which may block; whoever needs one waits for a turn.
+//! Connections to the database. Each is used by one thread at a time, which may block; other users wait for a turn.
 
 use parking_lot::Mutex;
 use std::{fmt, path::Path, sync::Arc, time::Duration};
@@ -13,18 +13,18 @@ use tokio::{
 
 use super::error::{Result, StoreError};
 
-/// Statements that a connection keeps prepared: those that are used again and again. The store has some 200 texts, and makes
-/// others of the columns that change or that a list filters by.
+/// The number of statements that a connection keeps prepared for repeated use. The store has some 200 texts of
+/// statements, and makes further ones from the columns that change or that a list filters by.
 const MOST_STATEMENTS: usize = 200;
 
-/// For what a database is opened.
+/// What a database is opened for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Mode {
-    /// To read it.
+    /// Reading.
     Read,
-    /// To read and write it.
+    /// Reading and writing.
     ReadWrite,
-    /// To read and write it; it is created if it does not exist.
+    /// Reading and writing; the database is created if it does not exist.
     #[cfg(test)]
     Create,
 }
@@ -45,7 +45,7 @@ pub(super) fn open(file: &Path, mode: Mode) -> Result<Connection> {
     Ok(connection)
 }
 
-/// Runs what may block.
+/// Runs work that may block on a thread for such work.
 pub(super) async fn blocking<T: Send + 'static>(
     work: impl FnOnce() -> Result<T> + Send + 'static,
 ) -> Result<T> {
@@ -59,12 +59,12 @@ pub(super) async fn blocking<T: Send + 'static>(
     })
 }
 
-/// The error that a store is used that was closed.
+/// The error of a use of the store after it was closed.
 pub(super) fn closed() -> StoreError {
     StoreError::Folder("the store is closed".into())
 }
 
-/// Some connections of one kind.
+/// A fixed number of connections that are opened in the same way.
 pub(super) struct Connections {
     count: u32,
     patience: Duration,
@@ -74,7 +74,7 @@ pub(super) struct Connections {
 }
 
 impl Connections {
-    /// Opens `count` connections by `open`. Who needs one waits for at most `patience`.
+    /// Opens `count` connections by `open`. A user waits for a free one for at most `patience`.
     pub(super) fn new(
         count: u32,
         patience: Duration,
@@ -113,7 +113,7 @@ impl Connections {
         }
     }
 
-    /// Closes the connections, once nobody uses one.
+    /// Closes all connections, once none is in use.
     pub(super) async fn close(&self) {
         let all = self.turns.acquire_many(self.count).await;
         self.turns.close();
@@ -127,7 +127,7 @@ impl Connections {
         let _ = blocking(closing).await; // it cannot fail
     }
 
-    /// Whether they were closed.
+    /// Whether the connections were closed.
     pub(super) fn is_closed(&self) -> bool {
         self.turns.is_closed()
     }
@@ -143,16 +143,16 @@ impl fmt::Debug for Connections {
     }
 }
 
-/// A connection in use; others may have it when this is dropped.
+/// A connection in use; it is free for others when this is dropped.
 pub(super) struct Lease {
-    /// None if it is to be opened anew.
+    /// The connection; `None` if it is opened anew at its next use.
     connection: Option<Connection>,
     of: Arc<Connections>,
     _turn: OwnedSemaphorePermit,
 }
 
 impl Lease {
-    /// The connection.
+    /// The connection, opened anew if it was discarded.
     pub(super) fn get(&mut self) -> Result<&Connection> {
         match &mut self.connection {
             Some(connection) => Ok(connection),
@@ -160,7 +160,7 @@ impl Lease {
         }
     }
 
-    /// Closes the connection; a new one is opened when one is needed next.
+    /// Closes the connection; a new one is opened at the next use.
     pub(super) fn discard(&mut self) {
         self.connection = None;
     }

@@ -1,8 +1,9 @@
 //! Content: bytes, stored once by their hash, in pieces, and attached to jobs and meshes under names.
 //!
-//! Large content is written before it is attached, in several short transactions; nobody reads it before. It goes with the last of
-//! what it was attached to, by a trigger (`migrations/0017_content.sql`); what was never attached, by
-//! [`Store::discard_content`] or at the next start. It is compared with its hash whenever it is read as a whole.
+//! Large content is written in several short transactions before it is attached; nobody reads it before that. Content
+//! is removed by a trigger (`migrations/0017_content.sql`) with the last job or mesh that it is attached to; content
+//! that was never attached is removed by [`Store::discard_content`] or at the next start. It is compared with its hash
+//! whenever it is read as a whole.
 //!
 //! [`Store::discard_content`]: super::Store::discard_content
 
@@ -23,7 +24,7 @@ pub const PIECE_BYTES: usize = 256 << 10;
 /// cancel or a submission during the write of a large result is still answered at once.
 pub const PIECES_PER_COMMIT: usize = 4;
 
-/// What has content, with its number.
+/// The job or mesh that content is attached to, by its key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Holder {
     Job(i64),
@@ -34,11 +35,11 @@ pub(super) enum Holder {
 pub(super) mod name {
     /// The problem of a job: its JSON without the title.
     pub(crate) const PROBLEM: &str = "problem";
-    /// The result of a job but for its fields, see `parts`.
+    /// The result of a job without its fields, see `parts`.
     pub(crate) const RESULT: &str = "result";
     /// The fields of a job.
     pub(crate) const FIELDS: &str = "fields";
-    /// What is attached to a job that has a result.
+    /// The names of the content that is attached to a job with a result.
     pub(crate) const OF_RESULT: [&str; 2] = [RESULT, FIELDS];
     /// The definition of the sweep of a job: JSON.
     pub(crate) const DEFINITION: &str = "definition";
@@ -54,7 +55,7 @@ impl Holder {
         }
     }
 
-    /// Content of this name, in errors.
+    /// The record of the holder's content of this name, as errors name it.
     pub(super) fn record(self, name: &str) -> Record {
         match self {
             Holder::Job(key) => Record::of_job(key, name),
@@ -63,17 +64,17 @@ impl Holder {
     }
 }
 
-/// The hash of content, and how long it is.
+/// The hash and the size of content.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fingerprint {
     /// SHA-256.
     pub hash: Vec<u8>,
-    /// Bytes.
+    /// The number of bytes.
     pub bytes: usize,
 }
 
 impl Fingerprint {
-    /// The fingerprint of bytes that lie in several places.
+    /// The fingerprint of the bytes of all chunks, one after the other.
     pub(super) fn of<'a>(chunks: impl IntoIterator<Item = &'a [u8]>) -> Fingerprint {
         let (mut hash, mut bytes) = (Sha256::new(), 0);
         for chunk in chunks {
@@ -84,7 +85,7 @@ impl Fingerprint {
         Fingerprint { hash, bytes }
     }
 
-    /// How many pieces it is stored in: one if it is empty.
+    /// The number of pieces in which the content is stored: one if it is empty.
     pub(super) fn pieces(&self) -> usize {
         self.bytes.div_ceil(PIECE_BYTES).max(1)
     }
@@ -95,14 +96,14 @@ impl Fingerprint {
     }
 }
 
-/// Content that is to be stored: one after the other, these bytes.
+/// Content that is to be stored: the bytes of its chunks, one after the other.
 pub(super) struct NewContent<'a> {
     pub(super) fingerprint: Cow<'a, Fingerprint>,
     pub(super) chunks: Vec<&'a [u8]>,
 }
 
 impl<'a> NewContent<'a> {
-    /// Bytes of which the hash is not known yet.
+    /// Content of these bytes, whose hash is computed here.
     pub(super) fn new(bytes: &'a [u8]) -> NewContent<'a> {
         NewContent {
             fingerprint: Cow::Owned(Fingerprint::of([bytes])),
@@ -110,7 +111,7 @@ impl<'a> NewContent<'a> {
         }
     }
 
-    /// The bytes in pieces as they are stored, in order.
+    /// The pieces in which the bytes are stored, in order.
     pub(super) fn pieces(&self) -> Vec<Cow<'a, [u8]>> {
         let mut pieces: Vec<Cow<'a, [u8]>> = vec![Cow::Borrowed(&[])];
         for chunk in &self.chunks {
@@ -127,7 +128,7 @@ impl<'a> NewContent<'a> {
     }
 }
 
-/// Removes content that is not attached; how many pieces it had.
+/// Removes content that is not attached, by its ids; returns how many pieces it had.
 pub(super) fn remove(tx: &Connection, ids: &[i64]) -> Result<usize> {
     let mut pieces = 0;
     for id in ids {
@@ -137,7 +138,8 @@ pub(super) fn remove(tx: &Connection, ids: &[i64]) -> Result<usize> {
     Ok(pieces)
 }
 
-/// Writes pieces of content, numbered from `first`; its number. What a disk has changed since it was written before is mended so.
+/// Writes pieces of content, numbered from `first`; returns the content's id. Pieces that were written before, and that
+/// a disk has changed since, are written again.
 pub(super) fn write_pieces(
     tx: &Connection,
     content: &Fingerprint,
@@ -155,7 +157,7 @@ pub(super) fn write_pieces(
     Ok(id)
 }
 
-/// The number of content with this hash, which is new if there was none.
+/// The id of the content with this hash, which is inserted if it does not exist.
 fn insert(tx: &Connection, content: &Fingerprint) -> Result<i64> {
     tx.value(
         "insert into content (hash, bytes, checksum) values (?, ?, ?)
@@ -165,8 +167,8 @@ fn insert(tx: &Connection, content: &Fingerprint) -> Result<i64> {
     )
 }
 
-/// Writes content, and attaches it under a name that has none. What is there already is compared: what a disk has changed since
-/// is mended so.
+/// Writes content, and attaches it under a name that the holder does not use yet. Pieces that are already stored, and
+/// that a disk has changed, are written again.
 pub(super) fn attach(
     tx: &Connection,
     holder: Holder,
@@ -178,7 +180,7 @@ pub(super) fn attach(
     attach_stored(tx, holder, name, id, &fingerprint.hash)
 }
 
-/// Attaches content that was written a moment ago; false if some of it is not there.
+/// Attaches content whose pieces were written before; false if a piece is missing.
 pub(super) fn attach_written(
     tx: &Connection,
     holder: Holder,
@@ -214,7 +216,7 @@ fn attachment_checksum(kind: &str, key: i64, name: &str, hash: &[u8]) -> i64 {
     sum.bytes(hash).stored()
 }
 
-/// Attaches what a job has under these names to another one, too.
+/// Attaches what the job `from` has under these names to the job `to`, too.
 pub(super) fn copy(tx: &Connection, from: i64, to: i64, names: &[&str]) -> Result<()> {
     let attached = all(tx, Holder::Job(from))?;
     let copied = attached
@@ -232,7 +234,7 @@ pub(super) fn copy(tx: &Connection, from: i64, to: i64, names: &[&str]) -> Resul
     Ok(())
 }
 
-/// Takes what is attached under these names away.
+/// Detaches the holder's content of these names.
 pub(super) fn detach(tx: &Connection, holder: Holder, names: &[&str]) -> Result<()> {
     let (kind, key) = holder.kind_and_key();
     let places = vec!["?"; names.len()].join(", ");
@@ -244,7 +246,7 @@ pub(super) fn detach(tx: &Connection, holder: Holder, names: &[&str]) -> Result<
     Ok(())
 }
 
-/// Content that is attached.
+/// Content that is attached to a job or mesh.
 #[derive(Debug)]
 pub(super) struct Content {
     /// The number of the content in the table `content`.
@@ -259,7 +261,7 @@ const ATTACHED: &str =
     "select name, attachment.checksum as attached, content, hash, bytes, content.checksum as stored
      from attachment left join content on content.id = content where kind = ? and key = ?";
 
-/// What is attached under a name, if there is something.
+/// The content that is attached under a name, if there is any.
 pub(super) fn find(connection: &Connection, holder: Holder, name: &str) -> Result<Option<Content>> {
     let (kind, key) = holder.kind_and_key();
     let statement = format!("{ATTACHED} and name = ?");
@@ -268,14 +270,14 @@ pub(super) fn find(connection: &Connection, holder: Holder, name: &str) -> Resul
     })
 }
 
-/// All that is attached, in the order of its names.
+/// All content that is attached to the holder, in the order of its names.
 pub(super) fn all(connection: &Connection, holder: Holder) -> Result<Vec<Content>> {
     let (kind, key) = holder.kind_and_key();
     let statement = format!("{ATTACHED} order by name");
     connection.rows(&statement, (kind, key), |row| attached(row, holder))
 }
 
-/// A row of attached content, if it is as it was written.
+/// The attached content of a row, if the checksums match.
 fn attached(row: &Row<'_>, holder: Holder) -> Result<Content> {
     let name = text(row, "name")?.to_owned();
     let record = holder.record(&name);
@@ -311,7 +313,7 @@ pub(super) fn read_text(connection: &Connection, holder: Holder, name: &str) -> 
     read.map_err(|error| error.reading(|| holder.record(name)))
 }
 
-/// As [`read_text`], but a page that cannot be read is an error of the database, not of the holder.
+/// Like [`read_text`], but a page that cannot be read is an error of the database, not of the holder.
 pub(super) fn try_to_read_text(
     connection: &Connection,
     holder: Holder,
@@ -324,12 +326,13 @@ pub(super) fn try_to_read_text(
 }
 
 impl Content {
-    /// Where it is, in errors.
+    /// The record of this content, as errors name it.
     pub(super) fn record(&self) -> Record {
         self.record.clone()
     }
 
-    /// All of it, compared with its hash. What differs is an error of the holder, a page that cannot be read one of the database.
+    /// The whole content, compared with its hash. A difference is an error of the holder; a page that cannot be read is
+    /// an error of the database.
     pub(super) fn read(&self, connection: &Connection) -> Result<Vec<u8>> {
         let mut whole = Vec::with_capacity(self.fingerprint.bytes.min(MOST_RESERVED));
         for number in 0..self.fingerprint.pieces() {
@@ -339,7 +342,7 @@ impl Content {
         Ok(whole)
     }
 
-    /// Compares it with its hash, one piece after the other.
+    /// Compares the content with its hash, one piece after the other.
     pub(super) fn check(&self, connection: &Connection) -> Result<()> {
         let (mut hash, mut bytes) = (Sha256::new(), 0);
         for number in 0..self.fingerprint.pieces() {
@@ -362,7 +365,7 @@ impl Content {
         }
     }
 
-    /// One of its pieces, from 0; not compared with anything.
+    /// The piece with this number, from 0; it is not compared with anything.
     pub(super) fn piece(&self, connection: &Connection, number: usize) -> Result<Vec<u8>> {
         let body = "select body from content_piece where content = ? and piece = ?";
         // a text, too: only its hash tells whether it is as it was written
@@ -373,5 +376,6 @@ impl Content {
     }
 }
 
-/// What is reserved for content before it is read: a number of bytes that a disk has changed must not take all memory.
+/// The most memory (bytes) that is reserved for content before it is read: a size that a disk has changed must not take
+/// all memory.
 const MOST_RESERVED: usize = 64 << 20;

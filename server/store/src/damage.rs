@@ -1,4 +1,5 @@
-//! What has been found damaged: told to the client that asked, once in the log, and by `/readyz`.
+//! The record of what was found damaged: damage is told to the client whose request meets it, once in the log, and by
+//! `/readyz`.
 
 use parking_lot::Mutex;
 use std::{
@@ -15,10 +16,10 @@ use super::{
     sql::Sql,
 };
 
-/// Most parts that are remembered; the log has all of them.
+/// The largest number of damaged records that are remembered; the log has all of them.
 const MOST: usize = 1000;
 
-/// What is found by a key, a name or a hash.
+/// The tables whose rows are found by a key, a name or a hash, so that a damaged index hides rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Table {
     Jobs,
@@ -31,7 +32,7 @@ pub(super) enum Table {
 }
 
 impl Table {
-    /// The error that it is damaged.
+    /// The error that this table is damaged.
     pub(super) fn damaged(self, cause: impl ToString) -> StoreError {
         let of = match self {
             Table::Jobs => "jobs",
@@ -46,17 +47,17 @@ impl Table {
     }
 }
 
-/// The parts that were found damaged since the store was opened.
+/// The damaged records that were found since the store was opened.
 #[derive(Debug)]
 pub(super) struct Damages {
     found: Mutex<BTreeMap<Record, (Uuid, Option<JobId>)>>,
-    /// Tables that cannot be trusted: what is not found in them may exist.
+    /// Damaged tables: a row that is not found in them may exist nevertheless.
     tables: Mutex<BTreeSet<Table>>,
     /// The fingerprints of requests whose key was damaged.
     suspects: Mutex<BTreeSet<String>>,
-    /// Why nothing is written any more.
+    /// The damage because of which nothing is written any more, if there is such damage.
     broken: OnceLock<String>,
-    /// Finds the public id of a job.
+    /// The connections that find the public ids of damaged jobs.
     reader: Arc<Connections>,
 }
 
@@ -71,7 +72,7 @@ impl Damages {
         }
     }
 
-    /// Takes note of damage that a query has found.
+    /// Records the damage if the result of a query is that error.
     pub(super) fn noting<T>(&self, found: Result<T>) -> Result<T> {
         match found {
             Err(StoreError::Damaged(damage)) => {
@@ -81,7 +82,7 @@ impl Damages {
         }
     }
 
-    /// Nothing is written any more, since this damage stands in the way of all that is written.
+    /// Stops all writing, because this damage prevents every write; returns the error of later writes.
     pub(super) fn stop_writing(&self, damage: &Damage) -> StoreError {
         let incident = damage.incident.unwrap_or_default();
         let text = format!(
@@ -94,7 +95,7 @@ impl Damages {
         StoreError::Broken(text)
     }
 
-    /// An error if nothing is written any more.
+    /// An error if all writing was stopped.
     pub(super) fn can_write(&self) -> Result<()> {
         match self.broken.get() {
             Some(text) => Err(StoreError::Broken(text.clone())),
@@ -102,7 +103,7 @@ impl Damages {
         }
     }
 
-    /// Takes note of damage: the first time it is logged, under an incident number that stays the same.
+    /// Records damage: at the first time it is logged, under an incident number that stays the same.
     pub(super) fn note(&self, mut damage: Damage) -> Damage {
         if damage.incident.is_some() {
             return damage;
@@ -138,7 +139,7 @@ impl Damages {
         Uuid::try_parse(&uuid?).ok().map(JobId::from)
     }
 
-    /// How many parts, and the incidents of the first few.
+    /// The number of damaged records, and the incident numbers of the first few.
     pub(super) fn summary(&self) -> (usize, Vec<Uuid>) {
         const SHOWN: usize = 10;
         let found = self.found();
@@ -146,7 +147,7 @@ impl Damages {
         (found.len(), incidents.take(SHOWN).collect())
     }
 
-    /// A table was found damaged, or differs from its indexes.
+    /// Records that a table was found damaged, or differs from its indexes.
     pub(super) fn note_table(&self, table: Table, cause: &str) {
         {
             let mut tables = self.tables.lock();
@@ -157,7 +158,7 @@ impl Damages {
         }
     }
 
-    /// An error if what was not found in these tables may exist nevertheless.
+    /// An error if one of these tables is damaged: a row that was not found in it may exist nevertheless.
     pub(super) fn have_all(&self, tables: &[Table]) -> Result<()> {
         let damaged = self.tables.lock();
         match tables.iter().find(|table| damaged.contains(table)) {
@@ -166,7 +167,7 @@ impl Damages {
         }
     }
 
-    /// The key of a request with this fingerprint was damaged.
+    /// Records that a damaged request key has this fingerprint.
     pub(super) fn suspect(&self, payload: String) {
         let mut suspects = self.suspects.lock();
         if suspects.len() < MOST {
@@ -174,7 +175,7 @@ impl Damages {
         }
     }
 
-    /// An error if the key of a request with this fingerprint, which was not found, may exist nevertheless.
+    /// An error if a request key with this fingerprint may exist although it was not found.
     pub(super) fn have_all_keys(&self, payload: &str) -> Result<()> {
         self.have_all(&[Table::Keys])?;
         let suspects = self.suspects.lock();

@@ -33,8 +33,8 @@ use super::{
     submission::{Inbox, Pending},
 };
 
-/// How long a query or a change waits for a connection; one that waits longer, behind others on a disk that hardly answers,
-/// fails, and may be tried again.
+/// How long a query or a change waits for a connection, behind others on a disk that hardly answers; then it fails, and
+/// may be tried again.
 const PATIENCE: Duration = Duration::from_secs(30);
 /// How long a list or a count waits for a connection.
 const LIST_PATIENCE: Duration = Duration::from_secs(5);
@@ -42,46 +42,47 @@ const LIST_PATIENCE: Duration = Duration::from_secs(5);
 /// The database of one server.
 #[derive(Debug)]
 pub struct Store {
-    /// The only one that writes.
+    /// The only connection that writes.
     writer: Arc<Connections>,
-    /// What the writer reads with beside its transaction, which a page that cannot be read would end.
+    /// The connection on which the writer reads outside its transaction: a page that cannot be read would end the
+    /// transaction.
     beside: Arc<Connections>,
     pub(super) reader: Arc<Connections>,
-    /// For lists and counts, which may be slow, so that they do not delay other reads.
+    /// The connections for lists and counts, which may be slow, so that they do not delay other reads.
     lists: Arc<Connections>,
-    /// How many jobs wait, as it is on the disk after every commit.
+    /// The number of waiting jobs, as it is on the disk after every commit.
     pub(super) waiting: AtomicUsize,
     /// Whether the queue is paused, as it is on the disk after every commit.
     pub(super) paused: AtomicBool,
-    /// Who may use the service, as it is on the disk after every commit.
+    /// The tokens, as they are on the disk after every commit.
     pub(super) tokens: RwLock<Tokens>,
-    /// There is a token, or was.
+    /// Whether a token exists, or ever existed.
     pub(super) any_tokens: AtomicBool,
-    /// How many jobs of one owner may run; without limit until it is set.
+    /// The number of jobs of one owner that may run at the same time; no limit until it is set.
     pub(super) most_running: OnceLock<usize>,
-    /// The memory that running jobs share; without limit until it is set.
+    /// The memory that running jobs share; no limit until it is set.
     pub(super) budget: OnceLock<Arc<Budget>>,
-    /// Where submissions wait for the next commit.
+    /// The inbox in which submissions wait for the next commit.
     pub(super) inbox: Inbox,
-    /// Running jobs that a client has canceled, even if that could not be stored yet.
+    /// The keys of running jobs that a client has canceled, even if that could not be stored yet.
     pub(super) cancels: Mutex<HashSet<i64>>,
-    /// What was found damaged.
+    /// The record of what was found damaged.
     pub(super) damages: Arc<Damages>,
-    /// Whether the request keys were read since it was opened.
+    /// Whether the request keys were read since the store was opened.
     pub(super) keys_read: watch::Sender<bool>,
-    /// Results that were found intact.
+    /// The content and inputs that were found intact.
     pub(super) intact: Arc<Intact>,
-    /// How far its clock is ahead of that of the machine, in microseconds: see `clock`.
+    /// How far the store's clock is ahead of the machine's clock (µs): see `clock`.
     pub(super) ahead: AtomicI64,
-    /// Time that it has not seen pass.
+    /// The pauses that the store has not seen pass.
     pub(super) pauses: Pauses,
-    /// How far the store has come.
+    /// The file that records how far the store has come.
     pub(super) progress: Progress,
-    /// The service that had it before this one stopped, and did not die.
+    /// Whether the service that had the store before was stopped, and did not die.
     pub(super) was_stopped: bool,
-    /// Space for control when the disk is full.
+    /// The reserved space that control operations use when the disk is full.
     pub(super) reserve: Reserve,
-    /// How many of the next commits find the disk full.
+    /// The number of next commits that a test lets fail as on a full disk.
     #[cfg(test)]
     pub(super) full_commits: Arc<std::sync::atomic::AtomicU32>,
     // last: SQLite's files are closed before
@@ -92,22 +93,23 @@ pub struct Store {
 /// Whether the database is rebuilt when the store is connected to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Rebuild {
-    /// If it is of an earlier version and cannot give space back.
+    /// The database is rebuilt if an earlier version made it and it cannot give space back.
     IfItCannotGiveBack,
-    /// By whoever connects, if at all.
+    /// Connecting does not rebuild the database; the caller may.
     Never,
 }
 
-/// The connection that writes, in use.
+/// The writing connection while a change uses it.
 pub(super) struct Writer<'a> {
     pub(super) store: &'a Store,
     connection: &'a Connection,
     beside: &'a Connection,
-    /// SQLite opens a file that it cannot write for reading only, which would last: such a connection is replaced.
+    /// Whether a transaction could not begin. SQLite opens a file that it cannot write for reading only, which would
+    /// last: such a connection is replaced.
     cannot_begin: Cell<bool>,
 }
 
-/// A transaction of the single writer; unless it is committed it is rolled back.
+/// A transaction of the single writer; it is rolled back unless it is committed.
 pub(super) struct Writing<'a> {
     tx: Transaction<'a>,
     store: &'a Store,
@@ -161,12 +163,12 @@ impl Writer<'_> {
         })
     }
 
-    /// The connection, for what is not part of a transaction.
+    /// The connection, for statements outside a transaction.
     pub(super) fn connection(&self) -> &Connection {
         self.connection
     }
 
-    /// A connection that reads what is committed.
+    /// A connection that reads only what is committed.
     pub(super) fn beside(&self) -> &Connection {
         self.beside
     }
@@ -236,7 +238,7 @@ impl Store {
         Ok((store, submissions))
     }
 
-    /// Closes every connection, and with the last one the write-ahead log. Another server may use the folder then.
+    /// Closes every connection; the last one closes the write-ahead log. Another server may then use the folder.
     pub async fn close(self: &Arc<Self>) {
         self.close_as(true).await;
     }
@@ -280,7 +282,7 @@ impl Store {
         self.folder.unlock();
     }
 
-    /// Runs a query, on a thread that may block, and takes note of damage that it finds.
+    /// Runs a query on a thread that may block, and records the damage that it finds.
     pub(super) async fn read<T: Send + 'static>(
         self: &Arc<Self>,
         query: impl FnOnce(&Store, &Connection) -> Result<T> + Send + 'static,
@@ -289,7 +291,7 @@ impl Store {
         self.query(lease, query).await
     }
 
-    /// Runs a list or a count, as `read` does, on connections of their own, so that other queries do not wait for them.
+    /// Runs a list or a count like `read`, but on connections for lists, so that other queries do not wait for it.
     pub(super) async fn read_list<T: Send + 'static>(
         self: &Arc<Self>,
         query: impl FnOnce(&Store, &Connection) -> Result<T> + Send + 'static,
@@ -312,8 +314,8 @@ impl Store {
         .await
     }
 
-    /// Runs what writes, on a thread that may block, and takes note of damage that it finds. It runs to its end even if
-    /// nobody waits for that any more.
+    /// Runs a change on a thread that may block, and records the damage that it finds. The change runs to its end even
+    /// if nobody waits for it any more.
     pub(super) async fn write<T: Send + 'static>(
         self: &Arc<Self>,
         work: impl FnOnce(&Writer<'_>) -> Result<T> + Send + 'static,
@@ -328,7 +330,8 @@ impl Store {
         .await
     }
 
-    /// Runs what writes, as `write` does, and must work even if the disk is full: then once more, with the space reserved for it.
+    /// Runs a change like `write`, and also when the disk is full: then it runs once more, with the reserved space
+    /// released.
     pub(super) async fn control<T: Send + 'static>(
         self: &Arc<Self>,
         work: impl Fn(&Writer<'_>) -> Result<T> + Send + 'static,
@@ -368,8 +371,9 @@ impl Store {
         done
     }
 
-    /// Damage of the database may be that of a single page, of data that this alone has met, or a disk may have failed to
-    /// read once: only if nothing else can be written either, all writing ends.
+    /// Records the damage that a change has met. Damage of the database may concern a single page, which other changes
+    /// do not need, or a disk may have failed to read once: all writing is stopped only if a check cannot write
+    /// anything either.
     fn noting_what_cannot_be_written<T>(&self, lease: &mut Lease, done: Result<T>) -> Result<T> {
         match self.damages.noting(done) {
             Err(StoreError::Damaged(damage)) if damage.record.is_database() => {
@@ -384,7 +388,7 @@ impl Store {
     }
 }
 
-/// Brings the tables up to date, before there are connections that read; how far the store has come.
+/// Brings the tables up to date, before any connection reads; returns how far the store has come.
 fn prepare(
     writer: &Arc<Connections>,
     path: &Path,
@@ -408,7 +412,8 @@ fn prepare(
     })
 }
 
-/// Compares the database with what is known of it before anything is written to it. If too little is known, why.
+/// Compares the database with what is known of its last commit, before anything is written to it. Returns why data may
+/// be lost unnoticed, if too little is known.
 pub(super) fn compare_with_the_past(
     path: &Path,
     known: &Known,
@@ -436,7 +441,7 @@ pub(super) fn compare_with_the_past(
     progress::compare(known, found.as_ref())
 }
 
-/// What the operator can do.
+/// The error with advice on what the operator can do about it.
 pub fn with_advice(error: StoreError, path: &Path) -> StoreError {
     let database = path.join(super::folder::DATABASE);
     let damaged = |how: &str| {
@@ -465,7 +470,7 @@ pub fn with_advice(error: StoreError, path: &Path) -> StoreError {
     }
 }
 
-/// Whether a commit is to find the disk full, as it does where the write-ahead log cannot grow.
+/// Whether this commit is to fail as on a full disk, where the write-ahead log cannot grow.
 #[cfg(test)]
 fn is_full(commits: &std::sync::atomic::AtomicU32) -> bool {
     use std::sync::atomic::Ordering::Relaxed;

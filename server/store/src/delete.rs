@@ -1,4 +1,4 @@
-//! Deleting jobs.
+//! Deletes jobs, and tells which were deleted.
 
 use std::{sync::Arc, time::Duration};
 
@@ -10,7 +10,7 @@ use rusqlite::Connection;
 
 use super::{change::Change, damage::Table, database::Store, error::Result, sql::Sql, sweeps};
 
-/// Between two transactions that remove things others write.
+/// The pause between two transactions of a long removal, in which other changes are written.
 pub(super) const PAUSE: Duration = Duration::from_millis(20);
 
 /// The effect of deleting a job.
@@ -25,7 +25,8 @@ pub enum Deletion {
 }
 
 impl Store {
-    /// Deletes a job that has ended, with its events and its result. Others that were answered with it keep it.
+    /// Deletes a job that has ended, with its events and its result. Other jobs that were answered with the result keep
+    /// it.
     pub async fn delete(self: &Arc<Self>, owners: Owners, key: i64) -> Result<Deletion> {
         self.control(move |writer| {
             let mut change = writer.control_change()?;
@@ -64,7 +65,7 @@ pub(super) fn delete(change: &mut Change<'_>, owners: &Owners, key: i64) -> Resu
     Ok(Deletion::Deleted)
 }
 
-/// Removes a job that has ended, and the sweep that it was the last job of.
+/// Removes a job that has ended, and its sweep if it was the sweep's last job.
 pub(super) fn remove(change: &mut Change<'_>, job: &Job) -> Result<()> {
     change.delete(job)?;
     if let Some(sweep) = job.sweep

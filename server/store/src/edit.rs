@@ -15,16 +15,16 @@ use super::{
     rows::with_id,
 };
 
-/// Changes to a job; absent fields stay unchanged.
+/// Changes to a job; absent fields leave the job as it is.
 #[derive(Clone, Debug, Default)]
 pub struct Edit {
-    /// A name, or none.
+    /// The new name, or `Some(None)` to remove it.
     pub name: Option<Option<String>>,
-    /// All labels.
+    /// The new labels, in place of all earlier ones.
     pub labels: Option<BTreeMap<String, String>>,
-    /// −10 … 10.
+    /// The new priority, −10 … 10.
     pub priority: Option<i32>,
-    /// Never deleted because of its age.
+    /// Whether the job is pinned: never deleted because of its age or size.
     pub pinned: Option<bool>,
 }
 
@@ -41,7 +41,8 @@ impl Edit {
 }
 
 impl Store {
-    /// Edits a job: `edit` decides from the job as it is, or refuses. `None`: there is no such job.
+    /// Edits a job: `edit` returns the changes, given the job as it is, or an error that is returned. `None` if there
+    /// is no such job.
     pub async fn edit<E: Send + 'static>(
         self: &Arc<Self>,
         owners: Owners,

@@ -1,4 +1,4 @@
-//! How the pieces of a part of a result hold it: deflated, or as columns.
+//! How the bytes of a stored part of a result are encoded: as plain JSON, deflated JSON, or columns.
 
 use std::io::{self, BufWriter, Read, Write};
 
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use solver::solution::Fields;
 
-/// Size and hash of the JSON of a part.
+/// The size and the hash of the JSON of a part.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PartInfo {
     /// The size of its JSON.
@@ -17,7 +17,7 @@ pub struct PartInfo {
     pub digest: Vec<u8>,
 }
 
-/// How the pieces of a part hold it.
+/// How the bytes of a stored part are encoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Encoding {
     /// JSON as it is, as earlier versions stored it.
@@ -28,16 +28,17 @@ pub(super) enum Encoding {
     Columns,
 }
 
-/// The content of a part.
+/// The content of a part, decoded.
 #[derive(Debug)]
 pub(super) enum Decoded {
     /// The part as JSON.
     Json(Vec<u8>),
-    /// Fields.
+    /// The part `fields`, decoded from columns.
     Fields(Box<Fields>),
 }
 
-/// The content of a part that was stored so, and size and hash of its JSON. `Err`: what is wrong with the bytes.
+/// The content of a part that was stored in this encoding, and the size and hash of its JSON. `Err`: what is wrong with
+/// the bytes.
 pub(super) fn decoded(
     stored: Vec<u8>,
     encoding: Encoding,
@@ -63,8 +64,8 @@ pub(super) fn decoded(
     Ok((info_of_json(&json), Decoded::Json(json)))
 }
 
-/// The memory that a part of fields takes at most while it is read, in bytes: what is stored, which begins with `first`, and what is
-/// made from it. `Err`: what is wrong with the bytes.
+/// The largest memory (bytes) that reading the part `fields` takes: its stored bytes, which begin with `first`, and
+/// what is made from them. `Err`: what is wrong with the bytes.
 pub(super) fn memory_to_read(
     first: &[u8],
     stored_bytes: usize,
@@ -80,12 +81,12 @@ pub(super) fn memory_to_read(
     Ok(stored_bytes.saturating_add(made))
 }
 
-/// The hash of the bytes that are stored.
+/// The SHA-256 of the stored bytes.
 pub(super) fn digest(stored: &[u8]) -> Vec<u8> {
     Sha256::digest(stored).to_vec()
 }
 
-/// Size and hash of a JSON.
+/// The size and the hash of a JSON text.
 pub(super) fn info_of_json(json: &[u8]) -> PartInfo {
     PartInfo {
         bytes: json.len() as u64,
@@ -93,7 +94,7 @@ pub(super) fn info_of_json(json: &[u8]) -> PartInfo {
     }
 }
 
-/// Size and hash of the JSON of fields, which is never in memory as a whole.
+/// The size and the hash of the JSON of fields, which is never in memory as a whole.
 pub(super) fn info_of_fields(fields: &Fields) -> serde_json::Result<PartInfo> {
     let (mut bytes, mut hash, mut json) = (0, Sha256::new(), FieldsJson::new(fields));
     while let Some(piece) = json.piece()? {
@@ -106,7 +107,7 @@ pub(super) fn info_of_fields(fields: &Fields) -> serde_json::Result<PartInfo> {
     })
 }
 
-/// What is written as JSON: counted, hashed and deflated, and never in memory as a whole.
+/// The size and hash of the JSON of `value`, and the deflated JSON. The plain JSON is never in memory as a whole.
 pub(super) fn deflated_json(value: &impl Serialize) -> serde_json::Result<(PartInfo, Vec<u8>)> {
     struct Sink {
         bytes: u64,
@@ -145,14 +146,14 @@ pub(super) fn deflated_json(value: &impl Serialize) -> serde_json::Result<(PartI
     Ok((info, body))
 }
 
-/// Bytes of JSON that are hashed and deflated at a time.
+/// The number of bytes of JSON that are hashed and deflated at a time.
 const AT_ONCE: usize = 16 << 10;
 
 fn deflate() -> DeflateEncoder<Vec<u8>> {
     DeflateEncoder::new(Vec::new(), Compression::new(6))
 }
 
-/// A text deflated. Level 6 is the usual one: 9 takes several times as long for a few per cent.
+/// The deflated text. Level 6 is the usual one: 9 takes several times as long for a few per cent.
 pub(super) fn deflated(text: &[u8]) -> Vec<u8> {
     let mut deflate = deflate();
     // writing to memory does not fail

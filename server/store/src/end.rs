@@ -27,7 +27,7 @@ use super::{
 /// The effect of asking a job to stop.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum CancelOutcome {
-    /// The job was not running, and is canceled; with the keys of the jobs that have changed.
+    /// The job was not running, and is canceled; the keys are those of all jobs whose status has changed.
     Canceled(Vec<i64>),
     /// This attempt of the job is running and should stop.
     Requested {
@@ -39,13 +39,13 @@ pub enum CancelOutcome {
 }
 
 impl Store {
-    /// Records that a client has asked the job to stop; a queued one is canceled at once.
+    /// Records that a client has asked the job to stop; a queued job is canceled at once.
     pub async fn request_cancel(self: &Arc<Self>, key: i64) -> Result<CancelOutcome> {
         self.control(move |writer| request_cancel(writer, key))
             .await
     }
 
-    /// Ends a running job, with its last events and the rest of its result. Returns the jobs that have changed;
+    /// Ends a running job, with its last events and its result. Returns the keys of the jobs whose status has changed;
     /// `None` when this attempt is no longer the current one, because the job was canceled or requeued meanwhile.
     pub async fn finish(
         self: &Arc<Self>,
@@ -74,13 +74,13 @@ impl Store {
         job.cancel_requested || self.cancels().contains(&job.key)
     }
 
-    /// Running jobs that a client has canceled.
+    /// The keys of the running jobs that a client has canceled.
     pub(super) fn cancels(&self) -> MutexGuard<'_, HashSet<i64>> {
         self.cancels.lock()
     }
 
-    /// Ends jobs that have waited longer than allowed, some at a time. A job coalesced into one that runs does
-    /// not wait for a worker, and is left alone.
+    /// Ends jobs that have waited longer than allowed, some at a time; returns the keys of the jobs whose status has
+    /// changed. A job coalesced into a running job does not wait for a worker, and is left alone.
     pub async fn expire_queued(self: &Arc<Self>, now: Time) -> Result<Vec<i64>> {
         let now = self.by_our_clock(now);
         // nearly always there is none, which a reader finds without occupying the writer
@@ -180,14 +180,14 @@ fn end_expired(writer: &Writer<'_>, now: Time) -> Result<Vec<i64>> {
     change.commit()
 }
 
-/// Jobs that have waited too long, up to a limit.
+/// The keys of the jobs that have waited too long, up to a limit.
 pub(super) const EXPIRED: &str = "select id from job indexed by job_expiry
      where status = 'queued' and expires_at <= ?
            and (coalesced_into is null or exists
                 (select 1 from job primary_job where primary_job.id = job.coalesced_into and primary_job.status = 'queued'))
      order by expires_at limit ?";
 
-/// Ends a job, and the jobs coalesced into it or replaces it by the first of them.
+/// Ends a job; the jobs coalesced into it end, too, or the first of them takes its place.
 pub(super) fn end(change: &mut Change<'_>, key: i64, ending: &Ending) -> Result<()> {
     end_job(change, key, ending)?;
     coalescing::end_coalesced(change, key)

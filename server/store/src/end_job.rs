@@ -1,10 +1,10 @@
-//! The end of one job, with all that belongs to it.
+//! Ends one job, with all that belongs to it.
 
 use base::{event::Payload, job::ResultAvailable};
 
 use super::{change::Change, error::Result, results, rules::Ending, sizes};
 
-/// Ends a job, with its one `done` event. Jobs coalesced into it stay as they are.
+/// Ends a job, and appends its only `done` event. Jobs coalesced into it stay as they are.
 pub(super) fn end_job(change: &mut Change<'_>, key: i64, ending: &Ending) -> Result<()> {
     let now = change.now();
     let mut ended = change.update(key, |row| row.end(ending, now))?;

@@ -1,21 +1,22 @@
-//! Entries of a list, as many as have room.
+//! The entries of a page of a list, limited by the size of their labels.
 
 use std::{collections::BTreeMap, ops::ControlFlow};
 
 use super::filter::Cursor;
 
-/// Most bytes of labels of the entries of a list that are read at a time: a page of a thousand jobs might have a hundred times
-/// as many.
+/// The largest size of the labels (bytes) of all entries of a page: the labels of a thousand jobs might have a hundred
+/// times as many.
 const MOST_LABEL_BYTES: usize = 2 << 20;
 
-/// Entries of a list.
+/// The entries of a page of a list.
 #[derive(Debug)]
 pub struct Entries<T> {
-    /// In the order of the list.
+    /// The entries, in the order of the list.
     pub items: Vec<T>,
-    /// There are more, which were not read since the labels of these are large.
+    /// Whether the page ends early, because the labels of its entries are large: more entries follow.
     pub cut: bool,
-    /// The place up to which the list was checked, if it goes on there: it may then have more, also if there are no items.
+    /// The place up to which the list was checked; `None` if it was checked to its end. The list may go on there even
+    /// if this page has no entries.
     pub checked_to: Option<Cursor>,
     bytes: usize,
 }
@@ -32,7 +33,7 @@ impl<T> Default for Entries<T> {
 }
 
 impl<T> Entries<T> {
-    /// Adds an entry with labels of so many bytes, if they have room beside those of the others.
+    /// Adds an entry, whose labels have `bytes` bytes, unless the labels of all entries would become too large.
     pub(super) fn add(&mut self, entry: T, bytes: usize) -> ControlFlow<()> {
         self.bytes = self.bytes.saturating_add(bytes);
         if self.bytes > MOST_LABEL_BYTES && !self.items.is_empty() {
@@ -44,7 +45,7 @@ impl<T> Entries<T> {
     }
 }
 
-/// Bytes of labels.
+/// The size of labels (bytes).
 pub(super) fn bytes_of(labels: &BTreeMap<String, String>) -> usize {
     labels
         .iter()

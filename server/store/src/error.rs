@@ -1,4 +1,4 @@
-//! Errors of the store.
+//! The errors of the store.
 
 use std::fmt;
 
@@ -9,28 +9,28 @@ use uuid::Uuid;
 /// An error of the store.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// The folder cannot be used.
+    /// The folder of the store, or a file in it, cannot be used.
     #[error("{0}")]
     Folder(String),
     /// Another process uses the folder.
     #[error("{0}")]
     Locked(String),
-    /// The tables are not those of this version.
+    /// The tables are not those of this version of the program.
     #[error("{0}")]
     Schema(String),
-    /// Something that was stored is missing.
+    /// Stored data are missing.
     #[error("{0}")]
     Lost(String),
-    /// The queue has reached its largest number of jobs.
+    /// The queue is full.
     #[error("the queue is full")]
     QueueFull,
     /// The owner already has the maximum number of waiting jobs.
     #[error("this owner already has the maximum number of waiting jobs")]
     OwnerQueueFull,
-    /// The key was used for another request.
+    /// The request key was used for another request.
     #[error("the key was used for another request")]
     KeyReuse,
-    /// The id belongs to another job.
+    /// The id that the client has chosen belongs to another job.
     #[error("{0} is the id of another job")]
     IdConflict(JobId),
     /// The job was deleted.
@@ -39,7 +39,7 @@ pub enum StoreError {
     /// The job's mesh is not stored.
     #[error("the mesh is not stored")]
     UnknownMesh,
-    /// Too many others use the database at the same time.
+    /// A connection to the database did not become free in time.
     #[error("the database was busy for too long")]
     Busy,
     /// The disk is full, or cannot be written: SQLite reports a quota and a limit on file sizes as errors of the disk.
@@ -54,7 +54,7 @@ pub enum StoreError {
     /// A record that is not as it was written.
     #[error("{0}: {cause}", cause = .0.cause)]
     Damaged(Box<Damage>),
-    /// What this program should not have asked for.
+    /// The program has asked the store for something that must not happen.
     #[error("unexpected: {0}")]
     Unexpected(String),
     /// An error of the database.
@@ -65,7 +65,7 @@ pub enum StoreError {
 /// A stored record, as errors name it.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Record {
-    /// The job that it belongs to, by its key.
+    /// The key of the job that the record belongs to, if it is known.
     pub job: Option<i64>,
     /// The name of the record, like "event 12".
     pub name: String,
@@ -74,13 +74,13 @@ pub struct Record {
 /// A record that is not as it was written.
 #[derive(Clone, Debug)]
 pub struct Damage {
-    /// Which one.
+    /// The damaged record.
     pub record: Record,
-    /// The job that it belongs to.
+    /// The public id of the job that the record belongs to, if it is known.
     pub job: Option<JobId>,
-    /// How that was found.
+    /// How the damage was found.
     pub cause: String,
-    /// Where to find it in the log, once it is there.
+    /// The incident number under which the log has the damage, once it was logged.
     pub incident: Option<Uuid>,
 }
 
@@ -102,7 +102,7 @@ impl Record {
         }
     }
 
-    /// Something that belongs to no job.
+    /// A record that belongs to no job.
     pub(super) fn named(name: impl Into<String>) -> Record {
         Record {
             job: None,
@@ -110,7 +110,7 @@ impl Record {
         }
     }
 
-    /// The database itself, or a part of it of which nobody knows whose it is.
+    /// The database itself, or a part of it that cannot be assigned to a job.
     fn database() -> Record {
         Record::named("database")
     }
@@ -120,7 +120,7 @@ impl Record {
         *self == Record::database()
     }
 
-    /// The error that it is damaged.
+    /// The error that this record is damaged.
     pub(super) fn damaged(self, cause: impl ToString) -> StoreError {
         StoreError::Damaged(Box::new(Damage {
             record: self,
@@ -131,10 +131,11 @@ impl Record {
     }
 }
 
-/// SQLite's numbers of errors that [`ErrorCode`] does not tell apart: reading failed, or ended early.
+/// SQLite's code of a failed read, which [`ErrorCode`] does not distinguish from other errors.
 const IOERR_READ: i32 = 266;
+/// SQLite's code of a read that ended early, which [`ErrorCode`] does not distinguish from other errors.
 const IOERR_SHORT_READ: i32 = 522;
-/// Writing failed: over a quota, a limit on files, or on a disk that fails.
+/// SQLite's code of a failed write: over a quota, a limit on file sizes, or on a disk that fails.
 const IOERR_WRITE: i32 = 778;
 
 impl From<SqlError> for StoreError {
@@ -178,18 +179,18 @@ impl From<FromSqlError> for StoreError {
 }
 
 impl StoreError {
-    /// Whether a record of this job is damaged, so that reading it once more would find the same; not so if a disk or the
-    /// database has failed, of which nobody knows what it concerns.
+    /// Whether a record of this job is damaged, so that reading the record again finds the same damage. Errors of a
+    /// disk or of the database are not included: they do not tell which job they concern.
     pub fn is_damage_of(&self, key: i64) -> bool {
         matches!(self, StoreError::Damaged(damage) if damage.record.job == Some(key))
     }
 
-    /// Whether nothing of this job can be stored, now or later, before the operator has repaired the store.
+    /// Whether no change of this job can be stored until the operator has repaired the store.
     pub fn is_lasting(&self, key: i64) -> bool {
         matches!(self, StoreError::Broken(_)) || self.is_damage_of(key)
     }
 
-    /// This error for another submission of the same transaction.
+    /// A copy of this error for another submission in the same transaction.
     pub(super) fn for_another(&self) -> StoreError {
         match self {
             StoreError::Full => StoreError::Full,
@@ -202,7 +203,7 @@ impl StoreError {
         }
     }
 
-    /// This error, naming the record that was being read if no job is known yet that it belongs to.
+    /// This error as damage of the record that was being read, if it is damage that no job is known for yet.
     pub(super) fn reading(self, record: impl FnOnce() -> Record) -> StoreError {
         match self {
             StoreError::Damaged(damage) if damage.record.job.is_none() => {

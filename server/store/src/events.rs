@@ -1,4 +1,4 @@
-//! The events of each job: appended, and read from any point on.
+//! The events of each job: appends them, and reads them from any number on.
 
 use std::sync::Arc;
 
@@ -21,13 +21,13 @@ use super::{
 pub struct FinalBatch {
     /// Events not yet stored.
     pub events: Vec<(Time, Payload)>,
-    /// The progress after them.
+    /// The job's progress after these events.
     pub progress: Progress,
 }
 
 impl Store {
-    /// Appends events of an attempt, with the progress after them; false when the attempt is no longer the current
-    /// one.
+    /// Appends events of an attempt, and sets the job's progress after them; false when the attempt is no longer the
+    /// current one.
     pub async fn append_events(
         self: &Arc<Self>,
         key: i64,
@@ -70,7 +70,7 @@ pub(super) fn iterations(connection: &Connection, key: i64, attempt: i32) -> Res
     )
 }
 
-/// At most `limit` events after number `after`, in order; an error if one is damaged or missing.
+/// At most `limit` events after number `after`, in order; an error if an event is damaged or missing.
 pub(super) fn read(
     connection: &Connection,
     key: i64,
@@ -106,7 +106,7 @@ pub(super) fn read(
     }
 }
 
-/// A row of the table as an event, if it is as it was written.
+/// The event of a row, if the checksum matches.
 fn event(key: i64, row: &Row<'_>) -> Result<Event> {
     let (seq, body) = checked(key, row)?;
     Ok(Event {
@@ -117,13 +117,13 @@ fn event(key: i64, row: &Row<'_>) -> Result<Event> {
     })
 }
 
-/// The time of an event (µs), if its row is as it was written.
+/// The time of an event (µs), if the checksum of its row matches.
 pub(super) fn intact_time(row: &Row<'_>) -> Option<i64> {
     checked(row.get("job_id").ok()?, row).ok()?;
     row.get("t").ok()
 }
 
-/// The number of an event and its body, if the row is as it was written.
+/// The number and the body of an event, if the checksum of its row matches.
 fn checked<'r>(key: i64, row: &'r Row<'_>) -> Result<(i64, &'r str)> {
     let read = || {
         let (seq, body) = (row.get("seq")?, text(row, "body")?);
@@ -144,7 +144,7 @@ fn record(key: i64, seq: i64) -> Record {
     Record::of_job(key, format!("event {seq}"))
 }
 
-/// Inserts events of an attempt; `first`: the number of the first of them.
+/// Inserts events of an attempt, numbered from `first`.
 pub(super) fn insert(
     tx: &Connection,
     key: i64,

@@ -1,4 +1,4 @@
-//! The fields of a job, which are most of its result, deleted by themselves.
+//! Deletes the fields of a job, which are most of its result, and keeps the rest.
 
 use std::sync::Arc;
 
@@ -33,7 +33,7 @@ impl Store {
     }
 }
 
-/// Deletes the fields of a job that has ended. Others with the same result keep them.
+/// Deletes the fields of a job that has ended. Other jobs with the same result keep the fields.
 pub(super) fn remove_fields(change: &mut Change<'_>, job: &Job) -> Result<()> {
     let tx = change.sql()?;
     tx.run(

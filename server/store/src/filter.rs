@@ -1,5 +1,5 @@
-//! Which jobs a list contains, and in what order. A filter is defined here, in `job_filters`; REST, gRPC, the command
-//! line and the documentation follow.
+//! Filters and orders of lists of jobs. The filters are defined here, in `job_filters`; REST, gRPC, the command line
+//! and the documentation use this definition.
 
 use base::{
     caller::Owners,
@@ -11,9 +11,10 @@ use base::{
 use rusqlite::types::Value;
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
-/// All filters but that by label, which is a name for each key. A line: the field of [`Filter`], its type, the name in
-/// requests (that of the field in the proto), the column with the comparison, the index that lists the jobs of
-/// a value in order of arrival, if there is one, and the meaning. `$use` is a macro that receives the lines.
+/// All filters except the one by labels, whose name in requests depends on the label. Each line has the field of
+/// [`Filter`], its type, the name in requests (that of the field in the proto), the column and the comparison, the
+/// index that lists the jobs of a value in order of arrival, if there is one, and the meaning. `$use` is a macro that
+/// receives the lines.
 #[macro_export]
 macro_rules! job_filters {
     ($use:ident) => {
@@ -39,15 +40,15 @@ macro_rules! job_filters {
 
 macro_rules! define {
     ($($field:ident: $type:ty, $name:ident, $column:literal $comparison:literal, $index:expr, $meaning:literal;)*) => {
-        /// Conditions on jobs; absent ones match every job.
+        /// The conditions of a list on its jobs; absent conditions match every job.
         #[derive(Clone, Debug, Default, PartialEq)]
         pub struct Filter {
             $(#[doc = $meaning] pub $field: $type,)*
-            /// With all of these labels.
+            /// Only jobs with all of these labels.
             pub labels: Vec<(String, String)>,
         }
 
-        /// The filters but that by label.
+        /// All filters except the one by labels.
         pub const FILTERS: &[Field] = &[$(Field {
             name: stringify!($name),
             meaning: $meaning,
@@ -64,29 +65,29 @@ macro_rules! define {
 }
 job_filters!(define);
 
-/// A filter: how it is described and read, and what it means.
+/// A filter: its name and description, how its values are read, and its condition.
 #[derive(Clone, Copy, Debug)]
 pub struct Field {
     /// The name of the filter in requests.
     pub name: &'static str,
-    /// What it does: one line, without a full stop.
+    /// The condition in words: one line, without a full stop.
     pub meaning: &'static str,
-    /// Several values may be given: those of any of them match.
+    /// Whether several values may be given: jobs with any of them match.
     pub several: bool,
     /// The JSON Schema of a value.
     pub schema: fn() -> serde_json::Value,
     /// The possible values in words.
     pub expected: fn() -> String,
-    /// Adds a value from its text; false if it is not one.
+    /// Adds the value that this text stands for; false if the text is not allowed.
     pub set: fn(&mut Filter, &str) -> bool,
     pub(super) column: &'static str,
     pub(super) comparison: &'static str,
     pub(super) index: Option<&'static str>,
-    /// The values that are asked for, as they are stored.
+    /// The values in a filter, in the form in which the column has them.
     pub(super) values: fn(&Filter) -> Vec<Value>,
 }
 
-/// A value of a filter.
+/// The type of a filter's values.
 trait Asked: Sized {
     fn allowed() -> impl Values<Value = Self>;
 
@@ -133,7 +134,7 @@ impl Asked for Time {
     }
 }
 
-/// The values of a filter: one, or several.
+/// The field of a filter that holds its values: one, or several.
 trait Criterion {
     type Value: Asked;
     const SEVERAL: bool;
@@ -179,10 +180,10 @@ impl<T: Asked> Criterion for Vec<T> {
 }
 
 impl Filter {
-    /// Most labels in one filter.
+    /// The largest number of labels in one filter.
     pub const MOST_LABELS: usize = 64;
 
-    /// This filter with each status and label once.
+    /// This filter with each of its statuses and labels once.
     pub fn tidied(mut self) -> Self {
         self.statuses
             .sort_unstable_by_key(|status| <&str>::from(*status));
@@ -192,7 +193,8 @@ impl Filter {
         self
     }
 
-    /// This filter restricted to these owners; `None` if it requests the jobs of another.
+    /// This filter restricted to the jobs of these owners; `None` if it requests the jobs of an owner who is not one of
+    /// them.
     pub(super) fn among(&self, owners: &Owners) -> Option<Self> {
         let mut filter = self.clone();
         if let Owners::Only(owner) = owners {
@@ -215,53 +217,53 @@ impl Filter {
 pub struct Order {
     /// The time to sort by.
     pub by: OrderBy,
-    /// Latest first.
+    /// Whether the latest time is first.
     pub descending: bool,
 }
 
-/// The time that orders a list; its name is that of the column.
+/// The time that orders a list. The name of the variant is that of the column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, EnumString, VariantArray)]
 #[strum(serialize_all = "snake_case")]
 pub enum OrderBy {
-    /// When they were accepted.
+    /// When the jobs were accepted.
     CreatedAt,
-    /// When they ended; jobs that have not are left out.
+    /// When the jobs ended; jobs that have not ended are left out.
     FinishedAt,
 }
 
 /// The last job of a page, after which the next one begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cursor {
-    /// The time of the last job by which the list is ordered, in microseconds.
+    /// The time of the last job by which the list is ordered (µs).
     pub micros: i64,
     /// The key of the last job.
     pub key: i64,
 }
 
-/// What jobs are grouped by; its name is that of the column.
+/// The property by which jobs are counted. The name of the variant is that of the column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, EnumString, VariantArray)]
 #[strum(serialize_all = "snake_case")]
 pub enum GroupBy {
-    /// By their status.
+    /// The status of the jobs.
     Status,
-    /// By their owner.
+    /// The owner of the jobs.
     Owner,
 }
 
 impl Order {
-    /// Newest first.
+    /// Jobs by the time of acceptance, newest first.
     pub const NEWEST_FIRST: Order = Order {
         by: OrderBy::CreatedAt,
         descending: true,
     };
 
-    /// In order of arrival.
+    /// Jobs by the time of acceptance, in order of arrival.
     pub const OLDEST_FIRST: Order = Order {
         by: OrderBy::CreatedAt,
         descending: false,
     };
 
-    /// Whether one place of a list comes before another.
+    /// Whether the place `one` comes before the place `other` in a list of this order.
     pub(super) fn is_before(self, one: Cursor, other: Cursor) -> bool {
         let (one, other) = ((one.micros, one.key), (other.micros, other.key));
         if self.descending {
@@ -271,7 +273,7 @@ impl Order {
         }
     }
 
-    /// `desc` or `asc`.
+    /// The direction in SQL: `desc` or `asc`.
     pub fn direction(self) -> &'static str {
         if self.descending { "desc" } else { "asc" }
     }

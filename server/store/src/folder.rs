@@ -14,17 +14,18 @@ use super::{
     progress, reserve,
 };
 
-/// The database, and the write-ahead log beside it.
+/// The file of the database.
 pub(super) const DATABASE: &str = "signorini.db";
+/// The file of the write-ahead log, beside the database.
 pub(super) const LOG: &str = "signorini.db-wal";
-/// The write-ahead log is cut to this size where it begins anew: a thousand pages of 4 KiB, and the largest transaction.
-/// It is longer only while somebody reads what was there long ago, as a backup does.
+/// The size (bytes) to which the write-ahead log is cut where it begins anew: a thousand pages of 4 KiB, and the
+/// largest transaction. It is longer only while a reader needs its older pages, as a backup does.
 pub(super) const LOG_BYTES: u64 = 8 << 20;
-/// Beside a database that is being created, before it has a write-ahead log.
+/// SQLite's journal beside a database that is being created, before the database has a write-ahead log.
 pub(super) const JOURNAL: &str = "signorini.db-journal";
-/// What becomes the database when a restore is complete. Where it is, one was interrupted.
+/// The file that becomes the database when a restore is complete. If it exists, a restore was interrupted.
 pub(super) const RESTORING: &str = "signorini.db.restoring";
-/// Every file of a store.
+/// The names of all files of a store.
 pub(super) const FILES: [&str; 7] = [
     DATABASE,
     LOG,
@@ -34,7 +35,7 @@ pub(super) const FILES: [&str; 7] = [
     reserve::FILE,
     OLD_LOCK,
 ];
-/// What earlier versions locked. It could be removed apart from the data.
+/// The file that earlier versions locked, which could be removed while the data stayed.
 const OLD_LOCK: &str = "lock";
 
 /// The error that a folder cannot be used.
@@ -42,18 +43,19 @@ pub(super) fn unusable(path: &Path, why: impl Display) -> StoreError {
     StoreError::Folder(format!("cannot use the folder {}: {why}", path.display()))
 }
 
-/// The folder and the database in it, locked as long as this exists.
+/// The folder of a store and the database in it, locked as long as this value exists.
 #[derive(Debug)]
 pub(super) struct Folder {
     path: PathBuf,
-    /// The last one, that of the database, is closed after SQLite's files, as that of `Identity`.
+    /// The open files that hold the locks. The last one, that of the database, is closed after SQLite's files, like the
+    /// file of `Identity`.
     locks: Vec<File>,
     has_database: bool,
 }
 
 impl Folder {
-    /// Creates the folder if necessary, and locks it: the folder itself, since a lock file could be removed. A second
-    /// server in it would run the same jobs.
+    /// Creates the folder if necessary, and locks the folder itself, since a lock file could be removed. A second
+    /// server in the folder would run the same jobs.
     pub(super) fn lock(path: &Path) -> Result<Folder> {
         let named = |error: io::Error| match error.kind() {
             ErrorKind::AlreadyExists | ErrorKind::NotADirectory => {
@@ -89,8 +91,8 @@ impl Folder {
         Ok(folder)
     }
 
-    /// Locks the database, if there is one: a second server may come to it by a link from another folder. One that cannot be
-    /// read is refused later.
+    /// Locks the database, if there is one: a second server may reach it by a link from another folder. A database that
+    /// cannot be read is refused later.
     fn lock_database(&mut self) -> Result<()> {
         // elsewhere such a lock is one of those that SQLite takes, too
         if self.has_database || !cfg!(target_os = "linux") {
@@ -111,7 +113,7 @@ impl Folder {
         Ok(())
     }
 
-    /// Lets another server in, once nothing is written any more.
+    /// Unlocks the folder and the database for another server, once nothing is written any more.
     pub(super) fn unlock(&self) {
         for file in &self.locks {
             let _ = file.unlock(); // it ends with the file, too
@@ -123,7 +125,7 @@ impl Folder {
         &self.path
     }
 
-    /// An error if a restore to this folder was interrupted: its store is none, or another.
+    /// An error if a restore to this folder was interrupted: the folder then has no store, or not the restored one.
     pub(super) fn is_complete(&self) -> Result<()> {
         if self.path.join(RESTORING).exists() {
             Err(StoreError::Folder(format!(
@@ -136,12 +138,12 @@ impl Folder {
         }
     }
 
-    /// Where the database is.
+    /// The path of the database.
     pub(super) fn database(&self) -> PathBuf {
         self.path.join(DATABASE)
     }
 
-    /// Creates the database as an empty file for its owner alone, unless it is there. SQLite gives its other files the
+    /// Creates the database as an empty file for its owner alone, unless it exists. SQLite gives its other files the
     /// same mode.
     pub(super) fn prepare(&mut self) -> Result<()> {
         let created = OpenOptions::new()
@@ -159,7 +161,7 @@ impl Folder {
         }
     }
 
-    /// Takes from others the access to the files, and to the folder if nothing else is in it.
+    /// Takes the access of other users to the files away, and to the folder if nothing else is in it.
     pub(super) fn tighten(&self) {
         let all = FILES.map(|name| self.path.join(name));
         let foreign = fs::read_dir(&self.path)
@@ -186,13 +188,13 @@ impl Folder {
     }
 }
 
-/// The files that the store has open, which must stay those in its folder.
+/// The files that the store has open, by which it notices when the files in its folder are no longer these.
 #[derive(Debug)]
 pub(super) struct Identity {
     database: PathBuf,
     log: PathBuf,
-    /// Opened before SQLite and closed after it: to close any descriptor of the file releases the locks that SQLite
-    /// holds on it.
+    /// The database, opened before SQLite opens it and closed after SQLite: to close any descriptor of the file
+    /// releases the locks that SQLite holds on it.
     file: File,
     seen: Mutex<Seen>,
 }
@@ -201,11 +203,12 @@ pub(super) struct Identity {
 struct Seen {
     database: Option<(u64, u64)>,
     log: Option<(u64, u64)>,
-    /// The size of the database; it shrinks only when the store gives space back.
+    /// The last size of the database (bytes); it shrinks only when the store gives space back.
     bytes: u64,
-    /// Then it may become as small as this, whenever the log is next copied into it.
+    /// The size (bytes) to which the database may shrink when the log is next copied into it, after space was given
+    /// back.
     least: Option<u64>,
-    /// What is wrong, as it was logged.
+    /// What is wrong with the files, as it was last logged.
     wrong: Option<String>,
 }
 
@@ -227,8 +230,8 @@ impl Identity {
         })
     }
 
-    /// An error if the database or its log was removed or replaced, or cut short: what is written then is lost at the
-    /// next start. Two calls of `stat`, of some microseconds.
+    /// An error if the database or its log was removed, replaced or cut short: data that are written then are lost at
+    /// the next start. It takes two calls of `stat`, some microseconds.
     pub(super) fn check(&self) -> Result<()> {
         let mut seen = self.seen.lock();
         let wrong = self.difference(&mut seen);
@@ -244,7 +247,8 @@ impl Identity {
         wrong.map_or(Ok(()), |what| Err(StoreError::Replaced(what)))
     }
 
-    /// The store gives space back: the database may become as small as this (bytes), instead of what was told before.
+    /// Allows the database to shrink to this size (bytes), because the store gives space back; replaces an earlier
+    /// size.
     pub(super) fn may_shrink_to(&self, bytes: u64) {
         let mut seen = self.seen.lock();
         seen.least = Some(bytes);
@@ -276,7 +280,8 @@ impl Identity {
         None
     }
 
-    /// An error if the file does not begin as a database does: what was read before may hide that. Blocks.
+    /// An error if the file does not begin as a database does: SQLite may not notice that, since it has read the pages
+    /// before. Blocks.
     pub(super) fn check_header(&self) -> Result<()> {
         const MAGIC: &[u8; 16] = b"SQLite format 3\0";
         let mut found = [0; 16];

@@ -1,5 +1,4 @@
-//! What tests of the crates above have to know of a store, or to do to it. The program uses nothing of this, and so nothing
-//! of it is in the program.
+//! What tests of other crates change in a store, or read from it. The program uses none of it, and does not contain it.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::{fs, os::unix::fs::FileExt, path::Path, sync::Arc};
@@ -15,14 +14,14 @@ use crate::{
 };
 
 impl Store {
-    /// Changes the record of a job, as a disk may.
+    /// Damages the record of a job, as a disk may.
     pub async fn damage_job(self: &Arc<Self>, key: i64) {
         let statement = "update job set priority = 0.0 + 1 where rowid = ?";
         let damaged = self.write(move |writer| writer.connection().run(statement, [key]));
         damaged.await.unwrap();
     }
 
-    /// Overwrites the first page of a table, as a disk may; nobody has the store open.
+    /// Overwrites the first page of a table, as a disk may. No process may have the store open.
     pub async fn erase_table(folder: &Path, table: &str) {
         let database = folder.join("signorini.db");
         let connection = open(&database, Mode::ReadWrite).unwrap();
@@ -36,7 +35,7 @@ impl Store {
             .unwrap();
     }
 
-    /// Makes the disk full after this number of further pages, until a write fails: the connection is then replaced.
+    /// Makes the disk full after `more` further pages, until a write fails and the connection is replaced.
     pub async fn bound(self: &Arc<Self>, more: i64) {
         let bounded = self.write(move |writer| {
             let connection = writer.connection();
@@ -47,7 +46,7 @@ impl Store {
         bounded.await.unwrap();
     }
 
-    /// Whether no write has failed yet.
+    /// Whether the bound set by `bound` still holds: no write has failed since.
     pub async fn is_bound(self: &Arc<Self>) -> bool {
         let pages = self.write(|writer| {
             let pages = "pragma max_page_count";
@@ -74,14 +73,14 @@ impl Store {
 }
 
 impl Parts {
-    /// The parts of a result that is nothing but a summary.
+    /// The parts of a result that has nothing but a summary.
     pub fn of_a_summary() -> Parts {
         Parts::new(vec![parts::Part::new("summary".into(), b"{}")])
     }
 }
 
 impl Part {
-    /// The JSON of the part, for tests.
+    /// The JSON of the part, inflated.
     pub fn json(self) -> Vec<u8> {
         match encoding::decoded(self.body, self.encoding, &self.info) {
             Ok((_, encoding::Decoded::Json(json))) => json,

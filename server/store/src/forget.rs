@@ -7,16 +7,19 @@ use rusqlite::params;
 
 use super::{database::Store, delete::PAUSE, error::Result, keys, sql::Sql, sweeps};
 
-/// How long the id of a deleted job is answered with *deleted*; then it is unknown.
+/// How long (s) the id of a deleted job or sweep is remembered, and requests for it are answered that it was deleted;
+/// after that it is unknown.
 const REMEMBERED_S: f64 = 7.0 * 86_400.0;
 
-/// How many of them are remembered, some 160 bytes each: what is removed as fast as it is solved does not fill the disk.
+/// The largest number of ids of deleted jobs that are remembered, some 160 bytes each: jobs that are deleted as fast as
+/// they are solved do not fill the disk.
 pub(super) const MOST_REMEMBERED: u32 = 100_000;
-/// Ids that are forgotten in one transaction, with their request keys: some milliseconds of the single writer.
+/// The number of ids that are forgotten in one transaction, with their request keys: it takes some milliseconds of the
+/// single writer.
 const FORGOTTEN_AT_ONCE: u32 = 250;
 
 impl Store {
-    /// Removes the ids of jobs and sweeps that were deleted long ago.
+    /// Forgets the ids of jobs and sweeps that were deleted long ago.
     pub async fn forget_deleted(self: &Arc<Self>, now: Time) -> Result<()> {
         let before = self.cutoff(self.by_our_clock(now), REMEMBERED_S).micros();
         self.forget_up_to(before - 1).await?;
@@ -33,7 +36,7 @@ impl Store {
         .await
     }
 
-    /// Removes the oldest ids of deleted jobs, so that at most `most` remain.
+    /// Forgets the oldest ids of deleted jobs, so that at most `most` remain.
     pub(super) async fn forget_beyond(self: &Arc<Self>, most: u32) -> Result<()> {
         let newest = self.read(move |_, connection| connection.optional_value(BEYOND, [most]));
         match newest.await? {
@@ -42,7 +45,7 @@ impl Store {
         }
     }
 
-    /// Removes the ids of jobs that were deleted until then, some at a time.
+    /// Forgets the ids of jobs that were deleted up to the time `last` (µs), some at a time.
     async fn forget_up_to(self: &Arc<Self>, last: i64) -> Result<()> {
         let some = "select exists (select 1 from deleted_job where deleted_at <= ?)";
         while self

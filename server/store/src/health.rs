@@ -1,4 +1,4 @@
-//! Whether the store works: what `/readyz` tells, and what is watched meanwhile.
+//! Whether the store works, as `/readyz` tells it, and the task that watches the store's files.
 
 use std::{
     sync::{Arc, Weak},
@@ -16,27 +16,27 @@ use super::{
     sql::Sql,
 };
 
-/// How often the files are looked at.
+/// How often the files of the store are checked.
 const INTERVAL: Duration = Duration::from_secs(1);
 
 /// How well the store works.
 #[derive(Clone, Debug, Default)]
 pub struct Health {
-    /// The disk is full: only canceling, deleting, pausing and reading work.
+    /// Whether the disk is full: only canceling, deleting, pausing and reading work.
     pub full: bool,
-    /// How many records were found damaged.
+    /// The number of records that were found damaged.
     pub damaged: usize,
-    /// The incidents of the first of them, for the log.
+    /// The incident numbers of the first damaged records, by which the log has them.
     pub incidents: Vec<Uuid>,
 }
 
 impl Health {
-    /// Everything works.
+    /// Whether everything works.
     pub fn is_whole(&self) -> bool {
         !self.full && self.damaged == 0
     }
 
-    /// What does not work, for operators.
+    /// Texts for operators about everything that does not work.
     pub fn lines(&self) -> Vec<String> {
         let mut lines = vec![];
         if self.full {
@@ -58,8 +58,8 @@ impl Health {
 }
 
 impl Store {
-    /// Reads the newest and the oldest job as clients do, and looks at the files; an error if that does not work. A
-    /// damaged record is none: the others can be read.
+    /// Reads the newest and the oldest job as clients do, and checks the files; an error if that does not work. A
+    /// damaged record of a job is no error: the others can be read.
     pub async fn health(self: &Arc<Self>) -> Result<Health> {
         self.identity.check()?;
         self.identity.check_header()?;
@@ -85,8 +85,8 @@ impl Store {
 }
 
 impl Store {
-    /// Returns when the single writer and a reader have answered, and be it with an error: neither a full disk nor a damaged
-    /// database gets better by a restart. False if a connection is not given back.
+    /// Waits until the single writer and a reader have answered, even with an error: neither a full disk nor a damaged
+    /// database gets better by a restart. False if no connection becomes free in time.
     pub async fn answers(self: &Arc<Self>) -> bool {
         let write = self.write(|writer| {
             let _ = writer.begin_control(); // rolled back
@@ -100,21 +100,21 @@ impl Store {
         !is_busy(write.await) && !is_busy(read.await)
     }
 
-    /// An error if the disk is full but for what control needs; for what is written beside the database.
+    /// An error if the disk has no space except for control operations; for data that are written beside the database.
     pub fn has_room(&self) -> Result<()> {
         self.reserve.has_room()
     }
 }
 
-/// Reads the first job of a query.
+/// A query for its first job.
 fn first(
     query: &'static str,
 ) -> impl FnOnce(&Store, &Connection) -> Result<Option<Job>> + Send + 'static {
     move |_, connection| connection.row(query, (), from_row)
 }
 
-/// Looks at the files of the store, flushes the record of its progress, and takes its reserve again, until the store is
-/// dropped or closed.
+/// Checks the files of the store, flushes the file that records its progress, and takes its reserve again, until the
+/// store is dropped or closed.
 pub(super) async fn watch(store: Weak<Store>) {
     let (mut set_by_s, mut was_full) = (0.0, false);
     loop {

@@ -1,4 +1,4 @@
-//! Checking a store that no server has open, and copying what is intact to a new one.
+//! Checks a store that no server has open, and copies its intact data to a new store.
 //!
 //! It reads as the service does, one job after the other by its number, so that damage in one place does not hide what
 //! lies elsewhere. Nothing is written to the store that is inspected.
@@ -30,25 +30,26 @@ use super::{
 /// What an inspection has found.
 #[derive(Debug, Default)]
 pub struct Report {
-    /// Each damage, or what is missing: where, and how that was seen.
+    /// A text about each damaged or missing record: what it is, and how that was found.
     pub findings: Vec<String>,
-    /// Jobs of which at least a trace was found.
+    /// The number of jobs of which at least a trace was found.
     pub jobs: u64,
-    /// Jobs that are intact, with their problem, events and result.
+    /// The number of jobs that are intact, with their problem, events and result.
     pub intact: u64,
-    /// The tables cannot be read: there may be more jobs.
+    /// Whether a table cannot be read, so that there may be more jobs.
     pub incomplete: bool,
 }
 
-/// Jobs that are written to the new store in one transaction.
+/// The number of jobs that are written to the new store in one transaction.
 const JOBS_PER_COMMIT: u64 = 100;
-/// Every number up to this is looked for, whether or not a list has it. Beyond it only those that are listed: to look for
-/// all takes minutes, and the highest may have been read from a damaged record.
+/// The highest number up to which every job is looked for, whether or not an index lists it. Of higher numbers only
+/// listed ones are read: looking for all takes minutes, and the highest number may come from a damaged record.
 const MOST_NUMBERS: i64 = 10_000_000;
-/// Events that are read at once.
+/// The number of events that are read at once.
 const EVENTS_PER_READ: i64 = 1000;
 
-/// Checks everything in the store of this folder; with `new`, which must be empty or missing, copies what is intact.
+/// Checks everything in the store of `folder`. With `new`, a folder which must be empty or missing, copies the intact
+/// data to a new store there.
 pub async fn inspect(folder: &Path, new: Option<&Path>) -> Result<Report> {
     let folder = folder.to_owned();
     let (_locked, report, folder) = blocking(move || {
@@ -75,8 +76,9 @@ pub async fn inspect(folder: &Path, new: Option<&Path>) -> Result<Report> {
     Ok(report)
 }
 
-/// Checks the database of a backup that is being made, which has no log. If its tables are of an earlier version, only
-/// whether it can be read: what they contain is not known here.
+/// Checks the database of a backup that is being made, which has no log. If its tables are of an earlier version,
+/// checks only whether it can be read, since this version does not know their content. Returns a text about each
+/// damaged record.
 pub(super) fn check_copy(folder: &Path) -> Result<Vec<String>> {
     let copy = open(&folder.join(DATABASE), Mode::Read)?;
     let mut report = Report::default();
@@ -88,7 +90,7 @@ pub(super) fn check_copy(folder: &Path) -> Result<Vec<String>> {
     Ok(report.findings)
 }
 
-/// Why there is nothing to inspect.
+/// The error text that the folder has no store to inspect.
 pub(super) fn absent(folder: &Path) -> String {
     match progress::read(folder) {
         Ok(Known::Missing) => format!("it contains no {DATABASE}"),
@@ -99,7 +101,7 @@ pub(super) fn absent(folder: &Path) -> String {
 }
 
 impl Report {
-    /// What the comparison with the past says.
+    /// Begins a report with the comparison of the database with its last known commit.
     fn begin(folder: &Path) -> Result<Report> {
         let mut report = Report::default();
         let known = progress::read(folder)?;
@@ -115,7 +117,7 @@ impl Report {
         Ok(report)
     }
 
-    /// Adds to the report what the store in this folder contains.
+    /// Adds the findings about the store in `folder` to the report, and copies intact data to `target`.
     fn complete(mut self, folder: &Path, target: Option<&Writer<'_>>) -> Result<Report> {
         match open(&folder.join(DATABASE), Mode::Read) {
             Ok(source) => {
@@ -201,7 +203,7 @@ impl Report {
         }
     }
 
-    /// Checks the tables and indexes as such.
+    /// Checks the structure of tables and indexes.
     fn check_pages(&mut self, source: &Connection) {
         match source.values::<String>("pragma integrity_check(20)", ()) {
             Ok(lines) => {
@@ -244,7 +246,8 @@ impl Report {
         }
     }
 
-    /// Checks the rows of a table, one after the other, and copies those that are intact, a mesh with its body; whether all are.
+    /// Checks the rows of a table, one after the other, and copies the intact ones, meshes with their content. Returns
+    /// whether all rows are intact.
     fn check_table(
         &mut self,
         source: &Connection,
@@ -285,10 +288,10 @@ impl Report {
     }
 }
 
-/// What is wrong with a row.
+/// A function that returns an error if a row is damaged.
 type Check = fn(&Connection, &Row<'_>) -> Result<()>;
 
-/// What is no part of a job: tables that are checked and copied row by row, in this order.
+/// Tables with data that belong to no job: they are checked and copied row by row, in this order.
 const TABLES: [(&str, Check); 9] = [
     ("mesh", check_mesh),
     // one whose owner cannot be read becomes an administrator's
@@ -309,7 +312,7 @@ fn check_mesh(source: &Connection, row: &Row<'_>) -> Result<()> {
     meshes::read_body(source, &hash).map(drop)
 }
 
-/// The numbers of jobs after this one of which there is a trace, in order.
+/// The numbers greater than `key` of jobs that have a row or an event, in order.
 fn keys_after(source: &Connection, key: i64) -> Result<Vec<i64>> {
     source.values(
         "select id from job where id > ?1 union select distinct job_id from event where job_id > ?1 order by 1",
@@ -317,7 +320,7 @@ fn keys_after(source: &Connection, key: i64) -> Result<Vec<i64>> {
     )
 }
 
-/// The highest number of a job up to [`MOST_NUMBERS`] that is found anywhere.
+/// The highest number of a job, up to [`MOST_NUMBERS`], that the database contains in any place.
 fn last_key(source: &Connection) -> i64 {
     let mut last = 0;
     for statement in [

@@ -1,4 +1,4 @@
-//! What was found intact: content that was read whole and found as it was written, since the store was opened.
+//! The content that was read whole and found as it was written since the store was opened.
 
 use parking_lot::{Mutex, MutexGuard};
 use std::{borrow::Borrow, collections::HashSet, hash::Hash};
@@ -10,12 +10,12 @@ use super::{
     error::{Record, Result},
 };
 
-/// What was found so. What answers other jobs is checked once.
+/// The content and the inputs that were found intact, so that a result that answers other jobs is checked only once.
 #[derive(Debug, Default)]
 pub(super) struct Intact {
-    /// Numbers of content; they are never used again.
+    /// The ids of intact content; an id is never used again.
     pub(super) content: Recent<i64>,
-    /// Hashes of inputs of which the newest result was found intact.
+    /// The hashes of inputs whose newest result was found intact.
     pub(super) inputs: Recent<String>,
 }
 
@@ -62,8 +62,8 @@ impl<T: Hash + Eq> Recent<T> {
     }
 }
 
-/// Compares the content of a result with its hash, without decoding it, which would take a hundred times as long: what is in
-/// it is compared when it is served. What was found intact before is not read again.
+/// Compares the content of a result with its hash, unless it was found intact before. It is not decoded, which would
+/// take a hundred times as long: the parts in it are checked when they are served.
 pub(super) fn check_result(
     connection: &Connection,
     intact: &Intact,
