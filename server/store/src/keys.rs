@@ -1,4 +1,5 @@
-//! Repeated requests: with a request key, or with an id chosen by the client. Both belong to an owner.
+//! Requests that repeat an earlier one, by a request key or by a job id that the client has chosen. Both belong to an
+//! owner.
 
 use std::{ops::Range, sync::Arc};
 
@@ -21,7 +22,7 @@ use super::{
 };
 
 impl Store {
-    /// The jobs that this owner has submitted under a key.
+    /// The jobs that this owner has submitted under a request key.
     pub async fn replay(
         self: &Arc<Self>,
         owner: &str,
@@ -68,7 +69,8 @@ impl Store {
     }
 }
 
-/// The jobs of a submission that repeats an earlier one, by its key or by a client's id.
+/// The jobs of the earlier submission that a submission repeats, by its request key or by the ids that the client has
+/// chosen.
 pub(super) fn already_submitted(
     change: &mut Change<'_>,
     owner: &str,
@@ -110,7 +112,7 @@ pub(super) fn already_submitted(
     Ok((!old.is_empty()).then_some(old))
 }
 
-/// Records that these jobs, numbered without a gap, were accepted under a key.
+/// Records that these jobs, whose numbers have no gap, were accepted under a request key.
 pub(super) fn remember(
     change: &mut Change<'_>,
     owner: &str,
@@ -130,7 +132,7 @@ pub(super) fn remember(
     Ok(())
 }
 
-/// The jobs that were accepted under a request key, by number.
+/// The numbers of the jobs that were accepted under a request key.
 fn jobs_of_key(
     connection: &Connection,
     owner: &str,
@@ -157,7 +159,7 @@ fn jobs_of_key(
     }
 }
 
-/// An error if a row of the table is not as it was written.
+/// An error if the checksum of a row of the table `request_key` does not match.
 pub(super) fn check(row: &Row<'_>) -> Result<()> {
     let key = RequestKey {
         key: row.get("key")?,
@@ -175,7 +177,8 @@ fn checksum(owner: &str, key: &RequestKey, first: i64, jobs: i64) -> Checksum {
     row.text(&key.payload).int(first).int(jobs)
 }
 
-/// Forgets the key under which this job was submitted, whose id was forgotten, unless others of its jobs are still known.
+/// Forgets the request key under which a job was submitted whose id was just forgotten, unless another job of the key
+/// is still known.
 pub(super) fn forget(tx: &Connection, job: i64) -> Result<()> {
     tx.run(FORGET, [job])?;
     Ok(())
@@ -186,8 +189,8 @@ pub(super) const FORGET: &str = "delete from request_key
            and not exists (select 1 from job where id between first_job and first_job + jobs - 1)
            and not exists (select 1 from deleted_job where id between first_job and first_job + jobs - 1)";
 
-/// Those of these jobs that still exist. If all of them were deleted, that is an error as long as their ids are
-/// kept; after that the key may be used again.
+/// The jobs with these keys that still exist. An error if all of them were deleted and their ids are still remembered;
+/// `None` after that: the request key may be used again.
 fn remaining(connection: &Connection, keys: Range<i64>) -> Result<Option<Vec<Job>>> {
     let (mut jobs, mut deleted) = (vec![], None);
     for key in keys {

@@ -1,4 +1,4 @@
-//! Labels in a table of their own, for searches.
+//! Writes labels to a table of their own, in which jobs are found by label.
 
 use base::job::Job;
 use rusqlite::params;
@@ -20,7 +20,7 @@ pub(super) fn write(change: &mut Change<'_>, job: &Job) -> Result<()> {
     Ok(())
 }
 
-/// Writes the labels of a job in place of earlier ones.
+/// Replaces the stored labels of a job by its present ones.
 pub(super) fn replace(change: &mut Change<'_>, job: &Job) -> Result<()> {
     let tx = change.sql()?;
     tx.run("delete from job_label where job_id = ?", [job.key])?;

@@ -1,9 +1,10 @@
 //! Lists of jobs: pages, counts, keys.
 //!
-//! A filter has an index with the jobs of each value in order of arrival, and there is one of all jobs in order of
-//! arrival and one in order of their ends. A page is read along one of them, and the other filters are checked row by
-//! row, for at most [`MOST_CHECKED`] rows: then the page is short, and the next one goes on behind the last row that was
-//! checked. Of several indexes the one is taken that gets furthest in so many rows; their lengths need not be known.
+//! A filter has an index with the jobs of each value in order of arrival. There is also one index of all jobs in order
+//! of arrival, and one in order of their ends. A page is read along one index, and the other filters are checked row by
+//! row, for at most [`MOST_CHECKED`] rows: then the page is short, and the next page begins after the last row that was
+//! checked. Of several indexes the one is chosen that gets furthest within this number of rows; their lengths need not
+//! be known.
 
 use std::sync::Arc;
 
@@ -20,23 +21,23 @@ use super::{
     sql::{Query, Sql},
 };
 
-/// Rows that are checked for a page; few in tests, so that pages are short.
+/// The largest number of rows that are checked for a page; few in tests, so that pages are short.
 const MOST_CHECKED: i64 = if cfg!(test) { 8 } else { 2000 };
-/// Labels by whose index a list may be read.
+/// The largest number of labels in a filter whose indexes are tried for a list.
 const MOST_LABEL_PATHS: usize = 4;
 
 /// A part of an index: the rows of one value.
 #[derive(Clone, Copy)]
 enum Lane<'a> {
-    /// Of a label.
+    /// The rows of a label.
     Label(&'a (String, String)),
-    /// Of a value of a column.
+    /// The rows of a value of a column: the name of the index, the filter, and the value.
     Value(&'static str, &'static Field, &'a Value),
     /// All jobs, or all that have ended.
     All,
 }
 
-/// How the rows of a list are found: the lanes of one index, merged, and the time that orders each.
+/// A way to find the rows of a list: the lanes of one index, merged, and the time that orders their rows.
 pub(super) struct Path<'a> {
     lanes: Vec<Lane<'a>>,
     by: OrderBy,
@@ -45,30 +46,30 @@ pub(super) struct Path<'a> {
 /// The part of a path that is read for a page.
 #[derive(Clone, Copy)]
 pub(super) struct Window {
-    /// The window begins after this row; none: at the first row.
+    /// The row after which the window begins; `None`: the window begins with the first row.
     pub(super) after: Option<Cursor>,
-    /// The window ends with this row; none: at the end of the list.
+    /// The last row of the window; `None`: the window ends with the list.
     pub(super) last: Option<Cursor>,
     pub(super) order: Order,
 }
 
-/// Keys of jobs, in order of arrival.
+/// The keys of a number of jobs, in order of arrival.
 #[derive(Debug)]
 pub struct Keys {
     /// The keys.
     pub keys: Vec<i64>,
-    /// Where the next ones begin; none after the last.
+    /// The place after which further keys follow; `None` after the last key.
     pub next: Option<Cursor>,
 }
 
 impl Path<'_> {
-    /// The path of all jobs.
+    /// The path of all jobs, ordered by this time.
     fn whole(by: OrderBy) -> Self {
         let lanes = vec![Lane::All];
         Path { lanes, by }
     }
 
-    /// The order in which its rows are for a list of that order.
+    /// The order in which the path has its rows, in the direction of this list.
     pub(super) fn order(&self, list: Order) -> Order {
         Order {
             by: self.by,
@@ -78,7 +79,7 @@ impl Path<'_> {
 }
 
 impl Store {
-    /// At most `limit` jobs of a list, after `cursor`, from as many pages as that takes.
+    /// At most `limit` jobs of a list, after `cursor`, from as many pages as are needed.
     #[cfg(test)]
     pub async fn jobs(
         self: &Arc<Self>,
@@ -135,7 +136,7 @@ impl Store {
         .await
     }
 
-    /// How many jobs there are, by group if requested; the groups are sorted by name.
+    /// The number of jobs, by group if requested; the groups are sorted by name.
     pub async fn count(
         self: &Arc<Self>,
         owners: Owners,
@@ -154,7 +155,7 @@ impl Store {
         .await
     }
 
-    /// The keys of at most `limit` jobs, in order of arrival, after a place in that order and up to a key.
+    /// The keys of at most `limit` jobs, in order of arrival, after the place `after` and up to the key `up_to`.
     pub async fn keys(
         self: &Arc<Self>,
         owners: Owners,
@@ -190,7 +191,7 @@ impl Store {
     }
 }
 
-/// Where jobs are found by this filter.
+/// The tables whose rows or indexes find the jobs of this filter.
 fn tables_of(filter: &Filter) -> &'static [Table] {
     if filter.labels.is_empty() {
         &[Table::Jobs]
@@ -199,7 +200,7 @@ fn tables_of(filter: &Filter) -> &'static [Table] {
     }
 }
 
-/// The filters that are given, each with its values.
+/// The filters that are in use, each with its values.
 pub(super) fn values_of(filter: &Filter) -> Vec<(&'static Field, Vec<Value>)> {
     let each = FILTERS.iter().map(|field| (field, (field.values)(filter)));
     each.filter(|(_, values)| !values.is_empty()).collect()
@@ -236,8 +237,9 @@ pub(super) fn paths<'a>(
     paths
 }
 
-/// The path of a page and its part. One in the order of the list is read as far as the limit permits; one in another
-/// order only if that is to its end, since its rows are sorted.
+/// The path for a page, and the part of it that the page reads. A path in the order of the list is read as far as the
+/// limit of rows permits. A path in another order is only chosen if it can be read to its end, since its rows must be
+/// sorted.
 fn choose<'a>(
     connection: &Connection,
     filter: &'a Filter,
@@ -277,7 +279,7 @@ fn choose<'a>(
     Ok(furthest)
 }
 
-/// The place of the row of a path that is `most` rows behind another place; none if it ends before.
+/// A query for the row of a path that is `most` rows after the place `after`; it finds nothing if the path ends before.
 pub(super) fn reach(
     filter: &Filter,
     path: &Path<'_>,
@@ -302,7 +304,7 @@ pub(super) fn reach(
     query
 }
 
-/// At most `limit` jobs of a path, in order, with keys up to `up_to`.
+/// A query for at most `limit` jobs of a path, in order, with keys up to `up_to`.
 pub(super) fn page(
     columns: &str,
     filter: &Filter,
@@ -336,7 +338,7 @@ pub(super) fn page(
     query
 }
 
-/// The lanes of a path, each with at most `most` rows, merged in order.
+/// Adds the lanes of a path to a query, each with at most `most` rows, merged in order.
 fn merged<'a>(
     query: &mut Query,
     path: &Path<'a>,
@@ -365,7 +367,8 @@ fn ordered(at: &str, id: &str, order: Order) -> String {
     format!(" order by {at} {direction}, {id} {direction}")
 }
 
-/// The rows of a lane. `indexed by`: the planner does not know how many jobs a filter matches, and would guess.
+/// Adds the rows of a lane to a query. It has `indexed by`, since SQLite does not know how many jobs a filter matches,
+/// and would guess.
 fn from(query: &mut Query, lane: Lane<'_>, by: OrderBy, columns: &str) {
     match lane {
         Lane::Label((key, value)) => {
@@ -402,7 +405,7 @@ fn from(query: &mut Query, lane: Lane<'_>, by: OrderBy, columns: &str) {
     }
 }
 
-/// The number of jobs in each group.
+/// A query for the number of jobs in each group.
 pub(super) fn counted(filter: &Filter, group_by: Option<GroupBy>) -> Query {
     let group = group_by.map_or("''", Into::into);
     let mut query = Query::default();
@@ -421,7 +424,7 @@ pub(super) fn counted(filter: &Filter, group_by: Option<GroupBy>) -> Query {
     query
 }
 
-/// The conditions of a filter, except for that of the lane and for bounds of the time that orders the list.
+/// Adds the conditions of a filter to a query, except those of the lane and of the time that orders the list.
 fn conditions(query: &mut Query, filter: &Filter, lane: Option<Lane<'_>>, by: OrderBy) {
     for (field, values) in values_of(filter) {
         let of_lane = matches!(lane, Some(Lane::Value(_, own, _)) if own.name == field.name);
@@ -457,7 +460,7 @@ fn conditions(query: &mut Query, filter: &Filter, lane: Option<Lane<'_>>, by: Or
     }
 }
 
-/// The names of the time that orders the rows of a lane and of the key.
+/// The names of two columns of a lane: the time that orders its rows, and the key of the job.
 #[derive(Clone, Copy)]
 struct Place {
     at: &'static str,
@@ -483,9 +486,9 @@ impl Place {
     }
 }
 
-/// The bounds of the time that orders the rows, and those of the window. No job ends before it was accepted: a bound on
-/// one time is also one on the other. A bound that the window implies is left out, since the index would be read from
-/// the weaker one as well.
+/// Adds the bounds of the time that orders the rows, and those of the window, to a query. No job ends before it was
+/// accepted: a bound on one time is also one on the other. A bound that the window implies is left out, since SQLite
+/// would search the index by the weaker bound.
 fn bounds(query: &mut Query, filter: &Filter, place: Place, window: Window) {
     let Place { at, id } = place;
     let Window { after, last, order } = window;

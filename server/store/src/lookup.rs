@@ -1,4 +1,4 @@
-//! One job: found by its public id; details of it by its key.
+//! Queries about one job: the job by its public id, and details by its key.
 
 use std::sync::Arc;
 
@@ -43,7 +43,7 @@ impl Store {
         .await
     }
 
-    /// Whether the job is terminal, so that its events contain `done`; `None` if it no longer exists.
+    /// Whether the job has ended, so that its events contain `done`; `None` if the job no longer exists.
     pub async fn has_ended(self: &Arc<Self>, key: i64) -> Result<Option<bool>> {
         self.read(move |_, connection| {
             let status = "select status from job where id = ?";

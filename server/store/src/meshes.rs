@@ -1,4 +1,4 @@
-//! Stored meshes.
+//! Stores, finds and removes meshes.
 
 use std::sync::Arc;
 
@@ -21,14 +21,14 @@ pub enum Removal {
     Removed,
     /// There is no such mesh.
     Unknown,
-    /// Jobs that wait or run need it; it was not removed.
+    /// Jobs that wait or run need the mesh, which was not removed.
     InUse,
 }
 
-/// A stored mesh, with its place in the list.
+/// A stored mesh, with its place in the list of meshes.
 #[derive(Debug)]
 pub struct StoredMesh {
-    /// Order of arrival.
+    /// The number of the mesh, in order of arrival.
     pub key: i64,
     /// The description of the mesh, as clients see it.
     pub info: MeshInfo,
@@ -87,7 +87,7 @@ impl Store {
         .await
     }
 
-    /// Makes a stored mesh one of this owner's, too; false if it was before. `None`: it is not stored.
+    /// Makes a stored mesh belong to this owner, too; false if it did before. `None` if the mesh is not stored.
     pub async fn own_mesh(self: &Arc<Self>, owner: &str, hash: &str) -> Result<Option<bool>> {
         let (owner, hash) = (owner.to_owned(), hash.to_owned());
         self.write(move |writer| {
@@ -102,8 +102,9 @@ impl Store {
         .await
     }
 
-    /// Completes a mesh, whose body was written before, as this owner's; false if it was theirs already. `None`: some of the body
-    /// was removed meanwhile, with an earlier mesh of the same file, and must be written again.
+    /// Stores the description of a mesh whose body was written before, and makes the mesh belong to this owner; false
+    /// if it did before. `None`: a piece of the body was removed meanwhile, with an earlier mesh of the same file, and
+    /// must be written again.
     pub async fn insert_mesh(
         self: &Arc<Self>,
         owner: &str,
@@ -130,7 +131,7 @@ impl Store {
         .await
     }
 
-    /// The parsed mesh as it was written.
+    /// The body of a mesh, which is the parsed mesh, as it was written; `None` if the mesh is not stored.
     pub async fn mesh_body(self: &Arc<Self>, hash: &str) -> Result<Option<Vec<u8>>> {
         let hash = hash.to_owned();
         self.read(move |_, connection| {
@@ -141,8 +142,8 @@ impl Store {
         .await
     }
 
-    /// Removes a mesh of these owners, unless one of their jobs that wait or run needs it. Its content goes with the last
-    /// owner, as soon as no job needs it.
+    /// Makes a mesh no longer belong to these owners, unless one of their jobs that wait or run needs it. With its last
+    /// owner the mesh is removed.
     pub async fn remove_mesh(self: &Arc<Self>, owners: Owners, hash: &str) -> Result<Removal> {
         let hash = hash.to_owned();
         self.control(move |writer| try_to_remove(writer, &owners, &hash))
@@ -188,7 +189,7 @@ fn try_to_remove(writer: &Writer<'_>, owners: &Owners, hash: &str) -> Result<Rem
     Ok(Removal::Removed)
 }
 
-/// Makes a mesh one of this owner's; false if it was before.
+/// Makes a mesh belong to this owner; false if it did before.
 fn own(tx: &Connection, owner: &str, hash: &str, now: Time) -> Result<bool> {
     let added = tx.run(
         "insert into mesh_owner (hash, owner, created_at) values (?, ?, ?) on conflict do nothing",
@@ -197,7 +198,7 @@ fn own(tx: &Connection, owner: &str, hash: &str, now: Time) -> Result<bool> {
     Ok(added > 0)
 }
 
-/// Whether a job that waits or runs needs the mesh: one of this owner, or any.
+/// Whether a job that waits or runs needs the mesh: a job of `owner`, or any job if that is `None`.
 fn is_needed(tx: &Connection, owner: Option<&str>, hash: &str) -> Result<bool> {
     tx.value(
         "select exists (select 1 from job indexed by job_by_mesh
@@ -206,7 +207,7 @@ fn is_needed(tx: &Connection, owner: Option<&str>, hash: &str) -> Result<bool> {
     )
 }
 
-/// The body of a mesh as it was written; `None` if it is not stored.
+/// The body of a mesh as it was written; `None` if the mesh is not stored.
 pub(super) fn read_body(connection: &Connection, hash: &str) -> Result<Option<Vec<u8>>> {
     let named = |error: StoreError| error.reading(|| record(hash));
     let Some(key) = key_of(connection, hash).map_err(named)? else {
@@ -224,7 +225,7 @@ fn key_of(connection: &Connection, hash: &str) -> Result<Option<i64>> {
     connection.optional_value("select id from mesh where hash = ?", [hash])
 }
 
-/// A row of the table as the description of a mesh.
+/// The mesh of a row of the table `mesh`, if the checksum matches.
 pub(super) fn described(row: &Row<'_>) -> Result<StoredMesh> {
     let hash = text(row, "hash")?;
     let record = || Record::named(format!("description of mesh {hash}"));
@@ -240,7 +241,7 @@ fn record(hash: &str) -> Record {
     Record::named(format!("mesh {hash}"))
 }
 
-/// A job's mesh must be stored when the job is accepted.
+/// An error if the mesh that a job needs is not stored.
 pub(super) fn require(tx: &Connection, mesh: Option<&str>) -> Result<()> {
     match mesh {
         Some(hash) if !is_stored(tx, hash)? => Err(StoreError::UnknownMesh),

@@ -1,4 +1,4 @@
-//! The tables and their history: `migrations/`, compiled in.
+//! The tables and the steps that brought them to their present form: `migrations/`, compiled in.
 
 use std::{cmp::Ordering, collections::BTreeMap, path::Path, time::Instant};
 
@@ -11,8 +11,8 @@ use super::{
     sql::Sql,
 };
 
-/// Where the applied steps are listed. The table, its name and the checksums are those of sqlx, with which earlier versions
-/// applied them.
+/// The table that lists the applied steps. Its name, columns and checksums are those of sqlx, with which earlier
+/// versions applied the steps.
 const APPLIED: &str = "create table if not exists _sqlx_migrations (
     version BIGINT PRIMARY KEY,
     description TEXT NOT NULL,
@@ -22,7 +22,7 @@ const APPLIED: &str = "create table if not exists _sqlx_migrations (
     execution_time BIGINT NOT NULL
 )";
 
-/// Every step, with the name of its file; a test compares the list with the folder.
+/// All steps, each with its version, name and text; a test compares the list with the folder `migrations`.
 const STEPS: [(i64, &str, &str); 19] = [
     (1, "jobs", include_str!("../../../migrations/0001_jobs.sql")),
     (
@@ -117,7 +117,7 @@ const STEPS: [(i64, &str, &str); 19] = [
     ),
 ];
 
-/// The version of the tables of this program.
+/// The version of the tables that this program uses.
 pub(super) fn last_step() -> i64 {
     STEPS.last().map_or(0, |(version, ..)| *version)
 }
@@ -182,7 +182,8 @@ fn later(version: i64) -> StoreError {
     ))
 }
 
-/// An error if the tables are of an earlier or a later version. One of the database if the list of steps is missing.
+/// An error if the tables are of an earlier or a later version. If the list of steps is missing, the error is one of
+/// the database.
 pub(super) fn are_current(connection: &Connection) -> Result<()> {
     let last = "select coalesce(max(version), 0) from _sqlx_migrations";
     let last: i64 = connection.value(last, ())?;
@@ -195,7 +196,7 @@ pub(super) fn are_current(connection: &Connection) -> Result<()> {
     }
 }
 
-/// The statements that made the tables and indexes, by name.
+/// The statements that made the tables and indexes, by the name of the table or index.
 fn schema(connection: &Connection) -> Result<BTreeMap<String, Option<String>>> {
     let all = "select name, sql from sqlite_schema
                where name not like 'sqlite_stat%' and name not like '%_sqlx_migrations%'";
@@ -203,22 +204,22 @@ fn schema(connection: &Connection) -> Result<BTreeMap<String, Option<String>>> {
     Ok(all.into_iter().collect())
 }
 
-/// The step after which `old_content` moves what earlier versions stored.
+/// The version of the step after which `old_content` moves what earlier versions stored.
 pub(super) const CONTENT: i64 = 17;
 
-/// Whether there is a list of steps.
+/// Whether the database has the table that lists the applied steps.
 fn is_listed(connection: &Connection) -> Result<bool> {
     let any = "select exists (select 1 from sqlite_schema where name = '_sqlx_migrations')";
     connection.value(any, ())
 }
 
-/// Whether the tables have this step.
+/// Whether the step with this version was applied.
 fn has_step(connection: &Connection, version: i64) -> Result<bool> {
     let step = "select exists (select 1 from _sqlx_migrations where version = ?)";
     Ok(is_listed(connection)? && connection.value(step, [version])?)
 }
 
-/// Applies the steps up to this one which the tables do not have, each in a transaction.
+/// Applies the steps up to the version `last` that were not applied yet, each in a transaction.
 pub(super) fn run_to(connection: &Connection, last: i64) -> Result<()> {
     connection.execute_batch(APPLIED)?;
     check(connection)?;

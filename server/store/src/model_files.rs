@@ -18,10 +18,10 @@ use super::{
     sql::{Sql, text},
 };
 
-/// The folder of the files, in that of the store.
+/// The name of the folder for the files, inside the folder of the store.
 const FOLDER: &str = "models";
 
-/// What such a file contains. The parts are kept as text, so that every number stays as it was written.
+/// The content of a model's file. The parts are kept as text, so that every number stays as it was written.
 #[derive(Serialize)]
 struct Definition<'a> {
     title: Option<&'a RawValue>,
@@ -30,7 +30,7 @@ struct Definition<'a> {
     problem: &'a RawValue,
 }
 
-/// The column `description`; it also had the numbers of the problem at the inputs, which the problem tells again.
+/// The column `description`, without the numbers of the problem at the inputs, which the problem itself contains.
 #[derive(Deserialize)]
 struct Description<'a> {
     #[serde(borrow)]
@@ -41,8 +41,8 @@ struct Description<'a> {
     outputs: &'a RawValue,
 }
 
-/// Writes each model to `models/NAME,OWNER.json`: neither name can contain a comma. Does nothing without the tables. A damaged
-/// model is left out, and the log says so. The files are on the disk when this returns.
+/// Writes each model to `models/NAME,OWNER.json`: neither name can contain a comma. Does nothing if there are no tables
+/// of models. A damaged model is left out, with a line in the log. The files are on the disk when this returns.
 pub(super) fn write(connection: &Connection, store: &Path) -> Result<()> {
     let exists = "select exists (select 1 from sqlite_schema where name = 'model_problem')";
     let any = "select exists (select 1 from model)";
@@ -99,7 +99,7 @@ fn write_file(path: &Path, text: &str) -> io::Result<()> {
     file.sync_all()
 }
 
-/// The name of the file of a model, and its content.
+/// The name of a model's file, and its content.
 fn definition(connection: &Connection, row: &Row<'_>) -> Result<(String, String)> {
     let key: i64 = row.get("id")?;
     let (name, owner) = (text(row, "name")?, text(row, "owner")?);

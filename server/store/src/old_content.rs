@@ -1,8 +1,9 @@
-//! What versions before step 17 of the tables stored in five of them, moved to content: problems, results, partial results,
-//! meshes, definitions of sweeps. It is done once, between steps 17 and 18, some at a time: an interrupted start goes on where it was.
+//! Moves what versions before step 17 of the tables stored in five tables to content: problems, results, partial
+//! results, meshes, definitions of sweeps. This is done once, between steps 17 and 18, a part at a time: after an
+//! interrupted start it continues.
 //!
-//! What a disk has changed stays damaged: a result is moved as it is, so that reading it finds that; a problem, a definition or
-//! a mesh that differs from its checksum is left out, and missing.
+//! What a disk has changed stays damaged: a result is moved as it is, so that reading it finds the damage; a problem, a
+//! definition or a mesh that differs from its checksum is left out, and is then missing.
 
 use std::time::{Duration, Instant};
 
@@ -17,12 +18,12 @@ use super::{
     sql::{Sql, optional_text, text},
 };
 
-/// What is moved in one transaction: results, jobs or meshes.
+/// The number of results or jobs that are moved in one transaction.
 const AT_ONCE: usize = 50;
-/// How often the log tells how far it is.
+/// The time between two lines of the log that tell the progress.
 const TOLD_EVERY: Duration = Duration::from_secs(5);
 
-/// Moves all of it.
+/// Moves all problems, results, definitions and meshes of earlier versions.
 pub(super) fn move_all(database: &Connection) -> Result<()> {
     let begin = || Transaction::new_unchecked(database, TransactionBehavior::Immediate);
     let mut told = Instant::now();
@@ -68,7 +69,8 @@ pub(super) fn move_all(database: &Connection) -> Result<()> {
     }
 }
 
-/// Moves some results; how many. They were stored under the key of the job that was solved, partial ones under its negative.
+/// Moves some results; returns how many. A result was stored under the key of the job that was solved, a partial one
+/// under the negative key.
 fn move_results(tx: &Connection) -> Result<usize> {
     let keys: Vec<i64> = tx.values(
         "select distinct job_id from (select job_id from result_info union select job_id from result_part) order by 1 limit ?",
@@ -92,7 +94,7 @@ fn move_results(tx: &Connection) -> Result<usize> {
     Ok(keys.len())
 }
 
-/// The jobs that have the result under this key, and whether their fields were deleted.
+/// The keys of the jobs that have the result stored under `key`, each with whether its fields were deleted.
 fn holders(tx: &Connection, key: i64) -> Result<Vec<(i64, bool)>> {
     let of_jobs = "select id, exists (select 1 from job_size where job_id = id and fields = 2) from job
          where (?1 < 0 and id = -?1 and finished_at is null)
@@ -101,7 +103,7 @@ fn holders(tx: &Connection, key: i64) -> Result<Vec<(i64, bool)>> {
     tx.rows(of_jobs, [key], |row| Ok(row.try_into()?))
 }
 
-/// The parts of a result.
+/// The parts of the result stored under `key`.
 fn old_parts(tx: &Connection, key: i64) -> Result<Vec<Part>> {
     let names: Vec<String> = tx.values(
         "select name from result_info where job_id = ?1 union select name from result_part where job_id = ?1",
@@ -114,7 +116,7 @@ fn old_parts(tx: &Connection, key: i64) -> Result<Vec<Part>> {
     Ok(parts)
 }
 
-/// Size and hash of JSON that there is not.
+/// The size and hash of a part whose JSON is not known: no JSON has them.
 fn of_nothing() -> PartInfo {
     PartInfo {
         bytes: 0,
@@ -122,7 +124,7 @@ fn of_nothing() -> PartInfo {
     }
 }
 
-/// A part of a result; `None` if nothing is kept of it.
+/// A part of the result stored under `key`; `None` if only its size and hash were kept.
 fn old_part(tx: &Connection, key: i64, name: String) -> Result<Option<Part>> {
     let pieces: Vec<(i64, Vec<u8>, Option<i64>)> = tx.rows(
         "select piece, body, checksum from result_part where job_id = ? and name = ? order by piece",
@@ -163,7 +165,7 @@ fn old_part(tx: &Connection, key: i64, name: String) -> Result<Option<Part>> {
     }))
 }
 
-/// How a part is encoded, and size and hash of its JSON; `None` if the row is damaged.
+/// The encoding of a part, and the size and hash of its JSON; `None` if the row is damaged.
 fn old_info(row: &Row<'_>) -> Result<Option<(Encoding, PartInfo)>> {
     let (key, name) = (row.get("job_id")?, text(row, "name")?);
     let (bytes, digest): (i64, Vec<u8>) = (row.get("bytes")?, row.get("digest")?);
@@ -188,25 +190,26 @@ fn old_info(row: &Row<'_>) -> Result<Option<(Encoding, PartInfo)>> {
     Ok(intact.then_some((encoding, PartInfo { bytes, digest })))
 }
 
-/// Rows of early versions have no checksum.
+/// Whether a checksum matches the stored one; a row of an early version, which has none, counts as intact.
 fn is_intact(sum: Checksum, stored: Option<i64>) -> bool {
     stored.is_none_or(|stored| stored == sum.stored())
 }
 
-/// Whether a whole row is as it was written, as far as that can be known.
+/// Whether the checksum of a whole row matches, if it has one.
 fn row_is_intact(row: &Row<'_>) -> Result<bool> {
     let stored: Option<i64> = row.get("checksum")?;
     let found = checksum::of_row(row)?;
     Ok(stored.is_none_or(|stored| stored == found))
 }
 
-/// A job, as far as something is moved from it.
+/// The columns of a job's row that are needed to move its content.
 struct OldJob {
     input_hash: String,
     sweep: Option<String>,
 }
 
-/// Gives some jobs after this one their problem, the definition of their sweep, and what only the row of the problem told; how many.
+/// Attaches content to some jobs after the job `last`: to each its problem and the definition of its sweep. Also sets
+/// what only the row of the problem told: the mesh and the memory. Returns how many jobs.
 fn move_from_jobs(tx: &Connection, last: &mut i64) -> Result<usize> {
     let jobs = "select * from job where id > ? order by id limit ?";
     let jobs = tx.rows(jobs, [*last, AT_ONCE as i64], |row| {
@@ -252,10 +255,10 @@ fn move_from_job(tx: &Connection, key: i64, old: &OldJob) -> Result<()> {
     checksum::seal(tx, "job", "id", key)
 }
 
-/// Body, mesh and memory of a problem.
+/// The body, mesh and memory of a problem.
 type OldProblem = (String, Option<String>, Option<i64>);
 
-/// A problem, unless it is damaged.
+/// The problem of this fingerprint, unless it is damaged.
 fn old_problem(tx: &Connection, input_hash: &str) -> Result<Option<OldProblem>> {
     let found = "select * from problem where input_hash = ?";
     let found = tx.row(found, [input_hash], |row| {
@@ -272,7 +275,7 @@ fn old_problem(tx: &Connection, input_hash: &str) -> Result<Option<OldProblem>> 
     Ok(found.flatten())
 }
 
-/// The definition of a sweep, unless it is damaged.
+/// The definition of the sweep with this id, unless it is damaged.
 fn old_definition(tx: &Connection, uuid: &str) -> Result<Option<String>> {
     let found = tx.row(
         "select sweep_definition.* from sweep_definition join sweep on sweep.id = sweep where uuid = ?",
@@ -287,16 +290,16 @@ fn old_definition(tx: &Connection, uuid: &str) -> Result<Option<String>> {
     Ok(found.flatten())
 }
 
-/// A mesh, as far as something is moved from it.
+/// The columns of a mesh's row that are needed to move its body.
 struct OldMesh {
     key: i64,
     hash: String,
-    /// How many pieces it has, if that is known.
+    /// The number of pieces of its body, if it is known.
     pieces: Option<i64>,
     is_intact: bool,
 }
 
-/// Moves the body of the first mesh after this one; false if there is none.
+/// Moves the body of the first mesh after the mesh `last`; false if there is none.
 fn move_mesh(tx: &Connection, last: &mut i64) -> Result<bool> {
     let found = "select * from mesh where id > ? order by id limit 1";
     let found = tx.row(found, [*last], |row| {

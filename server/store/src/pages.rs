@@ -1,22 +1,22 @@
-//! The pages of the database: how large it is, and how much of it is free.
+//! The pages of the database: their number, how many of them are free, and their size.
 
 use rusqlite::Connection;
 
 use super::error::Result;
 
-/// The pages of a database.
+/// The number and the size of a database's pages.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pages {
-    /// All of them.
+    /// The number of all pages.
     pub(super) count: i64,
-    /// Pages without content.
+    /// The number of pages without content.
     pub(super) free: i64,
-    /// Bytes of each.
+    /// The size of a page (bytes).
     bytes: i64,
 }
 
 impl Pages {
-    /// As they are now.
+    /// The present pages of a database.
     pub(super) fn of(database: &Connection) -> Result<Pages> {
         let pages = "select page_count, freelist_count, page_size
                      from pragma_page_count, pragma_freelist_count, pragma_page_size";
@@ -24,7 +24,7 @@ impl Pages {
         Ok(Pages { count, free, bytes })
     }
 
-    /// Bytes of so many of them.
+    /// The size of this number of pages (bytes).
     pub(super) fn bytes_of(self, pages: i64) -> u64 {
         u64::try_from(pages.saturating_mul(self.bytes)).unwrap_or(0)
     }

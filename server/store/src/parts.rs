@@ -1,8 +1,9 @@
-//! The stored form of a result: named parts behind an index of them, and the fields by themselves.
+//! The stored form of a result: named parts after an index of them, and the fields apart.
 //!
-//! The parts are one content ([`name::RESULT`]), so that a job whose input has a result gets all of it by one row: a version,
-//! length and checksum of the index, the index, the parts one after the other. The fields, which can be deleted alone, are another
-//! ([`name::FIELDS`]); the index says how they are encoded.
+//! The parts are one content ([`name::RESULT`]), so that a job whose input has a result gets all of it by one row. This
+//! content begins with a version and the length and checksum of the index; the index and the parts follow, one after
+//! the other. The fields, which can be deleted alone, are another content ([`name::FIELDS`]); the index tells how they
+//! are encoded.
 //!
 //! [`name::RESULT`]: super::content::name::RESULT
 //! [`name::FIELDS`]: super::content::name::FIELDS
@@ -19,20 +20,20 @@ use super::{
     encoding::{Encoding, PartInfo, deflated, deflated_json, info_of_fields, info_of_json},
 };
 
-/// The version of the form: a later one may be another.
+/// The version of the stored form.
 const VERSION: u8 = 1;
-/// Bytes before the index: the version, its length and its CRC-32.
+/// The number of bytes before the index: a version, the length of the index, and its CRC-32.
 pub(super) const HEADER_BYTES: usize = 9;
 
-/// The stored form of a document.
+/// A result in its stored form.
 #[derive(Debug)]
 pub struct Parts {
     parts: Vec<Part>,
-    /// What is stored before the parts: header and index.
+    /// The bytes that are stored before the parts: header and index.
     index: Vec<u8>,
-    /// Of index and parts.
+    /// The fingerprint of the content with index and parts.
     result: Fingerprint,
-    /// Of the fields, if there are some.
+    /// The fingerprint of the fields, if the result has fields.
     fields: Option<Fingerprint>,
 }
 
@@ -40,21 +41,21 @@ pub struct Parts {
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Part {
     pub(super) name: String,
-    /// How `body` holds it.
+    /// How the bytes in `body` are encoded.
     pub(super) encoding: Encoding,
-    /// The bytes that are stored. Between processes they follow the message.
+    /// The bytes that are stored. They are not part of a message between processes, but follow it.
     #[serde(skip)]
     pub body: Vec<u8>,
     pub(super) info: PartInfo,
 }
 
-/// A part in the index.
+/// The entry of a part in the index.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Entry {
     pub(super) name: String,
     pub(super) encoding: Encoding,
     pub(super) info: PartInfo,
-    /// Bytes that are stored; those of fields are stored elsewhere.
+    /// The number of bytes of the part; those of fields are stored apart.
     pub(super) bytes: usize,
 }
 
@@ -64,7 +65,7 @@ impl Part {
         &self.name
     }
 
-    /// A part from what its JSON says.
+    /// A part with the JSON of `value`.
     fn of_value(name: String, value: &impl Serialize) -> serde_json::Result<Part> {
         let (info, body) = deflated_json(value)?;
         Ok(Part {
@@ -85,7 +86,7 @@ impl Part {
         }
     }
 
-    /// Fields, whose JSON is never in memory as a whole.
+    /// The part `fields`, whose JSON is never in memory as a whole.
     pub(super) fn of_fields(fields: &Fields, law: &columns::Law) -> serde_json::Result<Part> {
         let info = info_of_fields(fields)?;
         let body = columns::encode(fields, law)
@@ -103,7 +104,7 @@ impl Part {
     }
 }
 
-/// What is stored of a step in the part `steps`.
+/// The entry of a load step in the part `steps`.
 #[derive(Serialize)]
 struct StepPart<'a> {
     name: &'a str,
@@ -111,8 +112,9 @@ struct StepPart<'a> {
 }
 
 impl Parts {
-    /// Divides a document into the parts that can be requested. What was divided is freed at once: both would take twice
-    /// as much. `go_on` is asked after every load step; `None` if it says no.
+    /// Divides a document into the parts that can be requested. Each piece of the document is freed as soon as it is
+    /// encoded, since both forms together take twice the memory. `go_on` is called before every load step; `None` if it
+    /// returns false.
     pub fn of(
         document: Document,
         go_on: &mut dyn FnMut() -> bool,
@@ -158,7 +160,7 @@ impl Parts {
         Ok(Some(Parts::new(parts)))
     }
 
-    /// A result of these parts, which may come from another process.
+    /// A result with these parts, which may come from another process.
     pub fn new(parts: Vec<Part>) -> Parts {
         let entries = parts.iter().map(|part| Entry {
             name: part.name.clone(),
@@ -184,12 +186,12 @@ impl Parts {
         self.parts.into_iter()
     }
 
-    /// The stored size of all parts together.
+    /// The stored size of all parts together (bytes).
     pub fn bytes(&self) -> usize {
         self.parts.iter().map(|part| part.body.len()).sum()
     }
 
-    /// What is stored, with the names under which it is attached to the job.
+    /// The content that is stored, with the names under which it is attached to the job.
     pub(super) fn contents(&self) -> Vec<(&'static str, NewContent<'_>)> {
         let bodies = |fields| {
             let parts = self
@@ -210,13 +212,13 @@ impl Parts {
         [(name::RESULT, result)].into_iter().chain(fields).collect()
     }
 
-    /// The hashes of what is stored.
+    /// The fingerprints of the content that is stored.
     pub(super) fn fingerprints(&self) -> Vec<&Fingerprint> {
         [&self.result].into_iter().chain(&self.fields).collect()
     }
 }
 
-/// The index of parts, with what is stored before it.
+/// The header and the index of these entries, as they are stored.
 pub(super) fn write_index(entries: &[Entry]) -> Vec<u8> {
     // writing to memory does not fail
     let index = postcard::to_stdvec(entries).unwrap_or_default();
@@ -227,7 +229,7 @@ pub(super) fn write_index(entries: &[Entry]) -> Vec<u8> {
     stored
 }
 
-/// How long the index is that follows this header. `Err`: what is wrong with it.
+/// The length of the index after this header. `Err`: what is wrong with the header.
 pub(super) fn index_bytes(stored: &[u8]) -> std::result::Result<usize, String> {
     match stored.first_chunk::<5>() {
         Some([VERSION, length @ ..]) => Ok(u32::from_le_bytes(*length) as usize),
@@ -236,7 +238,7 @@ pub(super) fn index_bytes(stored: &[u8]) -> std::result::Result<usize, String> {
     }
 }
 
-/// The index in what begins with a header. `Err`: what is wrong with it.
+/// The entries of the index in bytes that begin with a header. `Err`: what is wrong with the bytes.
 pub(super) fn read_index(stored: &[u8]) -> std::result::Result<Vec<Entry>, String> {
     let end = HEADER_BYTES + index_bytes(stored)?;
     let index = stored
@@ -251,15 +253,15 @@ pub(super) fn read_index(stored: &[u8]) -> std::result::Result<Vec<Entry>, Strin
 /// The points at which a stored profile has its values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ProfilePoints {
-    /// At nodes and friction points and the places of the peaks.
+    /// The nodes, the friction points and the places of the peaks.
     All,
-    /// At the nodes of the boundary.
+    /// The nodes of the boundary.
     Nodes,
-    /// Where friction acts.
+    /// The points where friction acts.
     Friction,
 }
 
-/// The part that holds the profile of a boundary, at the end or at the end of a load step.
+/// The name of the part with the profile of a boundary, at the end of the problem or of a load step (from 0).
 pub(super) fn profile_part(boundary: &str, points: ProfilePoints, step: Option<usize>) -> String {
     let kind = match points {
         ProfilePoints::All => "all",

@@ -1,19 +1,21 @@
-//! Time that the store has not seen pass: no service ran, or a clock was wrong.
+//! Pauses: time that the store has not seen pass, because no service ran or a clock was wrong.
 //!
-//! Nobody can tell which: a service that finds the clock a hundred days later may have been off for so long, or one of two
-//! starts had a wrong clock (a machine without a battery begins with an old time, until it hears of the right one). So what
-//! is removed for its age, and what expires in the queue, counts the time while the service ran, which no clock can set.
+//! Nobody can tell which of these it was: if the clock shows a hundred days more at a start, no service may have run
+//! for that long, or the clock was wrong at one of the two starts (a machine without a battery begins with an old time,
+//! until it learns the right one). The age at which data are removed, and the time after which a job expires in the
+//! queue, therefore count the time while the service ran, which no clock can change.
 
 use parking_lot::{Mutex, MutexGuard};
 use serde::{Deserialize, Serialize};
 
-/// Pauses that are kept: beyond that the shortest ones are forgotten. Of a year with twenty restarts a day those are a small part
-/// of each age that matters.
+/// The largest number of pauses that are kept: of more, the shortest are forgotten. After a year with twenty restarts a
+/// day, the forgotten ones are a small part of each age that matters.
 const MOST: usize = 200;
-/// A pause of so small a part of an age counts: a wrong clock makes that little difference, and machines are off at night.
+/// A pause counts as part of an age if it is at most one part in this many of it: a wrong clock changes the age little
+/// then, and machines are off at night.
 const SMALL_PART: i64 = 30;
 
-/// A pause, by the times of the store (µs).
+/// The begin and the end of a pause, by the clock of the store (µs).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Pause(pub(super) i64, pub(super) i64);
 
@@ -28,7 +30,8 @@ impl Pause {
 pub(super) struct Pauses(Mutex<Vec<Pause>>);
 
 impl Pauses {
-    /// Replaces them. What lies after `now` is left out: a clock that was ahead is right again.
+    /// Replaces all pauses; returns those that are kept. The part of a pause after `now` is left out: a clock that was
+    /// ahead is right again.
     pub(super) fn set(&self, pauses: Vec<Pause>, now: i64) -> Vec<Pause> {
         let until_now = pauses
             .into_iter()
@@ -42,7 +45,7 @@ impl Pauses {
         kept
     }
 
-    /// The time `age` before `now` (µs), without the pauses.
+    /// The time `age` before `now` (µs), not counting the pauses.
     pub(super) fn cutoff(&self, now: i64, age: i64) -> i64 {
         cutoff(&self.all(), now, age)
     }
@@ -52,7 +55,7 @@ impl Pauses {
     }
 }
 
-/// Back from `now` by an age, without the pauses that are more than a small part of it (µs).
+/// The time `age` before `now` (µs), not counting the pauses that are more than a small part of `age`.
 fn cutoff(pauses: &[Pause], now: i64, age: i64) -> i64 {
     let (mut at, mut left) = (now, age.max(0));
     for pause @ Pause(from, to) in pauses.iter().rev() {

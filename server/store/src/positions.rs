@@ -1,4 +1,4 @@
-//! What is told of a job that is not in its row: its position in the queue, and what it keeps.
+//! Fills in what the row of a job does not have: its position in the queue, and the size of what it keeps.
 
 use base::job::{Job, QueuePosition, Status, Waiting};
 use rusqlite::Connection;
@@ -6,22 +6,23 @@ use rusqlite::Connection;
 use super::{database::Store, error::Result, rows::find, sizes, turns::Line};
 
 impl Store {
-    /// Fills in the queue positions, and what jobs keep that have ended, if they can be read: a request that has changed
-    /// something is answered even without them.
+    /// Fills in the queue positions, and the size of what ended jobs keep, if they can be read: a request that has
+    /// changed something is answered even without them.
     pub(super) fn try_to_complete(&self, connection: &Connection, jobs: &mut [&mut Job]) {
         if let Err(cause) = self.damages.noting(self.complete(connection, jobs)) {
             tracing::warn!(%cause, "queue positions and sizes could not be read: {cause}");
         }
     }
 
-    /// Fills in what is not in the row of a job: its position in the queue, and what it keeps once it has ended.
+    /// Fills in the positions of queued jobs, and the size of what ended jobs keep.
     pub(super) fn complete(&self, connection: &Connection, jobs: &mut [&mut Job]) -> Result<()> {
         self.add_queue_positions(connection, jobs)?;
         self.add_full_disk(jobs);
         sizes::add_sizes(connection, jobs)
     }
 
-    /// What running jobs find cannot be stored while the disk is full: one that is solved stays running.
+    /// Sets the stage `low_disk` in the progress of running jobs while the disk is full: their results cannot be
+    /// stored, and a job that is solved stays running.
     fn add_full_disk(&self, jobs: &mut [&mut Job]) {
         if !self.reserve.was_disk_full() {
             return;
@@ -33,8 +34,8 @@ impl Store {
         }
     }
 
-    /// Fills in the queue positions of those that are queued. A coalesced job has the position and the progress of
-    /// its primary.
+    /// Fills in the queue positions of the queued jobs. A coalesced job has the position and the progress of its
+    /// primary.
     fn add_queue_positions(&self, connection: &Connection, jobs: &mut [&mut Job]) -> Result<()> {
         let mut queue = None;
         for job in jobs.iter_mut().filter(|job| job.status == Status::Queued) {
@@ -67,7 +68,7 @@ impl Store {
         Ok(())
     }
 
-    /// Why a job waits for a worker whose owner has so many running jobs.
+    /// Why a job waits for a worker, if its owner has this many running jobs.
     fn why_it_waits(&self, running: i64) -> Waiting {
         if self.is_paused() {
             Waiting::Paused

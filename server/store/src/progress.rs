@@ -1,9 +1,9 @@
-//! How far the store has come, in a file beside the database: so that it is noticed when the database, or the
-//! write-ahead log with its last transactions, is missing or has been replaced by an older one.
+//! A file beside the database that records how far the store has come: by it the service notices when the database, or
+//! the write-ahead log with its last transactions, is missing or was replaced by an older one.
 //!
-//! Every transaction counts itself in the database, and after its commit the file gets the number too: 80 bytes in
-//! place, without a flush, which would cost as much as the commit. So the file is never ahead of what is durable. After
-//! a power cut it may be behind, and then less is noticed, but nothing is refused that is whole.
+//! Every transaction counts itself in the database, and after its commit the number is written to the file: 80 bytes in
+//! place, without a flush, which would cost as much as the commit. The file is therefore never ahead of what is
+//! durable. After a power cut it may be behind: then less is noticed, but no intact store is refused.
 
 use parking_lot::Mutex;
 use std::{
@@ -23,33 +23,34 @@ use super::{
 
 /// The name of the file.
 pub(super) const FILE: &str = "signorini.progress";
-/// The words of the file for how the service ended: it runs or died, or it was stopped. They have the same length.
+/// The word in the file while the service runs, and after it has died. It is as long as [`STOPPED`].
 const RUNNING: &str = "running";
+/// The word in the file after the service was stopped.
 const STOPPED: &str = "stopped";
 
-/// What the file says.
+/// The last commit of a store, as the file or the database records it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct LastCommit {
-    /// The name of the store.
+    /// The identity of the store.
     pub(super) store: String,
-    /// The number of its last transaction.
+    /// The number of the store's last transaction.
     pub(super) commits: i64,
-    /// The service stopped after it, and did not die.
+    /// Whether the service was stopped after this transaction, and did not die.
     pub(super) stopped: bool,
 }
 
-/// What is known of the last commit.
+/// What the file tells about the last commit.
 #[derive(Debug)]
 pub(super) enum Known {
     /// There is no file.
     Missing,
     /// The file is not as it was written.
     Damaged,
-    /// What the file says.
+    /// The last commit that the file records.
     Last(LastCommit),
 }
 
-/// The file, open.
+/// The file, kept open.
 #[derive(Clone, Debug)]
 pub(super) struct Progress(Arc<Mutex<Open>>);
 
@@ -57,7 +58,7 @@ pub(super) struct Progress(Arc<Mutex<Open>>);
 struct Open {
     file: File,
     last: LastCommit,
-    /// A failure was logged.
+    /// Whether the last write failed, which was logged.
     failed: bool,
 }
 
@@ -74,7 +75,7 @@ pub(super) fn read(folder: &Path) -> Result<Known> {
     }
 }
 
-/// What the database says; `None` if it is of a version that did not count.
+/// The last commit that the database records; `None` if it is of a version that did not count transactions.
 pub(super) fn in_database(connection: &Connection) -> Result<Option<LastCommit>> {
     let counted = "select exists (select 1 from sqlite_schema where name = 'progress')";
     if !connection.value::<bool>(counted, ())? {
@@ -93,7 +94,8 @@ pub(super) fn in_database(connection: &Connection) -> Result<Option<LastCommit>>
     }
 }
 
-/// An error if the database is not the one that the file tells of, or has not come as far. If that cannot be known, why.
+/// An error if the database is of another store than the file, or lacks transactions that the file counts. Returns why
+/// this cannot be known, if the file is missing or damaged.
 pub(super) fn compare(known: &Known, database: Option<&LastCommit>) -> Result<Option<String>> {
     let doubt = |how: &str| {
         // a version that did not count had no file
@@ -119,7 +121,7 @@ pub(super) fn compare(known: &Known, database: Option<&LastCommit>) -> Result<Op
 }
 
 impl Progress {
-    /// Writes the file, on the disk when this returns, and keeps it open.
+    /// Writes the file, which is on the disk when this returns, and keeps it open.
     pub(super) fn start(folder: &Path, last: LastCommit) -> io::Result<Progress> {
         let file = OpenOptions::new()
             .write(true)
@@ -151,7 +153,7 @@ impl Progress {
         open.failed = written.is_err();
     }
 
-    /// Records that the service has stopped: nothing is written any more. Needs no space on the disk.
+    /// Records that the service was stopped, after its last write. Needs no space on the disk.
     pub(super) fn stop(&self) -> io::Result<()> {
         {
             let mut open = self.0.lock();
@@ -178,7 +180,7 @@ impl Open {
 }
 
 impl LastCommit {
-    /// Always of the same length, so that it is replaced in place, and within one sector.
+    /// The text of the file, always of the same length, so that it is replaced in place and within one sector.
     fn text(&self) -> String {
         let LastCommit { store, commits, .. } = self;
         let state = if self.stopped { STOPPED } else { RUNNING };
@@ -199,7 +201,8 @@ impl LastCommit {
     }
 }
 
-/// Forgets how far the store had come: what is there now is accepted at the next start. Returns whether it was known.
+/// Forgets how far the store had come, so that the next start accepts the present database. Returns whether the file
+/// existed.
 pub fn accept(folder: &Path) -> io::Result<bool> {
     let moved = |path: PathBuf| {
         let mut name = path.clone().into_os_string();

@@ -10,13 +10,13 @@ pub struct RepeatedError {
 }
 
 impl RepeatedError {
-    /// For an operation; `what` says that it failed.
+    /// No error yet; the lines of the log about errors begin with `what`.
     pub fn new(what: &'static str) -> RepeatedError {
         let logged = String::new();
         RepeatedError { what, logged }
     }
 
-    /// The result of an attempt; `None` if it failed, which is logged if the error is new.
+    /// The result of an attempt; `None` if it failed. An error is logged if it differs from the last one.
     pub fn note<T>(&mut self, done: Result<T>) -> Option<T> {
         let cause = match done {
             Ok(done) => {

@@ -1,4 +1,4 @@
-//! Running jobs back in the queue: when the service stops, and after it has crashed.
+//! Puts running jobs back in the queue: when the service stops, and after it has crashed.
 
 use std::sync::Arc;
 
@@ -21,8 +21,9 @@ use super::{
 };
 
 impl Store {
-    /// Requeues a running job because the service stops, which does not count against its attempts; one that was
-    /// asked to stop is canceled instead. Returns its new status; `None` when the attempt is no longer the current one.
+    /// Requeues a running job because the service stops, which does not count against the job's attempts; a job that
+    /// was asked to stop is canceled instead. Returns the job's new status; `None` when the attempt is no longer the
+    /// current one.
     pub async fn requeue_drained(
         self: &Arc<Self>,
         key: i64,
@@ -32,13 +33,14 @@ impl Store {
             .await
     }
 
-    /// Requeues the jobs that were running when the service ended; ends those that were asked to stop, and, if the process
-    /// died, those whose attempts are used up. To be called before the listener opens. Returns their number.
+    /// Requeues the jobs that were running when the service ended; ends those that were asked to stop, and, if the
+    /// process died, those whose attempts are used up. Must be called before the listener opens. Returns the number of
+    /// these jobs.
     pub async fn requeue_interrupted(self: &Arc<Self>) -> Result<usize> {
         self.control(requeue_interrupted).await
     }
 
-    /// The jobs that run, with the numbers of their attempts.
+    /// The keys of the running jobs, with the numbers of their attempts.
     pub async fn running(self: &Arc<Self>) -> Result<Vec<(i64, i32)>> {
         self.read(|_, connection| {
             let running = "select id, attempt from job where status = 'running'";
@@ -47,8 +49,9 @@ impl Store {
         .await
     }
 
-    /// Requeues a running job whose own process died; ends it if it was asked to stop, or if its attempts are used up.
-    /// `how` it died is told to the client then. Returns the jobs that have changed.
+    /// Requeues a running job whose worker process died; ends it if it was asked to stop, or if its attempts are used
+    /// up. In the last case `how` tells the client how the process died. Returns the keys of the jobs whose status has
+    /// changed.
     pub async fn requeue_lost(
         self: &Arc<Self>,
         key: i64,
@@ -118,8 +121,8 @@ fn requeue_lost(writer: &Writer<'_>, key: i64, attempt: i32, how: &str) -> Resul
     Ok(changed)
 }
 
-/// Requeues a job that was interrupted, or ends it. `stop`: a client has asked it to stop; `how`: in which way its process
-/// died, if it did.
+/// Requeues a job that was interrupted, or ends it. `stop`: whether a client has asked it to stop; `how`: how its
+/// process died, if it did.
 fn interrupt(
     change: &mut Change<'_>,
     job: &Job,
@@ -140,7 +143,7 @@ fn interrupt(
     }
 }
 
-/// How many attempts at a job ended with the process, before the current one.
+/// The number of earlier attempts at a job in which the process died.
 fn count_deaths(tx: &Connection, key: i64) -> Result<i64> {
     let lost = <&str>::from(Requeue::WorkerLost);
     tx.value(
@@ -149,7 +152,7 @@ fn count_deaths(tx: &Connection, key: i64) -> Result<i64> {
     )
 }
 
-/// Puts a running job back in the queue.
+/// Puts a running job back in the queue, for the reason `why`.
 fn requeue(change: &mut Change<'_>, key: i64, why: Requeue) -> Result<()> {
     let now = change.now();
     change.update(key, |row| row.requeue(why, now))?;

@@ -1,6 +1,7 @@
-//! Space that is kept free for control: a file that is removed when the disk is full, so that jobs can still be
-//! canceled and deleted, and the queue paused. As long as it is not there in full, nothing else is written. A part of it
-//! stays for the next start, which must write too, even on a disk that is full to its last byte.
+//! A file that reserves space for control operations: it is removed or cut short when the disk is full, so that jobs
+//! can still be canceled and deleted, and the queue paused. As long as the file does not have its full size, nothing
+//! else is written. A part of it stays for the next start, which must write too, even on a disk that is full to its
+//! last byte.
 
 use std::{
     fs::{self, File, OpenOptions},
@@ -15,27 +16,29 @@ use super::error::{Result, StoreError};
 /// The name of the file.
 pub(super) const FILE: &str = "signorini.reserve";
 
-/// Four times what the write-ahead log grows by before SQLite reuses it: a thousand pages of 4 KiB.
+/// The size of the file (bytes): four times what the write-ahead log grows by before SQLite reuses it, which is a
+/// thousand pages of 4 KiB.
 const BYTES: u64 = 16 << 20;
 
-/// What of it stays for the next start: the index of a write-ahead log of this size or more, and what is written there about
-/// jobs that were running.
+/// The size of the part that stays for the next start (bytes): room for the index of a write-ahead log of the usual
+/// size or more, and for what a start writes about jobs that were running.
 const FOR_A_START: u64 = 2 << 20;
 
-/// With less than this the disk is full: a submit takes some ten kilobytes.
+/// The free space (bytes) below which the disk counts as full: a submission takes some ten kilobytes.
 const LEAST: u64 = 256 << 10;
 
-/// The file, if it is there.
+/// The file, which has its full size or not.
 #[derive(Debug)]
 pub(super) struct Reserve {
     path: PathBuf,
     held: AtomicBool,
-    /// Whether the disk was full when it was last asked.
+    /// Whether the disk was full at the last check.
     full: AtomicBool,
 }
 
 impl Reserve {
-    /// Takes the space, if there is some; if not, or if nothing else is left, frees what was kept for this start.
+    /// Reserves the space. If there is too little, removes the file, and if the disk has no other space left, cuts the
+    /// file short: this start needs the space.
     pub(super) fn new(folder: &Path) -> Reserve {
         let reserve = Reserve {
             path: folder.join(FILE),
@@ -50,7 +53,7 @@ impl Reserve {
         reserve
     }
 
-    /// An error if the disk is full but for what control needs.
+    /// An error if the disk has no space except for control operations.
     pub(super) fn has_room(&self) -> Result<()> {
         if self.held.load(Ordering::Acquire) {
             Ok(())
@@ -59,7 +62,7 @@ impl Reserve {
         }
     }
 
-    /// Whether the disk is full, also if the space is not needed yet.
+    /// Whether the disk is full, even if the reserved space is not needed yet.
     pub(super) fn is_disk_full(&self) -> bool {
         let folder = self.path.parent();
         let free = folder.and_then(|folder| rustix::fs::statvfs(folder).ok());
@@ -69,12 +72,12 @@ impl Reserve {
         full
     }
 
-    /// Whether the disk was full when that was last checked, at most a second ago; without asking the file system.
+    /// Whether the disk was full at the last check, at most a second ago; it does not ask the file system.
     pub(super) fn was_disk_full(&self) -> bool {
         self.full.load(Ordering::Relaxed)
     }
 
-    /// Frees the space but for what the next start needs; false if that was done before.
+    /// Frees the reserved space except for what the next start needs; false if it was freed before.
     pub(super) fn release(&self) -> bool {
         if !self.held.swap(false, Ordering::AcqRel) {
             return false;
@@ -89,7 +92,7 @@ impl Reserve {
         }
     }
 
-    /// Takes the space again, once there is some; false if there is none. Blocks.
+    /// Reserves the space again; false if there is not enough. Blocks.
     pub(super) fn retake(&self) -> bool {
         if self.held.load(Ordering::Acquire) {
             return true;
@@ -106,7 +109,7 @@ impl Reserve {
         }
     }
 
-    /// Takes what the next start needs, or as much of it as there is: this start may have used some of what was there.
+    /// Reserves what the next start needs, or as much of it as there is: this start may have used a part of it.
     pub(super) fn keep_for_a_start(&self) {
         for part in [1, 2, 4, 8] {
             match allocate(&self.path, FOR_A_START / part) {
@@ -117,7 +120,7 @@ impl Reserve {
     }
 }
 
-/// Gives the file this size, unless it has it. If it cannot have that, it is as it was before.
+/// Gives the file this size, unless it is at least as large. If that fails, the file is as it was before.
 fn allocate(path: &Path, bytes: u64) -> io::Result<()> {
     let before = fs::metadata(path).map_or(0, |found| found.len());
     if before >= bytes {

@@ -1,4 +1,4 @@
-//! A backup becomes a store again.
+//! Makes a backup a store again.
 
 use std::{
     fs::{self, DirBuilder, File},
@@ -18,21 +18,22 @@ use super::{
     progress::{self, Progress},
 };
 
-/// How the name of a folder begins that has a store which was replaced, and how it ends as long as that is not complete.
+/// The beginning of the name of a folder with a store that a restore has replaced.
 const ASIDE: &str = "replaced-";
+/// The end of the name of a folder to which a restore has not moved the whole replaced store yet.
 const PARTIAL: &str = ".partial";
 
-/// A store that was made from a backup.
+/// The result of a restore.
 #[derive(Debug)]
 pub struct Restored {
-    /// What the backup contains.
+    /// The manifest of the backup.
     pub manifest: Manifest,
-    /// Where the store is that was in the folder before.
+    /// The folder to which the earlier store was moved, if there was one.
     pub replaced: Option<PathBuf>,
 }
 
-/// Makes the backup in `backup` the store in `data`, which must be empty or missing, unless it is to be replaced. The
-/// service refuses to start on it until this is complete.
+/// Makes the backup in `backup` the store in `data`, which must be empty or missing, unless `replace` is set. The
+/// service refuses to start on the folder until the restore is complete.
 pub async fn restore(backup: &Path, data: &Path, replace: bool) -> Result<Restored> {
     let (backup, data) = (backup.to_owned(), data.to_owned());
     blocking(move || write_store(&backup, &data, replace)).await
@@ -105,7 +106,7 @@ fn read_manifest(backup: &Path) -> Result<Manifest> {
     }
 }
 
-/// Whether there is anything but what an interrupted restore leaves, or a file system.
+/// Whether the folder has files, apart from those that an interrupted restore or a file system leaves.
 fn is_occupied(data: &Path) -> io::Result<bool> {
     let store = data.join(DATABASE).exists();
     for entry in fs::read_dir(data)? {
@@ -118,7 +119,8 @@ fn is_occupied(data: &Path) -> io::Result<bool> {
     Ok(false)
 }
 
-/// Copies the database and compares it with the manifest; on the disk when this returns. Gives how far it had come.
+/// Copies the database and compares the copy with the manifest; it is on the disk when this returns. Returns the last
+/// commit that it records.
 fn copy(backup: &Path, new: &Path, manifest: &Manifest) -> Result<Option<progress::LastCommit>> {
     let source = backup.join(DATABASE);
     let copied = || -> io::Result<_> {
@@ -149,8 +151,8 @@ fn copy(backup: &Path, new: &Path, manifest: &Manifest) -> Result<Option<progres
     progress::in_database(&connection)
 }
 
-/// Moves the store in this folder to a folder within it, whose name is returned. Until all of it is there, that folder is
-/// called `….partial`, and a restore that follows one that was killed goes on with it.
+/// Moves the store in this folder to a folder within it; returns the path of that folder. Its name ends with `.partial`
+/// until the whole store is in it, and a restore that follows one that was killed continues with it.
 fn put_aside(data: &Path) -> io::Result<PathBuf> {
     let partial = match begun(data)? {
         Some(partial) => partial,
@@ -173,7 +175,8 @@ fn put_aside(data: &Path) -> io::Result<PathBuf> {
     Ok(aside)
 }
 
-/// The folder to which a restore that was killed has moved a part of this store: what is there is not here.
+/// The folder to which a restore that was killed has moved a part of this store, if there is one: no file is in both
+/// folders.
 fn begun(data: &Path) -> io::Result<Option<PathBuf>> {
     for entry in fs::read_dir(data)? {
         let entry = entry?;

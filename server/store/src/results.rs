@@ -1,4 +1,4 @@
-//! The result of a job: written, in pieces before its end, and read, part by part.
+//! Writes the result of a job, in pieces before the job ends, and reads it, part by part.
 
 use std::sync::Arc;
 
@@ -18,8 +18,8 @@ use super::{
 };
 
 impl Store {
-    /// Writes the content of a large result in several short transactions; false when the attempt is no longer the current
-    /// one. Small content is written when the job ends.
+    /// Writes the content of a large result in several short transactions, before the job ends; false when the attempt
+    /// is no longer the current one. Small content is written when the job ends.
     pub async fn write_before_end(
         self: &Arc<Self>,
         key: i64,
@@ -52,13 +52,13 @@ impl Store {
         Ok(true)
     }
 
-    /// Removes what was written of a result that no job has.
+    /// Removes the content of a result that was written for a job and attached to none.
     pub async fn discard_parts(self: &Arc<Self>, parts: &Parts) -> Result<()> {
         self.discard_content(&parts.fingerprints()).await
     }
 
-    /// Stores the partial result of a running job (its finished load steps) in place of an earlier one; false when the attempt is
-    /// no longer the current one.
+    /// Stores the partial result of a running job (its finished load steps) in place of an earlier one; false when the
+    /// attempt is no longer the current one.
     pub async fn write_partial(
         self: &Arc<Self>,
         key: i64,
@@ -80,7 +80,7 @@ impl Store {
         .await
     }
 
-    /// The memory that reading a part of the result of this job takes at most, in bytes; `None` if there is no such part.
+    /// The largest memory (bytes) that reading a part of the result of this job takes; `None` if there is no such part.
     pub async fn part_memory(self: &Arc<Self>, key: i64, part: &str) -> Result<Option<usize>> {
         let part = part.to_owned();
         self.read(move |store, connection| {
@@ -112,7 +112,7 @@ pub(super) fn attach(change: &mut Change<'_>, key: i64, parts: &Parts) -> Result
     Ok(())
 }
 
-/// Gives a job the result of another one.
+/// Gives the job `to` the result of the job `from`.
 pub(super) fn share(tx: &Connection, from: i64, to: i64) -> Result<()> {
     content::copy(tx, from, to, &name::OF_RESULT)
 }
@@ -122,14 +122,14 @@ pub(super) fn remove(tx: &Connection, key: i64) -> Result<()> {
     content::detach(tx, Holder::Job(key), &name::OF_RESULT)
 }
 
-/// The result of a job as it is stored: its index is read, its parts are not.
+/// The result of a job as it is stored: the index was read, the parts were not.
 pub(super) struct StoredResult {
     key: i64,
     content: Content,
-    /// The fields, if they are kept.
+    /// The content of the fields, if they are kept.
     fields: Option<Content>,
     entries: Vec<Entry>,
-    /// The first pieces, up to the end of the index.
+    /// The bytes of the first pieces, at least up to the end of the index.
     begin: Vec<u8>,
 }
 
@@ -178,13 +178,13 @@ impl StoredResult {
         entries.map(|entry| entry.name.as_str())
     }
 
-    /// The number of the content of the fields, and size and hash of their JSON.
+    /// The id of the content of the fields, and the size and hash of their JSON.
     pub(super) fn fields(&self) -> Option<(i64, &PartInfo)> {
         let (entry, _) = self.find(name::FIELDS)?;
         Some((self.fields.as_ref()?.id, &entry.info))
     }
 
-    /// An error if there should be fields: they were not deleted, and are not attached any more.
+    /// An error if the result had fields that were not deleted: they should be attached, and are missing.
     pub(super) fn must_have_no_fields(&self, connection: &Connection) -> Result<()> {
         let had_some = self.find(name::FIELDS).is_some();
         if had_some && !sizes::lost_fields(connection, self.key)? {
@@ -194,7 +194,7 @@ impl StoredResult {
         }
     }
 
-    /// A part in the index, with its place among the bytes of all parts.
+    /// The entry of a part in the index, with the place of its first byte after the index.
     fn find(&self, part: &str) -> Option<(&Entry, usize)> {
         let mut place = 0usize;
         for entry in &self.entries {
@@ -235,7 +235,7 @@ impl StoredResult {
         }
     }
 
-    /// Bytes after the index, from the pieces that have them.
+    /// The bytes from `place` after the index, from the pieces that have them.
     fn bytes(&self, connection: &Connection, place: usize, length: usize) -> Result<Vec<u8>> {
         let first = HEADER_BYTES + index_bytes(&self.begin).unwrap_or_default() + place;
         let end = first.saturating_add(length);
@@ -257,7 +257,7 @@ impl StoredResult {
         Ok(found)
     }
 
-    /// The memory that reading a part takes at most, in bytes; `None` if there is no such part.
+    /// The largest memory (bytes) that reading a part takes; `None` if there is no such part.
     fn memory_to_read(
         &self,
         connection: &Connection,

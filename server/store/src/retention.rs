@@ -1,8 +1,8 @@
-//! Retention: what has ended is removed when it is old, or when there is too much, the oldest first. Pinned jobs never are,
-//! and do not count.
+//! Retention: ended jobs are removed when they are old, or when they are too many or too large, the oldest first.
+//! Pinned jobs are never removed, and do not count.
 //!
-//! Sums of what owners keep have no checksums: they are compared with those of the jobs before anything is removed for being
-//! too much, and a job is removed only if its own record says that it ended so long ago.
+//! The sums of what owners keep have no checksums. They are compared with the sums of the jobs before anything is
+//! removed because there is too much, and a job is removed only if its own record says that it ended so long ago.
 
 use std::{
     collections::HashSet,
@@ -26,39 +26,40 @@ use super::{
     sql::Sql,
 };
 
-/// How long and how much is kept; `None` without limit.
+/// The limits of what is kept; `None` means no limit.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Retention {
-    /// Seconds after its end.
+    /// The time for which a job is kept after its end (s).
     pub age_s: Option<f64>,
-    /// Seconds that fields are kept, which are most of a result.
+    /// The time for which the fields of a job are kept after its end (s); fields are most of a result.
     pub fields_age_s: Option<f64>,
-    /// Jobs that have ended.
+    /// The largest number of ended jobs.
     pub jobs: Option<u64>,
-    /// Bytes of jobs that have ended.
+    /// The largest size of all ended jobs (bytes).
     pub bytes: Option<u64>,
-    /// Jobs of one owner.
+    /// The largest number of ended jobs of one owner.
     pub jobs_of_owner: Option<u64>,
-    /// Bytes of the jobs of one owner.
+    /// The largest size of the ended jobs of one owner (bytes).
     pub bytes_of_owner: Option<u64>,
 }
 
-/// Jobs that are read at a time: more than one transaction removes.
+/// The number of jobs that are read at a time: more than one transaction removes.
 const AT_ONCE: usize = 200;
 
-/// What has just ended is never removed for being too much: whoever waits for it must get it.
+/// The time (s) after its end in which a job is never removed because there is too much: clients that wait for it must
+/// get its result.
 const YOUNG_S: f64 = 60.0;
 
-/// The effect of one application of the limits.
+/// What one application of the limits has removed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Retired {
-    /// Jobs that were removed.
+    /// The number of jobs that were removed.
     pub jobs: usize,
-    /// Jobs whose fields were removed.
+    /// The number of jobs whose fields were removed.
     pub fields: usize,
 }
 
-/// What an owner keeps, or what is too much of that: jobs that have ended, and their bytes.
+/// The number and size of the ended jobs of an owner, or of those that are too much.
 #[derive(Clone, Debug)]
 struct Kept {
     owner: String,
@@ -84,7 +85,7 @@ pub(super) const OLDEST_OF_OWNER: &str =
      where job.owner = ? and job.finished_at is not null and pinned = 0 and job.finished_at < ?
      order by job.finished_at, id limit ?";
 
-/// But for what is pinned, who keeps most first.
+/// The number and size of every owner's ended jobs that are not pinned, owners with the largest size first.
 pub(super) const KEPT: &str =
     "select owner, owner_size.jobs - coalesce(pinned.jobs, 0), job_bytes - coalesce(pinned.bytes, 0)
      from owner_size left join
@@ -93,14 +94,15 @@ pub(super) const KEPT: &str =
            where pinned = 1 and job.finished_at is not null group by job.owner) pinned using (owner)
      order by 3 desc, owner";
 
-/// How often the limits are applied, and space is given back …
+/// The time between two applications of the limits, each of which also gives space back.
 const INTERVAL: Duration = Duration::from_secs(10);
-/// … and while the disk is full.
+/// The time between two applications of the limits while the disk is full.
 const INTERVAL_WHEN_FULL: Duration = Duration::from_secs(1);
-/// How often it is noted that time passes, in intervals.
+/// The number of applications of the limits after which the present moment is stored.
 const NOTED_EVERY: u32 = (NOTED_MICROS / INTERVAL.as_micros() as i64) as u32;
 
-/// What is removed for its age at once is told as a warning where it is at least so many jobs, and half of all.
+/// The number of jobs from which on a removal because of age is logged as a warning, if they are also at least half of
+/// all.
 const MUCH: i64 = 10;
 
 /// Keeps a store within its limits, and gives space back to the file system, until the store is dropped or closed.
@@ -147,7 +149,7 @@ async fn retire_regularly(store: Weak<Store>, retention: Retention) {
     }
 }
 
-/// Waits until the limits are to be applied again.
+/// Waits until the limits must be applied again.
 async fn pause(store: &Weak<Store>) {
     let mut left = INTERVAL;
     while !left.is_zero() {
@@ -161,7 +163,7 @@ async fn pause(store: &Weak<Store>) {
 }
 
 impl Store {
-    /// Removes what is no longer kept. Jobs that cannot be removed, since they are damaged, stay.
+    /// Removes jobs and fields that the limits no longer allow. Damaged jobs, which cannot be removed, stay.
     pub async fn retire(self: &Arc<Self>, retention: &Retention, now: Time) -> Result<Retired> {
         let now = self.by_our_clock(now);
         let mut retired = Retired::default();
@@ -205,7 +207,7 @@ impl Store {
         }
     }
 
-    /// Warns before much is removed for its age.
+    /// Logs a warning if the jobs that ended before `before`, which are about to be removed for their age, are many.
     async fn tell_if_much(self: &Arc<Self>, before: Time) -> Result<()> {
         self.read(move |_, connection| {
             let old: i64 = connection.value(COUNT_OLD, [before.micros()])?;
@@ -225,7 +227,7 @@ impl Store {
         .await
     }
 
-    /// Discards all that a statement finds from before this time; how many jobs.
+    /// Discards the jobs that `statement` finds, which ended before `before`, or their fields; returns how many.
     async fn discard_old(
         self: &Arc<Self>,
         statement: &'static str,
@@ -253,7 +255,8 @@ impl Store {
         }
     }
 
-    /// Discards the first of these jobs; how many. Those that it meets and cannot discard are left alone.
+    /// Discards the first of these jobs, or their fields; returns how many. Jobs that cannot be discarded are added to
+    /// `left_alone`.
     async fn discard(
         self: &Arc<Self>,
         what: &Discard,
@@ -283,7 +286,7 @@ impl Store {
         Ok(discarded)
     }
 
-    /// An error unless the sums by owner are those of the jobs and meshes.
+    /// An error unless the sums by owner match the jobs and meshes.
     pub(super) async fn compare_sums(self: &Arc<Self>) -> Result<()> {
         self.read(|_, connection| {
             let differ: bool = connection.value(
@@ -308,7 +311,7 @@ Ok(())
         .await
     }
 
-    /// When retention begins, if the store is from before it.
+    /// The time from which on jobs are removed, if the store was written by a version that kept everything.
     async fn retention_begins(self: &Arc<Self>) -> Result<Option<Time>> {
         self.read(|_, connection| {
             let begins = "select value from setting where name = 'retention_begins'";
@@ -322,7 +325,7 @@ Ok(())
         .await
     }
 
-    /// Tells in the log what will be removed, if the store is from before retention.
+    /// Logs what will be removed, if the store was written by a version that kept everything.
     async fn announce(self: &Arc<Self>, retention: &Retention) -> Result<()> {
         let begins = self.retention_begins().await?;
         let Some(begins) = begins.filter(|at| self.now() < *at) else {
@@ -341,7 +344,7 @@ Ok(())
         Ok(())
     }
 
-    /// About how many jobs, and bytes of them, would be removed at this time of those that there are.
+    /// About how many of the present jobs the limits would remove at the time `at`, and their size (bytes).
     pub(super) async fn foreseen(
         self: &Arc<Self>,
         retention: &Retention,
@@ -379,7 +382,8 @@ Ok(())
     }
 }
 
-/// Some jobs that are too much: of one owner, or of all, and then of those who keep most.
+/// Some of the oldest jobs beyond the limits: of one owner beyond the limits of an owner; otherwise, beyond the limits
+/// of all, of the owners who keep most.
 fn too_much(
     connection: &Connection,
     retention: &Retention,
@@ -426,7 +430,7 @@ fn too_much(
     Ok(keys)
 }
 
-/// What every owner keeps.
+/// What every owner keeps, without pinned jobs.
 fn kept(connection: &Connection) -> Result<Vec<Kept>> {
     let count = |count: i64| u64::try_from(count).unwrap_or(0);
     connection.rows(KEPT, (), |row| {
@@ -438,7 +442,7 @@ fn kept(connection: &Connection) -> Result<Vec<Kept>> {
     })
 }
 
-/// The oldest jobs of an owner with their bytes, as many as are too many or have the bytes that are too many.
+/// The oldest jobs of an owner with their sizes (bytes), until their number and their size make up the excess.
 fn oldest(
     connection: &Connection,
     excess: &Kept,
@@ -471,7 +475,8 @@ fn oldest(
     Ok(found)
 }
 
-/// By how much each of these amounts is reduced so that their sum is within the limit: the largest, to an even rest.
+/// By how much each of these amounts must be reduced so that their sum is within the limit. The largest amounts are
+/// reduced, all to the same rest.
 fn reductions(amounts: &[u64], limit: Option<u64>) -> Vec<u64> {
     let mut left = limit.unwrap_or(u64::MAX);
     let mut rising = amounts.to_vec();

@@ -1,5 +1,5 @@
-//! A row of the table `job`: read, checked, and written. Only this file has statements that write this table, but for `old_content`, which moves
-//! what earlier versions stored.
+//! Reads, checks and writes rows of the table `job`. Only this file has statements that write this table, except
+//! `old_content`, which moves what earlier versions stored.
 
 use std::{collections::BTreeMap, str::FromStr};
 
@@ -20,23 +20,23 @@ use super::{
     sql::{Sql, optional_text, text},
 };
 
-/// All that is stored in a row: the job as clients see it, and what only the store needs.
+/// All data of a row: the job as clients see it, and what only the store needs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct JobRow {
     pub(super) job: Job,
-    /// The problem's title.
+    /// The title of the problem.
     pub(super) title: Option<String>,
-    /// Fingerprint of everything that the client submitted; none in rows of early versions.
+    /// The fingerprint of everything that the client submitted; `None` in rows of early versions.
     pub(super) payload: Option<String>,
-    /// When it fails unless it was started before.
+    /// The time at which the job fails unless it was started before.
     pub(super) expires_at: Option<Time>,
-    /// The version of this program that ended it.
+    /// The version of the program that ended the job.
     pub(super) solver_version: Option<String>,
-    /// Number of its last event.
+    /// The number of the job's last event.
     pub(super) last_seq: i64,
 }
 
-/// The error that a job is missing which must exist.
+/// The error that a job which must exist is missing.
 pub(super) fn missing(key: i64) -> StoreError {
     Record::of_job(key, "record").damaged("it is missing")
 }
@@ -46,7 +46,7 @@ pub(super) fn find(connection: &Connection, key: i64) -> Result<Option<Job>> {
     Ok(find_row(connection, key)?.map(|(row, _)| row.job))
 }
 
-/// The row of the job with this key, if it still exists, and its values as they are stored.
+/// The row of the job with this key, if it still exists, and the values of its columns.
 pub(super) fn find_row(connection: &Connection, key: i64) -> Result<Option<(JobRow, Vec<Value>)>> {
     connection.row("select * from job where id = ?", [key], checked)
 }
@@ -71,7 +71,7 @@ pub(super) fn next_key(tx: &Connection) -> Result<i64> {
     tx.value(next, ())
 }
 
-/// Inserts a row; returns its values as they are stored.
+/// Inserts a row; returns the values of its columns.
 pub(super) fn insert(tx: &Connection, row: &JobRow) -> Result<Vec<Value>> {
     let (names, values) = row.columns()?;
     let places = "?, ".repeat(names.len());
@@ -85,8 +85,8 @@ pub(super) fn insert(tx: &Connection, row: &JobRow) -> Result<Vec<Value>> {
     Ok(values)
 }
 
-/// Writes a row that is in the table as `stored`, and its checksum; returns its values as they are stored now. Columns that
-/// stay as they are, and with them their indexes, are not written.
+/// Writes a row, of which the table has the values `stored`, with its checksum; returns its new values. Columns that
+/// stay as they are, and their indexes, are not written.
 pub(super) fn update(tx: &Connection, stored: &[Value], row: &JobRow) -> Result<Vec<Value>> {
     let (names, values) = row.columns()?;
     let columns = names.iter().zip(values.iter().zip(stored));
@@ -105,7 +105,7 @@ pub(super) fn update(tx: &Connection, stored: &[Value], row: &JobRow) -> Result<
     }
 }
 
-/// Deletes a job, and what only this job has.
+/// Deletes a job, and the data that no other job shares.
 pub(super) fn delete(tx: &Connection, job: &Job, now: Time) -> Result<()> {
     tx.run(
         "insert into deleted_job (uuid, id, owner, deleted_at) values (?, ?, ?, ?)",
@@ -123,12 +123,12 @@ pub(super) fn delete(tx: &Connection, job: &Job, now: Time) -> Result<()> {
     Ok(())
 }
 
-/// A row of the table as a job, if it is as it was written.
+/// The job of a row of the table, if the checksum matches.
 pub(super) fn from_row(row: &Row<'_>) -> Result<Job> {
     checked(row).map(|(row, _)| row.job)
 }
 
-/// A row of the table, if it is as it was written, and its values.
+/// A row of the table, and its values, if the checksum matches.
 fn checked(row: &Row<'_>) -> Result<(JobRow, Vec<Value>)> {
     let read = || {
         let values = checksum::values(row)?;
@@ -217,7 +217,7 @@ fn parse(row: &Row<'_>) -> Result<JobRow> {
 }
 
 impl JobRow {
-    /// Fills in what follows from the rest.
+    /// Computes the job's waiting time, running time and links from its other fields.
     pub(super) fn derive(&mut self) {
         let job = &mut self.job;
         let started = job.started_at;
@@ -227,8 +227,8 @@ impl JobRow {
         job.links = links(job);
     }
 
-    /// Names and values of its columns, in the order of the table, but for the checksum. A column that a migration adds is
-    /// added here and where rows are read.
+    /// The names and values of the row's columns, in the order of the table, without the checksum. A column that a
+    /// migration adds is added here and where rows are read.
     fn columns(&self) -> Result<(Vec<&'static str>, Vec<Value>)> {
         let job = &self.job;
         let uuid = |id: Option<JobId>| Value::from(id.map(|id| id.0.to_string()));
@@ -286,7 +286,7 @@ fn word_of(word: impl Into<&'static str>) -> Value {
     word.to_owned().into()
 }
 
-/// The value of a word in this column.
+/// The value that this word stands for in this column.
 fn word<T: FromStr>(column: &str, text: &str) -> Result<T> {
     text.parse().map_err(|_| corrupt(column))
 }
@@ -318,7 +318,7 @@ fn links(job: &Job) -> BTreeMap<String, String> {
         .collect()
 }
 
-/// The figures that can be drawn of a job, as far as its row says.
+/// The names of the figures that can be drawn of a job, as far as its row tells.
 fn plots(job: &Job) -> Vec<&'static str> {
     // without contacts there is one iteration without a residual; a job that was answered by another one has counted none itself
     let iterations = job.progress.as_ref().is_some_and(|made| {

@@ -1,5 +1,5 @@
-//! The rules of a job: which status may follow which (`base::job::Status::may_become`), what each verb does to a job, and what follows from a change of its
-//! row: a version, an event, a line in the log. No I/O.
+//! The rules of a job: what each operation does to a job, and what follows from a change of its row: a version, an
+//! event, a line in the log. Which status may follow which is in `base::job::Status::may_become`. No I/O.
 
 use base::{
     event::{Payload, Requeue},
@@ -15,7 +15,7 @@ use super::{
     submission::NewJob,
 };
 
-/// Attempts that may end with the process before a job fails.
+/// The number of attempts that may end with the death of the process before a job fails.
 const MAX_ATTEMPTS: i32 = 3;
 
 /// How a job ends.
@@ -23,19 +23,19 @@ const MAX_ATTEMPTS: i32 = 3;
 pub struct Ending {
     /// A terminal status.
     pub status: Status,
-    /// Why, unless it succeeded.
+    /// The reason, unless the job succeeded.
     pub reason: Option<Reason>,
-    /// What went wrong, if it failed.
+    /// What went wrong, if the job failed.
     pub failure: Option<Failure>,
-    /// The result that is stored with it.
+    /// Whether the job has a result, partial or final.
     pub result: ResultAvailable,
-    /// The worst warnings of that result.
+    /// The worst warnings about the result.
     #[serde(default)]
     pub warnings: Vec<Warning>,
 }
 
 impl Ending {
-    /// Canceled, without a result.
+    /// The end of a canceled job without a result.
     pub fn canceled() -> Self {
         let reason = Some(Reason::UserCancel);
         Ending {
@@ -47,12 +47,12 @@ impl Ending {
         }
     }
 
-    /// Failed, since what it needs is damaged.
+    /// The end of a job that failed because data that it needs are damaged.
     pub(super) fn damaged(damage: &Damage) -> Self {
         Ending::failed(Reason::Internal, damage.to_string())
     }
 
-    /// Failed, without a result.
+    /// The end of a job that failed without a result.
     pub fn failed(reason: Reason, detail: impl Into<String>) -> Self {
         let failure = Some(Failure::new(reason, detail));
         Ending {
@@ -64,7 +64,7 @@ impl Ending {
         }
     }
 
-    /// The end of a job that is answered by the result of this one.
+    /// The end of a job that is answered with the result of the job `source`.
     pub(super) fn like(source: &Job) -> Self {
         Ending {
             status: source.status,
@@ -75,7 +75,8 @@ impl Ending {
         }
     }
 
-    /// The end of a job that a client has asked to stop: what was found before the solver noticed that is a partial result.
+    /// The end of a job that a client has asked to stop, given the end that its solver reports: a result that was found
+    /// before the solver noticed the request is kept as a partial result.
     pub(super) fn after_a_request_to_stop(&self) -> Self {
         match self.status {
             Status::Succeeded => Ending {
@@ -88,7 +89,7 @@ impl Ending {
     }
 }
 
-/// What the request of a client to cancel a job does.
+/// What a client's request to cancel a job does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Cancel {
     /// The job does not run, and ends at once.
@@ -101,18 +102,18 @@ pub(super) enum Cancel {
     TooLate,
 }
 
-/// What becomes of a job that ran when the service stopped, or whose process died.
+/// What happens to a job that was running when the service stopped, or whose process died.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Interrupted {
-    /// A client has asked it to stop: it ends.
+    /// The job ends, since a client has asked it to stop.
     Cancel,
     /// The job waits again.
     Requeue(Requeue),
-    /// The process died in the last attempt that it had: it fails.
+    /// The job fails, since its process died in its last attempt.
     Fail,
 }
 
-/// What canceling this job does.
+/// What a request to cancel this job does.
 pub(super) fn canceling(job: &Job) -> Cancel {
     match job.status {
         Status::Queued => Cancel::End,
@@ -122,7 +123,7 @@ pub(super) fn canceling(job: &Job) -> Cancel {
     }
 }
 
-/// What becomes of a running job that is interrupted for this reason; `stop`: a client has asked it to stop.
+/// What happens to a running job that is interrupted for this reason; `stop`: whether a client has asked it to stop.
 pub(super) fn interrupted(job: &Job, why: Requeue, stop: bool) -> Interrupted {
     match why {
         _ if stop => Interrupted::Cancel,
@@ -132,7 +133,7 @@ pub(super) fn interrupted(job: &Job, why: Requeue, stop: bool) -> Interrupted {
 }
 
 impl JobRow {
-    /// A job that is accepted now; `key`: its number.
+    /// The row of a job that is accepted now; `key` is the job's number.
     pub(super) fn accepted(key: i64, owner: &str, new: &NewJob, now: Time) -> JobRow {
         let job = Job {
             key,
@@ -165,7 +166,7 @@ impl JobRow {
         row
     }
 
-    /// An attempt starts.
+    /// Starts an attempt.
     pub(super) fn start(&mut self, now: Time) -> Result<()> {
         self.becomes(Status::Running)?;
         let job = &mut self.job;
@@ -178,7 +179,7 @@ impl JobRow {
         Ok(())
     }
 
-    /// Starts a job that is ended at once with the result of another job of the same input.
+    /// Starts a job that ends at once with the result of the job `source`, which has the same input.
     pub(super) fn start_with_answer(&mut self, source: &Job, now: Time) -> Result<()> {
         self.start(now)?;
         self.job.cached_from = Some(source.id);
@@ -201,7 +202,7 @@ impl JobRow {
         Ok(())
     }
 
-    /// The job waits again.
+    /// Lets the job wait again.
     pub(super) fn requeue(&mut self, why: Requeue, now: Time) -> Result<()> {
         self.becomes(Status::Queued)?;
         // The attempt keeps its number, by which events are distinguished; if it does not count, one more is allowed.
@@ -210,12 +211,12 @@ impl JobRow {
         Ok(())
     }
 
-    /// A client asks it to stop while it runs.
+    /// Records that a client has asked the running job to stop.
     pub(super) fn ask_to_stop(&mut self) {
         self.job.cancel_requested = true;
     }
 
-    /// Begins the time that the job may wait, now.
+    /// Begins the time for which the job may wait at `now`.
     pub(super) fn waits_from(&mut self, now: Time) {
         self.expires_at = Some(now.after_s(self.job.limits.queue_ttl_s));
     }
@@ -238,14 +239,14 @@ impl JobRow {
     }
 }
 
-/// Whether a change is one of those that the version counts: of the status, a request to stop, an edit; not progress.
+/// Whether the version counts a change: of the status, a request to stop, or an edit; not of the progress.
 pub(super) fn is_new_version(old: &Job, new: &Job) -> bool {
     let counted = |job: &Job| (job.status, job.cancel_requested, job.priority, job.pinned);
     counted(old) != counted(new) || old.name != new.name || old.labels != new.labels
 }
 
-/// The event for a change of status; none if the status did not change, or if the job has ended: `end_job` makes the event of the
-/// end, which also tells what the job keeps in the store.
+/// The event of a change of status; `None` if the status did not change, or if the job has ended: `end_job` makes the
+/// event of the end, which also tells what the job keeps in the store.
 pub(super) fn event(old: Option<&Job>, new: &Job, now: Time) -> Option<(Time, Payload)> {
     if old.is_some_and(|old| old.status == new.status) {
         return None;
@@ -269,19 +270,19 @@ pub(super) fn event(old: Option<&Job>, new: &Job, now: Time) -> Option<(Time, Pa
     }
 }
 
-/// The end of a job, as the log and the counters tell it.
+/// The end of a job, as it is logged and counted.
 #[derive(Debug, PartialEq)]
 pub(super) struct Ended {
     pub(super) owner: String,
-    /// How long it waited and ran, if it ran.
+    /// The times for which the job waited and ran (s), if it ran.
     pub(super) times_s: Option<(f64, f64)>,
     pub(super) status: Status,
     pub(super) reason: Option<Reason>,
-    /// What went wrong.
+    /// What went wrong; empty if nothing did.
     pub(super) detail: String,
 }
 
-/// The end of a job, if this change was it.
+/// The end of a job, if this change is its end.
 pub(super) fn ended(old: &Job, new: &Job) -> Option<Ended> {
     if old.status.is_terminal() || !new.status.is_terminal() {
         return None;

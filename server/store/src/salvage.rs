@@ -1,4 +1,4 @@
-//! Copying what is intact to a new store, row by row.
+//! Copies intact data to a new store, row by row.
 
 use std::{path::Path, sync::Arc};
 
@@ -16,7 +16,7 @@ use super::{
     sql::Sql,
 };
 
-/// A store in a folder that must be empty or missing.
+/// Opens a new store in a folder that must be empty or missing.
 pub(super) async fn new_store(folder: &Path) -> Result<Arc<Store>> {
     let folder = folder.to_owned();
     let created = blocking(move || {
@@ -37,7 +37,7 @@ pub(super) async fn new_store(folder: &Path) -> Result<Arc<Store>> {
     Ok(store)
 }
 
-/// Copies a job with its events, and with its problem, its result and whatever else is attached to it.
+/// Copies a job with its events, its problem, its result and whatever else is attached to it.
 pub(super) fn copy_job(source: &Connection, tx: &Connection, job: &Job) -> Result<()> {
     for (table, statement) in [
         ("job", "select * from job where id = ?"),
@@ -56,7 +56,7 @@ pub(super) fn copy_job(source: &Connection, tx: &Connection, job: &Job) -> Resul
     copy_content(source, tx, Holder::Job(job.key))
 }
 
-/// Copies what is attached, one after the other.
+/// Copies the content that is attached to a job or mesh, one after the other.
 pub(super) fn copy_content(source: &Connection, tx: &Connection, holder: Holder) -> Result<()> {
     for attached in content::all(source, holder)? {
         let bytes = attached.read(source)?;
@@ -65,7 +65,7 @@ pub(super) fn copy_content(source: &Connection, tx: &Connection, holder: Holder)
     Ok(())
 }
 
-/// Copies what can be read of the rest, and sets right what refers to jobs that were not copied.
+/// Copies other data that can be read, and corrects what refers to jobs or meshes that were not copied.
 pub(super) fn copy_the_rest(source: &Connection, target: &Writer<'_>, last: i64) -> Result<()> {
     let mut change = target.change()?;
     let lost_fields = "select job_id from job_size where fields = 2";
@@ -94,7 +94,7 @@ pub(super) fn copy_the_rest(source: &Connection, target: &Writer<'_>, last: i64)
     change.commit().map(drop)
 }
 
-/// A row as it was read from a table: the names of its columns, and its values.
+/// A row of a table: the names of its columns, and its values.
 pub(super) struct StoredRow {
     names: Vec<String>,
     values: Vec<Value>,
@@ -110,7 +110,7 @@ impl StoredRow {
         Ok(StoredRow { names, values })
     }
 
-    /// Inserts it into the same table of another store.
+    /// Inserts the row into the same table of another store.
     pub(super) fn insert(&self, tx: &Connection, table: &str) -> Result<()> {
         let names = self.names.join(", ");
         let places = vec!["?"; self.names.len()].join(", ");
@@ -119,7 +119,7 @@ impl StoredRow {
         Ok(())
     }
 
-    /// The number of the row, if it has one.
+    /// The value of the row's column `id`, if there is one.
     pub(super) fn id(&self) -> Option<i64> {
         let place = self.names.iter().position(|name| name == "id")?;
         match self.values[place] {

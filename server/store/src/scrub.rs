@@ -1,8 +1,9 @@
-//! Reads what is found by a key, a name or a hash, at the start and then once a day, beside the work: what an index lacks, or
-//! whose key has changed, would be said not to exist. Before a request key is said to be new the keys were read once.
+//! Reads the tables whose rows are found by a key, a name or a hash, at the start and then once a day, in the
+//! background: the service would say that a row does not exist which an index lacks, or whose key has changed. A
+//! request key counts as new only after the keys were read once.
 //!
-//! Events and what is attached to jobs and meshes are too large for it. Of them nothing is found by its content: they are
-//! compared when they are read, and by `doctor`.
+//! Events, and content attached to jobs and meshes, are too large for this, and are never searched by their content.
+//! They are compared with their checksums when they are read, and by `doctor`.
 
 use std::{path::Path, sync::Weak, time::Duration};
 
@@ -18,22 +19,25 @@ use super::{
     sweeps,
 };
 
-/// How long after one reading the next begins.
+/// The time between two readings.
 const PAUSE: Duration = Duration::from_secs(86_400);
-/// A table that cannot be read, for lack of memory or of files, is read once more, so often and after such a time.
+/// How often a table that cannot be read, for lack of memory or of files, is read again.
 const TRIES: u32 = 5;
+/// The time before a table is read again.
 const BEFORE_ANOTHER: Duration = Duration::from_secs(1);
-/// Jobs that are read at a time, and the pause after them: others need the processors, too.
+/// The number of jobs that are read at a time.
 const JOBS_AT_ONCE: i64 = 500;
+/// The pause after these jobs, in which other work has the processors.
 const BETWEEN: Duration = Duration::from_millis(20);
 
-/// What is found by a job, and hides no key.
+/// The name of an index in errors; its damage hides no request key.
 const BY_JOB: &str = "index of the request keys by job";
 
-/// What is wrong with a row.
+/// A function that returns an error if a row is damaged.
 type Check = fn(&Row<'_>) -> Result<()>;
 
-/// Tables whose rows are few, or small, with the check of a row if it has a checksum.
+/// The tables with few or small rows, each with the check of a row, if its rows have a checksum and are not read
+/// elsewhere.
 const TABLES: [(Table, &str, Option<Check>); 9] = [
     (Table::Keys, "request_key", Some(keys::check)),
     (Table::Jobs, "job", None),
@@ -55,14 +59,14 @@ const TABLES: [(Table, &str, Option<Check>); 9] = [
 ];
 
 impl Store {
-    /// Waits until the request keys were read once.
+    /// Waits until the request keys were read once since the store was opened.
     pub(super) async fn keys_were_read(&self) {
         // an error: the store is closed
         let _ = self.keys_read.subscribe().wait_for(|read| *read).await;
     }
 }
 
-/// Reads all of it, until the store is dropped.
+/// Reads the tables again and again, until the store is dropped.
 pub(super) async fn scrub(store: Weak<Store>) {
     while store.strong_count() > 0 {
         read_once(&store).await;
@@ -70,7 +74,7 @@ pub(super) async fn scrub(store: Weak<Store>) {
     }
 }
 
-/// Reads all of it once.
+/// Reads all of the tables once.
 pub(super) async fn read_once(store: &Weak<Store>) {
     let Some(file) = store.upgrade().map(|store| store.folder.database()) else {
         return;
@@ -177,7 +181,7 @@ fn rows_of(
     Ok(())
 }
 
-/// Reads the records of all jobs.
+/// Reads the records of all jobs, and records damage.
 async fn read_jobs(store: &Weak<Store>) -> Result<()> {
     let mut after = 0;
     loop {

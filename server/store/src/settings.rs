@@ -1,4 +1,4 @@
-//! Settings that can be changed while the service runs, and are kept across restarts.
+//! Settings that can be changed while the service runs, and are kept across restarts; and the memory budget.
 
 use std::sync::{Arc, atomic::Ordering};
 
@@ -18,7 +18,7 @@ impl Store {
         .await
     }
 
-    /// Sets the memory that running jobs share; once and before any is claimed.
+    /// Sets the memory that running jobs share; must be called once, before any job is claimed.
     pub fn set_budget(&self, budget: Arc<Budget>) {
         let _ = self.budget.set(budget); // fails if it is set already, which is kept
     }
@@ -33,7 +33,7 @@ impl Store {
         self.paused.load(Ordering::Relaxed)
     }
 
-    /// Pauses or resumes the queue; kept across restarts.
+    /// Pauses or resumes the queue; this is kept across restarts.
     pub async fn set_paused(self: &Arc<Self>, paused: bool) -> Result<()> {
         self.control(move |writer| {
             let tx = writer.begin_control()?;

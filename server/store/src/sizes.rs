@@ -1,4 +1,4 @@
-//! What jobs and owners keep, in bytes.
+//! The sizes of what jobs and owners keep, in bytes.
 
 use std::{collections::HashMap, sync::Arc};
 
@@ -7,27 +7,27 @@ use rusqlite::Connection;
 
 use super::{database::Store, error::Result, sql::Sql};
 
-/// What an owner keeps.
+/// The size of what an owner keeps.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct OwnerSize {
     /// The name of the owner.
     pub owner: String,
-    /// Jobs that have ended.
+    /// The number of ended jobs.
     pub jobs: u64,
-    /// Bytes of these: results, problems, events, members of sweeps.
+    /// The size of the ended jobs (bytes): results, problems, events, members of sweeps.
     pub job_bytes: u64,
-    /// Bytes of the meshes that they have uploaded.
+    /// The size of the meshes that the owner has uploaded (bytes).
     pub mesh_bytes: u64,
 }
 
 impl OwnerSize {
-    /// All bytes.
+    /// The size of jobs and meshes together (bytes).
     pub fn bytes(&self) -> u64 {
         self.job_bytes + self.mesh_bytes
     }
 }
 
-/// The columns of an owner's size.
+/// The columns of a row of the table `owner_size`.
 type Columns = (String, i64, i64, i64);
 
 fn size((owner, jobs, job_bytes, mesh_bytes): Columns) -> OwnerSize {
@@ -46,7 +46,7 @@ pub(super) const WAITING_BYTES: &str = "select coalesce(sum(bytes), 0) from cont
                where owner = ? and status = 'queued' group by input_hash))";
 
 impl Store {
-    /// What an owner keeps.
+    /// The size of what an owner keeps.
     pub async fn size_of_owner(self: &Arc<Self>, owner: &str) -> Result<OwnerSize> {
         let owner = owner.to_owned();
         self.read(move |_, connection| {
@@ -64,7 +64,7 @@ impl Store {
         .await
     }
 
-    /// Bytes of the problems of an owner's jobs that wait, each once.
+    /// The size of the problems of an owner's waiting jobs (bytes), each problem once.
     pub async fn waiting_bytes_of(self: &Arc<Self>, owner: &str) -> Result<u64> {
         let owner = owner.to_owned();
         self.read(move |_, connection| {
@@ -74,7 +74,7 @@ impl Store {
         .await
     }
 
-    /// What every owner keeps, who keeps most first: at most `limit` of them.
+    /// The sizes of what owners keep, the largest first, of at most `limit` owners.
     pub async fn sizes_of_owners(self: &Arc<Self>, limit: i64) -> Result<Vec<OwnerSize>> {
         self.read(move |_, connection| {
             connection.rows(
@@ -87,20 +87,20 @@ impl Store {
         .await
     }
 
-    /// Whether the fields of this job were deleted by themselves.
+    /// Whether the fields of this job were deleted alone, and the job was kept.
     pub async fn lost_fields(self: &Arc<Self>, key: i64) -> Result<bool> {
         self.read(move |_, connection| lost_fields(connection, key))
             .await
     }
 }
 
-/// Whether the fields of a job were deleted by themselves.
+/// Whether the fields of a job were deleted alone, and the job was kept.
 pub(super) fn lost_fields(connection: &Connection, key: i64) -> Result<bool> {
     let lost = "select exists (select 1 from job_size where job_id = ? and fields = 2)";
     connection.value(lost, [key])
 }
 
-/// Counts what a job keeps that has just ended.
+/// Counts the size of a job that has just ended.
 pub(super) fn count(tx: &Connection, key: i64) -> Result<()> {
     tx.run(
         "insert into job_size (job_id, owner, bytes, finished_at, fields)
@@ -110,7 +110,7 @@ pub(super) fn count(tx: &Connection, key: i64) -> Result<()> {
     Ok(())
 }
 
-/// Fills in what jobs keep.
+/// Fills in the sizes of ended jobs.
 pub(super) fn add_sizes(connection: &Connection, jobs: &mut [&mut Job]) -> Result<()> {
     let ended = jobs.iter().filter(|job| job.status.is_terminal());
     let keys: Vec<i64> = ended.map(|job| job.key).collect();

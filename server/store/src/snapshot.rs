@@ -1,4 +1,4 @@
-//! Reading the result of a job.
+//! Reads the result of a job.
 
 use parking_lot::Mutex;
 use std::sync::Arc;
@@ -24,7 +24,7 @@ use super::{
 };
 
 impl Store {
-    /// Size and hash of the JSON of the fields of this job, if they were read whole and found intact before.
+    /// The size and hash of the JSON of this job's fields, if the fields were read whole and found intact before.
     pub async fn fields_info(self: &Arc<Self>, key: i64) -> Result<Option<PartInfo>> {
         self.read(move |store, connection| {
             let found = StoredResult::of(connection, key)?;
@@ -35,12 +35,12 @@ impl Store {
         .await
     }
 
-    /// The memory that reading the fields of this job takes at most, in bytes; `None` if there are none.
+    /// The largest memory (bytes) that reading the fields of this job takes; `None` if it has none.
     pub async fn fields_memory(self: &Arc<Self>, key: i64) -> Result<Option<usize>> {
         self.part_memory(key, name::FIELDS).await
     }
 
-    /// The fields of this job, with size and hash of their JSON.
+    /// The fields of this job, and the size and hash of their JSON.
     pub async fn fields(self: &Arc<Self>, key: i64) -> Result<Option<(PartInfo, Fields)>> {
         self.read(move |store, connection| {
             let Some(found) = StoredResult::of(connection, key)? else {
@@ -64,8 +64,8 @@ impl Store {
         .await
     }
 
-    /// A job and its result at one moment: the parts may be replaced while the job runs, and are removed when it is
-    /// deleted.
+    /// A job and its result at one moment: the parts may be replaced while the job runs, and are removed when the job
+    /// is deleted.
     pub async fn snapshot(self: &Arc<Self>, owners: Owners, id: JobId) -> Result<Option<Snapshot>> {
         let (lease, store) = (self.reader.turn().await?, self.clone());
         blocking(move || {
@@ -80,19 +80,19 @@ impl Store {
 pub struct Snapshot {
     /// The job, without its queue position.
     pub job: Job,
-    /// A thread that may block has it while it reads.
+    /// What is stored of the job; a thread that may block has it while it reads.
     stored: Arc<Mutex<Stored>>,
     damages: Arc<Damages>,
 }
 
-/// What is stored of a job at one moment.
+/// The stored state of the database at one moment.
 struct Stored {
     moment: Moment,
-    /// The result of the job, once it was asked for.
+    /// The result of the job, once it was read.
     result: Option<StoredResult>,
 }
 
-/// A connection in a transaction that sees one state.
+/// A connection in a transaction that sees one state of the database.
 struct Moment(Lease);
 
 impl Moment {
@@ -145,7 +145,7 @@ impl Snapshot {
         Ok(read.await?.flatten())
     }
 
-    /// The profile of a boundary, at the end or at the end of a load step (from 0).
+    /// The JSON of the profile of a boundary, at the end of the problem or of a load step (from 0).
     pub async fn profile(
         &mut self,
         boundary: &str,
@@ -168,7 +168,7 @@ impl Snapshot {
         Ok(names.await?.unwrap_or_default())
     }
 
-    /// The iterations of the job's attempt, each as the JSON of its event, in order.
+    /// The iterations of the job's current attempt, each as the JSON of its event, in order.
     pub async fn iterations(&mut self) -> Result<Vec<String>> {
         let (key, attempt) = (self.job.key, self.job.attempt);
         self.read(move |stored| events::iterations(stored.moment.connection()?, key, attempt))

@@ -1,4 +1,4 @@
-//! The space of the database on the disk: how much it is, and what is free in it given back to the file system.
+//! The space of the database on the disk: tells its size, and gives free space back to the file system.
 
 use std::{path::Path, sync::Arc};
 
@@ -13,17 +13,17 @@ use super::{
     sql::Sql,
 };
 
-/// Free pages that stay in the file, since new rows fill them soon: 4 MiB.
+/// The number of free pages that stay in the file, since new rows fill them soon: 4 MiB.
 const KEPT_PAGES: i64 = 1024;
 
 /// The space of a store, in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Space {
-    /// Of the database and its write-ahead log.
+    /// The size of the database and its write-ahead log.
     pub used: u64,
-    /// Of it without content, for what comes next.
+    /// The part of the database without content, which later data will fill.
     pub unused: u64,
-    /// What the file system has left.
+    /// The free space of the file system.
     pub free: u64,
 }
 
@@ -40,12 +40,13 @@ impl Store {
         })
     }
 
-    /// The pages of its database.
+    /// The pages of the store's database.
     async fn pages(self: &Arc<Self>) -> Result<Pages> {
         self.read(|_, connection| Pages::of(connection)).await
     }
 
-    /// Gives free pages back to the file system, as long as there are many, or all of them if the disk is full; how many were.
+    /// Gives free pages back to the file system if there are many, or all of them if the disk is full; returns how
+    /// many.
     pub async fn give_space_back(self: &Arc<Self>) -> Result<i64> {
         let gives_back = self.read(|_, connection| compact::gives_back(connection));
         let given = if gives_back.await? {
@@ -57,7 +58,8 @@ impl Store {
         Ok(given)
     }
 
-    /// Takes free pages out of the database, some at a time. Its file still has them until the log is copied into it.
+    /// Takes free pages out of the database, some at a time; returns how many. The file has them until the log is
+    /// copied into it.
     async fn free_pages(self: &Arc<Self>) -> Result<i64> {
         let kept = match self.has_room() {
             Ok(()) => KEPT_PAGES,
@@ -88,8 +90,8 @@ impl Store {
         }
     }
 
-    /// Makes the files of the database as small as what is in them: SQLite does so only after a thousand more pages were
-    /// written, and never on a disk that is full. Where a reader still needs what is in the log, the next call does it.
+    /// Shrinks the files of the database to the size of their content: SQLite does so only after a thousand more pages
+    /// were written, and never on a full disk. If a reader still needs pages of the log, the next call does it.
     async fn shorten_files(self: &Arc<Self>) -> Result<()> {
         let pages = self.pages().await?;
         let content = pages.bytes_of(pages.count);
@@ -111,19 +113,20 @@ impl Store {
         .await
     }
 
-    /// Bytes of a file in its folder.
+    /// The size of a file in the store's folder (bytes).
     fn length(&self, name: &str) -> u64 {
         std::fs::metadata(self.folder.path().join(name)).map_or(0, |file| file.len())
     }
 }
 
-/// As small as the database can become, in bytes: without free pages, and some that tell where others are.
+/// The smallest size of the database (bytes): without its free pages, and without some pages that tell where others
+/// are.
 fn least_bytes(pages: Pages) -> u64 {
     let of_places = pages.count / 500 + 2;
     pages.bytes_of(pages.count - pages.free - of_places)
 }
 
-/// Rebuilds the database of a store that no service uses; its size before and after, in bytes.
+/// Rebuilds the database of a store that no service uses; returns its size before and after (bytes).
 pub async fn compact_folder(folder: &Path) -> Result<(u64, u64)> {
     if !folder.join(DATABASE).exists() {
         let text = format!("there is no store in {}", folder.display());

@@ -1,4 +1,4 @@
-//! Statements of SQL. Each is prepared once for a connection.
+//! Runs statements of SQL. Each is prepared once for a connection.
 
 use rusqlite::{
     Connection, Params, Row, params_from_iter,
@@ -7,9 +7,9 @@ use rusqlite::{
 
 use super::error::Result;
 
-/// Runs statements, each text being one of them.
+/// Runs statements; each text must be a single statement.
 pub(super) trait Sql {
-    /// How many rows a statement has changed.
+    /// Runs a statement; returns how many rows it has changed.
     fn run(&self, sql: &str, params: impl Params) -> Result<usize>;
 
     /// All rows of a query.
@@ -72,17 +72,17 @@ impl Sql for Connection {
     }
 }
 
-/// A text of a row, not copied.
+/// The text in a column of a row, not copied.
 pub(super) fn text<'r>(row: &'r Row<'_>, column: &str) -> Result<&'r str> {
     Ok(row.get_ref(column)?.as_str()?)
 }
 
-/// A text of a row that may be null, not copied.
+/// The text in a column of a row, which may be null, not copied.
 pub(super) fn optional_text<'r>(row: &'r Row<'_>, column: &str) -> Result<Option<&'r str>> {
     Ok(row.get_ref(column)?.as_str_or_null()?)
 }
 
-/// A query that is put together from parts, with its values.
+/// A query that is put together from parts, with the values of its parameters.
 #[derive(Default)]
 pub(super) struct Query {
     sql: String,
@@ -90,13 +90,13 @@ pub(super) struct Query {
 }
 
 impl Query {
-    /// Adds a part of its text.
+    /// Adds a part of the query's text.
     pub(super) fn push(&mut self, sql: impl AsRef<str>) -> &mut Self {
         self.sql.push_str(sql.as_ref());
         self
     }
 
-    /// Adds a value.
+    /// Adds a parameter to the query's text, and its value.
     pub(super) fn push_value(&mut self, value: impl Into<Value>) -> &mut Self {
         self.sql.push('?');
         self.values.push(value.into());

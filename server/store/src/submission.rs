@@ -10,7 +10,7 @@ use tokio::sync::{mpsc, oneshot};
 
 use super::error::Result;
 
-/// A job that is about to be accepted.
+/// A job that is submitted, and not accepted yet.
 #[derive(Clone, Debug)]
 pub struct NewJob {
     /// The public id, if the client has chosen it.
@@ -23,27 +23,27 @@ pub struct NewJob {
     pub priority: i32,
     /// The time limits of the job.
     pub limits: Limits,
-    /// Whether earlier results may answer it.
+    /// Whether earlier results may answer the job.
     pub cache: Cache,
-    /// The job that it retries.
+    /// The job that this one retries.
     pub parent: Option<JobId>,
-    /// The sweep whose members it solves.
+    /// The sweep whose members the job solves.
     pub sweep: Option<SweepId>,
     /// The problem's title.
     pub title: Option<String>,
-    /// Fingerprint of the problem.
+    /// The fingerprint of the problem.
     pub input_hash: String,
     /// The problem as JSON, without its title.
     pub problem: String,
-    /// The stored mesh that it names.
+    /// The hash of the stored mesh that the problem names.
     pub mesh: Option<String>,
-    /// Memory that it is estimated to need (bytes).
+    /// The memory that the job is estimated to need (bytes).
     pub memory_bytes: u64,
-    /// Fingerprint of everything that the client submitted.
+    /// The fingerprint of everything that the client submitted.
     pub payload: String,
 }
 
-/// A sweep that is about to be accepted with its jobs.
+/// A sweep that is submitted with its jobs, and not accepted yet.
 #[derive(Clone, Debug)]
 pub struct NewSweep {
     /// The public id of the sweep.
@@ -52,9 +52,9 @@ pub struct NewSweep {
     pub name: Option<String>,
     /// Labels for programs.
     pub labels: BTreeMap<String, String>,
-    /// JSON Pointers: what members differ in.
+    /// The values in which members differ: JSON Pointers.
     pub paths: Vec<String>,
-    /// What its members are, as JSON.
+    /// The definition of the sweep's members, as JSON.
     pub definition: String,
     /// The members of each job, in the order of the jobs.
     pub groups: Vec<Vec<usize>>,
@@ -63,9 +63,9 @@ pub struct NewSweep {
 /// A key that makes a request repeatable.
 #[derive(Clone, Debug)]
 pub struct RequestKey {
-    /// The client's text.
+    /// The text that the client has chosen.
     pub key: String,
-    /// Fingerprint of the whole request.
+    /// The fingerprint of the whole request.
     pub payload: String,
 }
 
@@ -74,22 +74,22 @@ pub struct RequestKey {
 pub struct Submission {
     /// The owner of the jobs and of the key.
     pub owner: String,
-    /// One or more.
+    /// The jobs, at least one.
     pub jobs: Vec<NewJob>,
-    /// The sweep that the jobs solve, each a group of its members.
+    /// The sweep that the jobs solve; each job solves a group of its members.
     pub sweep: Option<NewSweep>,
-    /// The client's key.
+    /// The request key, if the client has chosen one.
     pub key: Option<RequestKey>,
-    /// How many jobs may wait.
+    /// The limits on the number of waiting jobs.
     pub limits: QueueLimits,
 }
 
-/// How many jobs may wait.
+/// The limits on the number of waiting jobs.
 #[derive(Clone, Copy, Debug)]
 pub struct QueueLimits {
-    /// In all.
+    /// The largest number of waiting jobs of all owners.
     pub queued: u32,
-    /// Of the owner who submits them; `None`: as many as in all.
+    /// The largest number of waiting jobs of the owner who submits; `None`: no limit apart from that of all owners.
     pub queued_of_owner: Option<u32>,
 }
 
@@ -98,12 +98,12 @@ pub struct QueueLimits {
 pub struct Accepted {
     /// The jobs, in the order in which they were submitted.
     pub jobs: Vec<Job>,
-    /// Whether the jobs existed already: the key, or the id chosen by the client, was used before.
+    /// Whether the jobs existed already: the request key, or the id chosen by the client, was used before.
     pub replayed: bool,
     /// The next job of the queue, if a claim was requested and there is one.
     pub claim: Option<Claim>,
-    /// Jobs whose status has changed since they were inserted: those of these that were started or answered at once, and others
-    /// that were answered while the next job was claimed.
+    /// The keys of the jobs whose status has changed since they were inserted: new jobs that were started or answered
+    /// at once, and earlier jobs that were answered while the next job was claimed.
     pub changed: Vec<i64>,
 }
 
@@ -114,33 +114,34 @@ pub struct Claim {
     pub job: Job,
     /// The problem of the job as JSON, without its title.
     pub problem: String,
-    /// The stored mesh that it names.
+    /// The hash of the stored mesh that the problem names.
     pub mesh: Option<String>,
-    /// The memory that is reserved for it until its solver has returned.
+    /// The memory that is reserved for the job until its solver has returned.
     pub memory: Reservation,
 }
 
-/// Most submissions that share a commit.
+/// The largest number of submissions that share a commit.
 pub(super) const MOST_PER_COMMIT: usize = 64;
 
 /// A submission that waits for the next commit.
 #[derive(Debug)]
 pub(super) struct Pending {
     pub(super) submission: Submission,
-    /// Whether the next job of the queue is to be claimed with it.
+    /// Whether the next job of the queue is to be claimed in the commit of the submission.
     pub(super) claim: bool,
-    /// Whether the results that may answer its jobs were checked before.
+    /// Whether the results that may answer the submission's jobs were checked before.
     pub(super) checked: bool,
-    /// The channel for the answer.
+    /// The channel to which the outcome of the submission is sent.
     pub(super) reply: oneshot::Sender<Result<Answer>>,
 }
 
-/// What becomes of a submission.
+/// The outcome of a submission.
 #[derive(Debug)]
 pub(super) enum Answer {
     /// The jobs are accepted, and on the disk.
     Accepted(Box<Accepted>),
-    /// An earlier result may answer one of its jobs, and has to be checked first, which would occupy the single writer.
+    /// The submission, not accepted: an earlier result may answer one of its jobs, and must be checked first, outside
+    /// the transaction, since the check would occupy the single writer.
     ToCheck(Submission),
 }
 

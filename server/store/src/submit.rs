@@ -1,7 +1,7 @@
-//! Accepting jobs: one commit for many clients.
+//! Accepts jobs: one commit for many clients.
 //!
 //! A commit costs a flush of the disk, whatever it contains. Submissions that arrive during a commit therefore wait
-//! together and share the next one, each with a savepoint of its own, so that a refused one does not affect the
+//! together and share the next one, each with a savepoint of its own, so that a refused submission does not affect the
 //! others.
 
 use std::{
@@ -30,8 +30,8 @@ use super::{
 };
 
 impl Store {
-    /// Accepts jobs. They are stored on the disk when this returns. With `claim` (a worker is free) the next job of the
-    /// queue is claimed in the same commit, if it fits into the memory budget.
+    /// Accepts jobs, which are on the disk when this returns. With `claim` (a worker is free) the next job of the queue
+    /// is claimed in the same commit, if it fits into the memory budget.
     pub async fn submit(self: &Arc<Self>, submission: Submission, claim: bool) -> Result<Accepted> {
         if claim {
             self.check_result_for_next().await;
@@ -51,7 +51,7 @@ impl Store {
         }
     }
 
-    /// Sends a submission to the next commit.
+    /// Sends a submission to the inbox of the next commit, and waits for its outcome.
     async fn send(&self, submission: Submission, claim: bool, checked: bool) -> Result<Answer> {
         let (reply, answer) = oneshot::channel();
         let pending = Pending {
@@ -65,7 +65,7 @@ impl Store {
         answer.await.map_err(|_| closed())?
     }
 
-    /// Accepts submissions in one commit, and answers each.
+    /// Accepts submissions in one commit, and sends each its outcome.
     async fn commit_together(self: &Arc<Self>, pending: Vec<Pending>) {
         let (mut submissions, mut replies) = (vec![], vec![]);
         for one in pending {
@@ -92,7 +92,7 @@ impl Store {
     }
 }
 
-/// Accepts submissions in one transaction; for each, what has become of it.
+/// Accepts submissions in one transaction; returns the outcome of each.
 fn accept_together(
     writer: &Writer<'_>,
     submissions: Vec<(Submission, bool, bool)>,

@@ -1,4 +1,4 @@
-//! Sweeps, and the rows of their members.
+//! Stores sweeps, and the rows of their members.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -27,29 +27,29 @@ use super::{
     submission::NewSweep,
 };
 
-/// What a job of a sweep has to solve.
+/// The members of a sweep that a job has to solve.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MembersTask {
     /// The definition of the sweep.
     pub definition: String,
-    /// The first member of the job: its problem is that of the job.
+    /// The number of the job's first member, whose problem is the problem of the job.
     pub first: usize,
-    /// All members of the job, in order.
+    /// The numbers of all members of the job, in order.
     pub group: Vec<usize>,
-    /// The members without a row.
+    /// The numbers of the job's members that have no row yet.
     pub numbers: Vec<usize>,
 }
 
-/// Members of a sweep that have ended, each with the number and time of its event.
+/// Events of members that have ended.
 #[derive(Debug)]
 pub struct MemberEvents {
-    /// The sweep after them.
+    /// The sweep at the moment when the events were read.
     pub sweep: Sweep,
-    /// In order; some at a time.
+    /// The number, time and row of each event, in order.
     pub events: Vec<(i64, Time, MemberRow)>,
-    /// There may be more after these.
+    /// Whether further events may follow.
     pub more: bool,
-    /// The number of the last one that there is.
+    /// The number of the last event that the sweep has.
     pub last: i64,
 }
 
@@ -115,7 +115,7 @@ impl Store {
         .await
     }
 
-    /// The definition of a sweep as JSON.
+    /// The definition of a sweep as JSON; `None` if the sweep was deleted.
     pub async fn sweep_definition(self: &Arc<Self>, key: i64) -> Result<Option<String>> {
         self.read(move |_, connection| {
             let tx = connection.unchecked_transaction()?;
@@ -127,7 +127,7 @@ impl Store {
         .await
     }
 
-    /// At most `limit` members from this number on, in order; without their parameters.
+    /// At most `limit` members from the number `from` on, in order, without their parameters.
     pub async fn members(
         self: &Arc<Self>,
         key: i64,
@@ -163,8 +163,8 @@ impl Store {
         .await
     }
 
-    /// About the memory (bytes) that all members of a sweep take as rows and as a table, overestimated rather than
-    /// underestimated.
+    /// About how much memory (bytes) all members of a sweep take as rows and as a table, rather too much than too
+    /// little.
     pub async fn members_memory(self: &Arc<Self>, key: i64) -> Result<usize> {
         const OF_ROW: i64 = 1500;
         const OF_BODY: i64 = 3;
@@ -191,7 +191,7 @@ impl Store {
         .await
     }
 
-    /// Members that have ended, after event number `after`; `None`: the sweep was deleted.
+    /// At most `limit` events of members that have ended, after event number `after`; `None` if the sweep was deleted.
     pub async fn member_events(
         self: &Arc<Self>,
         key: i64,
@@ -234,7 +234,7 @@ impl Store {
         .await
     }
 
-    /// How many members have a row.
+    /// The number of the last event of a sweep's members; 0 if there is none.
     pub async fn last_member_event(self: &Arc<Self>, key: i64) -> Result<i64> {
         self.read(move |_, connection| {
             let last = "select last_seq from sweep where id = ?";
@@ -243,7 +243,7 @@ impl Store {
         .await
     }
 
-    /// What a job of a sweep has to solve.
+    /// The members of its sweep that a job has to solve; `None` if there are none.
     pub async fn members_task(self: &Arc<Self>, job: i64) -> Result<Option<MembersTask>> {
         self.read(move |_, connection| {
             let tx = connection.unchecked_transaction()?;
@@ -266,7 +266,7 @@ impl Store {
         .await
     }
 
-    /// The member that a job's own problem is, and the job that solves a member: by their keys.
+    /// The key of some job of a sweep; `None` if the sweep was deleted.
     pub async fn some_job_of(self: &Arc<Self>, key: i64) -> Result<Option<i64>> {
         self.read(move |_, connection| {
             let tx = connection.unchecked_transaction()?;
@@ -275,8 +275,8 @@ impl Store {
         .await
     }
 
-    /// Stores the rows of members that an attempt of a job has solved; returns their sweep, and `None` when the attempt
-    /// is no longer the current one.
+    /// Stores the rows of members that an attempt of a job has solved; returns the key of their sweep, and `None` when
+    /// the attempt is no longer the current one.
     pub async fn record_members(
         self: &Arc<Self>,
         job: i64,
@@ -287,7 +287,7 @@ impl Store {
             .await
     }
 
-    /// Deletes a sweep whose jobs were deleted before; false if it has jobs, which may still run.
+    /// Deletes a sweep whose jobs were deleted before; false if the sweep still has jobs, which may run.
     pub async fn delete_sweep(self: &Arc<Self>, key: i64) -> Result<bool> {
         self.control(move |writer| {
             let mut change = writer.control_change()?;
@@ -374,7 +374,8 @@ pub(super) fn insert(change: &mut Change<'_>, owner: &str, new: &NewSweep) -> Re
     Ok(key)
 }
 
-/// Attaches the definition of its sweep to a job, so that it is kept as long as one of its jobs. With the first of them it is written.
+/// Attaches the definition of a sweep to one of its jobs, so that it is kept as long as one of the jobs is. For the
+/// first job the definition is written.
 pub(super) fn attach_definition(
     tx: &Connection,
     job: i64,
@@ -405,7 +406,7 @@ pub(super) fn insert_members(
     Ok(())
 }
 
-/// Deletes a sweep; false if it has jobs.
+/// Deletes a sweep; false if it still has jobs.
 fn delete(change: &mut Change<'_>, key: i64) -> Result<bool> {
     let now = change.now().micros();
     let tx = change.sql()?;
@@ -427,7 +428,7 @@ fn delete(change: &mut Change<'_>, key: i64) -> Result<bool> {
     Ok(true)
 }
 
-/// Deletes a sweep with the last of its jobs; false if there are others.
+/// Deletes a sweep that has no jobs left; false if it has some.
 pub(super) fn remove_without_jobs(change: &mut Change<'_>, id: SweepId) -> Result<bool> {
     let key = "select id from sweep where uuid = ?";
     let key: Option<i64> = change.sql()?.optional_value(key, [id.0.to_string()])?;
@@ -437,7 +438,7 @@ pub(super) fn remove_without_jobs(change: &mut Change<'_>, id: SweepId) -> Resul
     }
 }
 
-/// Stores how the members ended that a job has not solved, before it is forgotten: those of one that failed have failed.
+/// Before a failed job is deleted, stores that the members which it has not solved have failed.
 pub(super) fn keep_failures(tx: &Connection, deleted: &Job) -> Result<()> {
     if deleted.status != Status::Failed {
         return Ok(()); // without a job they count as canceled
@@ -465,18 +466,18 @@ pub(super) fn keep_failures(tx: &Connection, deleted: &Job) -> Result<()> {
     Ok(())
 }
 
-/// Removes the ids of sweeps that were deleted long ago.
+/// Forgets the ids of sweeps that were deleted before the time `before` (µs).
 pub(super) fn forget_deleted(tx: &Connection, before: i64) -> Result<()> {
     tx.run("delete from deleted_sweep where deleted_at < ?", [before])?;
     Ok(())
 }
 
-/// An error if a row of a member is not as it was written.
+/// An error if the checksum of a member's row does not match.
 pub(super) fn check_member(row: &Row<'_>) -> Result<()> {
     checked(row).map(|_| ())
 }
 
-/// Some job of a sweep, which has its definition; `None`: the sweep was deleted.
+/// The key of some job of a sweep, to which the definition is attached; `None` if the sweep was deleted.
 fn some_job(connection: &Connection, key: i64) -> Result<Option<i64>> {
     connection.row("select * from sweep where id = ?", [key], |row| {
         intact(row, key)?;
@@ -495,10 +496,10 @@ fn number(number: i64) -> usize {
     usize::try_from(number).unwrap_or_default()
 }
 
-/// What is stored of a member that has ended.
+/// The stored outcome of a member that has ended.
 struct Ended<'a> {
     status: &'a str,
-    /// Number and time of its event, if it was solved.
+    /// The number and time of the member's event, if it was solved.
     event: Option<(i64, i64)>,
     body: &'a str,
 }
@@ -520,7 +521,7 @@ fn sum(sweep: i64, number: i64, job: i64, ended: Option<Ended<'_>>) -> Checksum 
     }
 }
 
-/// Key, number and body of a member, if the row is as it was written.
+/// The sweep's key, the member's number and the body of a member's row, if its checksum matches.
 fn checked<'r>(row: &'r Row<'_>) -> Result<(i64, i64, Option<&'r str>)> {
     let (sweep, number, job) = (row.get("sweep")?, row.get("number")?, row.get("job")?);
     let body = optional_text(row, "body")?;
@@ -538,7 +539,7 @@ fn checked<'r>(row: &'r Row<'_>) -> Result<(i64, i64, Option<&'r str>)> {
     Ok((sweep, number, body))
 }
 
-/// A member with its own row, or by the status of its job.
+/// The member of a row: as its body tells, or without a body by the status of its job.
 fn member(row: &Row<'_>) -> Result<MemberRow> {
     let (sweep, n, body) = checked(row)?;
     if let Some(body) = body {
@@ -554,7 +555,7 @@ fn member(row: &Row<'_>) -> Result<MemberRow> {
     Ok(MemberRow::unsolved(number(n), status, reason))
 }
 
-/// The number of the last event of a sweep, if its row is as it was written.
+/// The number of the last event of a sweep, if the checksum of the sweep's row matches.
 fn row_of(tx: &Connection, key: i64) -> Result<Option<i64>> {
     tx.row("select * from sweep where id = ?", [key], |row| {
         intact(row, key)?;
@@ -562,7 +563,7 @@ fn row_of(tx: &Connection, key: i64) -> Result<Option<i64>> {
     })
 }
 
-/// An error if the row of a sweep is not as it was written.
+/// An error if the checksum of a sweep's row does not match.
 pub(super) fn intact(row: &Row<'_>, key: i64) -> Result<()> {
     if checksum::row_is_intact(row)? {
         Ok(())
@@ -583,7 +584,7 @@ fn find(connection: &Connection, key: i64) -> Result<Option<Sweep>> {
     })
 }
 
-/// A row of the table as a sweep, with what its jobs say.
+/// The sweep of a row, with its status and counts from the rows of its jobs.
 fn described(connection: &Connection, row: &Row<'_>) -> Result<Sweep> {
     let key: i64 = row.get("id")?;
     intact(row, key)?;

@@ -1,4 +1,4 @@
-//! Tokens. All of them are also kept in memory, since every request is identified by one.
+//! Stores tokens, and keeps all of them in memory, since every request is identified by one.
 
 use parking_lot::{RwLockReadGuard, RwLockWriteGuard};
 use std::sync::{Arc, atomic::Ordering::Relaxed};
@@ -17,7 +17,7 @@ use super::{
 };
 
 impl Store {
-    /// Reads the tokens, when the store is opened. One that is damaged identifies nobody.
+    /// Reads the tokens, when the store is opened. A damaged token identifies nobody.
     pub(super) async fn read_tokens(self: &Arc<Self>) -> Result<()> {
         self.read(|store, connection| {
             let marked = "select exists (select 1 from setting where name = 'tokens_required')";
@@ -40,19 +40,19 @@ impl Store {
         .await
     }
 
-    /// Whether there is a token, or was: from then on every request needs one.
+    /// Whether a token exists, or ever existed: every request then needs a token.
     pub fn has_tokens(&self) -> bool {
         self.any_tokens.load(Relaxed)
     }
 
-    /// The valid token that was sent, if it is one.
+    /// The token that a client has sent, if it is valid and the secret is right.
     pub fn find_token(&self, presented: &Presented, now: Time) -> Option<Token> {
         let tokens = self.tokens_in_memory();
         let (token, hash) = tokens.get(&presented.id)?;
         (*hash == presented.hash && token.is_valid(now)).then(|| token.clone())
     }
 
-    /// Whether the token with this id is still valid, and has this secret, if one is given.
+    /// Whether the token with this id is valid, and has this secret, if one is given.
     pub fn is_valid_token(&self, id: &str, secret: Option<SecretHash>, now: Time) -> bool {
         let tokens = self.tokens_in_memory();
         tokens.get(id).is_some_and(|(token, hash)| {
@@ -78,7 +78,7 @@ impl Store {
             .await
     }
 
-    /// Revokes a token, once and for all; `None` if there is none with this id.
+    /// Revokes a token for ever; `None` if there is no token with this id.
     pub async fn revoke_token(self: &Arc<Self>, id: &str, now: Time) -> Result<Option<Token>> {
         self.change_token(id, move |token, _| {
             token.revoked_at.get_or_insert(now);
@@ -86,7 +86,7 @@ impl Store {
         .await
     }
 
-    /// Gives a valid token another secret; the old one is refused from then on.
+    /// Gives a valid token another secret, and from then on refuses the old one; `None` if no valid token has this id.
     pub async fn rotate_token(
         self: &Arc<Self>,
         id: &str,
@@ -128,7 +128,7 @@ impl Store {
     }
 }
 
-/// Writes a token, then keeps it in memory.
+/// Writes a token to the database, then to memory. `insert` is the verb of the statement.
 fn write(writer: &Writer<'_>, token: &Token, hash: SecretHash, insert: &str) -> Result<()> {
     let tx = writer.begin_control()?;
     let statement = format!(
@@ -157,14 +157,14 @@ fn write(writer: &Writer<'_>, token: &Token, hash: SecretHash, insert: &str) -> 
     Ok(())
 }
 
-/// From now on every request needs a token, also if all of them are lost.
+/// Records that every request needs a token from now on, even if all tokens are lost.
 pub(super) fn require_tokens(tx: &Connection) -> Result<()> {
     let required = "insert into setting (name, value) values ('tokens_required', 'true') on conflict do nothing";
     tx.run(required, ())?;
     Ok(())
 }
 
-/// A row of the table.
+/// The token of a row and the hash of its secret, if the checksum matches.
 pub(super) fn read(row: &Row<'_>) -> Result<(Token, SecretHash)> {
     let id: String = row.get("id")?;
     let record = || Record::named(format!("token {id}"));

@@ -1,11 +1,12 @@
-//! Whose turn it is.
+//! Decides whose turn it is.
 //!
-//! The highest priority goes first. Within a priority owners take turns: the next job is the oldest one of the owner who
-//! had their last turn longest ago; those who had none yet come before, in the order of their first jobs. So a job of somebody else waits for one job of an owner who has submitted thousands,
-//! and not for all of them. Turns are stored, and go on after a restart.
+//! The highest priority goes first. Within a priority owners take turns: the next job is the oldest one of the owner
+//! whose last turn was longest ago; owners without a turn come before, in the order of their first jobs. A job of one
+//! owner thus waits for one job of another owner who has submitted thousands, and not for all of them. Turns are
+//! stored, and go on after a restart.
 //!
-//! Triggers keep the counts of `queue`, `owner_queue` and `waiting` (`migrations/0019_turns.sql`), whatever changes a job:
-//! a claim looks at one job of each owner, and a limit at one row.
+//! Triggers keep the counts in `queue`, `owner_queue` and `waiting` (`migrations/0019_turns.sql`), whatever changes a
+//! job: a claim looks at one job of each owner, and a check of a limit at one row.
 
 use std::{
     collections::{BTreeSet, HashMap},
@@ -17,7 +18,8 @@ use rusqlite::Connection;
 
 use super::{change::Change, database::Store, error::Result, sql::Sql};
 
-/// The next job: but for those in a list of keys as JSON, and for those of owners who have as many running as they may.
+/// The query for the next job, except jobs whose keys are in a JSON list, and jobs of owners who have as many running
+/// jobs as they may.
 pub(super) const NEXT: &str = "select owner,
          (select id from job indexed by job_queue
           where status = 'queued' and coalesced_into is null and job.priority = waiting.priority and job.owner = waiting.owner
@@ -25,37 +27,38 @@ pub(super) const NEXT: &str = "select owner,
      from waiting join owner_queue using (owner) where running < ? and first is not null
      order by priority desc, turn limit 1";
 
-/// How many jobs wait for a worker, by priority and owner.
+/// The query for the number of jobs that wait for a worker, by priority and owner.
 const GROUPS: &str = "select priority, owner, waiting.jobs, turn, running
      from waiting join owner_queue using (owner)";
 
-/// The oldest job of each owner and priority.
+/// The query for the key of the oldest job that waits for a worker.
 const OLDEST: &str = "select min((select min(id) from job indexed by job_queue
          where status = 'queued' and coalesced_into is null and job.priority = waiting.priority and job.owner = waiting.owner))
      from waiting";
 
-/// The jobs that wait for a worker, as `waiting` counts them.
+/// The query that counts the jobs that wait for a worker, for the table `waiting`.
 const BY_PRIORITY: &str = "select priority, owner, count(*) as jobs from job indexed by job_queue
      where status = 'queued' and coalesced_into is null group by priority, owner";
 
-/// The jobs that wait or run, as `owner_queue` counts them. The turn is that of an owner who had none.
+/// The query that counts the jobs that wait or run, for the table `owner_queue`. The turn is that of an owner who has
+/// had none.
 const BY_OWNER: &str =
     "select owner, min(id) - 4611686018427387904 as turn, sum(status = 'queued') as jobs,
          sum(status = 'running') as running
      from job where status in ('queued', 'running') group by owner";
 
-/// What an owner has in the queue.
+/// The number of an owner's jobs in the queue.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Load {
-    /// Jobs that wait for a worker, or for the job that they are coalesced into.
+    /// The number of jobs that wait for a worker, or for the job that they are coalesced into.
     pub queued: u64,
-    /// Jobs that run.
+    /// The number of running jobs.
     pub running: u64,
 }
 
 impl Store {
-    /// Compares the counts of the queue with the jobs, when the store is opened, and mends them if they differ. What cannot be
-    /// read now stays as it is.
+    /// Compares the counts of the queue with the jobs, when the store is opened, and corrects them if they differ. If
+    /// that fails, they stay as they are, and the error is logged.
     pub(super) async fn count_queue(self: &Arc<Self>) -> Result<()> {
         let right = self.read(|_, connection| are_right(connection)).await;
         if !matches!(right, Ok(true)) {
@@ -75,7 +78,7 @@ impl Store {
         .await
     }
 
-    /// What every owner has in the queue who has anything in it.
+    /// The numbers of jobs of every owner who has waiting or running jobs.
     pub async fn loads(self: &Arc<Self>) -> Result<HashMap<String, Load>> {
         self.read(|_, connection| {
             let loads =
@@ -89,14 +92,14 @@ impl Store {
         .await
     }
 
-    /// What this owner has in the queue.
+    /// The numbers of this owner's waiting and running jobs.
     pub async fn load_of(self: &Arc<Self>, owner: &str) -> Result<Load> {
         let owner = owner.to_owned();
         self.read(move |_, connection| load_of(connection, &owner))
             .await
     }
 
-    /// Sets how many jobs of one owner may run at the same time; once and before any is claimed.
+    /// Sets how many jobs of one owner may run at the same time; must be called once, before any job is claimed.
     pub fn set_most_running_of_owner(&self, most: usize) {
         let _ = self.most_running.set(most); // fails if it is set already, which is kept
     }
@@ -112,7 +115,7 @@ impl Store {
         self.waiting.load(Ordering::Relaxed)
     }
 
-    /// Takes note of how many jobs wait, after a commit.
+    /// Records how many jobs wait, after a commit.
     pub(super) fn note_waiting(&self, waiting: usize) {
         self.waiting.store(waiting, Ordering::Relaxed);
     }
@@ -129,13 +132,13 @@ impl Store {
 }
 
 impl Change<'_> {
-    /// The next job that waits, but for damaged ones.
+    /// The key of the next job of the queue, except the damaged ones.
     pub(super) fn next(&mut self, damaged: &BTreeSet<i64>) -> Result<Option<i64>> {
         let most_running = self.store().most_running_of_owner();
         next(self.sql()?, damaged, most_running)
     }
 
-    /// An owner has a turn.
+    /// Records that an owner has a turn.
     pub(super) fn take_turn(&mut self, owner: &str) -> Result<()> {
         let tx = self.sql()?;
         let turn: i64 = tx.value("update queue set turns = turns + 1 returning turns", ())?;
@@ -157,7 +160,7 @@ impl Change<'_> {
     }
 }
 
-/// The key of the next job that waits, but for damaged ones.
+/// The key of the next job of the queue, except the damaged ones.
 pub(super) fn next(
     connection: &Connection,
     damaged: &BTreeSet<i64>,
@@ -186,7 +189,7 @@ fn load((queued, running): (i64, i64)) -> Load {
     }
 }
 
-/// Whether the counts are those of the jobs.
+/// Whether the stored counts match the jobs.
 pub(super) fn are_right(connection: &Connection) -> Result<bool> {
     let differ = |kept: &str, counted: &str| -> Result<bool> {
         connection.value(
@@ -209,7 +212,7 @@ pub(super) fn are_right(connection: &Connection) -> Result<bool> {
     Ok(!waiting && !owners && !jobs)
 }
 
-/// Writes the counts of the jobs.
+/// Counts the jobs, and stores the counts.
 fn count_again(tx: &Connection) -> Result<()> {
     for statement in [
         "delete from waiting",
@@ -226,26 +229,27 @@ fn count_again(tx: &Connection) -> Result<()> {
     Ok(())
 }
 
-/// The queue at one moment, for the positions of several jobs.
+/// The queue at one moment, from which the positions of several jobs are computed.
 pub(super) struct Line<'a> {
     connection: &'a Connection,
     groups: Vec<Group>,
-    /// For a priority and owner: the last job whose place among theirs was counted, and how many were before it.
+    /// For a priority and owner: the key of the last job whose place among theirs was counted, and the number of jobs
+    /// before it.
     counted: HashMap<(i32, String), (i64, i64)>,
 }
 
-/// The jobs of one priority and owner.
+/// The waiting jobs of one priority and owner.
 struct Group {
     priority: i32,
     owner: String,
     jobs: i64,
     running: i64,
-    /// The owner's last turn.
+    /// The number of the owner's last turn.
     turn: i64,
 }
 
 impl Line<'_> {
-    /// The queue as it is.
+    /// Reads the present queue.
     pub(super) fn read(connection: &Connection) -> Result<Line<'_>> {
         let groups = connection.rows(GROUPS, (), |row| {
             Ok(Group {
@@ -263,14 +267,14 @@ impl Line<'_> {
         })
     }
 
-    /// How many jobs of this owner run, if any wait.
+    /// The number of running jobs of this owner; 0 if the owner has no waiting jobs.
     pub(super) fn running_of(&self, owner: &str) -> i64 {
         let group = self.groups.iter().find(|group| group.owner == owner);
         group.map_or(0, |group| group.running)
     }
 
-    /// Jobs ahead of this one; none if it does not wait for a worker. Owners with as many running jobs as they may have are
-    /// counted as if they had fewer.
+    /// The number of jobs ahead of this one; `None` if it does not wait for a worker. Owners who have as many running
+    /// jobs as they may are counted as if they had fewer.
     pub(super) fn ahead(&mut self, job: &Job) -> Result<Option<i64>> {
         let own = |group: &&Group| group.priority == job.priority && group.owner == job.owner;
         let Some(group) = self.groups.iter().find(own) else {
@@ -291,10 +295,10 @@ impl Line<'_> {
         Ok(Some(here + others.sum::<i64>()))
     }
 
-    /// How many of the jobs of its priority and owner, of which there are so many, are before this one; none if it does not
-    /// wait. Counted from the last one that was asked for: a page of jobs costs one pass.
+    /// How many of the `jobs` waiting jobs with the priority and owner of `job` are before it; `None` if it does not
+    /// wait. It is counted from the last job that was asked for: for a page of jobs, each row is counted once.
     fn before(&mut self, job: &Job, jobs: i64) -> Result<Option<i64>> {
-        /// A new job is the last, or nearly so.
+        /// The number of jobs at the end of the queue that are tried first: a new job is usually among them.
         const NEAR: i64 = 100;
         let group = (job.priority, job.owner.as_str());
         let there = "select exists (select 1 from job indexed by job_queue where status = 'queued' and coalesced_into is null

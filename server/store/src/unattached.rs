@@ -1,4 +1,5 @@
-//! Content that is not attached yet: written in several short transactions, and removed if nothing needs it any more.
+//! Content that is not attached yet: writes it in several short transactions, and removes it if nothing needs it any
+//! more.
 
 use std::sync::Arc;
 
@@ -12,7 +13,7 @@ use super::{
 };
 
 impl Store {
-    /// Writes pieces of content, numbered from `first`. They are kept once it is attached.
+    /// Writes pieces of content, numbered from `first`. They stay once the content is attached.
     pub async fn write_pieces(
         self: &Arc<Self>,
         content: &Fingerprint,
@@ -28,7 +29,8 @@ impl Store {
         .await
     }
 
-    /// Removes content that was written and never attached. One who stores the same content meanwhile notices that it is gone.
+    /// Removes content that was written and never attached. Whoever stores the same content meanwhile finds it missing
+    /// when attaching it.
     pub async fn discard_content(self: &Arc<Self>, content: &[&Fingerprint]) -> Result<()> {
         let hashes: Vec<Vec<u8>> = content.iter().map(|content| content.hash.clone()).collect();
         self.control(move |writer| {
@@ -46,7 +48,8 @@ impl Store {
         .await
     }
 
-    /// Removes all content that is not attached: what was being written when the service was interrupted. How many pieces.
+    /// Removes all content that is not attached, because the service was interrupted while it was written. Returns how
+    /// many pieces.
     pub async fn discard_unattached(self: &Arc<Self>) -> Result<usize> {
         let mut pieces = 0;
         loop {
@@ -69,7 +72,8 @@ impl Store {
     }
 }
 
-/// Some content that is not attached, by the index and by the table itself: what an index lacks must not be removed.
+/// The ids of some content that is not attached, by the index and by the table itself: an index that lacks rows must
+/// not lead to a removal.
 fn unattached(connection: &Connection) -> Result<Vec<i64>> {
     const AT_ONCE: i64 = 100;
     let by_index: Vec<i64> = connection.values(

@@ -14,7 +14,7 @@ use super::{
     submit,
 };
 
-/// Without limits, since the check concerns the database, not the number of waiting jobs.
+/// No limits on waiting jobs, since the check concerns only the database.
 const UNLIMITED: QueueLimits = QueueLimits {
     queued: u32::MAX,
     queued_of_owner: None,
