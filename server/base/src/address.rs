@@ -2,7 +2,8 @@
 
 use std::sync::OnceLock;
 
-/// Set once at the start: a process has one address, and links are also written where no request is available.
+/// The prefix, set once at the start: a process has one address, and links are also written where no request is
+/// available.
 static PREFIX: OnceLock<String> = OnceLock::new();
 
 /// Sets the path that all links begin with.
@@ -16,7 +17,7 @@ pub fn prefix() -> &'static str {
     PREFIX.get().map_or("", String::as_str)
 }
 
-/// A path that a client has sent, without the prefix, if it has it.
+/// The path that a client has sent, without the prefix if it begins with the prefix.
 pub fn without_prefix(path: &str) -> &str {
     let rest = path.strip_prefix(prefix());
     rest.filter(|rest| rest.starts_with('/')).unwrap_or(path)

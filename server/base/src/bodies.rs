@@ -1,9 +1,9 @@
 //! Condensed bodies that are kept for later jobs on the same body, up to a limit; the least recently used is dropped
 //! first. This module only holds data: `memory` decides when jobs need the room.
 //!
-//! A body is found by a hash of everything that it is made from, and a solution on it has the same bits as one on a new
-//! body. Jobs on meshes of their own (adaptive refinement, `verify`) and worker processes keep none. Two jobs that
-//! begin at the same time each make their own.
+//! A body is found by a hash of everything that it is made from; a solution on a kept body has the same bits as one on
+//! a new body. Jobs on meshes of their own (adaptive refinement, `verify`) and worker processes keep none. Two jobs
+//! that begin at the same time each make their own.
 
 use std::{collections::HashMap, sync::Arc};
 
@@ -33,12 +33,12 @@ struct Kept {
     /// The body, with the model that it was made for.
     prepared: Arc<Prepared>,
     bytes: u64,
-    /// The number of its last use.
+    /// The number of the body's last use.
     used: u64,
 }
 
 impl Kept {
-    /// Whether no job uses it, so that dropping it frees its memory.
+    /// Whether no job uses the body, so that dropping it frees its memory.
     fn is_idle(&self) -> bool {
         Arc::strong_count(&self.prepared) == 1 && Arc::strong_count(&self.prepared.body) == 1
     }
@@ -56,13 +56,13 @@ struct Counts {
 pub struct BodyCache {
     /// The number of bodies that are kept now.
     pub bodies: u64,
-    /// The size of these bodies (bytes).
+    /// The size of the bodies that are kept now (bytes).
     pub bytes: u64,
-    /// The number of jobs whose body was found.
+    /// The number of jobs whose body was found among the kept ones.
     pub hits: u64,
-    /// The number of jobs whose body was not found and had to be factored.
+    /// The number of jobs whose body was not found, so that it had to be factored.
     pub misses: u64,
-    /// The number of bodies that were dropped to make room, for others or for jobs.
+    /// The number of bodies that were dropped to make room for other bodies or for jobs.
     pub evictions: u64,
 }
 
@@ -102,8 +102,8 @@ impl Bodies {
         self.counts.misses += 1;
     }
 
-    /// Keeps a body, unless it alone is larger than the limit; it replaces one with the same key, which was made at the
-    /// same time. Returns the bodies that are dropped, to be freed where nobody waits for it.
+    /// Keeps a body, unless it alone is larger than the limit. It replaces a body with the same key, which was made at
+    /// the same time. Returns the bodies that are dropped, to be freed on a thread that nobody waits for.
     pub fn keep(&mut self, key: Key, prepared: Prepared, bytes: u64) -> Vec<Arc<Prepared>> {
         if bytes > self.limit {
             return vec![Arc::new(prepared)];
@@ -125,8 +125,8 @@ impl Bodies {
         dropped
     }
 
-    /// Drops bodies that no job uses until the others have at most `most` bytes. Returns them, as [`keep`](Self::keep)
-    /// does.
+    /// Drops the least recently used of the bodies that no job uses, until those left have at most `most` bytes.
+    /// Returns the dropped bodies, as [`keep`](Self::keep) does.
     pub fn shrink_idle(&mut self, most: u64) -> Vec<Arc<Prepared>> {
         let mut dropped = vec![];
         while self.idle_bytes() > most {
@@ -138,7 +138,7 @@ impl Bodies {
         dropped
     }
 
-    /// The present figures.
+    /// The present figures of the kept bodies.
     pub fn figures(&self) -> BodyCache {
         let Counts {
             hits,

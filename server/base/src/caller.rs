@@ -33,7 +33,8 @@ pub enum Scope {
     Submit,
     /// Cancel and delete jobs, delete meshes.
     Cancel,
-    /// All of these for the jobs of every owner; also pause the queue, manage tokens, and give priorities above 0.
+    /// All of the other scopes for the jobs of every owner; also pause the queue, manage tokens, and give priorities
+    /// above 0.
     Admin,
 }
 
@@ -63,7 +64,7 @@ impl Access {
     }
 }
 
-/// The caller of a request; every verb takes one.
+/// The caller of a request; every operation of the service takes one.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Caller {
     /// The owner of the jobs that this caller submits.
@@ -76,7 +77,7 @@ pub struct Caller {
     request: Option<RequestId>,
 }
 
-/// The name of a request in the log, and in its answer.
+/// The name of a request in the log and in the response.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RequestId(pub String);
 
@@ -150,7 +151,7 @@ impl Caller {
     }
 }
 
-/// The owner of what is submitted to a service without authentication.
+/// The owner of everything that is submitted to a service without authentication.
 pub const LOCAL: &str = "local";
 
 /// The largest length of an owner's name.
@@ -172,7 +173,7 @@ pub enum Owners {
 }
 
 impl Owners {
-    /// Whether `owner` is among them.
+    /// Whether `owner` is one of these owners.
     pub fn include(&self, owner: &str) -> bool {
         match self {
             Owners::All => true,

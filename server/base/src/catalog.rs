@@ -39,7 +39,7 @@ pub struct WarningKind {
     pub explanation: &'static str,
 }
 
-/// The stable facts about this warning; its meaning is that in the schema of results.
+/// The stable facts about this warning; its meaning is taken from the schema of results.
 pub fn warning(code: WarningCode) -> WarningKind {
     let schema = schemars::schema_for!(WarningCode).to_value();
     let code = code.as_str();
@@ -109,7 +109,7 @@ fn grpc_name<S: serde::Serializer>(code: &Option<Grpc>, serializer: S) -> Result
     code.map(grpc_code_name).serialize(serializer)
 }
 
-/// A kind of error that a request may be answered with.
+/// A kind of error that a response to a request may have.
 fn of_request(
     code: &'static str,
     title: &'static str,

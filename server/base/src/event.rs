@@ -15,7 +15,7 @@ use crate::{
 pub struct Event {
     /// The number of the event.
     pub seq: i64,
-    /// The attempt it belongs to; 0 before the first.
+    /// The attempt that the event belongs to; 0 before the first attempt.
     pub attempt: i32,
     /// The time of the event.
     pub t: Time,
@@ -42,14 +42,14 @@ pub enum Payload {
         /// The phase.
         stage: Phase,
     },
-    /// Adaptive refinement has begun to solve on a mesh, or returned to the one before. Iterations are reported once
-    /// the mesh is known to be the last.
+    /// Adaptive refinement has begun to solve on a mesh, or has returned to the mesh before. Iterations are reported
+    /// once the mesh is known to be the last.
     Mesh {
         /// The number of the mesh, from 1.
         number: u32,
         /// The number of its elements.
         elements: u64,
-        /// The largest relative error on the mesh before; absent for the first mesh, and where it is unknown.
+        /// The largest relative error on the mesh before; absent for the first mesh, and where the error is unknown.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         error: Option<f64>,
     },
@@ -57,7 +57,7 @@ pub enum Payload {
     Iteration(TimedIteration),
     /// A warning about the problem or its solution.
     Warning(Warning),
-    /// The job has ended. A job has exactly one such event, and it is the last.
+    /// The job has ended. A job has exactly one `done` event, which is its last.
     Done {
         /// The job in its final state.
         job: Box<Job>,
@@ -76,12 +76,12 @@ pub struct TimedIteration {
 }
 
 impl Payload {
-    /// The value of `type`.
+    /// The word for the kind of event: the value of `type` in JSON.
     pub fn kind(&self) -> &'static str {
         self.into()
     }
 
-    /// A change of status.
+    /// The event of a change of status.
     pub fn status(status: Status) -> Self {
         Payload::Status {
             status,
@@ -89,7 +89,7 @@ impl Payload {
         }
     }
 
-    /// The event that a job was requeued, with the reason.
+    /// The event that a job was requeued, for this reason.
     pub fn requeued(reason: Requeue) -> Self {
         Payload::Status {
             status: Status::Queued,
@@ -102,7 +102,7 @@ impl Payload {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr)]
 #[strum(serialize_all = "snake_case")]
 pub enum Requeue {
-    /// The process died while it ran.
+    /// The process that ran the job died.
     WorkerLost,
     /// The service stopped.
     Drain,

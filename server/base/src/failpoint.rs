@@ -1,5 +1,5 @@
-//! Points between the stages of a job's life at which a test can make it fail, by a panic or an error. The program
-//! sets none of them; there a point costs the reading of one flag.
+//! Points between the stages of a job's life at which a test can make it fail, by a panic or an error. The program sets
+//! no failures; passing a point then costs the reading of one flag.
 
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -11,11 +11,11 @@ use crate::job::JobId;
 /// A boundary between two stages of a job, in their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, strum::VariantArray)]
 pub enum Point {
-    /// The job is accepted, but that is not committed.
+    /// The job is accepted, but the acceptance is not committed.
     Accepted,
-    /// The acceptance of a job is committed, but not answered.
+    /// The acceptance of the job is committed, but the client has no response yet.
     Answered,
-    /// The job is claimed, but that is not committed.
+    /// The job is claimed, but the claim is not committed.
     Claimed,
     /// The claim is committed, but no worker has the job.
     Given,
@@ -30,11 +30,11 @@ pub enum Point {
     Meshing,
     /// The stiffness is assembled.
     Assembling,
-    /// Its unknowns are ordered.
+    /// The unknowns of the stiffness are ordered.
     Ordering,
-    /// It is factored.
+    /// The stiffness is factored.
     Factoring,
-    /// It is condensed to the contact boundary.
+    /// The stiffness is condensed to the contact boundary.
     Condensing,
     /// The iterations begin.
     Iterating,
@@ -52,16 +52,16 @@ pub enum Point {
     Solved,
     /// All but the last pieces of the result are stored.
     AlmostStored,
-    /// The job has ended, but that is not committed.
+    /// The job has ended, but its end is not committed.
     Ended,
-    /// The end is committed, but not announced.
+    /// The job's end is committed, but not announced.
     Unannounced,
     /// The worker has finished with the job.
     Done,
 }
 
 impl Point {
-    /// The point at the beginning of a phase; none for the phase before the solver.
+    /// The failpoint at the beginning of a phase; `None` for the phase before the solver.
     pub fn beginning_of(phase: Phase) -> Option<Point> {
         Some(match phase {
             Phase::Parse => return None,
@@ -77,7 +77,7 @@ impl Point {
     }
 }
 
-/// Makes a job fail at a point where the caller cannot return an error.
+/// Makes a job fail at a point where the caller cannot return an error: panics if a failure is set.
 #[inline]
 pub fn pass(point: Point, job: JobId) {
     fails(point, job);
@@ -86,13 +86,13 @@ pub fn pass(point: Point, job: JobId) {
 /// The way in which a job fails at a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Failing {
-    /// By a panic.
+    /// The job panics.
     Panic,
-    /// By an error.
+    /// The operation returns an error.
     Error,
 }
 
-/// The failures that are set, each for one use. Tests run in parallel, so each names its job.
+/// The failures that are set, each for one use and one job, since tests run in parallel.
 static SET: Mutex<Vec<(Point, JobId, Failing)>> = Mutex::new(vec![]);
 
 /// Whether anything was ever set to fail.
@@ -111,12 +111,12 @@ pub fn set(point: Point, job: JobId, failing: Failing) {
     ARMED.store(true, Relaxed);
 }
 
-/// Whether the job has not reached the point; removes the failure.
+/// Removes a failure that was set; returns whether the job had not reached the point.
 pub fn was_missed(point: Point, job: JobId) -> bool {
     remove(point, job).is_some()
 }
 
-/// Whether the caller should return an error for this job; panics if that is set.
+/// Whether the caller should return an error for this job; panics if a panic is set.
 pub fn fails(point: Point, job: JobId) -> bool {
     if !ARMED.load(Relaxed) {
         return false;

@@ -46,7 +46,7 @@ impl Kind for OfSweep {
 }
 
 impl<K: Kind> Id<K> {
-    /// A new id, later than all before it.
+    /// A new id, which sorts after all earlier ones.
     pub fn new() -> Self {
         Uuid::now_v7().into()
     }

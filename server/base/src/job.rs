@@ -21,19 +21,20 @@ pub const MAX_PRIORITY: i32 = 10;
 /// A problem submitted to the service, as clients see it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Job {
-    /// The store's own number, in order of arrival; never shown.
+    /// The number of the job in the store, in order of arrival; never shown to clients.
     #[serde(skip)]
     pub key: i64,
-    /// The stored mesh that its problem names.
+    /// The stored mesh that the job's problem names.
     #[serde(skip)]
     pub mesh: Option<String>,
-    /// Memory that it is estimated to need (bytes); unknown for those of early versions.
+    /// The memory that the job is estimated to need (bytes); unknown for jobs of early versions.
     #[serde(skip)]
     pub memory_bytes: Option<u64>,
-    /// The key of the job that it is coalesced into: it is not solved itself, but ends with the result of that job.
+    /// The key of the job that this one is coalesced into: it is not solved itself, but ends with the result of that
+    /// job.
     #[serde(skip)]
     pub coalesced_into: Option<i64>,
-    /// Whether an earlier result may be used for it.
+    /// Whether an earlier result may be used for the job.
     #[serde(skip)]
     pub cache: Cache,
     /// The public id.
@@ -42,7 +43,7 @@ pub struct Job {
     pub status: Status,
     /// Why the job failed or was canceled.
     pub reason: Option<Reason>,
-    /// Whether a client asked it to stop while it was running.
+    /// Whether a client asked the job to stop while it was running.
     pub cancel_requested: bool,
     /// The number of changes of status and edits; progress does not count.
     pub version: i64,
@@ -50,15 +51,15 @@ pub struct Job {
     pub name: Option<String>,
     /// Labels for programs.
     pub labels: BTreeMap<String, String>,
-    /// The owner who submitted it.
+    /// The owner who submitted the job.
     pub owner: String,
     /// The priority, −10 … 10; higher runs first.
     pub priority: i32,
-    /// Number of the current or last attempt to solve it, 0 before the first.
+    /// The number of the current or last attempt to solve the job, 0 before the first.
     pub attempt: i32,
-    /// If the worker is lost in the last of these attempts, the job fails.
+    /// The number of attempts that the job has: if the worker is lost in the last of them, the job fails.
     pub max_attempts: i32,
-    /// SHA-256 of the problem with its defaults, without its title.
+    /// The SHA-256 of the problem with its defaults, without its title.
     pub input_hash: String,
     /// The job whose result answered this one.
     #[serde(default)]
@@ -66,17 +67,17 @@ pub struct Job {
     /// The job that this one retries.
     #[serde(default)]
     pub parent: Option<JobId>,
-    /// The sweep whose members it solves; its own problem and result are those of the first of these members.
+    /// The sweep whose members the job solves; its own problem and result are those of the first of these members.
     #[serde(default)]
     pub sweep: Option<SweepId>,
     /// Whether the job is pinned: never deleted because of its age or size.
     #[serde(default)]
     pub pinned: bool,
-    /// The time when it was accepted.
+    /// The time when the job was accepted.
     pub created_at: Time,
-    /// The time when its last attempt began.
+    /// The time when the job's last attempt began.
     pub started_at: Option<Time>,
-    /// The time when it ended.
+    /// The time when the job ended.
     pub finished_at: Option<Time>,
     /// Seconds from acceptance to the start of the last attempt.
     pub queue_wait_s: Option<f64>,
@@ -89,16 +90,16 @@ pub struct Job {
     /// The time limits of the job.
     #[serde(default)]
     pub limits: Limits,
-    /// What went wrong.
+    /// What went wrong, if the job failed.
     pub failure: Option<Failure>,
     /// Whether a result is available.
     pub result_available: ResultAvailable,
-    /// Bytes that it takes in the store once it has ended: its result, problem and events before the last. Data that it
-    /// shares with other jobs are counted for one of them.
+    /// Bytes that the job takes in the store once it has ended: its result, problem and events before the last. Data
+    /// that it shares with other jobs are counted for one of them.
     #[serde(default)]
     pub stored_bytes: Option<u64>,
-    /// Up to five warnings about its result, the worst first; the summary of the result has all of them. A job that
-    /// ended under an earlier version has them only there.
+    /// Up to five warnings about the result, the worst first; the summary of the result has all of them. For a job that
+    /// ended under an earlier version, only the summary has them.
     #[serde(default)]
     pub warnings: Vec<Warning>,
     /// Addresses of related resources.
@@ -389,22 +390,22 @@ pub struct Progress {
     pub eta_s: Option<f64>,
     /// The number of the present mesh of adaptive refinement, from 1; absent without it.
     pub mesh: Option<u32>,
-    /// The number of elements of that mesh.
+    /// The number of elements of the present mesh of adaptive refinement.
     pub mesh_elements: Option<u64>,
-    /// The largest relative error on the mesh before.
+    /// The largest relative error on the mesh before the present one.
     pub mesh_error: Option<f64>,
 }
 
 /// Why a job failed, in the form of a problem document.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Failure {
-    /// The address of the explanation.
+    /// The address of the page that explains the kind of failure.
     pub r#type: String,
     /// The title: one line, the same for every failure of its kind.
     pub title: String,
-    /// The kind, a stable name for programs.
+    /// The kind of failure, a stable name for programs.
     pub code: String,
-    /// What happened in this case.
+    /// What happened in this job.
     pub detail: String,
 }
 
@@ -421,7 +422,7 @@ impl Failure {
     }
 }
 
-/// The text about iterations that ended without a solution.
+/// The text about a solver that ended without a solution.
 pub fn without_solution(outcome: Outcome, iterations: u32, residuals: &Residuals) -> String {
     let Residuals {
         kkt,

@@ -53,7 +53,7 @@ pub mod digest;
 pub mod failpoint;
 pub mod run;
 
-/// As in the program: tests see what a job holds.
+/// The allocator of the program, which tests need, too, to measure what a job holds.
 #[cfg(test)]
 #[global_allocator]
 static ALLOCATOR: allocator::Counting = allocator::Counting;

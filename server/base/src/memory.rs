@@ -17,16 +17,17 @@ use solver::{Prepared, body::ElasticBody, model::Model};
 
 use crate::bodies::{Bodies, BodyCache, Key};
 
-/// The memory that all jobs together may use beyond the budget (bytes), since estimates are not exact; more if there
-/// are so many jobs that each has the smallest margin.
+/// The memory that all jobs together may use beyond the budget (bytes), since estimates are not exact. With many jobs
+/// it is more, since each has at least the smallest margin.
 const MARGINS: u64 = 128 << 20;
+/// The smallest memory that each job may use beyond its estimate (bytes).
 const LEAST_MARGIN: u64 = 4 << 20;
 
 /// The budget of all running jobs together (bytes).
 #[derive(Debug)]
 pub struct Budget {
     bytes: u64,
-    /// The memory that a job may use beyond its estimate.
+    /// The memory that each job may use beyond its estimate (bytes).
     margin: u64,
     state: Mutex<State>,
     /// Whether the next job of the queue waits for memory.
@@ -65,9 +66,9 @@ impl Budget {
         self.state().reserved
     }
 
-    /// Reserves the estimated memory of a job; none if it does not fit together with the running ones. A job of unknown
-    /// need, or of more than the budget (which was larger when it was accepted), takes all of it and runs alone. Kept
-    /// bodies that no job uses are dropped if the job fits then.
+    /// Reserves the estimated memory of a job; `None` if it does not fit together with the running ones. A job of
+    /// unknown need, or of more than the budget (which was larger when the job was accepted), takes all of the budget
+    /// and runs alone. Kept bodies that no job uses are dropped if the job fits then.
     pub fn reserve(self: &Arc<Budget>, needed: Option<u64>) -> Option<Reservation> {
         let bytes = needed.unwrap_or(u64::MAX).min(self.bytes);
         let mut state = self.state();
@@ -218,7 +219,7 @@ impl Meter {
         self.start.set(self.start.get().saturating_sub(bytes));
     }
 
-    /// Whether the job may continue, which is about to allocate `needed` more bytes.
+    /// Whether the job, which is about to allocate `needed` more bytes, may continue.
     pub fn check(&self, needed: u64) -> Result<(), Outgrown> {
         let (used, share) = (self.used(), self.share);
         match used.saturating_add(needed) > share {
@@ -231,8 +232,8 @@ impl Meter {
         }
     }
 
-    /// The lack of memory of a job that was refused `needed` more bytes. If that is within its share, the machine has
-    /// less than the share: more than it is needed, whatever is used.
+    /// The error of a job that was refused `needed` more bytes by the system. If they are within its share, the machine
+    /// has less memory than the share; the error then names at least the share as needed, whatever is used.
     pub fn refused(&self, needed: u64) -> Outgrown {
         self.check(needed).err().unwrap_or_else(|| Outgrown {
             used: self.used(),

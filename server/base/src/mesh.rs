@@ -42,19 +42,19 @@ pub struct MeshInfo {
     pub node_sets: BTreeMap<String, u64>,
     /// The quality of the elements.
     pub quality: Quality,
-    /// Warnings about changes made when it was read.
+    /// Warnings about changes that were made to the mesh when it was read.
     pub warnings: Vec<Warning>,
-    /// The time when it was stored.
+    /// The time when the mesh was stored.
     pub created_at: Time,
 }
 
-/// Writes the stored form of a mesh: the mesh, followed by the list of added midsides and the number of nodes that its
-/// sets lost.
+/// Writes the stored form of a mesh: the mesh, followed by the list of added midsides and the number of nodes that the
+/// node sets lost.
 pub fn write_stored<W: std::io::Write>(mesh: &Mesh, to: W) -> postcard::Result<W> {
     postcard::to_io(&(mesh, mesh.added_midsides, &mesh.nodes_left_out), to)
 }
 
-/// Reads a mesh from its stored form; that of earlier versions ends after the mesh, or after its midsides.
+/// Reads a mesh from its stored form; the form of earlier versions ends after the mesh, or after the midsides.
 pub fn read_stored(bytes: &[u8]) -> postcard::Result<Mesh> {
     let (mut mesh, rest): (Mesh, &[u8]) = postcard::take_from_bytes(bytes)?;
     if !rest.is_empty() {
@@ -130,13 +130,13 @@ impl MeshInfo {
     }
 
     /// Whether an earlier version has stored the mesh without the number of its added midsides, which are then in its
-    /// sets.
+    /// node sets.
     pub fn lacks_added_midsides(&self, mesh: &Mesh) -> bool {
         let raised = |warning: &Warning| warning.code == WarningCode::RaisedToSecondOrder;
         mesh.added_midsides.is_none() && self.warnings.iter().any(raised)
     }
 
-    /// The numbers that an estimate needs.
+    /// The numbers by which memory and time are estimated.
     pub fn size(&self) -> MeshSize {
         let edges = |(name, info): (&String, &BoundaryInfo)| (name.clone(), info.edges);
         MeshSize {

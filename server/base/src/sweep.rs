@@ -20,7 +20,7 @@ use crate::{
 /// A sweep, as clients see it.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Sweep {
-    /// The store's own number, in order of arrival; never shown.
+    /// The number of the sweep in the store, in order of arrival; never shown to clients.
     #[serde(skip)]
     pub key: i64,
     /// The public id.
@@ -34,18 +34,18 @@ pub struct Sweep {
     pub name: Option<String>,
     /// Labels for programs.
     pub labels: BTreeMap<String, String>,
-    /// The owner who submitted it.
+    /// The owner who submitted the sweep.
     pub owner: String,
-    /// The time when it was accepted.
+    /// The time when the sweep was accepted.
     pub created_at: Time,
-    /// The time when its last job ended.
+    /// The time when the last job of the sweep ended.
     pub finished_at: Option<Time>,
     /// The values in which members differ: JSON Pointers into the problem.
     pub paths: Vec<String>,
     /// The numbers of members by status.
     pub members: MemberCounts,
-    /// The number of jobs that solve the members: one for all members on the same body. `GET /v1/jobs?sweep=…` lists
-    /// them.
+    /// The number of jobs that solve the members: one job for all members on the same body. `GET /v1/jobs?sweep=…`
+    /// lists the jobs.
     pub jobs: u32,
     /// Addresses of related resources.
     pub links: BTreeMap<String, String>,
@@ -58,7 +58,7 @@ pub struct MemberCounts {
     pub total: u32,
     /// Members whose job waits.
     pub queued: u32,
-    /// Members whose job is running; it solves them one after another.
+    /// Members whose job is running, which solves them one after another.
     pub running: u32,
     /// Members that converged.
     pub succeeded: u32,
@@ -71,16 +71,16 @@ pub struct MemberCounts {
 /// A member of a sweep, with its results: a row of the table.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MemberRow {
-    /// The number from 0, in the order of the definition.
+    /// The number of the member, from 0, in the order of the definition.
     pub number: u32,
-    /// The member's values by JSON Pointer, without those that equal the base's.
+    /// The values of the member by JSON Pointer, without those that equal the base's.
     #[serde(default)]
     pub parameters: BTreeMap<String, ParameterValue>,
     /// The member's status.
     pub status: Status,
     /// Why the member failed or was canceled.
     pub reason: Option<Reason>,
-    /// A description of the failure in words, if it failed.
+    /// What went wrong, if the member failed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub detail: Option<String>,
     /// The first violations of an invalid member; pointers refer to its problem.
@@ -102,9 +102,9 @@ pub struct MemberRow {
     pub peak_normal_stress: Option<f64>,
     /// The largest |σ_t|, with its sign; 0 without friction.
     pub peak_tangential_stress: Option<f64>,
-    /// Number of rows of its history; 0 if it was not solved.
+    /// The number of iterations of the member; 0 if it was not solved.
     pub iterations: u32,
-    /// Dimensionless residuals of its final state.
+    /// The dimensionless residuals of the member's final state.
     pub residuals: Option<Residuals>,
     /// The kinds of warnings to consider before relying on the results, each once.
     pub warnings: Vec<WarningCode>,
@@ -170,7 +170,7 @@ impl MemberRow {
         self
     }
 
-    /// A member that was solved, converged or not.
+    /// The row of a member that was solved, converged or not.
     pub fn solved(number: usize, member: Member) -> MemberRow {
         let Member {
             outcome,
@@ -216,7 +216,7 @@ impl MemberRow {
         .tidied()
     }
 
-    /// A member without a solution.
+    /// The row of a member that failed without a solution.
     pub fn failed(number: usize, reason: Reason, detail: String) -> MemberRow {
         MemberRow {
             number: number_of(number),
@@ -227,7 +227,7 @@ impl MemberRow {
         }
     }
 
-    /// A member whose problem is invalid.
+    /// The row of a member whose problem is invalid.
     pub fn invalid(number: usize, mut violations: Vec<Violation>) -> MemberRow {
         let detail = match violations.len() {
             1 => "the problem has a violation".to_owned(),
@@ -240,7 +240,7 @@ impl MemberRow {
         }
     }
 
-    /// A member without a row (yet), by the state of its job: waiting, running, or ended without it.
+    /// The row of a member that was not solved, or not yet, by the state of its job: waiting, running, or ended.
     pub fn unsolved(number: usize, status: Status, reason: Option<Reason>) -> MemberRow {
         MemberRow {
             number: number_of(number),
@@ -277,12 +277,12 @@ pub struct SweepEvent {
 #[serde(tag = "type", rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum SweepPayload {
-    /// A member was solved, or could not be.
+    /// A member was solved, or failed.
     Member {
         /// The member's row.
         member: Box<MemberRow>,
     },
-    /// All jobs of the sweep have ended: the last event. Members without an event were not reached.
+    /// All jobs of the sweep have ended; this is its last event. Members without an event were not reached.
     Done {
         /// The sweep in its final state.
         sweep: Box<Sweep>,

@@ -8,7 +8,7 @@ use std::{pin::Pin, sync::Arc};
 use parking_lot::Mutex;
 use tokio::task::{JoinError, JoinHandle};
 
-/// The result of work, once it has ended.
+/// The place where work leaves its result when it has ended.
 struct Slot<T>(Arc<Mutex<Option<T>>>);
 
 impl<T> Slot<T> {
@@ -30,7 +30,7 @@ impl<T> Slot<T> {
     }
 }
 
-/// Runs work that may block, on a thread for that; also if nobody waits for it any more.
+/// Runs work that may block, on a thread for such work. It is completed even if nobody waits for it any more.
 ///
 /// # Errors
 ///
@@ -44,7 +44,7 @@ pub async fn blocking<T: Send + 'static>(
     Ok(result.take())
 }
 
-/// Runs a task that also ends if nobody waits for it any more.
+/// Runs a task, which is completed even if nobody waits for it any more.
 ///
 /// # Errors
 ///

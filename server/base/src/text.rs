@@ -9,7 +9,7 @@ pub fn size(bytes: u64) -> String {
     }
 }
 
-/// How many there are of something, as text for people: "1 job", "2 jobs".
+/// A number of things, as text for people: "1 job", "2 jobs".
 pub fn number_of(count: usize, what: &str) -> String {
     match count {
         1 => format!("1 {what}"),

@@ -36,15 +36,15 @@ pub struct Token {
     pub id: String,
     /// A name for people, such as where the token is used.
     pub name: String,
-    /// The owner of the jobs that it submits.
+    /// The owner of the jobs that are submitted with the token.
     pub owner: String,
     /// The scopes of the token.
     pub scopes: BTreeSet<Scope>,
-    /// The time when it was created.
+    /// The time when the token was created.
     pub created_at: Time,
-    /// The time from which it is refused; null: never.
+    /// The time from which the token is refused; null: never.
     pub expires_at: Option<Time>,
-    /// The time since which it is refused; null: not revoked.
+    /// The time since which the token is refused; null: it was not revoked.
     pub revoked_at: Option<Time>,
 }
 
@@ -60,10 +60,10 @@ impl Token {
     }
 }
 
-/// Tokens by their ids, each with the hash of its secret.
+/// The tokens by their ids, each with the hash of its secret.
 pub type Tokens = BTreeMap<String, (Token, SecretHash)>;
 
-/// The hash of a secret, which is stored instead of it.
+/// The hash of a secret, which is stored instead of the secret.
 #[derive(Clone, Copy)]
 pub struct SecretHash(pub [u8; 32]);
 
@@ -74,7 +74,7 @@ impl SecretHash {
 }
 
 impl PartialEq for SecretHash {
-    /// Compares in a time that does not depend on how many bytes are right.
+    /// Compares in a time that does not depend on how many bytes are equal.
     fn eq(&self, other: &SecretHash) -> bool {
         self.0.ct_eq(&other.0).into()
     }
@@ -96,7 +96,7 @@ pub struct Presented {
 }
 
 impl Presented {
-    /// Reads a token; `None` if it is not one.
+    /// Reads a token; `None` if the text is not a token.
     pub fn parse(text: &str) -> Option<Presented> {
         let (id, secret) = text.strip_prefix(PREFIX)?.split_once('_')?;
         let hex = |byte: u8| byte.is_ascii_digit() || (b'a'..=b'f').contains(&byte);
@@ -111,7 +111,7 @@ impl Presented {
     }
 }
 
-/// The whole text of a new token, which is shown once, and nowhere else. It cannot be printed by accident.
+/// The whole text of a new token, which is shown only once. The type cannot be printed by accident.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Secret(String);
 

@@ -1,4 +1,4 @@
-//! The trace of a request by W3C Trace Context: that of its `traceparent` header, or a new one.
+//! The trace of a request by W3C Trace Context: the trace of its `traceparent` header, or a new one.
 
 use std::collections::HashMap;
 
@@ -13,8 +13,9 @@ use opentelemetry_sdk::{
     trace::{IdGenerator, RandomIdGenerator},
 };
 
-/// The header, and the largest number of its bytes that are read.
+/// The name of the header with the trace context.
 const HEADER: &str = "traceparent";
+/// The largest length of the header that is read (bytes).
 const LONGEST: usize = 128;
 
 /// A piece of work in a trace, and the work that it is part of.
@@ -22,7 +23,7 @@ const LONGEST: usize = 128;
 pub struct Trace {
     /// The ids of this work, and whether it is recorded.
     pub own: SpanContext,
-    /// The ids of the work that it is part of.
+    /// The ids of the work that this work is part of.
     pub parent: SpanContext,
 }
 
@@ -33,7 +34,8 @@ impl Trace {
         Trace::within(SpanContext::NONE, trace, TraceFlags::SAMPLED)
     }
 
-    /// The trace of a request. `tracestate` is ignored: it is for services that call others, and this one calls none.
+    /// The trace of a request. `tracestate` is ignored: it is for services that call others, and this service calls
+    /// none.
     pub fn of_request(headers: &HeaderMap) -> Trace {
         let mut sent = headers.get_all(HEADER).iter();
         let (first, more) = (sent.next(), sent.next().is_some());

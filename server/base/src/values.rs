@@ -1,4 +1,4 @@
-//! The allowed values of a parameter: how they are described, read, and listed in errors.
+//! The allowed values of a parameter: describes them, reads them, and lists them in errors.
 
 use std::ops::RangeInclusive;
 
@@ -18,7 +18,7 @@ pub trait Values {
     /// The allowed texts in words, for errors.
     fn expected(&self) -> String;
 
-    /// The value of this text; `None` if it is not allowed.
+    /// The value that this text stands for; `None` if it is not allowed.
     fn read(&self, text: &str) -> Option<Self::Value>;
 }
 

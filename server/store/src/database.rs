@@ -405,7 +405,8 @@ fn prepare(
     let pages = Pages::of(writer)?;
     identity.may_shrink_to(pages.bytes_of(pages.count));
     let record = progress::in_database(writer)?;
-    let record = record.ok_or_else(|| StoreError::Unexpected("no progress".into()))?;
+    let record =
+        record.ok_or_else(|| StoreError::Unexpected("the table progress is empty".into()))?;
     Progress::start(path, record).map_err(|error| {
         let file = path.join(progress::FILE);
         StoreError::Folder(format!("cannot write {}: {error}", file.display()))

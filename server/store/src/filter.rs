@@ -24,16 +24,16 @@ macro_rules! job_filters {
             owner: Option<String>, owner, "owner" "=", Some("job_by_owner"), "Only jobs of this owner";
             name: Option<String>, name, "name" "=", Some("job_by_name"), "Only jobs with this name";
             input_hash: Option<String>, input_hash, "input_hash" "=", Some("job_by_input"),
-                "Only jobs with this input";
+                "Only jobs with this fingerprint of the problem";
             sweep: Option<SweepId>, sweep, "sweep" "=", Some("job_by_sweep"), "Only jobs of this sweep";
             created_after: Option<Time>, created_after, "created_at" ">=", None,
                 "Only jobs accepted at this time or later";
             created_before: Option<Time>, created_before, "created_at" "<", None,
-                "Only jobs accepted earlier";
+                "Only jobs accepted before this time";
             finished_after: Option<Time>, finished_after, "finished_at" ">=", None,
                 "Only jobs that ended at this time or later";
             finished_before: Option<Time>, finished_before, "finished_at" "<", None,
-                "Only jobs that ended earlier";
+                "Only jobs that ended before this time";
         }
     };
 }

@@ -139,7 +139,7 @@ impl Hash {
         serde_json_canonicalizer::to_writer(value, self)
     }
 
-    /// Writes an array, one value after another; false if `go_on` returns false before one.
+    /// Writes an array, one value after another; false if `go_on` returned false before a value.
     fn array(
         &mut self,
         values: &[impl Serialize],
@@ -323,7 +323,7 @@ impl Hash {
         });
     }
 
-    /// Writes a number by `write`.
+    /// Writes a number: `write` puts it into the free room, and returns its length.
     #[inline]
     fn number(&mut self, write: impl FnOnce(&mut Recent, &mut [u8; ROOM]) -> usize) {
         self.make_room(ROOM);

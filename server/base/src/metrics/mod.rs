@@ -52,7 +52,7 @@ pub struct Metrics {
     grpc_durations: Family<Labels<1>, Histogram, fn() -> Histogram>,
     /// The number of requests that are being answered.
     pub in_progress: Gauge,
-    /// The bytes of answers.
+    /// The number of bytes of responses.
     pub sent_bytes: Counter,
     /// The number of open connections.
     pub connections: Gauge,
@@ -122,7 +122,8 @@ impl Metrics {
         Metrics { registry: all, ..metrics }
     }
 
-    /// Records an answered request over REST. Its route is a template, its method one of a few.
+    /// Records the response to a REST request. `route` is a template and `method` one of a few, so that labels have few
+    /// values.
     pub fn answered(&self, method: &'static str, route: &str, status: u16, took: Duration) {
         let class = match status {
             100..=199 => "1xx",
@@ -144,7 +145,7 @@ impl Metrics {
         durations.observe(took.as_secs_f64());
     }
 
-    /// Records an answered call over gRPC. Its rpc is one of the contract.
+    /// Records the response to a gRPC call. `rpc` is one of the contract.
     pub fn answered_call(&self, rpc: &'static str, code: &'static str, took: Duration) {
         let labels = [("rpc", rpc.into()), ("code", code.into())];
         self.grpc_requests.get_or_create(&labels).inc();
@@ -152,14 +153,14 @@ impl Metrics {
         durations.observe(took.as_secs_f64());
     }
 
-    /// Records an accepted job. Its result comes from the solver, from an earlier result, or from a queued or running
-    /// job with the same input.
+    /// Records an accepted job. `result_from` tells whether its result comes from the solver, an earlier result, or a
+    /// queued or running job with the same input.
     pub fn job_accepted(&self, result_from: &'static str) {
         let labels = [("result_from", result_from.into())];
         self.jobs_accepted.get_or_create(&labels).inc();
     }
 
-    /// Records that a job has ended, with the times that it waited and ran, if it ran.
+    /// Records that a job has ended, with the times for which it waited and ran, if it ran.
     pub fn job_ended(
         &self,
         status: &'static str,

@@ -34,7 +34,7 @@ pub struct Document {
     pub steps: Vec<Step>,
     /// Displacements and stresses at all nodes.
     pub fields: Fields,
-    /// The law by which stresses follow from displacements, with which fields are stored compactly.
+    /// The elastic law by which stresses follow from displacements; with it, fields are stored compactly.
     #[serde(skip)]
     pub law: Law,
 }
@@ -61,20 +61,20 @@ pub struct Step {
 /// The solver's summary, with timings and fingerprints.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Summary {
-    /// The solver's summary.
+    /// The summary that the solver has made.
     #[serde(flatten)]
     pub solution: solver::solution::Summary,
     /// Seconds by phase.
     pub timings: Timings,
     /// Whether the body was kept from an earlier job with the same mesh, materials, supports, loads and contact
-    /// boundaries: it was then not assembled and factored again, which changes no number.
+    /// boundaries. It was then not assembled and factored again, which changes no number.
     #[serde(default)]
     pub body_reused: bool,
-    /// The version of the program that solved it.
+    /// The version of the program that solved the problem.
     pub solver_version: String,
-    /// Fingerprint of the problem.
+    /// The fingerprint of the problem.
     pub input_hash: String,
-    /// Fingerprint of the result.
+    /// The fingerprint of the result.
     pub digest: String,
 }
 

@@ -1,5 +1,6 @@
 //! Solves members of a sweep that share a body, one after another, both for the worker and for `signorini sweep`. A
-//! later attempt does not store a row again, and solves its member again only if others start from it.
+//! later attempt stores no row a second time, and solves a member with a stored row only if other members start from
+//! it.
 
 use files::sweep::{Group, Neighbour, Plan, Problems, has_own_meshes};
 use solver::{
@@ -14,33 +15,34 @@ use solver::{
 
 use crate::{job::Reason, sweep::MemberRow};
 
-/// Checks a problem and prepares its body, which is made or reused: see [`solver::prepare`].
+/// A function that checks a problem and prepares its body, which is made or reused: see [`solver::prepare`].
 pub type Prepare<'a> =
     dyn Fn(&Problem, Option<External>, &mut dyn Observer) -> Result<Prepared, SolveError> + 'a;
 
-/// The members of a sweep that share a body, or may.
+/// The members of a group of a sweep, which may share a body.
 pub struct Members<'a> {
     plan: &'a Plan,
     problems: Problems<'a>,
     /// All members of the group, in order.
     group: &'a Group,
-    /// The mesh of the base, for members without a mesh of their own.
+    /// The mesh of the sweep's base problem, for members without a mesh of their own.
     mesh: &'a MeshInput,
     /// Reads the mesh that a problem only names or contains as text.
     external: &'a dyn Fn(&Problem) -> Option<External>,
-    /// Prepares the first member.
+    /// Prepares the body of the first member that is solved.
     prepare: &'a Prepare<'a>,
-    /// The common body, once a member that has one was solved.
+    /// The common body, once a member on it was prepared.
     family: Option<Family>,
-    /// Why the common body cannot be factored, and so no member solved.
+    /// Why the common body cannot be factored, so that no member on it can be solved.
     unsound: Option<SolveError>,
-    /// By line: the last member that was solved on it, with its end, or that of its neighbour if it has none.
+    /// By line of the sweep: the last member that was solved on the line, with its end, or with its neighbour's end if
+    /// it has none.
     lines: Vec<Option<(usize, Option<End>)>>,
 }
 
 impl<'a> Members<'a> {
-    /// The members of a plan, with the mesh of its base and the meshes that problems name; `family`: their common body,
-    /// if it is known.
+    /// The members `group` of a plan, with the mesh of its base. `external` reads meshes that problems name; `family`
+    /// is the common body, if it is known.
     pub fn new(
         plan: &'a Plan,
         group: &'a Group,
@@ -62,8 +64,8 @@ impl<'a> Members<'a> {
         }
     }
 
-    /// Solves one of the members; a failure is a row, too. They are solved in order. The error means that the solver
-    /// was stopped.
+    /// Solves the member with this number; members are solved in order. A failure is returned as a row; an error means
+    /// that the solver was stopped.
     pub fn row(
         &mut self,
         number: usize,
@@ -115,8 +117,8 @@ impl<'a> Members<'a> {
         self.member(number, observer)
     }
 
-    /// The members that a member starts from, directly or not, whose ends are not known, in the order in which they
-    /// must be solved.
+    /// The members from which the member starts, directly or not, and whose ends are not known, in the order in which
+    /// they must be solved.
     fn missing(&self, number: usize) -> Vec<usize> {
         let mut missing = Vec::new();
         let mut next = self.neighbour(number);
@@ -137,7 +139,7 @@ impl<'a> Members<'a> {
         self.plan.neighbour(self.group, place)
     }
 
-    /// Solves a member on the common body, from its neighbour, whose end is known.
+    /// Solves a member on the common body; it starts from its neighbour, whose end is known.
     fn on_body(
         &mut self,
         number: usize,
@@ -173,7 +175,7 @@ impl<'a> Members<'a> {
     }
 }
 
-/// Whether a problem shares no body with others, since it is solved on meshes of its own.
+/// Whether a problem shares its body with no other, since it is solved on meshes of its own.
 pub fn is_alone(problem: &Problem) -> bool {
     has_own_meshes(problem, &problem.mesh.refine)
 }

@@ -28,14 +28,14 @@ pub use stopwatch::Timings;
 /// The solver, or its substitute in a test.
 pub type Solve = fn(&Problem, Option<External>, &mut dyn Observer) -> Result<Solution, SolveError>;
 
-/// The size of a profile apart from its points, in points.
+/// The size of a profile without its points, counted in points.
 const OF_A_PROFILE: usize = 5;
 
 /// How long writing the results of a stopped job may take, so that a worker is not occupied by a result that nobody
 /// waits for.
 const WRITING: Duration = Duration::from_millis(250);
 
-/// Whether to go on writing: still true for `WRITING` after `stop` first was.
+/// A function that tells whether to go on writing: it is still true for `WRITING` after `stop` was first true.
 pub fn patient(mut stop: impl FnMut() -> bool) -> impl FnMut() -> bool {
     let mut stopped: Option<Instant> = None;
     move || !stop() || stopped.get_or_insert_with(Instant::now).elapsed() < WRITING
@@ -59,7 +59,7 @@ pub struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    /// Begins now. `parse_s`: seconds for reading the problem, which the caller has done.
+    /// Starts the measurement. `parse_s` is the time (s) that the caller took to read the problem.
     pub fn new(problem: &'a Problem, parse_s: f64) -> Run<'a> {
         Run {
             problem,
@@ -67,7 +67,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// The event of a job that tells what the observer of this run was just told; none if clients are not told.
+    /// The event of a job for what the solver has just reported to the observer of this run; `None` if clients are not
+    /// told of it.
     pub fn payload(&self, progress: Progress<'_>) -> Option<Payload> {
         match progress {
             Progress::Phase(stage) => Some(Payload::Stage { stage }),
@@ -132,8 +133,8 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Records the times of what an observer is told, and stops at a number that is not finite: JSON cannot write it, and
-/// going on is pointless.
+/// An observer that records the times of what the solver reports, and stops it at a number that is not finite: JSON
+/// cannot write such a number, and going on is pointless.
 struct Timed<'a> {
     observer: &'a mut dyn Observer,
     watch: &'a RefCell<Stopwatch>,

@@ -1,4 +1,4 @@
-//! Measures the time of each phase and iteration.
+//! A stopwatch for the time of each phase and iteration of the solver.
 
 use std::{collections::BTreeMap, time::Instant};
 
@@ -7,7 +7,7 @@ use strum::VariantArray;
 
 use crate::event::TimedIteration;
 
-/// The seconds of each phase.
+/// The time of each phase (s), by its name.
 pub type Timings = BTreeMap<String, f64>;
 
 /// A stopwatch from the start of the solver.
@@ -15,16 +15,16 @@ pub(super) struct Stopwatch {
     start: Instant,
     current: Option<(Phase, Instant)>,
     times: Times,
-    /// The number of the mesh of adaptive refinement that `times` are for; 0 without it.
+    /// The number of the mesh of adaptive refinement that `times` are for; 0 without adaptive refinement.
     mesh: u32,
-    /// The times of the iterations on the mesh before.
+    /// The times of the iterations on the mesh before the present one.
     before: Vec<f64>,
 }
 
 /// The measured times.
 #[derive(Clone, Debug)]
 pub(super) struct Times {
-    /// The time of every phase, also of those not reached; verification only if it was reached.
+    /// The time of every phase, 0 if it was not reached; verification is missing if it was not reached.
     pub(super) phases: Timings,
     /// Whether a body was factored.
     pub(super) factored: bool,
@@ -51,7 +51,7 @@ impl Stopwatch {
         }
     }
 
-    /// Records that adaptive refinement begins on a mesh with this number, or returns to the one before.
+    /// Records that adaptive refinement begins on the mesh with this number, or returns to the mesh before.
     pub(super) fn on_mesh(&mut self, number: u32) {
         let iterations = &mut self.times.iterations;
         if number > self.mesh {
@@ -78,7 +78,7 @@ impl Stopwatch {
         self.done(row);
     }
 
-    /// Records an iteration, done now unless it was recorded before.
+    /// Records that an iteration ends now, unless it was recorded before.
     pub(super) fn done(&mut self, row: &Iteration) {
         if self.times.iterations.len() <= place(row) {
             self.times
@@ -87,7 +87,7 @@ impl Stopwatch {
         }
     }
 
-    /// A recorded iteration with its time.
+    /// An iteration with its recorded time.
     pub(super) fn timed(&self, row: Iteration) -> TimedIteration {
         self.times.timed(row)
     }
@@ -102,7 +102,7 @@ impl Stopwatch {
 }
 
 impl Times {
-    /// Rows of the history with their times.
+    /// Iterations with their recorded times.
     pub(super) fn of(&self, rows: Vec<Iteration>) -> Vec<TimedIteration> {
         rows.into_iter().map(|row| self.timed(row)).collect()
     }
@@ -116,7 +116,7 @@ impl Times {
     }
 }
 
-/// The index of a row, since rows are numbered from 1.
+/// The index of an iteration in lists, since iterations are numbered from 1.
 fn place(row: &Iteration) -> usize {
     (row.k as usize).saturating_sub(1)
 }
