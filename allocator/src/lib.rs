@@ -1,17 +1,18 @@
 //! The system's allocator, which counts for each thread how many bytes it has taken and not given back, and asks for
 //! huge pages.
 //!
-//! A job is solved on one thread (a second one that helps it works in the memory that the first has taken), so this is
-//! what the job holds; the server ends a job that outgrows its share. The
-//! crates that count allocations do so for the whole process, or only within a closure for a test: none answers, in the
-//! middle of a job, what this thread holds. So it is written here, and it is all that this crate does: `GlobalAlloc`
-//! can only be implemented with `unsafe`, which the other crates forbid.
+//! A job is solved on one thread (a second one that helps it works in the memory that the first has taken), so the
+//! count of its thread is what the job holds; the server ends a job that outgrows its share. Published crates count
+//! allocations for the whole process, or only within a closure for a test: none tells, in the middle of a job, what its
+//! thread holds. The counting is therefore written here, in a crate that does nothing else: `GlobalAlloc` can only be
+//! implemented with `unsafe`, which the other crates forbid.
 //!
 //! Large allocations ask for huge pages. A factor of a million unknowns is half a million pages of 4 KiB, and handing
 //! out each of them takes the system as long as the arithmetic on it.
 //!
 //! Counting is two additions to a thread-local number, about a nanosecond. Bytes that another thread gives back are
-//! taken from that thread's count: a thread that hands over what it has made keeps it in its own.
+//! subtracted from that thread's count: memory that a thread has taken and hands over to another stays in its own
+//! count.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -26,8 +27,8 @@ thread_local! {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Counting;
 
-/// From now on, memory of 128 KiB and more goes back to the system as soon as it is freed. Otherwise glibc raises that
-/// limit by itself, up to 32 MiB, as soon as something of that size is freed: what was held for a hundred answers or a
+/// Makes memory of 128 KiB and more go back to the system as soon as it is freed, from now on. Otherwise glibc raises
+/// this limit by itself, up to 32 MiB, when an allocation of that size is freed: the memory of a hundred responses or a
 /// large mesh then stays with the process, in pieces. It costs no measurable time in a solution.
 pub fn give_back_large_memory() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
@@ -37,11 +38,11 @@ pub fn give_back_large_memory() {
     }
 }
 
-/// Bytes from which an allocation asks for huge pages: four of the usual 2 MiB, since one that is used in part takes up
-/// to one of them more than it uses. The many answers of a server are mostly smaller.
+/// The size (bytes) from which an allocation asks for huge pages: four pages of the usual 2 MiB, since an allocation
+/// that uses its last page in part takes up to one page too much. Most responses of a server are smaller.
 const LARGE: usize = 8 << 20;
 
-/// Asks for huge pages where the system leaves that to programs; elsewhere nothing changes.
+/// Asks for huge pages for this memory, where the system leaves that to programs; elsewhere does nothing.
 fn ask_for_huge_pages(memory: *mut u8, size: usize) {
     #[cfg(target_os = "linux")]
     if size >= LARGE && !memory.is_null() {
@@ -58,23 +59,23 @@ fn ask_for_huge_pages(memory: *mut u8, size: usize) {
     let _ = (memory, size);
 }
 
-/// Bytes that this thread has taken and not given back; negative if it has given back what others took. 0 in a program
-/// that does not use [`Counting`].
+/// The number of bytes that this thread has taken and not given back; negative if it has given back what other threads
+/// took. 0 in a program that does not use [`Counting`].
 pub fn held() -> i64 {
     HELD.get()
 }
 
-/// The highest count of this thread since [`forget_highest`].
+/// The highest value of [`held`] on this thread since [`forget_highest`].
 pub fn highest() -> i64 {
     HIGHEST.get()
 }
 
-/// Begins a new highest count.
+/// Sets the highest count of this thread to its present count.
 pub fn forget_highest() {
     HIGHEST.set(HELD.get());
 }
 
-/// Adds to the count of this thread. Sizes are below `isize::MAX`.
+/// Adds to the count of this thread; `bytes` is negative for memory that is given back. Sizes are below `isize::MAX`.
 fn count(bytes: i64) {
     let held = HELD.get().wrapping_add(bytes);
     HELD.set(held);

@@ -38,23 +38,23 @@ use web::{
     rest,
 };
 
-/// The running service, which listens on its address.
+/// The running service, which listens at its address.
 #[derive(Debug)]
 pub struct App {
     address: SocketAddr,
     store: Arc<Store>,
     queue: Arc<Queue>,
     health: HealthReporter,
-    /// Closes the listener, then the connections one by one.
+    /// The token that, when it is canceled, closes the listener, then the connections one by one.
     closing: CancellationToken,
     server: JoinHandle<()>,
     grace: Duration,
     tls: Option<Arc<Tls>>,
-    /// Sends spans, if that is configured.
+    /// The task that sends spans to a collector, if one is configured.
     exporting: Option<Exporting>,
 }
 
-/// Tells whether the service is alive.
+/// A handle that tells whether the service is alive.
 #[derive(Clone, Debug)]
 pub struct Pulse {
     store: Arc<Store>,
@@ -62,7 +62,7 @@ pub struct Pulse {
 }
 
 impl Pulse {
-    /// Returns when the store has answered; false if it will not answer.
+    /// Waits until the store has answered; false if it will not answer.
     pub async fn store_answers(&self) -> bool {
         self.store.answers().await
     }
@@ -86,7 +86,7 @@ impl Pulse {
 /// The time that the store has to close, even if there is no grace.
 const LEAST_FOR_STORE: Duration = Duration::from_millis(500);
 
-/// The service cannot listen at this address.
+/// The error that the service cannot listen at this address.
 #[derive(Clone, Copy, Debug, thiserror::Error)]
 #[error("cannot listen on {0}")]
 pub struct CannotListen(SocketAddr);
@@ -114,8 +114,8 @@ fn worker_process() -> Command {
     command
 }
 
-/// Requeues the jobs, and removes the uploads, that were interrupted when the service last ended. Jobs that cannot be
-/// requeued yet are requeued by the queue later.
+/// Requeues the jobs and removes the unfinished uploads that were interrupted when the service last ended. Jobs that
+/// cannot be requeued yet are requeued by the queue later.
 async fn clean_up(store: &Arc<Store>) -> store::Result<()> {
     store.requeue_interrupted().await?;
     let pieces = match store.discard_unattached().await {
@@ -131,7 +131,7 @@ async fn clean_up(store: &Arc<Store>) -> store::Result<()> {
     Ok(())
 }
 
-/// How long jobs are kept, and how many; 0 means no limit.
+/// The limits of what the store keeps, by the configuration, in which 0 means no limit.
 fn retention(config: &Config) -> Retention {
     let limits = &config.retention;
     let seconds = |days: f64| (days > 0.0).then_some(days * 86_400.0);
@@ -146,7 +146,7 @@ fn retention(config: &Config) -> Retention {
     }
 }
 
-/// The service would be reachable from other machines without any authentication.
+/// The error that everybody could use the service from other machines, because it has no authentication.
 #[derive(Clone, Copy, Debug, thiserror::Error)]
 #[error(
     "{0} can be reached from other machines, and there is no token: anyone who reaches it could do everything. Create a token \

@@ -1,12 +1,12 @@
-//! What every part of the service shares: the words of its contract (jobs, callers, kinds of errors, points in
-//! time), what running jobs hold in memory, and one solution with its measurements. Nothing here knows the store or a
-//! protocol.
+//! What every part of the service shares: the types of its contract (jobs, callers, kinds of errors, points in
+//! time), the memory that running jobs hold, and the solution of one problem with measured times. Nothing here depends
+//! on the store or on a protocol.
 //!
 //! # Where to look
 //!
 //! | subject | where |
 //! |---|---|
-//! | one solution with its times | `run` |
+//! | the solution of one problem, with its times | `run` |
 //! | sweeps: solving the members | `run/members.rs` |
 //! | kinds of errors, with status, gRPC code and explanation | `catalog.rs` |
 //! | callers, owners and scopes | `caller.rs` |
@@ -19,7 +19,7 @@
 //! | points where tests make a job fail | `failpoint.rs` |
 //! | ids of jobs and sweeps | `id.rs` |
 //! | allowed values of parameters | `values.rs` |
-//! | work on other threads and in tasks of its own | `tasks.rs` |
+//! | work on other threads and in separate tasks | `tasks.rs` |
 
 // Where clients reach the service; texts for people; points in time, and other values of parameters; traces; counts.
 pub mod address;

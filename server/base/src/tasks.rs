@@ -1,4 +1,4 @@
-//! Work on other threads and in tasks of their own.
+//! Runs work on other threads and in separate tasks.
 //!
 //! An async or generic function is compiled in the crate that calls it, and what tokio adds to a task is long: with work
 //! of any type in one box it is compiled once.

@@ -90,7 +90,7 @@ impl Connections {
         }))
     }
 
-    /// Waits for a connection; an error if that takes too long, as it does on a disk that does not answer.
+    /// Waits for a connection; an error if that takes too long, for example because the disk does not answer.
     pub(super) fn turn(self: &Arc<Self>) -> BoxFuture<'_, Result<Lease>> {
         Box::pin(async {
             let turn = timeout(self.patience, self.turns.clone().acquire_owned()).await;

@@ -18,9 +18,9 @@ use super::{
     sql::{Sql, text},
 };
 
-/// Bytes of one piece: larger rows make SQLite chain pages, and readers need more memory.
+/// The largest size of a piece (bytes): with larger rows SQLite chains pages, and readers need more memory.
 pub const PIECE_BYTES: usize = 256 << 10;
-/// Pieces per transaction: 1 MiB occupies the single writer for some ten milliseconds, so that a
+/// The number of pieces that one transaction writes: 1 MiB occupies the single writer for some ten milliseconds, so that a
 /// cancel or a submission during the write of a large result is still answered at once.
 pub const PIECES_PER_COMMIT: usize = 4;
 
@@ -33,17 +33,17 @@ pub(super) enum Holder {
 
 /// Names under which content is attached.
 pub(super) mod name {
-    /// The problem of a job: its JSON without the title.
+    /// The name of the problem of a job: its JSON without the title.
     pub(crate) const PROBLEM: &str = "problem";
-    /// The result of a job without its fields, see `parts`.
+    /// The name of the result of a job without its fields, see `parts`.
     pub(crate) const RESULT: &str = "result";
-    /// The fields of a job.
+    /// The name of the fields of a job.
     pub(crate) const FIELDS: &str = "fields";
     /// The names of the content that is attached to a job with a result.
     pub(crate) const OF_RESULT: [&str; 2] = [RESULT, FIELDS];
-    /// The definition of the sweep of a job: JSON.
+    /// The name of the definition of the sweep of a job: JSON.
     pub(crate) const DEFINITION: &str = "definition";
-    /// A mesh, parsed.
+    /// The name of the body of a mesh: the parsed mesh.
     pub(crate) const MESH: &str = "mesh";
 }
 
@@ -67,7 +67,7 @@ impl Holder {
 /// The hash and the size of content.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fingerprint {
-    /// SHA-256.
+    /// The SHA-256 of the bytes.
     pub hash: Vec<u8>,
     /// The number of bytes.
     pub bytes: usize,

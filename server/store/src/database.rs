@@ -90,7 +90,7 @@ pub struct Store {
     pub(super) folder: Folder,
 }
 
-/// Whether the database is rebuilt when the store is connected to.
+/// Whether connecting to the store rebuilds the database.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Rebuild {
     /// The database is rebuilt if an earlier version made it and it cannot give space back.

@@ -11,9 +11,9 @@ use solver::solution::Fields;
 /// The size and the hash of the JSON of a part.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PartInfo {
-    /// The size of its JSON.
+    /// The size of the JSON (bytes).
     pub bytes: u64,
-    /// The SHA-256 of its JSON.
+    /// The SHA-256 of the JSON.
     pub digest: Vec<u8>,
 }
 
@@ -24,7 +24,7 @@ pub(super) enum Encoding {
     Plain,
     /// JSON, deflated.
     Deflated,
-    /// The columns of fields.
+    /// The part `fields`, as columns of numbers.
     Columns,
 }
 

@@ -215,7 +215,7 @@ impl Report {
         }
     }
 
-    /// Reads everything of a job; returns it if it is intact.
+    /// Reads all data of a job; returns the job if all of them are intact.
     fn check_job(&mut self, source: &Connection, key: i64) -> Option<Job> {
         let job = match find(source, key) {
             Ok(Some(job)) => job,

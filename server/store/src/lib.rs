@@ -1,7 +1,7 @@
-//! Everything durable, and the only SQL: one SQLite file.
+//! The store: all data that outlast the process, in one SQLite file. Only this crate has SQL.
 //!
 //! One connection writes, always in `begin immediate`, so that no transaction fails half-way
-//! because it cannot get a lock; others read at the same time (WAL). A commit is on the disk when it returns
+//! because it cannot get a lock; other connections read at the same time (WAL). A commit is on the disk when it returns
 //! (synchronous FULL). Each method runs one query or change, in one transaction, on a thread that may block: all code below it
 //! is plain functions of a connection.
 //!
@@ -9,7 +9,7 @@
 //! job of another owner is not found, as if it did not exist. Keys, the store's own numbers of jobs, come only from
 //! the results of such queries.
 //!
-//! The files are listed in order of use: no file uses one that uses it.
+//! The modules are declared in order of use: no module uses a module that uses it.
 //!
 //! # Where to look
 //!
@@ -38,15 +38,15 @@
 //! | tokens | `tokens` |
 //! | what a disk has changed: checksums of rows | `checksum` |
 //! | what a disk has changed: content that was found intact | `intact` |
-//! | what a disk has changed: what was found so far | `damage` |
-//! | what a disk has changed: whether the database still takes a job | `write_check` |
+//! | what a disk has changed: the damage that was found so far | `damage` |
+//! | what a disk has changed: whether a job can still be stored | `write_check` |
 //! | what a disk has changed: reading all keys in the background | `scrub` |
 //! | the folder and its lock | `folder` |
 //! | how far the store had come | `progress` |
 //! | space for control on a full disk | `reserve` |
 //! | tables and migrations | `migrations`, `migrations/0001_jobs.sql` and those after it |
 //! | connections to the database, statements | `database`, `connections`, `sql` |
-//! | the clock of the store, and time that it has not seen pass | `clock`, `pauses` |
+//! | the clock of the store, and the time when no service ran | `clock`, `pauses` |
 //! | whether the store works (`/readyz`) | `health` |
 //! | retention | `retention` |
 //! | cancels and deletions of many jobs | `bulk` |
@@ -208,7 +208,7 @@ impl Store {
         Ok(store)
     }
 
-    /// Opens the store without the tasks that look after it from time to time.
+    /// Opens the store without the tasks that check its files and read its tables in the background.
     async fn open_unwatched(folder: &Path) -> Result<Arc<Store>> {
         let folder = folder.to_owned();
         let connect = move || Store::connect(&folder, Rebuild::IfItCannotGiveBack);

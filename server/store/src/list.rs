@@ -33,7 +33,7 @@ enum Lane<'a> {
     Label(&'a (String, String)),
     /// The rows of a value of a column: the name of the index, the filter, and the value.
     Value(&'static str, &'static Field, &'a Value),
-    /// All jobs, or all that have ended.
+    /// All jobs, or all jobs that have ended.
     All,
 }
 
@@ -206,7 +206,7 @@ pub(super) fn values_of(filter: &Filter) -> Vec<(&'static Field, Vec<Value>)> {
     each.filter(|(_, values)| !values.is_empty()).collect()
 }
 
-/// All ways to find the jobs of a list. The last one finds all jobs in the order of the list.
+/// All ways to find the jobs of a list. The last way finds all jobs, in the order of the list.
 pub(super) fn paths<'a>(
     filter: &'a Filter,
     values: &'a [(&'static Field, Vec<Value>)],

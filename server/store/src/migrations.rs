@@ -144,7 +144,7 @@ pub(super) fn run(database: &Connection, folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// An error if the tables are of a later version, or not of this program. Nothing is written.
+/// An error if the tables are of a later version, or of another program. Nothing is written.
 pub(super) fn check(connection: &Connection) -> Result<()> {
     if !is_listed(connection)? {
         return if connection.value("select exists (select 1 from sqlite_schema)", ())? {

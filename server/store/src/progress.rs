@@ -42,9 +42,9 @@ pub(super) struct LastCommit {
 /// What the file tells about the last commit.
 #[derive(Debug)]
 pub(super) enum Known {
-    /// There is no file.
+    /// The file does not exist.
     Missing,
-    /// The file is not as it was written.
+    /// The file is damaged: its checksum does not match.
     Damaged,
     /// The last commit that the file records.
     Last(LastCommit),

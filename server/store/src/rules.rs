@@ -21,7 +21,7 @@ const MAX_ATTEMPTS: i32 = 3;
 /// How a job ends.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Ending {
-    /// A terminal status.
+    /// The terminal status of the job.
     pub status: Status,
     /// The reason, unless the job succeeded.
     pub reason: Option<Reason>,

@@ -132,7 +132,7 @@ impl Snapshot {
         }))
     }
 
-    /// The JSON of a part.
+    /// The JSON of a part of the result, if the result has this part.
     pub async fn part(&mut self, part: &str) -> Result<Option<Vec<u8>>> {
         let part = part.to_owned();
         let read = self.read_result(move |result, connection| {

@@ -28,7 +28,7 @@ pub struct Space {
 }
 
 impl Store {
-    /// The space of the store.
+    /// Measures the space of the store.
     pub async fn space(self: &Arc<Self>) -> Result<Space> {
         let pages = self.pages().await?;
         let folder = self.folder.path();

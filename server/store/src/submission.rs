@@ -19,7 +19,7 @@ pub struct NewJob {
     pub name: Option<String>,
     /// Labels for programs.
     pub labels: BTreeMap<String, String>,
-    /// −10 … 10.
+    /// The priority, −10 … 10.
     pub priority: i32,
     /// The time limits of the job.
     pub limits: Limits,
