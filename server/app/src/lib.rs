@@ -167,7 +167,7 @@ fn refuse_open(config: &Config, store: &Store) -> Result<(), OpenToAll> {
 }
 
 impl App {
-    /// Starts all parts. When this returns, the service answers at its address.
+    /// Starts all parts of the service. When this returns, the service answers at its address.
     pub fn start(config: &Config) -> BoxFuture<'_, anyhow::Result<App>> {
         Box::pin(App::started(config))
     }
@@ -258,9 +258,9 @@ impl App {
         self.tls.clone()
     }
 
-    /// Stops in the order that loses nothing: starts no more jobs, requeues the running ones, ends the streams,
-    /// answers open requests, closes the store. Solvers may still run on their threads when this returns; their
-    /// results are dropped.
+    /// Stops the service in an order that loses nothing: starts no more jobs, requeues the running ones, ends the
+    /// streams, answers open requests, closes the store. Solvers may still run on their threads when this returns;
+    /// their results are dropped.
     pub fn stop(self) -> BoxFuture<'static, ()> {
         Box::pin(self.end())
     }

@@ -67,7 +67,7 @@ pub struct BodyCache {
 }
 
 impl Bodies {
-    /// No bodies yet, and a limit on their size (bytes); 0 keeps none.
+    /// An empty set of kept bodies, with a limit on their size (bytes); 0 keeps none.
     pub fn new(limit: u64) -> Bodies {
         Bodies {
             limit,
@@ -82,7 +82,7 @@ impl Bodies {
         self.limit
     }
 
-    /// The body with this key and its size (bytes). The caller compares it, and counts a hit or a miss.
+    /// The body with this key and its size (bytes). The caller compares its model, and counts a hit or a miss.
     pub fn find(&self, key: &Key) -> Option<(Arc<Prepared>, u64)> {
         let kept = self.kept.get(key)?;
         Some((kept.prepared.clone(), kept.bytes))

@@ -14,7 +14,7 @@ use crate::address::link;
 pub struct Kind {
     /// The stable name of the kind.
     pub code: &'static str,
-    /// The title: one line, the same every time.
+    /// The title: one line, the same for every error of the kind.
     pub title: &'static str,
     /// The HTTP status; absent for a reason that only jobs end with.
     pub status: Option<u16>,
@@ -33,7 +33,7 @@ pub struct Kind {
 pub struct WarningKind {
     /// The stable name of the warning.
     pub code: &'static str,
-    /// The meaning: one line, the same every time.
+    /// The meaning: one line, the same for every warning of the kind.
     pub title: String,
     /// What to do about it.
     pub explanation: &'static str,
@@ -143,7 +143,7 @@ fn of_job(code: &'static str, title: &'static str, explanation: &'static str) ->
 /// Makes the enum of the kinds, and the facts about each, from one table.
 macro_rules! catalog {
     ($($code:ident: $of:ident($($fact:expr),*),)*) => {
-        /// The kinds of errors in the order of their HTTP statuses, followed by those that only jobs end with.
+        /// The kinds of errors in the order of their HTTP statuses, followed by the reasons that only jobs end with.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, EnumString, VariantArray)]
         #[strum(serialize_all = "kebab-case")]
         #[allow(missing_docs)] // the table explains each

@@ -47,7 +47,7 @@ pub enum Payload {
     Mesh {
         /// The number of the mesh, from 1.
         number: u32,
-        /// The number of its elements.
+        /// The number of the mesh's elements.
         elements: u64,
         /// The largest relative error on the mesh before; absent for the first mesh, and where the error is unknown.
         #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -388,7 +388,7 @@ pub struct Progress {
     pub rate: Option<f64>,
     /// The estimated seconds to the end, extrapolated from the rate.
     pub eta_s: Option<f64>,
-    /// The number of the present mesh of adaptive refinement, from 1; absent without it.
+    /// The number of the present mesh of adaptive refinement, from 1; absent without adaptive refinement.
     pub mesh: Option<u32>,
     /// The number of elements of the present mesh of adaptive refinement.
     pub mesh_elements: Option<u64>,

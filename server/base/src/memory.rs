@@ -129,7 +129,7 @@ impl Budget {
     }
 }
 
-/// A reserved part of the budget, returned when it is dropped.
+/// A reserved part of the budget, returned to it when the reservation is dropped.
 #[derive(Debug)]
 pub struct Reservation {
     budget: Arc<Budget>,
@@ -143,7 +143,7 @@ pub struct Reservation {
 pub struct Allowance<'a> {
     /// The memory (bytes).
     pub share: u64,
-    /// The kept bodies; none if no bodies are kept.
+    /// The budget with the kept bodies; `None` if no bodies are kept.
     pub bodies: Option<&'a Budget>,
 }
 
@@ -162,7 +162,7 @@ impl Reservation {
     }
 
     /// The memory that the job may use: its estimate, which is meant to be an upper bound, plus a margin. All jobs
-    /// together use no more than the budget and 128 MiB, or 4 MiB for each.
+    /// together use no more than the budget plus 128 MiB, or plus 4 MiB for each job if that is more.
     pub fn share(&self) -> u64 {
         self.bytes.saturating_add(self.budget.margin)
     }

@@ -289,7 +289,7 @@ pub enum SweepPayload {
     },
 }
 
-/// The time limits of a job that solves this many members, if the client gives none: those of a single job, and six
+/// The time limits of a job that solves this many members, if the client gives none: the limits of a single job, and six
 /// more seconds for each further member, at most a week.
 pub fn limits_for(members: usize) -> Limits {
     const EACH_S: f64 = 6.0;

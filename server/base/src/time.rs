@@ -19,7 +19,7 @@ thread_local! {
 pub struct Time(i64);
 
 impl Time {
-    /// This moment. The machine's clock is read once; from then on time is measured by a counter that nobody can set
+    /// The present time. The machine's clock is read once; from then on time is measured by a counter that nobody can set
     /// and that also runs while the machine sleeps, so that durations, time limits and the order of times are right
     /// whatever happens to the clock. The clock is read again at the next start.
     pub fn now() -> Self {
@@ -81,7 +81,7 @@ impl Time {
         Time(self.0.saturating_add((seconds * 1e6) as i64))
     }
 
-    /// The seconds from this time to `later`. If the clock was set back in between, it is 0, not negative.
+    /// The seconds from this time to `later`; 0, not negative, if the clock was set back in between.
     pub fn seconds_until(self, later: Time) -> f64 {
         later.0.saturating_sub(self.0).max(0) as f64 / 1e6
     }

@@ -126,7 +126,7 @@ impl Hash {
         self.length += 1;
     }
 
-    /// Makes room for this many more bytes, by hashing those before them.
+    /// Makes room for `bytes` more bytes; if necessary, hashes the text so far and empties the buffer.
     #[inline]
     fn make_room(&mut self, bytes: usize) {
         if self.length + bytes > AT_ONCE {
@@ -157,7 +157,7 @@ impl Hash {
         Ok(true)
     }
 
-    /// Writes a problem without its title. Its mesh is written by hand, like fields.
+    /// Writes a problem without its title. A mesh that the problem contains is written by this type, not by serde.
     fn problem(&mut self, problem: &Problem) -> serde_json::Result<()> {
         // all of them by name, here and below, so that a new one is not forgotten
         let Problem {

@@ -1,4 +1,5 @@
-//! Figures of the process from /proc, under the usual names. The crates that read them bring a parser for all of /proc.
+//! Figures of the process from /proc, under the usual names. They are read here, since published crates for it bring a
+//! parser for all of /proc.
 
 use std::fs;
 
@@ -7,7 +8,7 @@ use prometheus_client::{
     registry::Registry,
 };
 
-/// Adds the figures that can be read; on systems other than Linux none.
+/// Adds the figures that can be read; on systems other than Linux there are none.
 pub(super) fn register(registry: &mut Registry) {
     let mut gauge = |name: &str, help: &str, value: Option<f64>| {
         if let Some(value) = value {
