@@ -289,8 +289,8 @@ pub enum SweepPayload {
     },
 }
 
-/// The time limits of a job that solves this many members, if the client gives none: the limits of a single job, and six
-/// more seconds for each further member, at most a week.
+/// The time limits of a job that solves this many members, if the client gives none: the limits of a single job, and
+/// six more seconds for each further member, at most a week.
 pub fn limits_for(members: usize) -> Limits {
     const EACH_S: f64 = 6.0;
     const MOST_S: f64 = 7.0 * 86_400.0;

@@ -1,7 +1,7 @@
 //! Runs work on other threads and in separate tasks.
 //!
-//! An async or generic function is compiled in the crate that calls it, and what tokio adds to a task is long: with work
-//! of any type in one box it is compiled once.
+//! An async or generic function is compiled in every crate that calls it, and the code that tokio adds to a task is long.
+//! Here work of every type is put into one type of box, so that this code is compiled once.
 
 use std::{pin::Pin, sync::Arc};
 

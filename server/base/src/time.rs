@@ -19,8 +19,8 @@ thread_local! {
 pub struct Time(i64);
 
 impl Time {
-    /// The present time. The machine's clock is read once; from then on time is measured by a counter that nobody can set
-    /// and that also runs while the machine sleeps, so that durations, time limits and the order of times are right
+    /// The present time. The machine's clock is read once; from then on time is measured by a counter that nobody can
+    /// set and that also runs while the machine sleeps, so that durations, time limits and the order of times are right
     /// whatever happens to the clock. The clock is read again at the next start.
     pub fn now() -> Self {
         if let Some(micros) = SIMULATED.get() {

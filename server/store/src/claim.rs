@@ -49,7 +49,8 @@ fn next(change: &mut Change<'_>) -> Result<Option<Job>> {
 /// wait with it, even those that would fit: the order is strict, so that no large job is overtaken for ever. Running
 /// jobs end within their time limits, and each job fits alone.
 pub(super) fn claim(change: &mut Change<'_>) -> Result<Option<Claim>> {
-    /// The largest number of jobs that are answered, coalesced or failed before one is claimed: more would take too long.
+    /// The largest number of jobs that are answered, coalesced or failed before one is claimed: more would take too
+    /// long.
     const MOST_ANSWERED: usize = 100;
     for _ in 0..MOST_ANSWERED {
         let Some(waiting) = next(change)? else {

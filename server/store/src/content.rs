@@ -20,8 +20,8 @@ use super::{
 
 /// The largest size of a piece (bytes): with larger rows SQLite chains pages, and readers need more memory.
 pub const PIECE_BYTES: usize = 256 << 10;
-/// The number of pieces that one transaction writes: 1 MiB occupies the single writer for some ten milliseconds, so that a
-/// cancel or a submission during the write of a large result is still answered at once.
+/// The number of pieces that one transaction writes: 1 MiB occupies the single writer for some ten milliseconds, so
+/// that a cancel or a submission during the write of a large result is still answered at once.
 pub const PIECES_PER_COMMIT: usize = 4;
 
 /// The job or mesh that content is attached to, by its key.

@@ -243,7 +243,8 @@ impl Store {
         self.close_as(true).await;
     }
 
-    /// Closes the store for a command that is not the service: the record of whether the service has stopped or died stays as it was.
+    /// Closes the store for a command that is not the service: the record of whether the service has stopped or died
+    /// stays as it was.
     pub async fn close_as_found(self: &Arc<Self>) {
         self.close_as(self.was_stopped).await;
     }

@@ -1,4 +1,5 @@
-//! The ids of deleted jobs and sweeps are remembered for a while, and with them the keys of the requests that submitted them.
+//! Forgets the ids of deleted jobs and sweeps, which are remembered for a while, and with the ids of jobs the request
+//! keys under which they were submitted.
 
 use std::sync::Arc;
 

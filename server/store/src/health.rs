@@ -122,7 +122,7 @@ pub(super) async fn watch(store: Weak<Store>) {
         let now_s = Time::clock_was_set_by_s();
         if (now_s - set_by_s).abs() > 1.0 {
             tracing::warn!(
-                "the clock of the machine was set by {:+.0} s; the service does not follow this until its next start",
+                "the clock of the machine was set by {:+.0} s; the times of jobs ignore this until the next start",
                 now_s - set_by_s
             );
             set_by_s = now_s;

@@ -1,9 +1,9 @@
 //! The store: all data that outlast the process, in one SQLite file. Only this crate has SQL.
 //!
-//! One connection writes, always in `begin immediate`, so that no transaction fails half-way
-//! because it cannot get a lock; other connections read at the same time (WAL). A commit is on the disk when it returns
-//! (synchronous FULL). Each method runs one query or change, in one transaction, on a thread that may block: all code below it
-//! is plain functions of a connection.
+//! One connection writes, always in `begin immediate`, so that no transaction fails half-way because it cannot get a
+//! lock; other connections read at the same time (WAL). A commit is on the disk when it returns (synchronous FULL).
+//! Each method runs one query or change, in one transaction, on a thread that may block: all code below it is plain
+//! functions of a connection.
 //!
 //! Queries by public id, lists and counts have a parameter for the owners whose jobs they may return ([`Owners`]): a
 //! job of another owner is not found, as if it did not exist. Keys, the store's own numbers of jobs, come only from

@@ -1,5 +1,5 @@
-//! Models that earlier versions registered for clients of UM-Bridge: before their tables are dropped, each becomes a file
-//! that `python -m signorini.umbridge` serves.
+//! Writes the models that earlier versions registered for clients of UM-Bridge to files, which
+//! `python -m signorini.umbridge` serves, before the tables of models are dropped.
 
 use std::{
     fs::{DirBuilder, File, OpenOptions},

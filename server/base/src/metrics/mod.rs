@@ -187,7 +187,8 @@ impl Metrics {
         self.commits.observe(took.as_secs_f64());
     }
 
-    /// All metrics with the present figures, in the text format of OpenMetrics. This reads files of /proc, and may block.
+    /// All metrics with the present figures, in the text format of OpenMetrics. This reads files of /proc, and may
+    /// block.
     pub fn text(&self, now: Snapshot) -> Result<String, fmt::Error> {
         let mut text = String::new();
         encode_registry(&mut text, &self.registry)?;
