@@ -151,7 +151,7 @@ fn fill(data: &Path, partial: &Partial, check: bool) -> Result<Backup> {
 struct Partial {
     target: PathBuf,
     path: PathBuf,
-    /// The lock on the target folder, held so that a second backup to the same target does not mix with this one.
+    /// The lock on the folder, held so that a second backup to the same target does not mix with this one.
     _lock: File,
 }
 

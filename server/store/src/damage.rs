@@ -72,7 +72,7 @@ impl Damages {
         }
     }
 
-    /// Records the damage if the result of a query is that error.
+    /// Records the damage if a query has failed because of damage; returns its result.
     pub(super) fn noting<T>(&self, found: Result<T>) -> Result<T> {
         match found {
             Err(StoreError::Damaged(damage)) => {

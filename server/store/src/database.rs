@@ -238,7 +238,7 @@ impl Store {
         Ok((store, submissions))
     }
 
-    /// Closes every connection; the last one closes the write-ahead log. Another server may then use the folder.
+    /// Closes every connection; the last one merges the write-ahead log. Another server may then use the folder.
     pub async fn close(self: &Arc<Self>) {
         self.close_as(true).await;
     }

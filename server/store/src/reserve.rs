@@ -27,7 +27,7 @@ const FOR_A_START: u64 = 2 << 20;
 /// The free space (bytes) below which the disk counts as full: a submission takes some ten kilobytes.
 const LEAST: u64 = 256 << 10;
 
-/// The file, which has its full size or not.
+/// The file that reserves space on the disk.
 #[derive(Debug)]
 pub(super) struct Reserve {
     path: PathBuf,
