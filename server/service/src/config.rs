@@ -15,7 +15,8 @@ use serde::Serialize;
 use strum::Display;
 use tracing_subscriber::filter::{LevelFilter, Targets};
 
-/// Settings of the service. A flag takes precedence over its environment variable, and that over the file.
+/// The settings of the service. A flag takes precedence over its environment variable, and the variable over the file
+/// of settings.
 #[derive(Clone, Debug, Args)]
 pub struct Config {
     /// Address and port of both REST and gRPC; port 0 chooses a free one
@@ -55,7 +56,7 @@ pub struct Config {
     pub workers: u16,
 
     /// Where jobs are solved: on threads of the service, or in processes, one for each worker and kept from job to job.
-    /// A crash such as a stack overflow then costs only the job that the process is solving
+    /// In a process, a crash such as a stack overflow costs only the job that the process is solving
     #[arg(long, env = "SIGNORINI_ISOLATION", value_enum, default_value_t = Isolation::Thread)]
     pub isolation: Isolation,
 
@@ -156,8 +157,8 @@ pub struct StoreFolder {
 }
 
 impl Config {
-    /// The size of all bodies that are kept (bytes). Worker processes keep none: each would hold bodies that the others
-    /// cannot use.
+    /// The memory for condensed bodies that are kept for later jobs (bytes). 0 for worker processes: each would hold
+    /// bodies that the other processes cannot use.
     pub fn body_cache_bytes(&self) -> u64 {
         match self.isolation {
             Isolation::Thread => {
@@ -170,7 +171,7 @@ impl Config {
     }
 }
 
-/// Limits on how long jobs that have ended are kept, and how many.
+/// Limits on how many jobs that have ended are kept, and for how long.
 #[derive(Clone, Debug, Default, Args)]
 pub struct RetentionLimits {
     /// Days that a job is kept after its end, unless it is pinned. 0: no limit
@@ -182,13 +183,13 @@ pub struct RetentionLimits {
     #[arg(long, env = "SIGNORINI_RETAIN_FIELDS_DAYS", default_value_t = 0.0, value_name = "DAYS", value_parser = days)]
     pub retain_fields_days: f64,
 
-    /// Most bytes of all jobs that have ended and are not pinned; beyond that the oldest jobs of the owners who store
-    /// most are removed. 0: no limit
+    /// Maximum bytes of all jobs that have ended and are not pinned; beyond that the oldest jobs of the owners who
+    /// store most are removed. 0: no limit
     #[arg(long, env = "SIGNORINI_RETAIN_BYTES", default_value_t = 20 << 30, value_name = "BYTES")]
     pub retain_bytes: u64,
 
-    /// Most bytes of the jobs of one owner that have ended; beyond that the owner's oldest jobs that are not pinned are
-    /// removed. 0: no limit
+    /// Maximum bytes of the jobs of one owner that have ended; beyond that the owner's oldest jobs that are not pinned
+    /// are removed. 0: no limit
     #[arg(
         long,
         env = "SIGNORINI_RETAIN_BYTES_PER_OWNER",
@@ -197,7 +198,7 @@ pub struct RetentionLimits {
     )]
     pub retain_bytes_per_owner: u64,
 
-    /// Most jobs that have ended; beyond that the oldest jobs that are not pinned are removed. 0: no limit
+    /// Maximum number of jobs that have ended; beyond that the oldest jobs that are not pinned are removed. 0: no limit
     #[arg(
         long,
         env = "SIGNORINI_RETAIN_JOBS",
@@ -206,8 +207,8 @@ pub struct RetentionLimits {
     )]
     pub retain_jobs: u64,
 
-    /// Most jobs of one owner that have ended; beyond that the owner's oldest jobs that are not pinned are removed. 0:
-    /// no limit
+    /// Maximum number of jobs of one owner that have ended; beyond that the owner's oldest jobs that are not pinned are
+    /// removed. 0: no limit
     #[arg(
         long,
         env = "SIGNORINI_RETAIN_JOBS_PER_OWNER",
@@ -229,8 +230,8 @@ fn days(text: &str) -> Result<f64, String> {
 /// The certificate of the service.
 #[derive(Clone, Debug, Default, Args)]
 pub struct Tls {
-    /// PEM file of a certificate, followed by those of its issuers: the service then accepts only TLS. SIGHUP reads it
-    /// and the key again
+    /// PEM file of a certificate, followed by the certificates of its issuers: the service then accepts only TLS.
+    /// SIGHUP reads it and the key again
     #[arg(long = "tls-cert", env = "SIGNORINI_TLS_CERT", value_name = "FILE")]
     cert: Option<PathBuf>,
 
@@ -242,13 +243,13 @@ pub struct Tls {
 /// The files of a certificate and its key.
 #[derive(Clone, Debug)]
 pub struct TlsFiles {
-    /// The certificate, and those of its issuers.
+    /// The file of the certificate, followed by the certificates of its issuers.
     pub cert: PathBuf,
-    /// The private key.
+    /// The file of the private key.
     pub key: PathBuf,
 }
 
-/// Only one of the two files is given, so that it is unclear whether the service should use TLS.
+/// The error that only one of the two files is given, so that it is unclear whether the service should use TLS.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{given} is set, and {missing} is not: TLS needs both the certificate and its key (on the command line, in the \
@@ -265,7 +266,8 @@ impl Tls {
         self.cert.is_some()
     }
 
-    /// Both files, or none. clap's `requires` is not used, since it does not see values from the file of settings.
+    /// The files of the certificate and its key; `None` if neither is set. clap's `requires` is not used, since it does
+    /// not see values from the file of settings.
     pub fn files(&self) -> Result<Option<TlsFiles>, HalfOfTls> {
         let half = |given, missing| Err(HalfOfTls { given, missing });
         match (&self.cert, &self.key) {
@@ -328,8 +330,8 @@ pub fn log_filter(text: &str) -> Result<Targets, String> {
 #[derive(Clone, Debug, Default, Args)]
 pub struct Web {
     /// A host name by which clients reach this service, such as lab.example or lab.example:8443; can be repeated, or a
-    /// list with commas. Numeric addresses, localhost and the name of this machine are always allowed, others are
-    /// refused: a page on another site could let its own name lead here
+    /// list with commas. Numeric addresses, localhost and the name of this machine are always allowed, other names are
+    /// refused: a page on another site could let its own name lead to this service
     #[arg(
         long = "allowed-host",
         env = "SIGNORINI_ALLOWED_HOSTS",
@@ -338,8 +340,8 @@ pub struct Web {
     )]
     pub allowed_hosts: Vec<String>,
 
-    /// Path below which clients reach this service, such as /signorini, where a proxy shows it there: links begin with
-    /// it. The service answers both below this path and without it, for proxies that remove it
+    /// Path below which clients reach this service, such as /signorini, where a proxy puts it below a path: links begin
+    /// with this path. The service answers both below this path and without it, for proxies that remove it
     #[arg(long, env = "SIGNORINI_PATH_PREFIX", value_name = "PATH", default_value = "",
           hide_default_value = true, value_parser = path_prefix)]
     pub path_prefix: String,
@@ -397,7 +399,7 @@ impl Default for ProxyTrust {
 }
 
 impl ProxyTrust {
-    /// Trust in these proxies alone, with the usual header and scopes; what is no network is left out.
+    /// Trusts these proxies, with the default header and scopes; texts that are not networks are left out.
     pub fn of(proxies: &[&str]) -> ProxyTrust {
         let proxies = proxies.iter().filter_map(|text| network(text).ok());
         ProxyTrust {
@@ -411,7 +413,7 @@ impl ProxyTrust {
         !self.proxies.is_empty()
     }
 
-    /// Whether a request from this address comes from a trusted proxy.
+    /// Whether the proxy at this address is trusted.
     pub fn includes(&self, address: IpAddr) -> bool {
         let address = address.to_canonical();
         self.proxies
@@ -419,7 +421,7 @@ impl ProxyTrust {
             .any(|network| network.contains(&address))
     }
 
-    /// The caller for a user whom the proxy names.
+    /// The caller that a request has whose user is named by a trusted proxy.
     pub fn caller(&self, user: &str) -> Caller {
         let admin = self.admins.iter().any(|admin| admin == user);
         let scopes = self.scopes.iter().copied();
@@ -427,7 +429,7 @@ impl ProxyTrust {
     }
 }
 
-/// Reads a network, or an address as a network of one.
+/// Reads a network; a single address is read as the network of this address alone.
 fn network(text: &str) -> Result<IpNet, String> {
     let one = text.parse::<IpAddr>().map(IpNet::from);
     let found = one.or_else(|_| text.parse()).map(|found| match found {
@@ -437,8 +439,8 @@ fn network(text: &str) -> Result<IpNet, String> {
     found.map_err(|_| "expected an address or a network, such as 127.0.0.1 or 10.0.0.0/8".into())
 }
 
-/// Converts an IPv4 network in the notation of IPv6, such as ::ffff:10.0.0.0/104, since requests from it are compared
-/// as IPv4.
+/// Converts an IPv4 network that is written as IPv6, such as ::ffff:10.0.0.0/104, to IPv4, since the addresses of
+/// requests are compared as IPv4.
 fn canonical(network: Ipv6Net) -> IpNet {
     const BEFORE_V4: u8 = 96;
     let within = network.addr().to_ipv4_mapped();
@@ -454,7 +456,7 @@ fn scope(text: &str) -> Result<Scope, String> {
         .map_err(|_| "expected read, submit, cancel or admin".into())
 }
 
-/// Reads a path without a slash at its end; the root is empty.
+/// Reads a path and removes a slash at its end; the root becomes empty.
 fn path_prefix(text: &str) -> Result<String, String> {
     const MOST: usize = 200;
     let path = text.strip_suffix('/').unwrap_or(text);
@@ -484,7 +486,7 @@ fn endpoint(text: &str) -> Result<String, String> {
     good.then(|| text.to_owned()).ok_or_else(|| EXPECTED.into())
 }
 
-/// Reads scheme, host and port as a browser writes them.
+/// Reads an origin: scheme, host and port as a browser writes them.
 fn origin(text: &str) -> Result<String, String> {
     let host = text
         .strip_prefix("https://")
@@ -533,7 +535,7 @@ pub struct MemoryBudget {
 }
 
 impl MemoryBudget {
-    /// The budget in bytes.
+    /// The memory budget in bytes: the setting, or half of the machine's memory.
     pub fn bytes(self) -> u64 {
         self.memory_budget_bytes
             .unwrap_or_else(|| machine_memory() / 2)

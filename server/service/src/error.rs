@@ -1,5 +1,5 @@
-//! Why a request failed, with the details of the case; `catalog` has the stable facts about each kind. Here an error
-//! becomes the HTTP document, and the gRPC status with its details.
+//! Why a request failed, with the details of the case; `catalog` has the stable facts about each kind. This module
+//! makes an error into the HTTP problem document, and into the gRPC status with its details.
 
 use std::fmt;
 
@@ -27,10 +27,10 @@ use crate::pace::{LEAST_RATE, LONGEST_PAUSE};
 /// Why a request failed.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum ApiError {
-    /// The body is not JSON.
+    /// The request body is not JSON.
     #[error("{0}")]
     MalformedJson(String),
-    /// A query parameter that this operation does not have.
+    /// A query parameter is unknown to this operation.
     #[error("this operation has no parameter {name:?}; it has: {known}")]
     UnknownParameter {
         /// The name that was sent.
@@ -38,32 +38,32 @@ pub enum ApiError {
         /// The parameters of the operation.
         known: String,
     },
-    /// A query parameter or header with an invalid value.
+    /// A query parameter or header has an invalid value.
     #[error("{name}: expected {expected}, got {got:?}")]
     BadParameter {
-        /// The parameter or header.
+        /// The name of the parameter or header.
         name: &'static str,
         /// The value that was sent.
         got: String,
         /// The value that was expected.
         expected: String,
     },
-    /// A page token that does not belong to this list.
+    /// A page token does not belong to this list.
     #[error("the page token does not belong to this list; start again without one")]
     BadPageToken,
-    /// A change of many jobs without a filter.
+    /// A request to change many jobs has no filter.
     #[error("a filter is required: at least one of {0}")]
     MissingFilter(String),
     /// The request is not HTTP, or not a message of the contract.
     #[error("{0}")]
     BadRequest(String),
-    /// The body arrived too slowly.
+    /// The request body arrived too slowly.
     #[error("the body arrived too slowly: nothing for {} s, or less than {} KiB a second", LONGEST_PAUSE.as_secs(), LEAST_RATE >> 10)]
     RequestTimeout,
-    /// The address is too long.
+    /// The URI of the request is too long.
     #[error("the path and the query are too long")]
     UriTooLong,
-    /// The headers are too large.
+    /// The headers of the request are too large.
     #[error("the headers of the request are too large")]
     HeaderTooLarge,
     /// Other requests occupy the memory for transfers, or the connections.
@@ -75,9 +75,9 @@ pub enum ApiError {
         uploads(owner, most)
     )]
     TooManyUploads {
-        /// The owner who uploads them; `None`: all owners.
+        /// The owner who has reached the limit; `None`: the limit of all owners together is reached.
         owner: Option<String>,
-        /// The limit.
+        /// The largest number of simultaneous uploads.
         most: usize,
     },
     /// The caller is not authenticated.
@@ -117,24 +117,24 @@ pub enum ApiError {
         /// The names of the available formats.
         available: String,
     },
-    /// A body in a format that is not understood.
+    /// The request body has a format that is not understood.
     #[error("expected a body of type {expected}, got {got}")]
     UnsupportedMedia {
-        /// The type that was expected.
+        /// The media type that was expected.
         expected: &'static str,
-        /// The type that was declared.
+        /// The media type that was declared.
         got: String,
     },
-    /// A body with a Content-Encoding that is not understood.
+    /// The request body has a Content-Encoding that is not understood.
     #[error("expected a body without Content-Encoding, or with gzip or zstd, got {0}")]
     UnsupportedEncoding(String),
     /// The job has not ended.
     #[error("the job is {0}; cancel it, or wait for its end")]
     JobActive(JobStatus),
-    /// The id belongs to a job with other content.
+    /// The id that the client has chosen belongs to a job with other content.
     #[error("{0} was submitted with other content; use a new id for another job")]
     IdConflict(JobId),
-    /// The key belongs to a request with other content.
+    /// The idempotency key was used for a request with other content.
     #[error(
         "this key was used for a request with other content; use a new key, or repeat that request unchanged"
     )]
@@ -142,7 +142,7 @@ pub enum ApiError {
     /// The job has a newer version.
     #[error("the job has version {0}")]
     StaleVersion(i64),
-    /// A range that begins after the end.
+    /// The requested range of bytes begins after the end of the data, which has this many bytes.
     #[error("the data has {0} bytes")]
     RangeNotSatisfiable(u64),
     /// Queued or running jobs use the mesh.
@@ -151,35 +151,35 @@ pub enum ApiError {
     /// The job has not ended and has no result yet.
     #[error("the job is {0}; its result is available when it has ended")]
     ResultNotReady(JobStatus),
-    /// The body is too large.
+    /// The request body is too large.
     #[error("the body is larger than {limit_bytes} bytes")]
     PayloadTooLarge {
-        /// The limit.
+        /// The largest allowed size (bytes).
         limit_bytes: usize,
     },
-    /// The body becomes much larger when its Content-Encoding is undone.
+    /// The request body becomes much larger when its Content-Encoding is undone.
     #[error(
         "the body becomes more than {ratio} times larger when its Content-Encoding is undone; send it without"
     )]
     EncodedTooLarge {
-        /// The largest allowed ratio.
+        /// The largest allowed ratio of the decoded size to the encoded size.
         ratio: usize,
     },
-    /// The message has too many parts.
+    /// The gRPC message has too many parts.
     #[error(
         "the message has too many parts: it would take more than {} in memory",
         size(*limit_bytes as u64)
     )]
     MessageTooLarge {
-        /// The limit in bytes.
+        /// The largest allowed memory of the message (bytes).
         limit_bytes: usize,
     },
-    /// The answer does not fit into one message.
+    /// The answer does not fit into one gRPC message.
     #[error(
         "the response is larger than a message may be (1 MiB); REST has no such limit: {instead}"
     )]
     AnswerTooLarge {
-        /// Where REST has it.
+        /// The REST operation that has the same data.
         instead: &'static str,
     },
     /// The job needs more memory than the budget allows.
@@ -202,7 +202,7 @@ pub enum ApiError {
     /// Too many requests at once.
     #[error("more requests arrive than can be answered in a short time")]
     RateLimited,
-    /// An unexpected error of the service; the log has the cause under this number.
+    /// An unexpected error of the service; the log has its cause under the number `incident`.
     #[error("an unexpected error, logged as incident {incident}")]
     Internal {
         /// The number of the incident in the log.
@@ -219,7 +219,7 @@ pub enum ApiError {
     /// Too many jobs wait.
     #[error("the queue holds {limit} jobs already{}", if *paused { ", and is paused: they wait until it is resumed" } else { "" })]
     QueueFull {
-        /// The limit.
+        /// The largest number of queued jobs.
         limit: u32,
         /// Whether the queue is paused, so that no job starts until it is resumed.
         paused: bool,
@@ -254,7 +254,7 @@ pub struct Quota {
     pub of: QuotaOf,
     /// The limit.
     pub limit: u64,
-    /// The present use.
+    /// The amount that the owner uses now.
     pub used: u64,
     /// The amount that the request would add.
     pub asked: u64,
@@ -273,7 +273,7 @@ pub enum QuotaOf {
 }
 
 impl Quota {
-    /// Seconds after which the same request may succeed; none if it exceeds the limit by itself.
+    /// Seconds after which the same request may succeed; `None` if it exceeds the limit alone, or would store bytes.
     fn retry_after_s(&self, code: Code) -> Option<u64> {
         match self.of {
             _ if self.asked > self.limit => None,
@@ -325,7 +325,7 @@ impl fmt::Display for Quota {
 }
 
 impl ApiError {
-    /// Logs an unexpected cause, here and only here; clients do not see it.
+    /// Makes an error of an unexpected cause, and logs the cause, which clients do not see.
     pub fn internal(cause: impl std::fmt::Display) -> Self {
         let incident = Uuid::now_v7();
         tracing::error!(%incident, %cause, "incident {incident}: {cause}");
@@ -391,7 +391,7 @@ impl ApiError {
             .unwrap_or(StatusCode::INTERNAL_SERVER_ERROR)
     }
 
-    /// Seconds after which the same request may succeed.
+    /// Seconds after which the same request may succeed; `None` if it would not.
     pub fn retry_after_s(&self) -> Option<u64> {
         match self {
             ApiError::QuotaExceeded(quota) => quota.retry_after_s(self.code()),
@@ -444,7 +444,8 @@ impl ApiError {
 }
 
 impl IntoResponse for ApiError {
-    /// Only the status and the error itself: REST writes headers and document, since it knows the path.
+    /// Makes a response of the status, with the error in its extensions: REST adds headers and document, since it knows
+    /// the path.
     fn into_response(self) -> Response {
         let mut response = self.http_status().into_response();
         response.extensions_mut().insert(self);
@@ -510,7 +511,7 @@ impl From<ApiError> for Status {
     }
 }
 
-/// A summary of violations: their count and the first ones, for clients that do not read the details.
+/// Summarises violations: their number and the first ones, for clients that do not read the details.
 fn summed_up(violations: &[Violation]) -> String {
     const SHOWN: usize = 3;
     let shown: Vec<String> = violations

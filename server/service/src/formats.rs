@@ -1,5 +1,5 @@
-//! The formats of a result: one list, and one way to write each format, for the data routes and for `signorini solve
-//! -o`.
+//! The formats of a result: the list of them, and one function to write each kind of data in a format, for the data
+//! routes and for `signorini solve -o`.
 
 use std::borrow::Cow;
 
@@ -57,7 +57,7 @@ impl Format {
     /// The formats of figures, the default first.
     pub const OF_FIGURES: &[Format] = &[Format::Svg, Format::Png, Format::Pdf];
 
-    /// The kind of image; `None` for data.
+    /// The kind of image of a figure's format; `None` for formats of data.
     pub fn image(self) -> Option<Image> {
         match self {
             Format::Svg => Some(Image::Svg),
@@ -67,12 +67,12 @@ impl Format {
         }
     }
 
-    /// The value of the parameter `format`, and the extension of a file.
+    /// The name of the format: the value of the parameter `format`, and the extension of a file.
     pub fn name(self) -> &'static str {
         self.into()
     }
 
-    /// The media type for `Accept`; the registered one if there is one.
+    /// The media type in `Accept`: the registered type, if there is one.
     pub fn media_type(self) -> &'static str {
         match self {
             Format::Json => "application/json",
@@ -87,7 +87,7 @@ impl Format {
         }
     }
 
-    /// The value of `Content-Type`.
+    /// The value of `Content-Type` for data in this format.
     pub fn content_type(self) -> String {
         match self {
             Format::Csv => format!("{}; charset=utf-8", self.media_type()),
@@ -102,17 +102,17 @@ impl Format {
     }
 }
 
-/// A profile in this format. The error is the reason why it cannot be written.
+/// Writes a profile in this format. The error is the reason why it cannot be written.
 pub fn profile(profile: &ContactProfile, format: Format) -> Result<Vec<u8>, String> {
     rows(profile, Table::of_profile, format)
 }
 
-/// A history in this format.
+/// Writes a history in this format. The error is the reason why it cannot be written.
 pub fn history(history: &[TimedIteration], format: Format) -> Result<Vec<u8>, String> {
     rows(history, history_table, format)
 }
 
-/// The table of a history: the solver's columns, and the times.
+/// The table of a history: the solver's columns, and the columns of times.
 fn history_table(history: &[TimedIteration]) -> Table {
     let mut table = Table::of_history(history.iter().map(|timed| &timed.row));
     table.columns.push(Column {
@@ -133,12 +133,13 @@ fn rows<T: Serialize + ?Sized>(
     }
 }
 
-/// The largest size of texts in NumPy's form (bytes), in which each is as wide as the longest of its column: a reader
-/// needs this memory.
+/// The largest size of a table's texts in NumPy's form (bytes), where each text is as wide as the longest of its
+/// column: a reader needs this memory.
 pub const MOST_PADDED_BYTES: u64 = 256 << 20;
 
-/// The rows of a sweep in this format; `paths`: the values in which members differ. The table has a column for each
-/// number of a row; nested numbers have both names, as in `residuals_kkt`, and the parameters their pointers.
+/// Writes the rows of a sweep in this format; `paths`: the JSON Pointers of the values in which members differ. The
+/// table has a column for each number of a row: a nested number's column is named after both fields, as in
+/// `residuals_kkt`, a parameter's column after its pointer.
 pub fn members(paths: &[String], rows: &[MemberRow], format: Format) -> Result<Vec<u8>, String> {
     match format {
         Format::Json => serde_json::to_vec(rows).map_err(|error| error.to_string()),
@@ -146,7 +147,7 @@ pub fn members(paths: &[String], rows: &[MemberRow], format: Format) -> Result<V
     }
 }
 
-/// A table in one of the formats of tables except JSON.
+/// Writes a table in one of the formats of tables except JSON.
 pub fn write_table(table: &Table, format: Format) -> Result<Vec<u8>, String> {
     match format {
         Format::Csv => table.csv().map(String::into_bytes),
@@ -162,7 +163,7 @@ pub fn write_table(table: &Table, format: Format) -> Result<Vec<u8>, String> {
     }
 }
 
-/// The reason why a table cannot be written as npz.
+/// The message that a table cannot be written as npz, because its padded texts would take this many bytes.
 pub fn too_wide(bytes: u64) -> String {
     format!(
         "npz, where each text is as wide as the longest of its column: that would be {}",
@@ -170,7 +171,7 @@ pub fn too_wide(bytes: u64) -> String {
     )
 }
 
-/// The rows of a sweep as a table.
+/// Makes a table of the rows of a sweep; `paths`: the JSON Pointers of the values in which members differ.
 #[rustfmt::skip] // a column in a row
 pub fn members_table(paths: &[String], rows: &[MemberRow]) -> Table {
     let column = |name: &'static str, values| Column { name: name.into(), values };
@@ -214,7 +215,7 @@ pub fn members_table(paths: &[String], rows: &[MemberRow]) -> Table {
     Table { columns }
 }
 
-/// The column of one parameter: numbers, or texts if one of its values is not a number.
+/// The column of the parameter at this JSON Pointer: numbers, or texts if one of its values is not a number.
 fn parameter(path: &str, rows: &[MemberRow]) -> Column {
     let values = rows.iter().map(|row| row.parameters.get(path));
     let number = |value: &ParameterValue| value.json().parse::<f64>().ok();
@@ -249,7 +250,7 @@ fn is_number(json: &str) -> bool {
     json.starts_with(|c: char| c == '-' || c.is_ascii_digit())
 }
 
-/// Fields in this format.
+/// Writes fields in this format. The error is the reason why they cannot be written.
 pub fn fields(fields: &Fields, format: Format) -> Result<Vec<u8>, String> {
     match format {
         Format::Json => serde_json::to_vec(fields).map_err(|error| error.to_string()),
@@ -261,8 +262,8 @@ pub fn fields(fields: &Fields, format: Format) -> Result<Vec<u8>, String> {
     }
 }
 
-/// Fields, history and profiles in one archive: `fields/points`, `history/k`, `profiles/top/normal_stress`, and for
-/// each load step `steps/0/profiles/top/normal_stress`.
+/// Writes fields, history and profiles into one archive: `fields/points`, `history/k`, `profiles/top/normal_stress`,
+/// and for each load step `steps/0/profiles/top/normal_stress`.
 pub fn everything_as_npz(document: &Document) -> Result<Vec<u8>, String> {
     let mut npz = Npz::new();
     files::fields::add(&mut npz, "fields/", &document.fields)?;

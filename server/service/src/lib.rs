@@ -9,7 +9,7 @@
 //! | how jobs start, are recorded and end | `queue` |
 //! | sweeps: operations | `verbs/sweeps.rs` |
 //! | an error of one request, with its details | `error.rs` |
-//! | a parameter of requests, for both protocols | `parameters`, and beside its verb in `verbs` |
+//! | a parameter of requests, for both protocols | `parameters`, and beside its operation in `verbs` |
 //! | bytes of requests and answers in memory | `transfer.rs` |
 //! | how fast clients must send and read | `pace.rs` |
 //! | the estimate of a problem | `solver/src/model/estimate.rs` |
@@ -39,7 +39,7 @@ pub mod queue;
 // The operations, whatever the protocol.
 pub mod verbs;
 
-/// As in the program: tests see what a job holds.
+/// The allocator of the program `signorini`, so that tests can measure the memory that a job holds.
 #[cfg(test)]
 #[global_allocator]
 static ALLOCATOR: allocator::Counting = allocator::Counting;

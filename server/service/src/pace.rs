@@ -5,12 +5,13 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
-/// The longest time in which a client may send or read nothing.
+/// The longest time for which a client may send or read nothing.
 pub const LONGEST_PAUSE: Duration = Duration::from_secs(60);
-/// The average rate at which a client must send or read (bytes per second), apart from one longest pause.
+/// The least average rate at which a client must send or read (bytes per second), after a first `LONGEST_PAUSE`.
 pub const LEAST_RATE: u64 = 4 << 10;
 
-/// The progress of one body or answer. Only the client's time counts, not that of the service.
+/// The progress of one request body or one answer. Only the time spent waiting for the client counts, not the time that
+/// the service takes.
 #[derive(Debug, Default)]
 pub struct Pace {
     waiting_since: Option<Instant>,
@@ -19,19 +20,19 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// Starts counting the client's time.
+    /// Starts counting the time spent waiting for the client, unless it is counted already.
     pub fn wait(&mut self) {
         self.waiting_since.get_or_insert_with(Instant::now);
     }
 
-    /// Records that the client has sent or read some bytes.
+    /// Records that the client has sent or read this many bytes, which ends a wait.
     pub fn advance(&mut self, bytes: usize) {
         self.waited += self.pause();
         self.waiting_since = None;
         self.bytes = self.bytes.saturating_add(bytes as u64);
     }
 
-    /// Whether the client is too slow.
+    /// Whether the client has paused for longer than `LONGEST_PAUSE`, or is slower on average than `LEAST_RATE`.
     pub fn is_too_slow(&self) -> bool {
         let allowed = LONGEST_PAUSE + Duration::from_secs(self.bytes / LEAST_RATE);
         let pause = self.pause();

@@ -9,7 +9,7 @@ use base::values::{Integers, Seconds, Values};
 /// An input of a request: a query parameter or a header over REST, a field of a message over gRPC.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameter<V> {
-    /// The name, also of the field over gRPC.
+    /// The name of the parameter over REST, and of the field over gRPC.
     pub name: &'static str,
     /// The meaning: one line, without a full stop.
     pub meaning: &'static str,
@@ -32,7 +32,7 @@ impl<V: Values> Parameter<V> {
         }
     }
 
-    /// Describes it as a query parameter with one value.
+    /// Describes the parameter as a query parameter with one value.
     pub fn describe(&self) -> Description {
         Description {
             location: Location::Query,
@@ -43,7 +43,7 @@ impl<V: Values> Parameter<V> {
         }
     }
 
-    /// Describes it as a query parameter that may be repeated.
+    /// Describes the parameter as a query parameter that may be repeated.
     pub fn describe_several(&self) -> Description {
         Description {
             schema: json!({ "type": "array", "items": self.values.schema() }),
@@ -81,7 +81,7 @@ impl Parameter<Seconds> {
 pub struct Variable<V> {
     /// The name in the path, in braces; also the name of the field over gRPC.
     pub name: &'static str,
-    /// The kind of thing that it refers to, for errors: `job`, `plot`.
+    /// The kind of thing that the variable names, for errors: `job`, `plot`.
     pub kind: &'static str,
     /// The meaning: one line, without a full stop.
     pub meaning: &'static str,
@@ -99,7 +99,7 @@ impl<V: Values> Variable<V> {
         })
     }
 
-    /// Describes it as a variable of a path.
+    /// Describes the variable as a variable of a path.
     pub fn describe(&self) -> Description {
         Description {
             location: Location::Path,
@@ -126,9 +126,9 @@ pub enum Location {
 /// A parameter in the description of the API.
 #[derive(Clone, Debug)]
 pub struct Description {
-    /// The place in the request.
+    /// The place of the parameter in the request.
     pub location: Location,
-    /// The name; with `{key}` at its end there is a name for each key.
+    /// The name; a name that ends in `{key}` stands for one parameter for each key.
     pub name: &'static str,
     /// The allowed values, as JSON Schema.
     pub schema: serde_json::Value,

@@ -3,20 +3,22 @@
 use parking_lot::Mutex;
 use std::{collections::HashMap, time::Instant};
 
-/// The largest number of owners that are remembered; beyond that those who have submitted nothing lately are forgotten.
+/// The largest number of owners that are remembered; beyond that, owners who may submit the full number again are
+/// forgotten.
 const MOST_OWNERS: usize = 10_000;
 
-/// The limit for each owner: the whole number of a minute at once, then evenly over time.
+/// The limit of submissions for each owner: an owner may submit all jobs of a minute at once; used-up jobs are regained
+/// evenly over a minute.
 #[derive(Debug)]
 pub struct Rates {
-    /// The number of jobs in a minute; `None` without limit.
+    /// The number of jobs that an owner may submit in a minute; `None`: no limit.
     pub per_minute: Option<u32>,
-    /// By owner: the number of jobs left, and the time of that.
+    /// The number of jobs that each owner had left, and the time when it was computed.
     left: Mutex<HashMap<String, (f64, Instant)>>,
 }
 
 impl Rates {
-    /// No jobs submitted yet.
+    /// The limit, with no jobs submitted yet.
     pub fn new(per_minute: Option<u32>) -> Rates {
         Rates {
             per_minute,
@@ -24,12 +26,12 @@ impl Rates {
         }
     }
 
-    /// Uses up a number of jobs; `Err`: how many are left, if too few.
+    /// Uses up `jobs` of an owner; if fewer are left, uses up none and returns the number left as `Err`.
     pub fn take(&self, owner: &str, jobs: u64) -> Result<(), u64> {
         self.take_at(owner, jobs, Instant::now())
     }
 
-    /// Returns jobs that were used up but not stored.
+    /// Gives jobs that were used up but not stored back to the owner.
     pub fn give_back(&self, owner: &str, jobs: u64) {
         let Some(per_minute) = self.per_minute else {
             return;
@@ -40,7 +42,7 @@ impl Rates {
         }
     }
 
-    /// How many jobs the owner may submit at once; `None` without limit.
+    /// How many jobs the owner may submit at once; `None`: no limit.
     pub fn left(&self, owner: &str) -> Option<u64> {
         let per_minute = self.per_minute?;
         let all = self.left.lock();
@@ -65,7 +67,7 @@ impl Rates {
     }
 }
 
-/// The number of jobs that an owner has left now.
+/// The number of jobs that an owner has left now; `known`: the number at an earlier time, and that time.
 fn refilled(known: Option<(f64, Instant)>, per_minute: u32, now: Instant) -> f64 {
     let most = f64::from(per_minute);
     known.map_or(most, |(left, then)| {

@@ -29,28 +29,28 @@ use tracing::{info, warn};
 const MOST_WAITING: usize = 4096;
 /// The largest number of spans in one message.
 const MOST_TOGETHER: usize = 512;
-/// How long spans wait for others to be sent with.
+/// How long the first span of a message waits for further ones.
 const LINGER: Duration = Duration::from_millis(200);
-/// How long the collector may take to receive a message.
+/// How long the collector may take to accept a message.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// How long the service waits for the collector when it stops.
+/// How long the service waits for the collector to accept the last spans when it stops.
 const FAREWELL: Duration = Duration::from_secs(1);
 
 /// The queue of spans that have ended; empty if no collector is configured.
 static WAITING: OnceLock<mpsc::Sender<SpanData>> = OnceLock::new();
 
-/// Work that has ended.
+/// A piece of work that has ended, with its times and attributes.
 #[derive(Debug)]
 pub struct Span {
-    /// The place in a trace.
+    /// The place of the span in a trace.
     pub trace: Trace,
     /// The kind of work: one of a few names.
     pub name: Cow<'static, str>,
-    /// Whether the span is the answer to a request rather than internal work.
+    /// Whether the work is answering a request rather than internal.
     pub answers: bool,
-    /// The time when it began.
+    /// The time when the work began.
     pub begun: Time,
-    /// The time when it ended.
+    /// The time when the work ended.
     pub ended: Time,
     /// Further attributes of the span.
     pub attributes: Vec<KeyValue>,
@@ -58,7 +58,7 @@ pub struct Span {
     pub error: Option<String>,
 }
 
-/// Whether spans are sent.
+/// Whether a collector is configured, so that spans are sent.
 pub fn are_wanted() -> bool {
     WAITING.get().is_some()
 }
@@ -140,7 +140,7 @@ impl Exporting {
     }
 }
 
-/// Sends spans until the service stops, and then the remaining ones.
+/// Sends spans until `stopping` is canceled, and then the spans that still wait.
 async fn send(
     mut waiting: mpsc::Receiver<SpanData>,
     otlp: Arc<impl SpanExporter>,

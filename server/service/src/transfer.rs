@@ -1,8 +1,8 @@
 //! Limits the bytes of requests and answers in memory, over all connections.
 //!
-//! Each request is limited by its own size; this is the limit on all of them together. Data without room are refused
-//! with `overloaded` instead of waiting, since waiting requests need memory, too. Small ones have room of their own, so
-//! that a job can be read, canceled and submitted while others transfer large files.
+//! Each request is limited by its own size; this module limits all of them together. Data without room are refused with
+//! `overloaded` instead of waiting, since waiting requests need memory, too. Small ones have room of their own, so that
+//! a job can be read, canceled and submitted while others transfer large files.
 
 use parking_lot::Mutex;
 use std::{
@@ -25,16 +25,17 @@ use crate::{
     pace::{LONGEST_PAUSE, Pace},
 };
 
-/// The number of first bytes of each request that count as small.
+/// The first bytes of each request, up to this number, count for the room of small requests.
 const SMALL_RECEIVED: usize = 16 << 10;
 /// The largest size of a small answer.
 const SMALL_SENT: usize = 64 << 10;
-/// The room for small requests, and the room for small answers: for some thousand at the same time.
+/// The room for small requests together (bytes), and the room for small answers together: each is enough for some
+/// thousand at the same time.
 const SMALL_BYTES: usize = 64 << 20;
 /// The unit of limits in bytes, since a semaphore has a limited number of permits.
 const UNIT: usize = 1 << 10;
 
-/// A limit on bytes over all requests.
+/// A limit on the bytes in memory over all requests.
 #[derive(Clone, Debug)]
 pub struct Limit {
     large: Room,
@@ -47,12 +48,12 @@ struct Room {
     units: u32,
 }
 
-/// A part of a limit, returned when it is dropped.
+/// A part of a limit that is in use; dropping it makes the part available again.
 #[derive(Debug)]
 pub struct Share(OwnedSemaphorePermit);
 
 impl Share {
-    /// Returns the part of the share beyond this many bytes.
+    /// Gives back the part of the share beyond this many bytes.
     pub fn shrink_to(&mut self, bytes: usize) {
         let more = self.0.num_permits().saturating_sub(bytes.div_ceil(UNIT));
         drop(self.0.split(more));
@@ -60,7 +61,7 @@ impl Share {
 }
 
 impl Limit {
-    /// A limit of this many bytes, apart from the room for small ones.
+    /// A limit of this many bytes for large requests or answers, with the usual room for small ones in addition.
     pub fn new(bytes: usize) -> Limit {
         Limit {
             large: Room::new(bytes),
@@ -68,17 +69,17 @@ impl Limit {
         }
     }
 
-    /// A share of this many bytes, if they are free. A share larger than the limit takes all of it.
+    /// Takes a share of this many bytes, if they are free. A share larger than the limit takes all of it.
     pub fn take(&self, bytes: usize) -> Result<Share, ApiError> {
         self.large.take(self.large.units(bytes))
     }
 
-    /// Waits for a share; for callers that hold no memory while they wait.
+    /// Takes a share of this many bytes once they are free; for callers that hold no memory while they wait.
     pub async fn wait_for(&self, bytes: usize) -> Result<Share, ApiError> {
         self.large.wait_for(self.large.units(bytes)).await
     }
 
-    /// Whether there is room for one more small answer, before the work for it is done.
+    /// Whether there is room for one more small answer; asked before the work for the answer is done.
     pub fn has_room(&self) -> bool {
         self.small.free.available_permits() > 0
     }
@@ -108,7 +109,7 @@ impl Room {
         u32::try_from(bytes.div_ceil(UNIT)).map_or(self.units, |units| units.min(self.units))
     }
 
-    /// Enlarges a share to this many bytes.
+    /// Enlarges a share to this many bytes; an error if they are not free.
     fn enlarge(&self, share: &mut Option<Share>, bytes: usize) -> Result<(), ApiError> {
         let held = share.as_ref().map_or(0, |share| share.0.num_permits());
         let more = (self.units(bytes) as usize).saturating_sub(held);
@@ -124,7 +125,8 @@ impl Room {
     }
 }
 
-/// Counts the data of one request that were received and are still in memory. The clones of one request count together.
+/// Counts the data of one request that were received and are still in memory. All clones of a `Received` count
+/// together.
 #[derive(Clone, Debug)]
 pub struct Received {
     limit: Limit,
@@ -139,7 +141,7 @@ struct Counted {
 }
 
 impl Received {
-    /// Nothing received yet.
+    /// A count of 0 bytes for this limit.
     pub fn new(limit: &Limit) -> Received {
         Received {
             limit: limit.clone(),
@@ -147,12 +149,12 @@ impl Received {
         }
     }
 
-    /// The limit that the data count for.
+    /// The limit that the request's data count for.
     pub fn limit(&self) -> &Limit {
         &self.limit
     }
 
-    /// Counts more bytes.
+    /// Counts more received bytes; an error if the limit has no room for them.
     pub fn count(&self, bytes: usize) -> Result<(), ApiError> {
         let mut counted = self.counted.lock();
         counted.bytes = counted.bytes.saturating_add(bytes);
@@ -162,16 +164,16 @@ impl Received {
         self.limit.large.enlarge(&mut counted.large, large)
     }
 
-    /// Returns the share, when nothing of the request is needed any more.
+    /// Gives the request's share back, once nothing of the request is needed any more.
     pub fn release(&self) {
         *self.counted.lock() = Counted::default();
     }
 }
 
-/// Why reading a body ended. Over gRPC its source is the status, where tonic finds it.
+/// Why reading a request's body failed. The `source` of this error is the gRPC status, where tonic finds it.
 #[derive(Debug)]
 pub struct BodyError {
-    /// The error, for REST.
+    /// The error as REST answers it.
     pub error: ApiError,
     status: tonic::Status,
 }
@@ -197,7 +199,7 @@ impl Error for BodyError {
     }
 }
 
-/// The error of this module that ended a body, or else the error itself.
+/// The cause of an error of reading a body, if this module ended the body; otherwise `Err` with the error.
 pub fn cause(mut error: axum::Error) -> Result<ApiError, axum::Error> {
     loop {
         // each layer around a body wraps its errors once more
@@ -214,8 +216,8 @@ pub fn cause(mut error: axum::Error) -> Result<ApiError, axum::Error> {
     }
 }
 
-/// The body of a request, which fails if it arrives too slowly; its bytes are counted as they arrive if they are kept
-/// in memory.
+/// Wraps the body of a request: the wrapped body fails if it arrives too slowly, and counts its bytes for `received` as
+/// they arrive, if that is given because they are kept in memory.
 pub fn arriving(body: Body, received: Option<Received>) -> Body {
     if body.is_end_stream() {
         return body;
@@ -242,7 +244,7 @@ struct Arriving {
 }
 
 impl Arriving {
-    /// Counts bytes that have arrived.
+    /// Records and counts bytes that have arrived; an error if the client is too slow or there is no room for them.
     fn check(&mut self, bytes: usize) -> Result<(), ApiError> {
         self.pace.advance(bytes);
         if self.pace.is_too_slow() {
@@ -288,11 +290,11 @@ fn length(frame: Option<&Result<Frame<Bytes>, axum::Error>>) -> usize {
     data.map_or(0, Bytes::len)
 }
 
-/// A mark in the extensions of a response whose body has its share already.
+/// A mark in the extensions of a response whose body has taken its share of the limit already.
 #[derive(Clone, Copy, Debug)]
 pub struct HasShare;
 
-/// Bytes with a share that was taken before they were made.
+/// Bytes with the share of the limit that was taken before they were made.
 pub fn with_own_share(bytes: Vec<u8>, mut share: Share) -> Bytes {
     share.shrink_to(bytes.len());
     Bytes::from_owner(Owner {
@@ -301,7 +303,7 @@ pub fn with_own_share(bytes: Vec<u8>, mut share: Share) -> Bytes {
     })
 }
 
-/// The treatment of an answer for which there is no room.
+/// What happens to an answer for which there is no room.
 #[derive(Clone, Copy, Debug)]
 pub enum NoRoom {
     /// The answer is refused: the client may ask again.
@@ -310,8 +312,8 @@ pub enum NoRoom {
     Wait,
 }
 
-/// The body of an answer whose bytes have their share of the limit until they are sent. For a stream these are the
-/// bytes that are ready at once, such as a whole gRPC answer, whose length is unknown; producers of large streams take
+/// Wraps the body of an answer so that its bytes hold a share of the limit until they are sent. For a stream of unknown
+/// length these are the bytes that are ready at once, such as a whole gRPC answer; producers of large streams take
 /// shares for their pieces themselves.
 pub async fn with_share(mut body: Body, limit: &Limit, no_room: NoRoom) -> Result<Body, ApiError> {
     let exact = body.size_hint().exact();
@@ -341,7 +343,7 @@ pub async fn with_share(mut body: Body, limit: &Limit, no_room: NoRoom) -> Resul
 }
 
 struct Shared {
-    /// The first piece that a stream had ready; the share is for this alone.
+    /// The first piece of a stream, if it was ready; the share is for this piece alone.
     first: Option<Result<Frame<Bytes>, axum::Error>>,
     body: Body,
     share: Option<Arc<Share>>,

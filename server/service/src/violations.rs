@@ -1,11 +1,11 @@
-//! Violations of a request: prefixes of their places, and quoting.
+//! Helps to report violations of a request: prefixes the JSON Pointers of their places, and shortens quoted names.
 
 use solver::error::Violation;
 
-/// The place of the problem in a request, where pointers start.
+/// The JSON Pointer of the problem in a request, with which pointers into the problem begin.
 pub const PROBLEM: &str = "/problem";
 
-/// Violations with pointers that start at `prefix`, the place of their subject in the request.
+/// Puts `prefix`, the place of the violations' subject in the request, before the pointers of the violations.
 pub fn prefixed(prefix: &str, violations: Vec<Violation>) -> Vec<Violation> {
     violations
         .into_iter()
@@ -16,8 +16,8 @@ pub fn prefixed(prefix: &str, violations: Vec<Violation>) -> Vec<Violation> {
         .collect()
 }
 
-/// A name from a request as quoted in messages: a long one by its beginning and its length, since it may be as long as
-/// the request.
+/// Quotes a name from a request in a message: a long name is given by its beginning and its length, since it may be as
+/// long as the request.
 pub fn quoted(text: &str) -> String {
     files::quoted(text)
 }

@@ -1,4 +1,4 @@
-//! Waits before a failed write to the store is retried.
+//! Pauses before a failed write to the store is retried.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use store::StoreError;
 use tokio_util::sync::CancellationToken;
 use tracing::error;
 
-/// The number of attempts, over some seconds, after which an unreadable disk is not tried again.
+/// The number of attempts to store data, over some seconds, after which an unreadable disk is not tried again.
 const MOST_TRIES_TO_READ: u32 = 5;
 
 /// Growing pauses between attempts to store data that must not be lost.
@@ -27,8 +27,8 @@ impl Default for Backoff {
 }
 
 impl Backoff {
-    /// Whether further attempts to store data of this job are useless, which is then logged: its worker is free for
-    /// others.
+    /// Whether further attempts to store data of this job are useless. If so, this is logged, and the caller should
+    /// give the job up, so that its worker is free for other jobs.
     pub(super) fn gives_up(&self, id: JobId, key: i64, cause: &StoreError) -> bool {
         let unreadable =
             matches!(cause, StoreError::Damaged(_)) && self.tries >= MOST_TRIES_TO_READ;
@@ -39,7 +39,7 @@ impl Backoff {
         gives_up
     }
 
-    /// Waits; false if the service stops in the meantime.
+    /// Waits for the next pause; returns false if the service stops in the meantime.
     pub(super) async fn wait(&mut self, stopping: &CancellationToken) -> bool {
         const LONGEST: Duration = Duration::from_secs(5);
         let pause = self.pause;

@@ -12,12 +12,13 @@ use super::{
     state::Queue,
 };
 
-/// How long a solver may take to stop; after that its job is canceled without waiting for it, and only the worker stays
-/// busy. It is half of the time that the API promises: the rest is for commits.
+/// How long a solver may take to stop; after that its job is canceled without waiting for the solver, which keeps its
+/// worker busy. This is half of the time that the API promises: the rest is for commits.
 pub(super) const CANCEL_GRACE: Duration = Duration::from_millis(250);
 
 impl Queue {
-    /// Asks a job to stop. A queued job is canceled when this returns, a running one within half a second.
+    /// Asks a job to stop. When this function returns, a queued job is canceled; a running job ends within half a
+    /// second.
     pub async fn cancel(self: &Arc<Self>, key: i64) -> Result<CancelOutcome> {
         let _guard = self.claiming.write().await;
         let requested = self.store.request_cancel(key).await;
@@ -59,8 +60,8 @@ impl Queue {
         Ok(outcome)
     }
 
-    /// Asks the first of these jobs to stop; those that wait, in one transaction. Returns how many were handled, and
-    /// how many of them had not ended before.
+    /// Asks the jobs at the beginning of `keys` to stop, all queued ones in one transaction. Returns how many of `keys`
+    /// were handled, and how many of the handled jobs had not ended before.
     pub async fn cancel_some(self: &Arc<Self>, keys: &[i64]) -> Result<(usize, usize)> {
         let batch = self.store.cancel_queued(keys).await?;
         self.announce(&batch.changed);
@@ -72,8 +73,8 @@ impl Queue {
         Ok((batch.seen, changed))
     }
 
-    /// Cancels a job whose solver does not stop in time; does nothing if it has stopped. It is retried until it
-    /// succeeds, since the client was told that the job ends.
+    /// Cancels a job whose solver does not stop in time; does nothing if the attempt has ended. This is retried until
+    /// it succeeds, since the client was told that the job ends.
     async fn force_cancel(self: Arc<Self>, key: i64, running: Running) {
         let Running { id, attempt, .. } = running;
         tokio::time::sleep(CANCEL_GRACE).await;

@@ -33,8 +33,8 @@ impl Queue {
         tokio::spawn(keep_running(self.clone(), Queue::run_periodic_tasks));
     }
 
-    /// Accepts jobs. They are stored on the disk when this returns; a free worker is given the next job of the queue in
-    /// the same commit.
+    /// Accepts jobs. When this function returns they are stored on the disk; a free worker is given the next job of the
+    /// queue in the same commit.
     pub async fn submit(self: &Arc<Self>, submission: Submission) -> Result<Accepted> {
         let Some(slot) = self.free_slot() else {
             let accepted = self.store.submit(submission, false).await?;
@@ -84,7 +84,7 @@ impl Queue {
         }
     }
 
-    /// An idle worker, unless no job may start now.
+    /// Takes an idle worker; `None` if there is none or no job may start now.
     fn free_slot(&self) -> Option<OwnedSemaphorePermit> {
         if self.store.is_paused() || self.stopping.is_cancelled() {
             return None;
@@ -92,7 +92,8 @@ impl Queue {
         self.slots.clone().try_acquire_owned().ok()
     }
 
-    /// Claims the next job for a worker; false if no job was ready.
+    /// Claims the next job for a worker, or ends jobs that can be answered from earlier results; false if it did
+    /// neither.
     async fn claim(self: &Arc<Self>, slot: OwnedSemaphorePermit) -> Result<bool> {
         let _guard = self.claiming.read().await;
         if self.stopping.is_cancelled() || self.store.is_paused() {
@@ -125,7 +126,7 @@ impl Queue {
         tokio::spawn(async move { worker::run_attempt(&queue, claim, running, slot).await });
     }
 
-    /// Jobs that run according to the store, but that no worker has.
+    /// Jobs that are running according to the store, but that no worker has: their keys and attempts.
     async fn lost(&self) -> Result<Vec<(i64, i32)>> {
         let mut running = self.store.running().await?;
         let ours = self.running();
@@ -133,8 +134,9 @@ impl Queue {
         Ok(running)
     }
 
-    /// Requeues jobs that have no worker: because the task that should have given them to one has panicked, or because
-    /// the disk was full when the last service ended and when this one started.
+    /// Requeues jobs that are running according to the store but have no worker: because the task that should have
+    /// given them to a worker has panicked, or because the disk was full when the last service ended and when this one
+    /// started.
     async fn requeue_lost(&self) -> Result<()> {
         if self.lost().await?.is_empty() {
             return Ok(()); // nearly always

@@ -28,18 +28,18 @@ pub(super) struct Solved {
     pub(super) parts: Parts,
 }
 
-/// Why there is no solution.
+/// Why an attempt to solve a job has no solution.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) enum NoSolution {
     /// The solver was asked to stop before it had a state to return.
     Stopped,
     /// The job needs more memory than its share.
     OutOfMemory(Outgrown),
-    /// The job fails, with this detail.
+    /// The job fails for this reason, with this detail.
     Failed(Reason, String),
     /// An error of the service, not of the client.
     Internal(String),
-    /// The process that solved it died: the reason in words.
+    /// The worker process that solved the job died, for the reason given in words.
     Lost(String),
 }
 
@@ -61,11 +61,12 @@ impl From<SolveError> for NoSolution {
     }
 }
 
-/// The largest number of warnings of a job, and of characters of their messages: jobs are read in lists of a thousand.
+/// The largest number of warnings that are stored with a job: jobs are read in lists of a thousand.
 const MOST_WARNINGS: usize = 5;
+/// The largest number of characters of a warning's message and of its pointer.
 const LONGEST_WARNING: usize = 400;
 
-/// The worst warnings, the worst first.
+/// The most severe warnings of a result, the most severe first.
 fn worst(warnings: &[Warning]) -> Vec<Warning> {
     let mut found: Vec<&Warning> = warnings.iter().collect();
     found.sort_by_key(|warning| gravity(warning.code)); // stable: else in their order
@@ -77,8 +78,8 @@ fn worst(warnings: &[Warning]) -> Vec<Warning> {
     found.into_iter().take(MOST_WARNINGS).map(short).collect()
 }
 
-/// The severity of a warning. 0: the numbers are not those of the intended problem; 1: some are not, or may not be; 2:
-/// good to know.
+/// The severity of a warning. 0: the results are not those of the intended problem; 1: some results are not, or may not
+/// be; 2: the warning is only good to know.
 fn gravity(code: WarningCode) -> u8 {
     use WarningCode::*;
     match code {
@@ -109,8 +110,8 @@ fn gravity(code: WarningCode) -> u8 {
     }
 }
 
-/// The end of a job that follows from the outcome of its solution; `outgrown`: the lack of memory for which it was
-/// stopped.
+/// The end of a job that follows from the outcome of its solution; `outgrown`: the lack of memory for which the solver
+/// was stopped.
 pub(super) fn ending_of_solution(document: &Document, outgrown: Option<Outgrown>) -> Ending {
     let (summary, partial) = (&document.summary.solution, ResultAvailable::Partial);
     let failed = |reason| {
@@ -207,7 +208,8 @@ fn out_of_memory(
     Ending::failed(Reason::ResourceExhausted, detail)
 }
 
-/// The failure of a job with this share (bytes) whose process was refused this many more bytes by the system.
+/// The failure of a job that has used its share of the memory (bytes) and whose process was refused `bytes` more by the
+/// system.
 pub(super) fn refused_memory(bytes: u64, share: u64) -> NoSolution {
     let detail = format!(
         "the job has used its share of {} of the memory and was refused {} more: use a coarser mesh, fewer contacts or fewer \
@@ -218,7 +220,7 @@ pub(super) fn refused_memory(bytes: u64, share: u64) -> NoSolution {
     NoSolution::Failed(Reason::ResourceExhausted, detail)
 }
 
-/// The failure of a job at its time limit, without a result.
+/// The failure of a job that has reached its time limit without a result.
 pub(super) fn timed_out(job: &Job) -> Ending {
     let detail = format!(
         "the job was stopped after {} s; see limits.timeout_s",
@@ -239,7 +241,7 @@ pub(super) fn internal(job: &Job, cause: &dyn std::fmt::Display) -> Ending {
     }
 }
 
-/// The message of a panic of `who`.
+/// The text that `who` panicked, with the message of the panic.
 pub(super) fn panicked(who: &str, panic: &(dyn Any + Send)) -> String {
     let text = |panic: &(dyn Any + Send)| {
         panic

@@ -1,7 +1,7 @@
 //! The events of a job, read from the store once for all of its watchers.
 //!
-//! Watchers receive events only from committed rows; these rows are shared here. Otherwise two hundred watchers would
-//! read two hundred times, and the solver would wait for the processor.
+//! Watchers receive events only from committed rows, which are read here for all of them. Otherwise two hundred
+//! watchers would read the rows two hundred times, and the solver would wait for the processor.
 
 use std::{collections::VecDeque, sync::Arc};
 
@@ -9,7 +9,7 @@ use base::event::Event;
 use store::Store;
 use tokio::sync::Mutex;
 
-/// The number of events that are read at a time, and the most that are kept for other watchers.
+/// The largest number of events that are read at a time, and that are kept for other watchers.
 const MOST: i64 = 256;
 
 /// The events that a watcher has not seen yet.
@@ -17,30 +17,31 @@ const MOST: i64 = 256;
 pub struct News {
     /// The next events in order, up to a limit.
     pub events: Vec<Arc<Event>>,
-    /// Whether the job had ended before these events were read; `None`: it is deleted.
+    /// Whether the job had ended before these events were read; `None`: the job is deleted.
     pub ended: Option<bool>,
 }
 
 /// The latest events of a job.
 #[derive(Debug, Default)]
 pub(super) struct Feed {
-    /// Locked while the store is read, so that other watchers wait for the result.
+    /// The kept events; locked while the store is read, so that other watchers wait for the result of reading.
     latest: Mutex<Latest>,
 }
 
 #[derive(Debug, Default)]
 struct Latest {
-    /// Consecutive events; the last one is number `last`.
+    /// The latest consecutive events; the last of them has number `last`.
     events: VecDeque<Arc<Event>>,
     last: i64,
-    /// The number of announcements when the store was read; `None`: never read, or there was more to read.
+    /// The number of announcements before the last reading of the store; `None`: the store was never read, or has more
+    /// events than were read.
     complete_at: Option<u64>,
     ended: Option<bool>,
 }
 
 impl Feed {
-    /// The events after number `after`. `announced`: how many changes of the job the watcher knows of. `others`:
-    /// whether events are kept for other watchers.
+    /// Returns the events of a job after number `after`. `announced`: the number of changes of the job that were
+    /// announced before this call. `others`: whether other watchers need the events, which are then kept for them.
     pub(super) async fn news(
         &self,
         store: &Arc<Store>,
@@ -68,7 +69,8 @@ impl Feed {
     }
 }
 
-/// Reads the end before the events: if the job had ended then, all its events are there.
+/// Reads from the store whether a job has ended, and afterwards its events after number `after`: if the job has ended,
+/// all of its events are stored when they are read.
 async fn read(store: &Arc<Store>, key: i64, after: i64) -> store::Result<News> {
     let ended = store.has_ended(key).await?;
     let events = store.events_after(key, after, MOST).await?;
@@ -79,7 +81,7 @@ async fn read(store: &Arc<Store>, key: i64, after: i64) -> store::Result<News> {
 }
 
 impl Latest {
-    /// The news for a watcher, if they can be given without reading the store.
+    /// The events after number `after`, if they are known without reading the store; `announced` as in `Feed::news`.
     fn known(&self, announced: u64, after: i64) -> Option<News> {
         if after == self.last && self.complete_at.is_some_and(|at| at >= announced) {
             return Some(News {
@@ -100,7 +102,7 @@ impl Latest {
         })
     }
 
-    /// Adds the result of reading after event number `after`.
+    /// Adds `news`, which was read from the store after event number `after`.
     fn add(&mut self, news: &News, announced: u64, after: i64) {
         if after > self.last {
             self.events.clear();

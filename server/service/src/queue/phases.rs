@@ -18,7 +18,7 @@ pub(super) struct Phases {
 }
 
 impl Phases {
-    /// Records that a phase begins, which ends the phase before.
+    /// Records that `phase` begins, and that the previous phase ends.
     pub(super) fn enter(&mut self, phase: Phase, now: Time) {
         self.end(now);
         self.current = Some((phase, now));

@@ -30,23 +30,25 @@ const MOST_MEMBERS: usize = 200;
 /// The longest time from the first event of a batch until it is stored.
 const LATENCY: Duration = Duration::from_millis(50);
 
-/// What a solver has told that is stored together; it is sent to the recorder piece by piece.
+/// Reports of a solver that are stored together. The solver sends each report as a batch of its own, and the recorder
+/// combines these batches.
 #[derive(Debug, Default)]
 pub(super) struct Batch {
     pub(super) events: Vec<(Time, Payload)>,
-    /// Members of a sweep.
+    /// The results of members of a sweep.
     pub(super) members: Vec<(Time, MemberRow)>,
-    /// A partial result that came after the events.
+    /// A partial result that the solver has reported after the events.
     pub(super) partial: Option<Arc<Parts>>,
-    /// Whether the end of the iterations will be that of the job.
+    /// Whether the problem has one load level on one grid, so that the job ends with its iterations.
     pub(super) one_level: bool,
     /// Whether the solver has ended, so that this is the last batch.
     pub(super) last: bool,
 }
 
-/// Stores the reports of the solver until it ends, and returns its last events: these are stored together with the end
-/// of the job, in one commit. A failed write is retried while the solver waits, since the disk may be full temporarily.
-/// When the attempt is no longer the current one, the solver is asked to stop and the rest is dropped.
+/// Stores the reports of the solver until the solver ends, and returns its last events: these are stored together with
+/// the end of the job, in one commit. A failed write is retried while the solver waits, since the disk may be full
+/// temporarily. When the attempt is no longer the current one, the solver is asked to stop and further reports are
+/// dropped.
 pub(super) async fn record(
     queue: &Queue,
     job: &Job,
@@ -93,7 +95,8 @@ pub(super) async fn record(
     (FinalBatch::default(), phases)
 }
 
-/// Stores a batch, however long that takes; false when the attempt is no longer the current one, or the service stops.
+/// Stores a batch, and retries until it is stored; false when the attempt is no longer the current one, the service
+/// stops, or the store cannot be written.
 async fn store_with_retries(
     queue: &Queue,
     job: &Job,
@@ -193,7 +196,7 @@ impl Batch {
     }
 }
 
-/// The progress after one more event.
+/// Updates the progress of a job by one more event.
 fn update_progress(progress: &mut Progress, payload: &Payload, one_level: bool) {
     match payload {
         Payload::Stage { stage } => {
@@ -226,8 +229,8 @@ fn update_progress(progress: &mut Progress, payload: &Payload, one_level: bool) 
     }
 }
 
-/// The estimated seconds to the end: the time of the remaining iterations, if each reduces the residual by the factor q
-/// and takes as long as those before: n = ln(tolerance / residual) / ln q.
+/// The estimated seconds to the end of the job: the time of the remaining iterations, if each reduces the residual by
+/// the factor q and takes as long as those before: n = ln(tolerance / residual) / ln q.
 fn eta_s(TimedIteration { row, wall_s }: &TimedIteration) -> Option<f64> {
     let q = row.contraction.filter(|q| (1e-6..1.0).contains(q))?;
     let residual = row.residual.max(row.friction_residual);

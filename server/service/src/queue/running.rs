@@ -11,12 +11,12 @@ pub(super) struct Running {
     pub(super) id: JobId,
     /// The number of the attempt.
     pub(super) attempt: i32,
-    /// Set to ask the solver to stop; it checks this in every iteration.
+    /// Set to ask the solver to stop; the solver checks it in every iteration.
     pub(super) stop: Arc<OnceLock<StopReason>>,
 }
 
 impl Running {
-    /// Asks the solver to stop. The first reason is kept.
+    /// Asks the solver to stop for this reason. If it was asked before, the first reason is kept.
     pub(super) fn stop(&self, reason: StopReason) {
         let _ = self.stop.set(reason); // fails if a reason is set already, which is kept
     }

@@ -32,7 +32,7 @@ use super::{
     supervisor::Supervisor,
 };
 
-/// Reads the stored form of a mesh, which existed when the job was accepted. Call this on a blocking thread.
+/// Reads the stored form of a mesh, which was stored when the job was accepted. Call this on a blocking thread.
 pub(super) fn stored_mesh(store: &Arc<Store>, hash: &str) -> Result<Vec<u8>, NoSolution> {
     let failed =
         |cause: &dyn std::fmt::Display| NoSolution::Internal(format!("mesh {hash}: {cause}"));
@@ -55,7 +55,8 @@ pub(super) fn members_of(store: &Arc<Store>, key: i64) -> Result<MembersTask, No
     task.ok_or_else(|| failed("they are not stored".into()))
 }
 
-/// Solves the problem of a job within its memory, and with it members of its sweep. Call this on a blocking thread.
+/// Solves the problem of a job within the memory of the job, and members of its sweep, if it has any. Call this on a
+/// blocking thread.
 pub(super) fn solve_task(
     problem: &str,
     mesh: Option<Mesh>,
@@ -70,7 +71,7 @@ pub(super) fn solve_task(
     )
 }
 
-/// As [`solve_task`], with partial results as `partials` decides.
+/// Solves as [`solve_task`] does; `partials` decides when partial results are stored.
 pub(super) fn solve_with_partials(
     problem: &str,
     mesh: Option<Mesh>,
@@ -184,16 +185,16 @@ fn solve_metered(
     })
 }
 
-/// Observes a solution for its supervisor, and keeps it within the memory of its job.
+/// Observes a solution for a supervisor, and keeps the solution within the memory of its job.
 struct Metered<'a> {
     supervisor: &'a mut dyn Supervisor,
     meter: &'a Meter,
-    /// The run whose events are told; none while other members of a sweep are solved.
+    /// The run whose events are reported; `None` while other members of a sweep are solved.
     run: Option<&'a Run<'a>>,
     partials: Partials,
-    /// Whether the solution is there, and stays: lack of memory ends only its verification.
+    /// Whether the solution is complete and is only being verified: a lack of memory now ends only the verification.
     verifying: bool,
-    /// The lack of memory for which the solver stops.
+    /// The lack of memory for which the solver is to stop.
     outgrown: Option<Outgrown>,
 }
 
@@ -202,14 +203,14 @@ impl Metered<'_> {
         self.outgrown.is_some() || self.supervisor.stop()
     }
 
-    /// Stops the solver for lack of memory, unless it is to stop anyway.
+    /// Makes the solver stop for lack of memory, unless it is to stop anyway.
     fn outgrow(&mut self, outgrown: Outgrown) {
         if !self.is_to_stop() {
             self.outgrown = Some(outgrown);
         }
     }
 
-    /// Tells a row; an error if the solver is to stop.
+    /// Reports the result of a member of a sweep; an error if the solver is to stop.
     fn member(&mut self, row: MemberRow) -> Result<(), SolveError> {
         self.meter.hand_over(|| self.supervisor.member(row));
         match self.is_to_stop() {
@@ -259,8 +260,8 @@ impl Observer for Metered<'_> {
     }
 }
 
-/// Prepares a problem on its body, which is made and kept unless it is kept already. Two jobs that begin at the same
-/// time each make their own, since the first body is not finished yet.
+/// Prepares a problem on its condensed body: a kept body with the same content, or a new one, which is then kept. Two
+/// jobs that begin at the same time each make a body, since the first is not finished yet.
 pub(super) fn prepare(
     problem: &Problem,
     external: Option<External>,
@@ -290,7 +291,7 @@ pub(super) fn prepare(
     Ok(prepared)
 }
 
-/// Tells the row of the first member, and solves the others; an error if that was stopped.
+/// Reports the result of the first member of a sweep, and solves the other members; an error if the solver was stopped.
 fn solve_others(
     problem: &Problem,
     mesh: Option<Mesh>,
@@ -324,20 +325,20 @@ fn solve_others(
     Ok(())
 }
 
-/// Decides when the results of finished load steps are stored as a partial result: not after each step, since
-/// everything is written each time and a problem may have a thousand steps; and not at all once the partial result is
-/// large.
+/// Decides when the results of finished load steps are stored as a partial result: not after each step, since all of
+/// these results are written each time and a problem may have a thousand steps; and not at all once the partial result
+/// is large.
 pub(super) struct Partials {
     /// The shortest time between two partial results.
     pause: Duration,
-    /// Storing takes at most this part of the time (1/n).
+    /// The largest part of the time that storing partial results may take, as 1/`part`.
     part: u32,
-    /// The time when the next one may be stored; `None` once one was too large.
+    /// The time when the next partial result may be stored; `None` once a partial result was too large.
     next: Option<Instant>,
 }
 
 impl Partials {
-    /// Stores at most once a second, and for at most a tenth of the time.
+    /// Partial results are stored at most once a second, and storing takes at most a tenth of the time.
     fn paced() -> Self {
         Partials {
             pause: Duration::from_secs(1),
@@ -346,7 +347,7 @@ impl Partials {
         }
     }
 
-    /// Stores after every step, as on a slow machine, so that tests do not depend on the clock.
+    /// Partial results are stored after every step, as on a slow machine, so that tests do not depend on the clock.
     #[cfg(test)]
     pub(super) fn every_step() -> Self {
         Partials {
@@ -358,10 +359,11 @@ impl Partials {
 
     /// The partial result, if it is time to store one.
     fn next(&mut self, run: &Run<'_>, solution: &Solution) -> Option<Parts> {
-        /// The largest partial result: it is written in one transaction, which occupies the single writer for some 40
-        /// ms.
+        /// The largest partial result (bytes): it is written in one transaction, which occupies the single writer for
+        /// some 40 ms.
         const MOST_BYTES: usize = 4 << 20;
-        /// The largest number of points: writing them takes a tenth of a second without a check whether to stop.
+        /// The largest number of points of a partial result: writing them takes a tenth of a second without a check
+        /// whether to stop.
         const MOST_POINTS: usize = 20_000;
         let start = Instant::now();
         if self.next.is_none_or(|next| start < next) {

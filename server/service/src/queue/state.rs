@@ -17,9 +17,9 @@ use super::{
     watchers::{Subscription, Watchers},
 };
 
-/// The largest number of simultaneous reads of jobs by waiting requests: a few for each connection to the database.
+/// The largest number of waiting requests that read jobs at the same time: a few for each connection to the database.
 const MOST_TURNS: usize = 16;
-/// The largest number of jobs whose requests are remembered: as many as may wait, by default.
+/// The largest number of jobs for which the submitting request is remembered: by default as many as may be queued.
 const MOST_ORIGINS: usize = 100_000;
 
 /// Where problems are solved.
@@ -48,17 +48,17 @@ pub struct Queue {
     turns: Semaphore,
     /// Jobs that a worker of this process is solving.
     pub(super) running: Mutex<HashMap<i64, Running>>,
-    /// Locked for reading while a job is claimed and entered into `running`, for writing while one is asked to stop, so
-    /// that no cancel comes between the two steps.
+    /// Locked for reading while a job is claimed and entered into `running`, and for writing while a job is asked to
+    /// stop, so that no cancel comes between the two steps of a claim.
     pub(super) claiming: RwLock<()>,
-    /// The requests that submitted the jobs, by the jobs' keys, for spans. They are not stored: after a restart a job
-    /// begins a trace of its own.
+    /// The traces of the requests that submitted the jobs, by the jobs' keys, for spans. They are not stored: after a
+    /// restart a job begins a trace of its own.
     origins: Mutex<BTreeMap<i64, Trace>>,
-    /// Canceled when the service is about to stop.
+    /// The token that is canceled when the service is about to stop.
     pub(super) stopping: CancellationToken,
 }
 
-/// A busy worker, until the last clone of this is dropped; then the next job is claimed.
+/// A busy worker. When the last clone of a `Slot` is dropped the worker is idle, and the next job is claimed.
 #[derive(Debug)]
 pub(super) struct Slot {
     pub(super) permit: Option<OwnedSemaphorePermit>,
@@ -121,7 +121,7 @@ impl Queue {
         self.watchers.announce_events(key);
     }
 
-    /// Subscribes to the rows of a sweep's members. Call this before they are read.
+    /// Subscribes to the rows of a sweep's members. Call this before the rows are read.
     pub fn subscribe_to_sweep(&self, key: i64) -> Subscription<'_> {
         self.sweeps.subscribe(key)
     }
@@ -131,12 +131,13 @@ impl Queue {
         self.sweeps.announce(key);
     }
 
-    /// A permit for a waiting request to read its job. Their number is limited, since one change may wake thousands.
+    /// A permit for a waiting request to read its job. The number of permits is limited, since one change may wake
+    /// thousands of requests.
     pub async fn turn(&self) -> Option<SemaphorePermit<'_>> {
         self.turns.acquire().await.ok()
     }
 
-    /// Canceled when the service is about to stop; streams end then.
+    /// The token that is canceled when the service is about to stop; streams of events then end.
     pub fn stopping(&self) -> &CancellationToken {
         &self.stopping
     }
@@ -166,7 +167,7 @@ impl Queue {
         Ok(())
     }
 
-    /// Ends an attempt without waiting for its solver; false if it was no longer the current one.
+    /// Ends an attempt without waiting for its solver; false if the attempt was no longer the current one.
     pub(super) async fn end_attempt(
         &self,
         key: i64,
@@ -182,7 +183,8 @@ impl Queue {
         Ok(changed.is_some())
     }
 
-    /// Remembers the request that submitted these jobs; beyond the limit, only the latest requests.
+    /// Remembers the request that submitted these jobs, by its trace; beyond `MOST_ORIGINS` jobs the oldest are
+    /// forgotten.
     pub fn remember_origin(&self, jobs: &[Job], trace: &Trace) {
         let mut origins = self.origins();
         for job in jobs.iter().filter(|job| !job.status.is_terminal()) {
@@ -193,7 +195,7 @@ impl Queue {
         }
     }
 
-    /// The request that submitted a job.
+    /// The trace of the request that submitted a job.
     pub(super) fn origin(&self, key: i64) -> Option<Trace> {
         self.origins().get(&key).cloned()
     }
@@ -207,7 +209,8 @@ impl Queue {
         self.origins.lock()
     }
 
-    /// Records that its worker has finished with the job. If it was requeued, another worker may have it already.
+    /// Records that the worker of this attempt has finished with the job. If the job was requeued, another worker may
+    /// be solving it already.
     pub(super) fn release(&self, job: &Job) {
         let mut running = self.running();
         let ours = |running: &Running| running.attempt == job.attempt;
@@ -217,7 +220,7 @@ impl Queue {
     }
 
     /// Whether there are processors for a second thread of every running job. A job that starts a moment later shares
-    /// the processors.
+    /// these processors.
     pub(super) fn has_spare_processor(&self) -> bool {
         let processors = std::thread::available_parallelism().map_or(1, usize::from);
         2 * self.running().len() <= processors

@@ -1,27 +1,27 @@
-//! What the solution of a job tells the service, and asks it.
+//! What the solution of a job reports to the service, and asks it.
 
 use base::{event::Payload, sweep::MemberRow};
 use store::Parts;
 
-/// Whoever has a job solved. In the service that is the worker of the job, in a worker process the connection to the
-/// service: a process solves a job as a thread does.
+/// The side that has a job solved. On a thread of the service this is the worker of the job, in a worker process the
+/// connection to the service: so a process solves a job as a thread does.
 pub(super) trait Supervisor {
-    /// Is told that the problem has one load level on one grid: when its iterations end, the job ends, so that the time
+    /// Receives that the problem has one load level on one grid: the job ends with its iterations, so that the time
     /// until then can be estimated.
     fn one_level(&mut self);
 
-    /// Is told an event of the job, as it is stored.
+    /// Receives an event of the job, in the form in which it is stored.
     fn event(&mut self, payload: Payload);
 
-    /// Is told a member of a sweep that is solved, or cannot be.
+    /// Receives the row of a member of a sweep that is solved, or cannot be solved.
     fn member(&mut self, row: MemberRow);
 
-    /// Is given a partial result, ready to be stored.
+    /// Receives a partial result, ready to be stored.
     fn partial(&mut self, parts: Parts);
 
-    /// Whether the solver should stop.
+    /// Returns whether the solver should stop.
     fn stop(&mut self) -> bool;
 
-    /// How many threads may share the next work.
+    /// Returns how many threads may share the next work of the solver.
     fn threads(&mut self) -> usize;
 }

@@ -1,4 +1,5 @@
-//! Notifies the watchers of a job of changes, without their content: watchers read the store, together (see `feed`).
+//! Notifies the watchers of a job of changes, but not of the content of changes: watchers read that from the store,
+//! together (see `feed`).
 
 use parking_lot::{Mutex, MutexGuard};
 use std::{collections::HashMap, sync::Arc};
@@ -8,23 +9,23 @@ use tokio::sync::watch;
 
 use super::feed::{Feed, News};
 
-/// The number of watchers of one job from which each reads less often.
+/// If one job has more watchers than this number, each of them reads less often.
 const CROWD: usize = 16;
 
-/// The jobs that are watched.
+/// The jobs or sweeps that are watched, by key.
 #[derive(Debug, Default)]
 pub(super) struct Watchers {
     watched: Mutex<HashMap<i64, Arc<Watched>>>,
 }
 
-/// A job that is watched.
+/// A job or sweep that is watched.
 #[derive(Debug)]
 struct Watched {
     changes: watch::Sender<Changes>,
     feed: Feed,
 }
 
-/// How many changes were announced.
+/// How many changes of a watched job were announced.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Changes {
     /// Changes of any kind.
@@ -85,18 +86,19 @@ pub struct Subscription<'a> {
     key: i64,
     watched: Arc<Watched>,
     receiver: watch::Receiver<Changes>,
-    /// The number of changes that were announced before the subscription, or already returned.
+    /// The number of changes of the job itself that were announced before the subscription, or that `job_changed` has
+    /// returned for.
     seen: u64,
 }
 
 impl Subscription<'_> {
-    /// Returns when anything was announced since the subscription or the last call.
+    /// Waits until anything was announced since the subscription or the last call.
     pub async fn changed(&mut self) {
         // an error would mean that the sender is gone, but it lives as long as this subscription
         let _ = self.receiver.changed().await;
     }
 
-    /// Returns when a change of the job itself was announced since the subscription or the last call.
+    /// Waits until a change of the job itself was announced since the subscription or the last call.
     pub async fn job_changed(&mut self) {
         let seen = self.seen;
         let changed = self.receiver.wait_for(|changes| changes.of_job != seen);
@@ -106,9 +108,9 @@ impl Subscription<'_> {
         }
     }
 
-    /// Events after number `after`, and whether the job has ended. All watchers of a job share what one of them reads.
-    /// The reading is done in a task of its own: a client that does not read blocks its stream at any point, and would
-    /// block the others if it held the lock that they wait for.
+    /// The job's events after number `after`, and whether the job has ended. All watchers of a job share what one of
+    /// them reads. The reading is done in a task of its own: a client that does not read blocks its stream at any
+    /// point, and would block the others if it held the lock that they wait for.
     pub async fn news(&mut self, store: &Arc<Store>, after: i64) -> store::Result<News> {
         let announced = self.receiver.borrow_and_update().all;
         let others = self.receiver_count() > 1;
@@ -121,7 +123,7 @@ impl Subscription<'_> {
         read.unwrap_or_else(|panic| Err(StoreError::Unexpected(panic.to_string())))
     }
 
-    /// Whether so many watch this job that each should read less often.
+    /// Whether this job has so many watchers that each should read less often.
     pub fn is_crowded(&self) -> bool {
         self.receiver_count() > CROWD
     }

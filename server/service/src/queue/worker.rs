@@ -25,7 +25,7 @@ use super::{
     supervisor::Supervisor,
 };
 
-/// How many events of a solver may wait to be recorded; after that the solver waits.
+/// How many reports of a solver may wait to be recorded; after that the solver waits.
 const MOST_UNRECORDED: usize = 256;
 
 /// How long the solver of a job that has reached its time limit may take to return its last state (see `Limits`).
@@ -133,7 +133,7 @@ async fn try_attempt(queue: Arc<Queue>, claim: Claim, running: Running, slot: Ar
     failpoint::pass(Point::Done, id);
 }
 
-/// The worker as the supervisor of its solver, on a blocking thread.
+/// The worker of a job as the supervisor of its solver, on a blocking thread.
 struct Worker {
     queue: Arc<Queue>,
     id: JobId,
@@ -183,7 +183,7 @@ impl Supervisor for Worker {
     }
 }
 
-/// Requeues a job whose process died, or ends it if that was its last attempt; retried until it succeeds.
+/// Requeues a job whose process died, or ends it if that was its last attempt; retried until it succeeds or is useless.
 async fn requeue_with_retries(queue: &Queue, job: &Job, how: &str) {
     warn!(job.id = %job.id, job.attempt, "the process that solved job {} died: {how}", job.id);
     let mut backoff = Backoff::default();
@@ -201,7 +201,7 @@ async fn requeue_with_retries(queue: &Queue, job: &Job, how: &str) {
     }
 }
 
-/// Stops a job at its time limit, and ends it by force if its solver does not stop.
+/// Asks the solver of a job to stop at the job's time limit, and ends the job by force if its solver does not stop.
 async fn time_out(queue: Arc<Queue>, job: Job, running: Running) {
     tokio::time::sleep(Duration::from_secs_f64(job.limits.timeout_s)).await;
     running.stop(StopReason::OutOfTime);
@@ -222,8 +222,8 @@ async fn time_out(queue: Arc<Queue>, job: Job, running: Running) {
     });
 }
 
-/// Stores the result, then the end. It is retried until it succeeds, since the disk may be full temporarily and a job
-/// must not stay running. If the service stops in the meantime, its next start requeues the job.
+/// Stores the result of an attempt, then its end. This is retried until it succeeds, since the disk may be full
+/// temporarily and a job must not stay running. If the service stops in the meantime, its next start requeues the job.
 async fn end_with_retries(
     queue: &Queue,
     job: &Job,
@@ -255,7 +255,7 @@ async fn end_with_retries(
     }
 }
 
-/// Stores the result and the end of an attempt; false when it is no longer the current one.
+/// Stores the result and the end of an attempt; false when the attempt is no longer the current one.
 async fn try_to_end(
     queue: &Queue,
     job: &Job,

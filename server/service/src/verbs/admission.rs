@@ -1,4 +1,4 @@
-//! Admits a job that was read: it is fingerprinted, checked in depth, and stored in the queue.
+//! Admits a job whose request was read: the job is fingerprinted, checked in depth, and stored in the queue.
 
 use base::{
     caller::Caller,
@@ -26,7 +26,7 @@ use crate::{
     spans,
 };
 
-/// A job that was read, but not yet checked in depth.
+/// A job whose request was read, but that is not yet checked in depth.
 pub(super) struct Prepared {
     envelope: Envelope,
     /// The problem with its fingerprint, or its violations.
@@ -39,8 +39,8 @@ pub(super) struct Prepared {
 }
 
 impl Prepared {
-    /// Computes the fingerprints of a job and of its problem once, since that of a large mesh takes half a second: call this on
-    /// a blocking thread.
+    /// Computes the fingerprints of a job and of its problem once, since fingerprinting a large mesh takes half a
+    /// second: call this on a blocking thread.
     pub(super) fn new(
         JobRequest { envelope, problem }: JobRequest,
         id: Option<JobId>,
@@ -65,7 +65,7 @@ impl Prepared {
         })
     }
 
-    /// Whether its problem refers to a stored mesh.
+    /// Whether the job's problem refers to a stored mesh.
     pub(super) fn has_stored_mesh(&self) -> bool {
         let problem = self.problem.as_ref();
         problem.is_ok_and(|(problem, _)| problem.mesh.stored().is_some())
@@ -133,7 +133,7 @@ impl Prepared {
     }
 }
 
-/// A job that was read and fingerprinted.
+/// Fingerprints a job that was read, on a blocking thread.
 pub(super) async fn prepare(
     service: &Service,
     request: JobRequest,
@@ -142,7 +142,8 @@ pub(super) async fn prepare(
     service.work(move || Prepared::new(request, id)).await?
 }
 
-/// The jobs of a key that this caller used before, for the same request.
+/// The jobs that this caller has submitted before with this idempotency key and the same request; `None` if there are
+/// none.
 pub(super) async fn replayed(
     service: &Service,
     caller: &Caller,
@@ -156,8 +157,8 @@ pub(super) async fn replayed(
     }
 }
 
-/// How many times its time limit a job may be estimated to take: a solvable job must not be refused, and a fast machine
-/// takes a third of the estimate or less (`tests/bench/estimates.py`).
+/// The largest ratio of a job's estimated time to its time limit: a solvable job must not be refused, and a fast
+/// machine takes a third of the estimate or less (`tests/bench/estimates.py`).
 const MOST_OVER: f64 = 10.0;
 
 /// The violation of a job whose estimated time (seconds) is so long that it would only reach its time limit.
@@ -174,7 +175,7 @@ pub(super) fn time_violation(run_s: Option<f64>, limits: &Limits) -> Option<Viol
     })
 }
 
-/// Checks a job in depth.
+/// Checks a job in depth, on the stored mesh that its problem refers to, if it does.
 pub(super) async fn admit(
     service: &Service,
     caller: &Caller,
@@ -214,9 +215,9 @@ pub(super) fn may_have_priorities(
     }
 }
 
-/// Refuses a caller whose limits do not permit this many more jobs, before they are meshed and checked, which takes
-/// processor time from others. The limit of queued jobs is not checked here, since a job with an earlier result does
-/// not wait.
+/// Refuses a caller whose limits of stored bytes and of submissions do not permit `asked` more jobs, before these are
+/// meshed and checked, which takes processor time from others. The limit of queued jobs is not checked here, since a
+/// job with an earlier result is not queued.
 pub(super) async fn has_share(
     service: &Service,
     caller: &Caller,
@@ -230,7 +231,7 @@ pub(super) async fn has_share(
     }
 }
 
-/// The error of a caller who has submitted too many jobs in this minute.
+/// The error for a caller who has `left` jobs left in this minute and submits `asked` jobs.
 fn too_often(service: &Service, caller: &Caller, left: u64, asked: u64) -> ApiError {
     let per_minute = service.rates().and_then(|rates| rates.per_minute);
     let limit = u64::from(per_minute.unwrap_or_default());
@@ -243,7 +244,7 @@ fn too_often(service: &Service, caller: &Caller, left: u64, asked: u64) -> ApiEr
     })
 }
 
-/// Stores jobs in the queue, all or none; the caller is their owner.
+/// Stores jobs in the queue, all or none, with the caller as their owner.
 pub(super) async fn enqueue(
     service: &Service,
     caller: &Caller,
@@ -253,7 +254,7 @@ pub(super) async fn enqueue(
     enqueue_sweep(service, caller, jobs, None, key).await
 }
 
-/// Stores the jobs of a sweep in the queue with the sweep, all or none.
+/// Stores the jobs of a sweep in the queue, together with the sweep, all or none.
 pub(super) async fn enqueue_sweep(
     service: &Service,
     caller: &Caller,
@@ -328,7 +329,7 @@ pub(super) async fn enqueue_sweep(
     Ok(accepted)
 }
 
-/// Logs jobs that were accepted.
+/// Logs that jobs were accepted.
 fn log(jobs: &[Job], caller: &Caller) {
     let (owner, request_id) = (caller.owner(), caller.request_id());
     if let Some(id) = jobs.iter().find_map(|job| job.sweep) {

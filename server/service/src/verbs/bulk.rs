@@ -20,7 +20,7 @@ use crate::error::ApiError;
 pub struct BulkResult {
     /// Jobs that match the filters.
     pub matched: u64,
-    /// How many of them changed.
+    /// How many of the matching jobs changed.
     pub changed: u64,
 }
 
@@ -42,15 +42,15 @@ pub fn delete_many<'a>(
     Box::pin(async move { for_each(service, caller, filter, Action::Delete).await })
 }
 
-/// The action of a bulk operation on each job.
+/// The action that a bulk operation applies to each job.
 #[derive(Clone, Copy, Debug)]
 enum Action {
     Cancel,
     Delete,
 }
 
-/// Applies the action to every job that matches a filter, in many short transactions, so that other requests do not
-/// wait for all of them. It continues if the client disconnects.
+/// Applies an action to every job that matches a filter, in many short transactions, so that other requests do not wait
+/// for all of them. The action continues if the client disconnects.
 async fn for_each(
     service: &Arc<Service>,
     caller: &Caller,
@@ -92,7 +92,8 @@ async fn for_each(
     .await
 }
 
-/// Applies the action to the first of these jobs. Returns their number, and how many of them it changed.
+/// Applies an action to the jobs at the beginning of `keys`. Returns how many of `keys` were handled, and how many of
+/// these jobs changed.
 async fn act(
     service: &Service,
     caller: &Caller,

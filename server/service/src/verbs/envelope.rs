@@ -1,4 +1,4 @@
-//! The fields of a submission other than the problem, and their violations.
+//! The envelope of a submission: its fields other than the problem, and their violations.
 
 use std::collections::BTreeMap;
 
@@ -50,7 +50,7 @@ pub struct JobRequest {
 }
 
 impl Envelope {
-    /// The violations of these fields.
+    /// The violations of the fields of this envelope.
     pub(super) fn violations(&self) -> Findings {
         let mut found = Findings::default();
         found.extend(self.name.as_deref().and_then(name_violation));
@@ -101,7 +101,7 @@ pub(super) fn priority_violation(priority: i32) -> Option<Violation> {
     })
 }
 
-/// The violation of a change of more labels than a job could lose and get.
+/// The violation of an edit that changes more labels than a job could lose and get.
 pub(super) fn label_changes_violation(changes: usize) -> Option<Violation> {
     (changes > 2 * MAX_LABELS).then(|| Violation {
         pointer: "/labels".into(),

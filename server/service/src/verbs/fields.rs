@@ -1,4 +1,4 @@
-//! Returns mesh, displacements and stresses, as JSON in pieces or in another format.
+//! Operations that return mesh, displacements and stresses, as JSON in pieces or in another format.
 
 use std::sync::Arc;
 
@@ -22,18 +22,18 @@ use crate::{
     formats::{self, Format},
 };
 
-/// The fields of a job: JSON of known length and fingerprint, in pieces.
+/// The fields of a job as JSON of known length and fingerprint, which is made in pieces.
 #[derive(Debug)]
 pub struct StoredFields {
     /// The length and fingerprint of the JSON.
     pub info: PartInfo,
     id: JobId,
     key: i64,
-    /// The fields, if they had to be read to check that they are intact.
+    /// The fields in memory, if they had to be read to find their length and fingerprint.
     loaded: Option<Arc<LoadedFields>>,
 }
 
-/// The fields at all nodes as JSON.
+/// Returns the fields at all nodes, as JSON.
 pub fn fields<'a>(
     service: &'a Arc<Service>,
     caller: &'a Caller,
@@ -72,8 +72,8 @@ pub(super) async fn are_kept(service: &Service, job: &Job) -> Result<(), ApiErro
     }
 }
 
-/// Loads fields once there is memory for them; `None` if there are none. In a task of its own: what is read goes on if the
-/// client does not wait, and its memory counts until then.
+/// Loads the fields of a job once there is memory for them; `None` if there are none. This runs in a task of its own:
+/// reading goes on if the client does not wait, and its memory counts until it ends.
 pub(super) async fn load(
     service: &Arc<Service>,
     key: i64,
@@ -108,8 +108,8 @@ async fn try_to_load(service: &Service, key: i64) -> Result<Option<Arc<LoadedFie
 }
 
 impl StoredFields {
-    /// The bytes from `start` to before `end`, in pieces, since there may be many. The bytes before `start` are
-    /// computed and skipped: a millisecond for each megabyte.
+    /// Returns the bytes of the JSON from `start` to before `end`, in pieces, since there may be many. The bytes before
+    /// `start` are computed and skipped, which takes a millisecond for each megabyte.
     pub fn bytes(
         &self,
         service: &Arc<Service>,
@@ -140,7 +140,7 @@ impl StoredFields {
     }
 }
 
-/// The fields in another format, in memory.
+/// Returns the fields in another format than JSON, in memory.
 pub fn converted_fields<'a>(
     service: &'a Arc<Service>,
     caller: &'a Caller,

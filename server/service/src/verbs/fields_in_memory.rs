@@ -21,7 +21,7 @@ pub(super) struct LoadedFields {
     pub(super) _share: Share,
 }
 
-/// The fields that are being sent, by the key of their result.
+/// The fields that are being sent, by the key of their job.
 #[derive(Debug, Default)]
 pub(super) struct FieldsInMemory(Mutex<HashMap<i64, Weak<LoadedFields>>>);
 
@@ -38,7 +38,7 @@ impl FieldsInMemory {
     }
 }
 
-/// Shared fields, in the form from which their JSON is written.
+/// Shared fields, as the writer of JSON takes them.
 pub(super) struct Shared(pub(super) Arc<LoadedFields>);
 
 impl Deref for Shared {

@@ -1,4 +1,5 @@
-//! The filters of jobs, for lists, counts and bulk operations: those of `store::FILTERS`, and labels.
+//! The filters of jobs, for lists, counts and bulk operations: the filters of `store::FILTERS`, and the filter by
+//! label.
 
 use base::values::Text;
 use serde_json::json;
@@ -10,7 +11,7 @@ use crate::{
     violations,
 };
 
-/// The filter by label: `label.{key}` is a name for each key.
+/// The filter by label; each key has its parameter `label.{key}`.
 pub const LABEL: Parameter<Text> = Parameter {
     name: "label.{key}",
     meaning: "label.KEY=VALUE: only jobs with this label; several may be given",
@@ -36,7 +37,7 @@ pub fn describe() -> Vec<Description> {
     described.chain([labels()]).collect()
 }
 
-/// Adds a value of a filter.
+/// Adds the value `text` of the filter by `field`.
 pub fn set(filter: &mut Filter, field: &Field, text: &str) -> Result<(), ApiError> {
     if (field.set)(filter, text) {
         Ok(())
@@ -49,8 +50,8 @@ pub fn set(filter: &mut Filter, field: &Field, text: &str) -> Result<(), ApiErro
     }
 }
 
-/// The description of labels for OpenAPI: members of an object, each of which is a parameter (style form, exploded: the
-/// default). Their values have no type: in a query all are text.
+/// The description of the filter by label for OpenAPI: an object whose members are separate parameters (style form,
+/// exploded: the default). The members have no type: in a query all values are text.
 fn labels() -> Description {
     let keys = json!({ "^label\\.": {} });
     Description {

@@ -1,4 +1,4 @@
-//! Returns the iterations of a job, one row each.
+//! The operation that returns the iterations of a job, one row for each.
 
 use std::sync::Arc;
 
@@ -25,8 +25,8 @@ pub const MAX_POINTS: Parameter<Integers> = Parameter {
     values: Integers(2..=i64::MAX),
 };
 
-/// The rows of the last attempt of a job, reduced to a maximum number: those of its result or, while there is none,
-/// those of its events.
+/// Returns the iterations of the last attempt of a job, reduced to a maximum number of rows. They are read from the
+/// result or, while there is none, from the job's events.
 pub fn history<'a>(
     service: &'a Arc<Service>,
     caller: &'a Caller,
@@ -80,7 +80,7 @@ async fn read_history(
     Ok(rows)
 }
 
-/// The stored form of a history.
+/// The rows of a history in their stored form.
 pub(super) enum StoredHistory {
     /// A history that is stored with the result.
     Whole(Vec<u8>),
@@ -120,7 +120,7 @@ fn row(line: &str) -> serde_json::Result<TimedIteration> {
     }
 }
 
-/// Keeps at most `most` rows (2 or more), evenly distributed, including the first and the last.
+/// Keeps at most `most` rows (`most` is 2 or more), evenly distributed, including the first and the last.
 fn downsample(rows: &mut Vec<TimedIteration>, most: usize) {
     let count = rows.len();
     if count <= most || most < 2 {

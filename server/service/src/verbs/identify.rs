@@ -1,5 +1,5 @@
-//! Identifies the caller of a request: by a token, or by the user header of a trusted proxy; without either, all
-//! callers are the same.
+//! Identifies the caller of a request: by a token, or by the user header of a trusted proxy; if the service needs
+//! neither, all callers are taken for one.
 
 use base::{
     caller::{Caller, LOCAL, Peer, is_owner},
@@ -13,7 +13,7 @@ use crate::{config::ProxyTrust, error::ApiError};
 /// The credentials of a request.
 #[derive(Clone, Debug, Default)]
 pub struct Credentials {
-    /// The token; an `Err` if the text sent is not a token.
+    /// The token, if one was sent; `Err` if the text that was sent is not a token.
     pub token: Option<Result<Presented, ()>>,
     /// The users named by the header of a proxy; more than one is an error.
     pub users: Vec<String>,

@@ -1,4 +1,4 @@
-//! Returns version and limits of the service.
+//! Operations that return version and limits of the service, the caller, and the owners' use.
 
 use std::collections::BTreeSet;
 
@@ -24,7 +24,7 @@ use crate::{config::Isolation, error::ApiError, formats::Format, rates::Rates};
 pub struct Info {
     /// The name of the service.
     pub name: String,
-    /// The version of the program, which is also that of the solver.
+    /// The version of the program and of its solver.
     pub version: String,
     /// The version of the API.
     pub api_version: String,
@@ -36,7 +36,7 @@ pub struct Info {
     pub limits: ServiceLimits,
     /// Condensed bodies that are kept for later jobs; all 0 with isolation `process`.
     pub body_cache: BodyCache,
-    /// The disk.
+    /// The use of the disk.
     pub disk: Disk,
     /// The formats of rows (profiles, history), the default first.
     pub table_formats: Vec<String>,
@@ -49,9 +49,10 @@ pub struct Info {
 pub struct Disk {
     /// The bytes of the database and its write-ahead log.
     pub used_bytes: u64,
-    /// The bytes of it that are unused and reserved for new data; beyond some, they are returned to the file system.
+    /// The bytes of the database that are unused and reserved for new data; the service returns them to the file system
+    /// if they are many.
     pub unused_bytes: u64,
-    /// The bytes that the file system has left.
+    /// The bytes that are free in the file system.
     pub free_bytes: u64,
 }
 
@@ -66,7 +67,7 @@ pub struct ServiceLimits {
     pub max_mesh_bytes: u64,
     /// The largest number of bytes of memory that one job may need, by the estimate.
     pub memory_budget_bytes: u64,
-    /// The bytes of it for kept bodies; 0: none are kept, as with isolation `process`.
+    /// The bytes of the memory budget for kept condensed bodies; 0: none are kept, as with isolation `process`.
     pub body_cache_bytes: u64,
     /// The largest number of waiting jobs.
     pub max_queued: u32,
@@ -81,7 +82,7 @@ pub struct ServiceLimits {
 /// The caller: their name, scopes and limits.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Me {
-    /// The owner of the jobs that they submit.
+    /// The owner of the jobs that the caller submits.
     pub owner: String,
     /// The scopes of the caller.
     pub scopes: BTreeSet<Scope>,
@@ -99,7 +100,7 @@ pub struct Me {
 /// The stored bytes of an owner.
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct Kept {
-    /// The present number.
+    /// The present use.
     pub used: u64,
     /// The limit; `null`: no limit.
     pub limit: Option<u64>,
@@ -108,9 +109,9 @@ pub struct Kept {
 /// A limit per minute.
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct Rate {
-    /// The number in a minute.
+    /// The number of jobs that may be submitted in a minute.
     pub per_minute: u64,
-    /// The number left at this moment.
+    /// The number of jobs that may be submitted at this moment.
     pub left: u64,
 }
 
@@ -134,13 +135,13 @@ pub struct OwnerUse {
 /// The present number of something that an owner has, and its limit.
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct Share {
-    /// The present number.
+    /// The present use.
     pub used: u64,
     /// The limit.
     pub limit: u64,
 }
 
-/// The caller: their name, scopes and limits.
+/// Returns the caller's name, scopes and limits.
 pub fn me<'a>(service: &'a Service, caller: &'a Caller) -> BoxFuture<'a, Result<Me, ApiError>> {
     Box::pin(async move {
         let stored = service.bytes_of(caller.owner()).await?;
@@ -176,8 +177,8 @@ pub fn me<'a>(service: &'a Service, caller: &'a Caller) -> BoxFuture<'a, Result<
     })
 }
 
-/// The use of the service by each owner: those with the most stored bytes first, at most a thousand of them, followed
-/// by those who store nothing yet.
+/// Returns the use of the service by each owner: first the owners with the most stored bytes, at most a thousand of
+/// them, then the owners who store nothing yet.
 pub fn owners<'a>(
     service: &'a Service,
     _caller: &'a Caller,
@@ -210,7 +211,7 @@ pub fn owners<'a>(
     })
 }
 
-/// Version and limits.
+/// Returns version and limits of the service.
 pub fn info<'a>(
     service: &'a Service,
     _caller: &'a Caller,

@@ -1,4 +1,4 @@
-//! Operations on one job: get, edit, cancel, delete; and its problem.
+//! Operations on one job: get, edit, cancel and delete the job, and get its problem.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -27,7 +27,7 @@ pub const ID: Variable<Ids<OfJob>> = Variable {
     values: Ids::all(),
 };
 
-/// The job in its present state.
+/// Returns the job in its present state.
 pub fn get<'a>(
     service: &'a Service,
     caller: &'a Caller,
@@ -41,7 +41,7 @@ pub fn get<'a>(
     })
 }
 
-/// The job with its result so far, read at one moment.
+/// Opens a snapshot of a job and its result so far, both at the same moment.
 pub(super) async fn snapshot(
     service: &Service,
     caller: &Caller,
@@ -66,7 +66,7 @@ async fn not_found(service: &Service, caller: &Caller, id: JobId) -> Result<ApiE
     )
 }
 
-/// The problem that was submitted, with its defaults filled in.
+/// Returns the problem of a job as it was submitted, with its defaults filled in.
 pub fn problem<'a>(
     service: &'a Service,
     caller: &'a Caller,
@@ -82,7 +82,7 @@ pub fn problem<'a>(
     })
 }
 
-/// Changes the editable fields of a job, if it has one of these versions; `None`: any version.
+/// Changes the editable fields of a job, if the version of the job is one of `versions`; `None`: any version.
 pub fn update<'a>(
     service: &'a Arc<Service>,
     caller: &'a Caller,
@@ -143,7 +143,7 @@ fn edit_violations(edit: &Edit) -> Findings {
     violations
 }
 
-/// Changes the editable fields of a job: `edit` decides from the job as it is, or refuses.
+/// Changes the editable fields of a job: `edit` receives the present job and returns the changes, or refuses them.
 async fn change(
     service: &Arc<Service>,
     caller: &Caller,
@@ -241,7 +241,7 @@ pub fn delete_fields<'a>(
     })
 }
 
-/// The error if a job was not deleted.
+/// Makes the error if `deletion` says that the job was not deleted.
 async fn answer(
     service: &Service,
     caller: &Caller,

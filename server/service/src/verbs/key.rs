@@ -4,18 +4,18 @@ use base::values::Values;
 
 use crate::parameters::Parameter;
 
-/// The key; over gRPC the field `request_id`.
+/// The parameter of the idempotency key; over gRPC it is the field `request_id`.
 pub const IDEMPOTENCY_KEY: Parameter<Keys> = Parameter {
     name: "Idempotency-Key",
     meaning: "Key chosen by the client for this request: a repetition with the same key returns what the first request created",
     values: Keys,
 };
 
-/// A valid key.
+/// A valid idempotency key.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Key(pub(super) String);
 
-/// The valid keys, as values.
+/// The allowed values of the parameter: all valid keys.
 #[derive(Clone, Copy, Debug)]
 pub struct Keys;
 

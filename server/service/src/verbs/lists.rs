@@ -1,4 +1,4 @@
-//! Lists and counts jobs.
+//! Operations that list and count jobs.
 
 use std::collections::BTreeMap;
 
@@ -26,12 +26,12 @@ pub const ORDER_BY: Parameter<Orders> = Parameter {
     values: Orders,
 };
 
-/// The possible orders, as values.
+/// The allowed values of the parameter: all orders of a list.
 #[derive(Clone, Copy, Debug)]
 pub struct Orders;
 
 impl Orders {
-    /// All orders, each with its word.
+    /// All orders of a list, each with the word that requests it.
     fn words() -> impl Iterator<Item = (String, Order)> {
         let times = OrderBy::VARIANTS.iter();
         let both = |by: &OrderBy| {
@@ -107,7 +107,7 @@ pub const GROUP_BY: Parameter<Words<GroupBy>> = Parameter {
 pub struct Count {
     /// The number of all jobs that match the filters.
     pub total: i64,
-    /// The number in each group, by its name; empty if no groups were requested.
+    /// The number of jobs in each group, by the group's name; empty if no groups were requested.
     pub groups: BTreeMap<String, i64>,
 }
 

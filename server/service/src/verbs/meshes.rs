@@ -1,4 +1,4 @@
-//! Operations on meshes, which are stored once and referred to by jobs.
+//! Operations on meshes, each of which is stored once and may be used by many jobs.
 
 use std::{
     fs::File,
@@ -39,7 +39,7 @@ pub const HASH: Variable<Hashes> = Variable {
     values: Hashes,
 };
 
-/// The names of meshes, as values: the hashes of their files.
+/// The allowed names of meshes: the hashes of their files.
 #[derive(Clone, Copy, Debug)]
 pub struct Hashes;
 
@@ -141,7 +141,7 @@ pub async fn upload(
     .await
 }
 
-/// Reads the file and writes the parsed mesh to another.
+/// Parses the mesh file `file` and writes the parsed mesh to another file.
 fn parse(
     mut file: File,
     folder: &Path,
@@ -175,7 +175,7 @@ fn parse(
     Ok((info, body, encoded))
 }
 
-/// A file with the hash of what was written, and the error that ended writing it.
+/// A file that is being written, with the hash of what was written, and the error that ended writing.
 struct Kept {
     out: BufWriter<File>,
     hash: Sha256,
@@ -223,7 +223,7 @@ async fn store(
     }
 }
 
-/// Writes all pieces.
+/// Writes all pieces of an encoded mesh into the store.
 async fn write_pieces(
     service: &Service,
     body: &Fingerprint,
@@ -259,7 +259,7 @@ fn unwritten(error: std::io::Error) -> ApiError {
     }
 }
 
-/// A stored mesh, without its nodes and elements.
+/// Returns a stored mesh, without its nodes and elements.
 pub fn get<'a>(
     service: &'a Service,
     caller: &'a Caller,
@@ -298,7 +298,7 @@ pub fn list<'a>(
     })
 }
 
-/// Removes a mesh of the caller that none of their waiting or running jobs needs.
+/// Removes a mesh of the caller, unless a waiting or running job of the caller needs it.
 pub fn delete<'a>(
     service: &'a Arc<Service>,
     caller: &'a Caller,
@@ -318,7 +318,7 @@ pub fn delete<'a>(
     })
 }
 
-/// The stored mesh that a problem refers to, or the violation that it is not stored.
+/// Loads the stored mesh of this hash, to which a problem refers; an error with a violation if it is not stored.
 pub(super) async fn load(
     service: &Service,
     caller: &Caller,

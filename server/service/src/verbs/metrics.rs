@@ -1,4 +1,4 @@
-//! Adds the present figures of the service to the metrics.
+//! The operation that returns the metrics, after adding the present figures of the service.
 
 use std::{fs, path::Path};
 
@@ -12,8 +12,8 @@ use rustix::fs::statvfs;
 use super::service::Service;
 use crate::error::ApiError;
 
-/// All metrics, in the text format of OpenMetrics. They contain no names of owners and no ids, so that every reader may
-/// see them.
+/// Returns all metrics, in the text format of OpenMetrics. They contain no names of owners and no ids, so that every
+/// reader may see them.
 pub fn metrics<'a>(
     service: &'a Service,
     _caller: &'a Caller,

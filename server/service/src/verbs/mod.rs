@@ -1,15 +1,15 @@
-//! The operations of the service, called verbs, each defined once for both protocols; `rest` and `grpc` only translate.
-//! A verb takes the service, the caller, and then the arguments of the request. The parameters of requests are defined
-//! next to their verb.
+//! The operations of the service, each defined once for both protocols; `rest` and `grpc` only translate requests and
+//! answers. An operation takes the service, the caller, and then the arguments of the request. The parameters of
+//! requests are defined next to their operation.
 //!
-//! A verb returns its future in a box. An async function is compiled in every crate that calls it: each protocol would
-//! compile all verbs, with what they use of the store.
+//! An operation returns its future in a box. An async function is compiled in every crate that calls it: each protocol
+//! would compile all operations, with what they use of the store.
 //!
 //! # Where to look
 //!
 //! | subject | where |
 //! |---|---|
-//! | the service that all verbs receive: its limits and pools | `service` |
+//! | the service that all operations receive: its limits and pools | `service` |
 //! | submitting jobs | `submit`, `envelope`, `key` |
 //! | retrying a job | `retry` |
 //! | admission, with shares of owners | `admission` |
@@ -27,7 +27,7 @@
 //! | version, limits and shares | `info` |
 //! | metrics | `metrics` |
 
-// The service, which every verb receives.
+// The service, which every operation receives.
 mod service;
 
 // Parts of requests: a job and what comes beside its problem, a key, filters, pages.

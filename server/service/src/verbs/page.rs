@@ -11,18 +11,18 @@ use store::{Cursor, Entries, Filter, Order, OrderBy};
 
 use crate::{error::ApiError, parameters::Parameter};
 
-/// The size of a page.
+/// The parameter of the size of a page.
 pub const PAGE_SIZE: Parameter<Integers> = Parameter {
     name: "page_size",
     meaning: "Maximum number of entries on a page; default 50",
     values: Integers(1..=MAX_PAGE_SIZE),
 };
-/// Largest number of entries on a page.
+/// The largest number of entries on a page.
 pub const MAX_PAGE_SIZE: i64 = 1000;
 /// The default size of a page; a unit test compares it with the text of `PAGE_SIZE`.
 const DEFAULT_PAGE_SIZE: i64 = 50;
 
-/// The token of the page to return.
+/// The parameter of the token of the page to return.
 pub const PAGE_TOKEN: Parameter<Text> = Parameter {
     name: "page_token",
     meaning: "The next_page_token of the previous page",
@@ -34,7 +34,7 @@ pub const PAGE_TOKEN: Parameter<Text> = Parameter {
 pub struct Paging {
     /// The maximum number of entries on the page.
     pub size: Option<i64>,
-    /// The token of the page; absent or empty: the first page.
+    /// The token of the requested page; absent or empty: the first page.
     pub token: Option<String>,
 }
 
@@ -43,16 +43,16 @@ pub struct Paging {
 pub struct Page<T> {
     /// The entries of the page.
     pub items: Vec<T>,
-    /// The token of the next page; none after the last.
+    /// The token of the next page; `None` on the last page.
     pub next: Option<String>,
 }
 
 /// The entries that the store has found for a page.
 pub(super) struct Found<T> {
     items: Vec<T>,
-    /// Whether there are more entries, whatever the size of the page is.
+    /// Whether the list has more entries, even if the found ones fit on the page.
     cut: bool,
-    /// The place up to which the list was checked, if it goes on there.
+    /// The place up to which the list was searched; `None` if it was searched to its end.
     checked_to: Option<Cursor>,
 }
 
@@ -83,7 +83,7 @@ impl<T> From<Entries<T>> for Found<T> {
 }
 
 impl Paging {
-    /// The place where the page of this list begins.
+    /// The place in the list named `list` where the requested page begins; `None`: the beginning.
     pub(super) fn cursor(&self, list: &str) -> Result<Option<Cursor>, ApiError> {
         let token = self.token.as_deref().filter(|token| !token.is_empty());
         token
@@ -91,12 +91,14 @@ impl Paging {
             .transpose()
     }
 
-    /// How many entries to read from the store: one more than the page holds shows whether there is another page.
+    /// The number of entries to read from the store: one more than the page holds, to show whether there is another
+    /// page.
     pub(super) fn limit(&self) -> i64 {
         self.size() + 1
     }
 
-    /// The page of this list, from the entries that were found. `at` returns the place of an entry in the list.
+    /// Makes a page of the list named `list` from the entries that were found. `at` returns the place of an entry in
+    /// the list.
     pub(super) fn page<T>(
         &self,
         list: &str,
@@ -121,13 +123,14 @@ impl Paging {
     }
 }
 
-/// A name for a list of jobs, from its filters and its order. The order of statuses and labels does not matter.
+/// The name of a list of jobs, made of its filters and its order. The order of statuses and labels in the filters does
+/// not matter.
 pub(super) fn list_of_jobs(filter: &Filter, order: Order) -> String {
     let filter = filter.clone().tidied();
     format!("jobs {filter:?} {order:?}")
 }
 
-/// The place right after a job in a list with this order.
+/// The place directly after a job in a list with this order.
 pub(super) fn after(job: &Job, order: Order) -> Cursor {
     let time = match order.by {
         OrderBy::CreatedAt => Some(job.created_at),
@@ -139,13 +142,13 @@ pub(super) fn after(job: &Job, order: Order) -> Cursor {
     }
 }
 
-/// The token for the page after the cursor in this list.
+/// The token of the page that begins after the cursor in the list named `list`.
 fn token(cursor: Cursor, list: &str) -> String {
     let Cursor { micros, key } = cursor;
     format!("{micros:016x}{key:016x}{}", checksum(cursor, list))
 }
 
-/// Reads a token for this list; none if it is not one.
+/// Reads a page token of the list named `list`; `None` if the text is not such a token.
 fn cursor(token: &str, list: &str) -> Option<Cursor> {
     let (micros, rest) = token.split_at_checked(16)?;
     let (key, _) = rest.split_at_checked(16)?;
@@ -156,7 +159,8 @@ fn cursor(token: &str, list: &str) -> Option<Cursor> {
     (self::token(cursor, list) == token).then_some(cursor)
 }
 
-/// Ties a token to its list. It is not a secret: a forged token shows only what the list would show anyway.
+/// The checksum that ties a token to its list. It is no secret: a forged token shows only what the list would show
+/// anyway.
 fn checksum(Cursor { micros, key }: Cursor, list: &str) -> String {
     let hash = Sha256::digest(format!("{micros} {key} {list}"));
     hex(&hash[..4])

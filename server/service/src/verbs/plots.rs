@@ -1,4 +1,4 @@
-//! Draws figures of a job's problem and result.
+//! The operation that draws a figure of a job's problem and result.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -101,7 +101,7 @@ pub struct Figure {
     pub step: Option<String>,
 }
 
-/// One figure, drawn from the stored data. Only the parts that it needs are read.
+/// Returns one figure, drawn from the stored data. Only the data that it needs are read.
 pub fn plot<'a>(
     service: &'a Arc<Service>,
     caller: &'a Caller,
@@ -192,7 +192,7 @@ pub fn plot<'a>(
     })
 }
 
-/// The data that a figure is drawn from, at this moment.
+/// Opens a snapshot of the data that a figure is drawn from.
 async fn snapshot(
     service: &Service,
     caller: &Caller,
@@ -206,7 +206,7 @@ async fn snapshot(
     }
 }
 
-/// The fields of a job for this figure, once there is memory for them.
+/// Loads the fields of a job for a figure, once there is memory for them.
 async fn fields_of(
     service: &Arc<Service>,
     caller: &Caller,
@@ -229,7 +229,7 @@ async fn fields_of(
 struct Loaded {
     job: Job,
     problem: Problem,
-    /// The requested load step, and its number.
+    /// The requested load step, with its number from 0.
     step: Option<(usize, StepResult)>,
     columns: Vec<(String, Vec<u8>)>,
     summary: Option<Vec<u8>>,
@@ -239,7 +239,7 @@ struct Loaded {
 }
 
 impl Loaded {
-    /// Draws the figure as SVG; the inner `Err` is the reason why there is no such figure.
+    /// Draws the figure as SVG; the inner `Err` is the reason why this job has no such figure.
     fn draw(self, plot: Plot, style: Style) -> Result<Result<String, String>, ApiError> {
         let summary: Option<Summary> = self.summary.map(|bytes| read(&bytes)).transpose()?;
         let mut profiles: BTreeMap<String, ContactProfile> = BTreeMap::new();

@@ -1,4 +1,4 @@
-//! Checks a problem before it becomes a job.
+//! The operation that checks a problem without storing it, and checks before a problem becomes a job.
 
 use base::{
     caller::Caller,
@@ -26,11 +26,11 @@ use crate::{
 /// The result of checking a problem.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Validation {
-    /// Whether the problem would be accepted as a job with a time limit not far below the estimate.
+    /// Whether the problem would be accepted as a job whose time limit is not far below the estimated time.
     pub valid: bool,
     /// All violations of the problem.
     pub violations: Vec<Violation>,
-    /// The warnings to consider before relying on its result.
+    /// The warnings to consider before relying on the problem's result.
     pub warnings: Vec<Warning>,
     /// The estimated cost of the problem, also of an invalid one; absent if the problem or its stored mesh cannot be read.
     pub estimate: Option<Estimate>,
@@ -38,7 +38,8 @@ pub struct Validation {
     pub input_hash: Option<String>,
 }
 
-/// Checks a problem and stores nothing. An invalid problem is not an error here: its violations are the answer.
+/// Checks a problem and stores nothing. The violations of an invalid problem are returned as the result, not as an
+/// error.
 pub fn validate<'a>(
     service: &'a Service,
     caller: &'a Caller,
@@ -116,7 +117,7 @@ fn too_large(problem: &Problem, estimate: &Estimate, budget_bytes: u64) -> Viola
     too_large_at(pointer, estimate, budget_bytes)
 }
 
-/// The violation of a problem that exceeds the memory budget, at this place of a request.
+/// The violation of a problem that exceeds the memory budget, at the place `pointer` of a request.
 pub(super) fn too_large_at(pointer: String, estimate: &Estimate, budget_bytes: u64) -> Violation {
     let (unknowns, memory) = (count(estimate.dofs), size(estimate.memory_bytes));
     Violation {
@@ -129,28 +130,28 @@ pub(super) fn too_large_at(pointer: String, estimate: &Estimate, budget_bytes: u
     }
 }
 
-/// The time (seconds) that a problem is estimated to take, if that is a real estimate: for adaptive refinement it is
-/// only the time of the largest allowed mesh, which few problems need, so that there is none.
+/// The estimated time of a problem (seconds). `None` for adaptive refinement, whose estimate is only the time of the
+/// largest allowed mesh, which few problems need.
 pub(super) fn expected_run_s(problem: &Problem, run_s: f64) -> Option<f64> {
     (!matches!(problem.mesh.refine, Refine::Adaptive(_))).then_some(run_s)
 }
 
-/// A problem that was found valid, as it is stored.
+/// A problem that was found valid, in the form in which it is stored.
 #[derive(Debug)]
 pub(super) struct Admitted {
-    /// The title, which becomes that of the job.
+    /// The title of the problem, which becomes the title of the job.
     pub title: Option<String>,
-    /// The rest as JSON.
+    /// The problem without its title, as JSON.
     pub json: String,
-    /// The stored mesh that it refers to.
+    /// The hash of the stored mesh that the problem refers to.
     pub mesh: Option<String>,
     /// The estimated memory (bytes).
     pub memory_bytes: u64,
-    /// The estimated time (seconds), if there is a real estimate.
+    /// The estimated time (seconds); `None` for adaptive refinement.
     pub run_s: Option<f64>,
 }
 
-/// The stored mesh that a problem refers to, if it does.
+/// Loads the stored mesh that a problem refers to; `None` if it refers to none.
 pub(super) async fn stored(
     service: &Service,
     caller: &Caller,
@@ -162,7 +163,7 @@ pub(super) async fn stored(
     }
 }
 
-/// Admits a problem, on the stored mesh that it refers to, if it is valid and within the memory budget (bytes).
+/// Admits a problem if it is valid and within the memory budget (bytes). `stored`: the stored mesh that it refers to.
 pub(super) fn admit(
     mut problem: Problem,
     stored: Option<(MeshInfo, Mesh)>,
@@ -197,7 +198,7 @@ pub(super) fn admit(
     })
 }
 
-/// Estimates the memory before meshing, since the mesh itself may need too much.
+/// Estimates the cost of a problem before it is meshed, since the mesh itself may need too much memory.
 fn estimate(problem: &Problem, stored: Option<&(MeshInfo, Mesh)>) -> Result<Estimate, Violation> {
     let size = stored.map(|(info, _)| info.size());
     let within = |violation| prefixed(PROBLEM, vec![violation]).remove(0);

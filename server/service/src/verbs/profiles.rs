@@ -1,4 +1,4 @@
-//! Returns columns along a contact boundary.
+//! The operation that returns a profile: columns of values along a contact boundary.
 
 use base::{
     caller::Caller,
@@ -24,7 +24,7 @@ use crate::{
 /// The points at which a profile has its values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Points {
-    /// At nodes and friction points and the places of the peaks.
+    /// At nodes, at friction points and at the places of the peaks.
     #[default]
     All,
     /// At the nodes of the boundary.
@@ -59,7 +59,7 @@ pub const POINTS: Parameter<Places> = Parameter {
     },
 };
 
-/// The points that can be requested, as values.
+/// The allowed values of the parameter: all choices of points.
 #[derive(Clone, Debug)]
 pub struct Places {
     /// The possible numbers of evenly spaced points.
@@ -91,8 +91,8 @@ impl Values for Places {
     }
 }
 
-/// The profile of one contact boundary: at the end of the solution, or at the end of a load step, given by its name or
-/// its number from 0.
+/// Returns the profile of one contact boundary: at the end of the solution, or at the end of a load step, given by its
+/// name or its number from 0.
 pub fn profile<'a>(
     service: &'a Service,
     caller: &'a Caller,
@@ -157,7 +157,7 @@ pub fn profile<'a>(
     })
 }
 
-/// The stored profile at all points; in results of older versions, the profile at nodes.
+/// The stored profile of a contact boundary at all points; in results of older versions, at the nodes.
 pub(super) async fn at_all_points(
     found: &mut Snapshot,
     boundary: &str,
@@ -170,8 +170,8 @@ pub(super) async fn at_all_points(
     }
 }
 
-/// A finished load step and its number, found by its name or that number. `None`: the only step of a problem without
-/// load steps.
+/// Finds a finished load step by its name or its number from 0, and returns it with this number. `None`: the only step
+/// of a problem without load steps.
 pub(super) async fn find_step(
     found: &mut Snapshot,
     wanted: &str,
@@ -190,7 +190,7 @@ pub(super) async fn find_step(
     Ok(Some((number, read(step.as_bytes())?)))
 }
 
-/// A step, of which only the name is read.
+/// A load step of which only the name is read.
 #[derive(Deserialize)]
 struct Named {
     name: String,

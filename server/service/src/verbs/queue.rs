@@ -27,7 +27,7 @@ pub struct QueueState {
     pub max_queued: u32,
 }
 
-/// The state of the queue.
+/// Returns the state of the queue.
 pub fn state(service: &Service, _caller: &Caller) -> QueueState {
     let state = service.queue.state();
     QueueState {
@@ -41,7 +41,7 @@ pub fn state(service: &Service, _caller: &Caller) -> QueueState {
 }
 
 /// Pauses the queue: no more jobs are started until it is resumed, also after a restart. Running jobs continue, and new
-/// ones are accepted.
+/// jobs are accepted.
 pub fn pause<'a>(
     service: &'a Arc<Service>,
     caller: &'a Caller,

@@ -1,4 +1,4 @@
-//! Returns the summary of a result, and says whether there is a result.
+//! The operation that returns the summary of a result, and help to find out whether there is a result.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use super::{
 };
 use crate::{error::ApiError, transfer::Share};
 
-/// The summary of one load step.
+/// The scalars of a result at the end of one load step.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct StepResult {
     /// The step's name in the problem, or its number from 0.
@@ -27,12 +27,12 @@ pub struct StepResult {
     pub summary: solver::solution::Summary,
 }
 
-/// The scalars of a result, as a whole and by load step.
+/// The scalars of a result: at its end, and for each load step.
 #[derive(Debug, Serialize, JsonSchema)]
 #[schemars(rename = "Result")]
 pub struct JobResult {
-    /// How much of the result is available, as in the job: `partial` if the job has not ended or has not converged, even
-    /// if the last finished load step converged.
+    /// How much of the result is available, as the job says: `partial` if the job has not ended or has not converged,
+    /// even if the last finished load step converged.
     pub result_available: ResultAvailable,
     /// The summary of the last finished load step.
     pub summary: Summary,
@@ -47,12 +47,12 @@ pub struct Found<T> {
     pub available: ResultAvailable,
     /// The requested part.
     pub content: T,
-    /// The part of the memory for answers that a large result takes.
+    /// The share of the memory for answers that a large result holds; `None` for a small result.
     pub share: Option<Share>,
 }
 
 impl<T> Found<T> {
-    /// A small part, without a share.
+    /// A small part of a result, without a share of the memory for answers.
     pub(super) fn new(available: ResultAvailable, content: T) -> Found<T> {
         Found {
             available,
@@ -65,8 +65,8 @@ impl<T> Found<T> {
 /// The largest size of parts of a result that are read without reserving memory (bytes).
 const SMALL: usize = 4 << 20;
 
-/// Reserves memory for parts of a result before they are read; none if they are small. A job of many contacts and steps
-/// has summaries of a hundred megabytes, and many clients may request them at once.
+/// Reserves memory for parts of a result before they are read; `None` if they are small. The summaries of a job of many
+/// contacts and steps take a hundred megabytes, and many clients may request them at once.
 pub(super) async fn room_for(
     service: &Service,
     caller: &Caller,
@@ -85,10 +85,10 @@ pub(super) async fn room_for(
     }
 }
 
-/// The name of the header, and over gRPC of the metadata, that says whether a result is partial or final.
+/// The name of the header, and of the entry in the metadata over gRPC, that says whether a result is partial or final.
 pub const RESULT_AVAILABLE: &str = "result-available";
 
-/// The scalars of a job that has a result.
+/// Returns the scalars of the result of a job; an error if the job has no result.
 pub fn result<'a>(
     service: &'a Arc<Service>,
     caller: &'a Caller,
@@ -130,7 +130,8 @@ async fn read_result(
     service.work_on(load, read).await?
 }
 
-/// The job, if it has a result: a final one, or that of finished load steps while it runs.
+/// Opens a snapshot of a job that has a result: a final one or, while the job runs, the result of its finished load
+/// steps. An error if it has none.
 pub(super) async fn with_result(
     service: &Service,
     caller: &Caller,
@@ -143,7 +144,7 @@ pub(super) async fn with_result(
     }
 }
 
-/// Reads a stored part.
+/// Reads a stored part of a result from its JSON.
 pub(super) fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, ApiError> {
     serde_json::from_slice(bytes).map_err(ApiError::internal)
 }

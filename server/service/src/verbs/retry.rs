@@ -1,4 +1,4 @@
-//! Retries a job that has ended.
+//! The operation that retries a job that has ended.
 
 use std::sync::Arc;
 
@@ -25,9 +25,9 @@ use crate::error::ApiError;
 /// Changes for the new job; absent fields stay unchanged.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Changes {
-    /// The seconds from the start of an attempt to its end.
+    /// The largest number of seconds from the start of an attempt to its end.
     pub timeout_s: Option<f64>,
-    /// The seconds that the job may wait in the queue.
+    /// The largest number of seconds that the job may wait in the queue.
     pub queue_ttl_s: Option<f64>,
     /// Jobs of higher priority run first.
     pub priority: Option<i32>,

@@ -1,4 +1,4 @@
-//! The service, which every verb receives.
+//! The service, which every operation receives: settings, store, queue and limits.
 
 use std::{sync::Arc, time::Duration};
 
@@ -20,13 +20,13 @@ use crate::{
     transfer::Limit,
 };
 
-/// How long a probe waits for the store.
+/// How long a health probe waits for the store.
 const HEALTH_PATIENCE: Duration = Duration::from_secs(2);
 
 /// Largest message over gRPC in either direction, as the contract promises.
 pub const MAX_MESSAGE_BYTES: usize = 1 << 20;
 
-/// The service, which every verb receives.
+/// The service, which every operation receives: settings, store, queue and limits.
 #[derive(Debug)]
 pub struct Service {
     /// The settings.
@@ -39,11 +39,12 @@ pub struct Service {
     checks: Arc<Semaphore>,
     /// Limits how many jobs each owner submits.
     rates: Rates,
-    /// Memory that one job may need, by the estimate: that of the settings, or a part of the machine's.
+    /// The memory that one job may need according to its estimate (bytes): the memory budget of the settings, or its
+    /// default.
     pub(super) memory_budget_bytes: u64,
-    /// Bytes of bodies in memory, over all requests.
+    /// The limit on bytes of request bodies in memory, over all requests.
     pub received: Limit,
-    /// Bytes of answers in memory, over all requests.
+    /// The limit on bytes of answers in memory, over all requests.
     pub sent: Limit,
     /// Fields that are being sent.
     pub(super) fields_in_memory: FieldsInMemory,
@@ -55,13 +56,13 @@ pub struct Service {
 #[derive(Debug)]
 pub(super) struct Room {
     owner: String,
-    /// The limit; `None` without limit.
+    /// The limit of stored bytes; `None`: no limit.
     limit: Option<u64>,
     used: u64,
 }
 
 impl Room {
-    /// Fails if the limit is reached, or does not permit these additional bytes.
+    /// Fails if the owner has reached the limit, or would exceed it with `more` bytes.
     pub(super) fn holds(&self, more: u64) -> Result<(), ApiError> {
         match self.limit {
             Some(limit) if self.used >= limit || self.used.saturating_add(more) > limit => {
@@ -118,13 +119,13 @@ impl Service {
         self.store.has_tokens() || self.config.trust.is_on()
     }
 
-    /// How many bytes one owner may store.
+    /// How many bytes one owner may store; `None`: no limit.
     pub(super) fn max_bytes_of_owner(&self) -> Option<u64> {
         let most = self.config.max_bytes_per_owner;
         most.filter(|_| self.is_shared())
     }
 
-    /// The limit of jobs that each owner may submit.
+    /// The limit on the jobs that each owner may submit; `None`: no limit.
     pub(super) fn rates(&self) -> Option<&Rates> {
         Some(&self.rates).filter(|rates| rates.per_minute.is_some() && self.is_shared())
     }
@@ -151,7 +152,7 @@ impl Service {
         Ok(Room { owner, limit, used })
     }
 
-    /// Counts an upload that begins.
+    /// Counts an upload of this owner that begins; an error if a limit on simultaneous uploads is reached.
     pub(super) fn begin_upload(&self, owner: &str) -> Result<Upload, ApiError> {
         self.uploads.begin(owner, self.is_shared())
     }
@@ -186,8 +187,9 @@ impl Service {
         self.work_on(async { Ok(()) }, |()| work()).await
     }
 
-    /// Runs work on data that are loaded first, once there is a permit, so that waiting requests use no memory. The permit is
-    /// that of the request until the data are loaded: what must count until then runs `detached`.
+    /// Loads data and runs work on them, once there is a permit, so that waiting requests use no memory. While data are
+    /// loaded the permit belongs to the request, afterwards to the work: loading that must count as long as it lasts
+    /// has to run `detached`.
     pub async fn work_on<L: Send + 'static, T: Send + 'static>(
         &self,
         load: impl Future<Output = Result<L, ApiError>>,
@@ -204,8 +206,8 @@ impl Service {
     }
 }
 
-/// Runs work detached from the request: a committed job must be announced even if the client disconnects before, and
-/// memory counts until what it is reserved for has ended.
+/// Runs work in a task of its own, which goes on if the client of the request disconnects: a committed job must be
+/// announced, and reserved memory counts until its use has ended.
 pub(super) async fn detached<T: Send + 'static>(
     work: impl Future<Output = Result<T, ApiError>> + Send + 'static,
 ) -> Result<T, ApiError> {

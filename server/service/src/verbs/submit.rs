@@ -1,5 +1,5 @@
-//! Submits jobs: one, one with an id chosen by the client, or many at once. Each submission runs in a task of its own,
-//! so that a client that disconnects changes nothing.
+//! Operations that submit jobs: one, one with an id chosen by the client, or many at once. Each submission runs in a
+//! task of its own, so that it does not matter whether the client disconnects.
 
 use std::sync::Arc;
 
@@ -29,15 +29,15 @@ pub const MAX_BATCH: usize = 1000;
 pub struct Submitted<T> {
     /// The accepted job or jobs.
     pub accepted: T,
-    /// Whether they existed already, under the key or the id.
+    /// Whether the jobs existed already, under the idempotency key or the id of the request.
     pub replayed: bool,
 }
 
-/// Reads a request for a job; called on a blocking thread.
+/// A function that reads a request for a job; it is called on a blocking thread.
 pub type ReadRequest = Box<dyn FnOnce() -> Result<JobRequest, ApiError> + Send>;
 
-/// Accepts a job. It is durable when this returns. Violations of envelope and problem are reported together. With
-/// a key, or an id chosen by the client, the same request gives the same job, however often it is repeated.
+/// Accepts a job and stores it durably. Violations of envelope and problem are reported together. With a key, or an id
+/// chosen by the client, the same request gives the same job, however often it is repeated.
 pub fn create<'a>(
     service: &'a Arc<Service>,
     caller: &'a Caller,
@@ -71,7 +71,7 @@ pub fn create<'a>(
     })
 }
 
-/// Reads and checks a job that repeats no other; in one go, unless its mesh has to be loaded.
+/// Reads and checks a job that repeats no other; all on one blocking thread, unless its mesh has to be loaded.
 async fn admit_new(
     service: &Service,
     caller: &Caller,
@@ -96,8 +96,8 @@ async fn admit_new(
     }
 }
 
-/// The jobs that this request has submitted before, by its key or the id that the client has chosen. They are looked for before
-/// the job is checked in depth: a request that was accepted once need not be acceptable now.
+/// The jobs that this request has submitted before, by its key or the id that the client has chosen; `None`: none. They
+/// are looked for before the job is checked in depth: a request that was accepted once need not be acceptable now.
 async fn repeated(
     service: &Service,
     caller: &Caller,
@@ -115,7 +115,7 @@ async fn repeated(
     }
 }
 
-/// Accepts all of these jobs or none. Violations of all are reported together, with pointers `/jobs/{n}/…`.
+/// Accepts all of these jobs or none. The violations of all jobs are reported together, with pointers `/jobs/{n}/…`.
 pub fn create_batch<'a>(
     service: &'a Arc<Service>,
     caller: &'a Caller,
@@ -166,7 +166,7 @@ pub fn create_batch<'a>(
     })
 }
 
-/// The job of a submission of one job.
+/// The result of a submission of one job, from the list `jobs`, which has this job alone.
 pub(super) fn single(jobs: Vec<Job>, replayed: bool) -> Result<Submitted<Job>, ApiError> {
     let accepted = jobs.into_iter().next();
     let accepted =
@@ -174,7 +174,8 @@ pub(super) fn single(jobs: Vec<Job>, replayed: bool) -> Result<Submitted<Job>, A
     Ok(Submitted { accepted, replayed })
 }
 
-/// Applies a function to each item, a few at a time, in order; the violations of all are reported together.
+/// Applies `work` to each item, a few at a time, and returns the results in the order of the items; the violations of
+/// all items are reported together.
 async fn each<A, B, F: Future<Output = Result<B, ApiError>>>(
     many: Vec<A>,
     work: impl Fn(A) -> F,

@@ -1,5 +1,5 @@
-//! Operations on sweeps, which are submitted as jobs for their members: submit, list, watch, cancel, delete; and the
-//! rows of their members.
+//! Operations on sweeps, which are submitted as jobs for their members: submit, list, watch, cancel and delete sweeps,
+//! get the rows of members, and submit a member as a job.
 
 use std::{sync::Arc, time::Duration};
 
@@ -68,31 +68,33 @@ pub const WAIT: Parameter<Seconds> = Parameter {
 /// The largest size of the problems of all jobs of a sweep together (bytes): each job stores its own, with its mesh.
 const MOST_STORED: usize = 64 << 20;
 
-/// The size of the problem of a further member apart from the body, for each unknown (bytes): its mesh, supports and
-/// loads.
+/// The memory for the problem of each further member that is solved on the same body, for each unknown (bytes): its
+/// mesh, supports and loads.
 const BYTES_PER_UNKNOWN: u64 = 64;
 
-/// How long to wait for news before checking in the store whether the jobs have ended, which is not announced.
+/// How long to wait for rows of members before checking in the store whether the jobs have ended, which is not
+/// announced.
 const PULSE: Duration = Duration::from_millis(250);
 
 /// The number of events and rows that are read at a time.
 const AT_ONCE: i64 = 500;
 
-/// The largest size of the values of events that are read at a time (bytes); one event alone may have more.
+/// The largest size of the members' values in the events that are read at a time (bytes); one event alone may have
+/// more.
 const MOST_EVENT_BYTES: usize = 64 << 10;
 
 /// A request for a sweep.
 #[derive(Debug)]
 pub struct SweepRequest {
-    /// The fields other than the definition; absent limits depend on the number of members.
+    /// The fields other than the definition; `limits` has the time limits.
     pub envelope: Envelope,
-    /// The time limits, if they are given.
+    /// The time limits of each job; `None`: they depend on the number of members.
     pub limits: Option<Limits>,
     /// The definition, or all its violations.
     pub definition: Result<Definition, Vec<Violation>>,
 }
 
-/// The data in which a repeated request must equal the first one.
+/// The data that have to be equal if a request with the same idempotency key is to count as repeated.
 #[derive(Serialize)]
 struct Payload<'a>(
     &'static str,
@@ -102,14 +104,14 @@ struct Payload<'a>(
     &'a Plan,
 );
 
-/// A sweep whose members were checked, except for their meshes.
+/// A sweep whose members were checked, apart from their meshes, and sorted into groups.
 struct Checked {
     definition: Definition,
     groups: Result<Vec<Vec<usize>>, Vec<Violation>>,
 }
 
-/// Accepts a sweep: all of its jobs or none. It is durable when this returns. Violations of the base, of the axes, of
-/// members and of the other fields are reported together.
+/// Accepts a sweep: all of its jobs or none, stored durably. Violations of the base, of the axes, of members and of the
+/// other fields are reported together.
 pub fn create<'a>(
     service: &'a Arc<Service>,
     caller: &'a Caller,
@@ -172,7 +174,7 @@ pub fn create<'a>(
     })
 }
 
-/// Checks the base like a job's problem; returns its estimated memory if it is valid.
+/// Checks the base of a sweep like a job's problem; returns its estimated memory if it is valid.
 async fn admit_base(
     service: &Arc<Service>,
     caller: &Caller,
@@ -205,7 +207,7 @@ async fn admit_base(
     }
 }
 
-/// The jobs of a sweep, one for each group, each with the problem of its first member.
+/// Makes the jobs of a sweep, one for each group, each with the problem of its group's first member, and the sweep.
 async fn admitted(
     service: &Arc<Service>,
     caller: &Caller,
@@ -313,7 +315,7 @@ base_bytes // of the checked base, on the same mesh
     made.await?
 }
 
-/// The sweep of jobs that were accepted together.
+/// The result of submitting a sweep, from its jobs.
 async fn of_jobs(
     service: &Service,
     caller: &Caller,
@@ -328,7 +330,7 @@ async fn of_jobs(
     })
 }
 
-/// The sweep in its present state.
+/// Returns the sweep in its present state.
 pub fn get<'a>(
     service: &'a Service,
     caller: &'a Caller,
@@ -395,7 +397,7 @@ pub fn list<'a>(
     })
 }
 
-/// A page of the members of a sweep, in the order of their numbers.
+/// Returns a page of the members of a sweep, in the order of their numbers.
 pub fn rows<'a>(
     service: &'a Service,
     caller: &'a Caller,
@@ -417,8 +419,8 @@ pub fn rows<'a>(
     })
 }
 
-/// All members of a sweep as a table in this format, in the order of their numbers. Its memory counts for the limit on
-/// answers from before it is made until it is sent.
+/// Returns all members of a sweep as a table in this format, in the order of their numbers. The memory of the table
+/// counts for the limit on answers from before it is made until it is sent.
 pub fn table<'a>(
     service: &'a Arc<Service>,
     caller: &'a Caller,
@@ -460,7 +462,7 @@ async fn make_table(
     service.work_on(load, write).await?
 }
 
-/// Members from this number on, without their values, and the definition that contains these.
+/// Loads members from the number `from` on, without their values, and the definition, which has the values.
 async fn load_members(
     service: &Service,
     (id, key): (SweepId, i64),
@@ -496,8 +498,9 @@ fn plan_of(definition: &str) -> Result<Plan, ApiError> {
     serde_json::from_str(definition).map_err(ApiError::internal)
 }
 
-/// Events after number `after`, past ones first, then live ones; the stream ends after `done`. `None`: the sweep has
-/// ended, and there are no events after that number. When the service stops the stream ends with an error.
+/// Returns the events of a sweep after number `after`, past ones first, then live ones; the stream ends after `done`.
+/// `None`: the sweep has ended, and there are no events after that number. When the service stops the stream ends with
+/// an error.
 pub async fn watch(
     service: &Arc<Service>,
     caller: &Caller,
@@ -564,8 +567,8 @@ fn follow(
     }
 }
 
-/// Adds the values of the members. The definition is read each time: otherwise hundreds of watchers would hold as many
-/// copies.
+/// Adds to the events the values in which their members differ. The definition is read each time: otherwise hundreds of
+/// watchers would hold as many copies of it.
 async fn with_parameters(
     service: &Service,
     (id, key): (SweepId, i64),
@@ -643,7 +646,7 @@ fn of_sweep(id: SweepId) -> Filter {
     }
 }
 
-/// Submits a member as a job of its own, for its fields, profiles and history.
+/// Submits a member of a sweep as a job of its own, which has fields, profiles and history.
 pub fn solve_member<'a>(
     service: &'a Arc<Service>,
     caller: &'a Caller,

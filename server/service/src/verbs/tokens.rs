@@ -1,4 +1,4 @@
-//! Operations on tokens by administrators: create, list, revoke, and replace the secret.
+//! Operations of administrators on tokens: create, list and revoke a token, and replace its secret.
 
 use std::{collections::BTreeSet, fmt, sync::Arc};
 
@@ -35,7 +35,7 @@ pub const TOKEN: Variable<TokenIds> = Variable {
     values: TokenIds,
 };
 
-/// The ids of tokens, as values.
+/// The allowed values of the variable: all ids of tokens.
 #[derive(Clone, Copy, Debug)]
 pub struct TokenIds;
 
@@ -61,11 +61,11 @@ impl Values for TokenIds {
 pub struct TokenRequest {
     /// A name for people, such as where the token is used.
     pub name: String,
-    /// The owner of the jobs that it submits.
+    /// The owner of the jobs that are submitted with the token.
     pub owner: String,
     /// The scopes of the token.
     pub scopes: Vec<String>,
-    /// The seconds until it expires; absent: never.
+    /// The seconds until the token expires; absent: it does not expire.
     pub expires_in_s: Option<f64>,
 }
 
@@ -85,12 +85,12 @@ impl fmt::Debug for NewToken {
     }
 }
 
-/// A mark in the extensions of an answer whose request has changed the tokens, perhaps that of its own caller. The
+/// A mark in the extensions of an answer whose request has changed tokens, perhaps the token of its own caller. The
 /// answer is sent anyway, since it may have the only copy of a secret.
 #[derive(Clone, Copy, Debug)]
 pub struct TokensChanged;
 
-/// Checks the content of a request; the error has all violations. `first`: there is no token yet.
+/// Checks a request for a token; the error has all violations. `first`: there is no token yet.
 fn checked(request: &TokenRequest, first: bool) -> Result<BTreeSet<Scope>, ApiError> {
     let mut found = Findings::default();
     let mut wrong = |pointer: &str, reason, got: &str, expected: String, hint: &str| {
@@ -208,7 +208,7 @@ pub fn create<'a>(
     })
 }
 
-/// All tokens, the oldest first, including those that are no longer valid.
+/// Lists all tokens, the oldest first, including tokens that are no longer valid.
 pub fn list(store: &Store, _caller: &Caller) -> Vec<Token> {
     store.tokens()
 }
@@ -231,7 +231,7 @@ pub fn revoke<'a>(
     })
 }
 
-/// Gives a token a new secret; the old one is refused from now on.
+/// Gives a token a new secret; the old secret is refused from now on.
 pub fn rotate<'a>(
     store: &'a Arc<Store>,
     caller: &'a Caller,

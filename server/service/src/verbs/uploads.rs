@@ -1,12 +1,13 @@
-//! Counts uploads that are arriving, of all owners and of each, and their bytes, which are in no table yet.
+//! Counts uploads that are arriving, in total and for each owner, and their bytes, which no table of the database has
+//! yet.
 
 use parking_lot::{Mutex, MutexGuard};
 use std::{collections::BTreeMap, sync::Arc};
 
 use crate::error::ApiError;
 
-/// The largest number of simultaneous uploads. Each has up to two files without a name, among those that
-/// `listener/files` reserves, and a buffer.
+/// The largest number of simultaneous uploads. Each has a buffer and up to two nameless files, for which
+/// `listener/files` reserves descriptors.
 const MOST: usize = 32;
 /// The largest number of simultaneous uploads of one owner, if there are several owners.
 const MOST_OF_OWNER: usize = 8;
@@ -15,13 +16,13 @@ const MOST_OF_OWNER: usize = 8;
 #[derive(Debug, Default)]
 pub(super) struct Uploads(Mutex<BTreeMap<String, Arriving>>);
 
-/// The uploads of one owner.
+/// The uploads of one owner that are arriving.
 #[derive(Debug, Default)]
 struct Arriving {
     number: usize,
-    /// The bytes of files that arrive.
+    /// The bytes of the mesh files that have arrived so far.
     file_bytes: u64,
-    /// The bytes of meshes that were read from such files, and are about to be stored.
+    /// The bytes of the meshes that were read from mesh files, and are about to be stored.
     mesh_bytes: u64,
 }
 
@@ -35,7 +36,7 @@ pub(super) struct Upload {
 }
 
 impl Uploads {
-    /// Counts an upload that begins; an error if the limit is reached.
+    /// Counts an upload that begins; an error if a limit is reached. `shared`: whether there are several owners.
     pub(super) fn begin(
         self: &Arc<Uploads>,
         owner: &str,
@@ -68,7 +69,8 @@ impl Uploads {
 }
 
 impl Upload {
-    /// Counts bytes of its file; returns the bytes of all files of its owner that are arriving.
+    /// Counts bytes that have arrived of this upload's file; returns the bytes of all files of its owner that are
+    /// arriving.
     pub(super) fn arrived(&mut self, bytes: usize) -> u64 {
         self.file_bytes += bytes as u64;
         let mut all = self.uploads.all();
@@ -77,8 +79,8 @@ impl Upload {
         of_owner.file_bytes
     }
 
-    /// Counts the mesh that was read from it, once; returns the bytes of all meshes of its owner that are about to be
-    /// stored.
+    /// Counts the mesh that was read from this upload's file; called once. Returns the bytes of all meshes of its owner
+    /// that are about to be stored.
     pub(super) fn read(&mut self, mesh_bytes: u64) -> u64 {
         self.mesh_bytes += mesh_bytes;
         let mut all = self.uploads.all();

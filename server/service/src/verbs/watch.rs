@@ -1,4 +1,4 @@
-//! Waits for a job to change or to end, and streams its events.
+//! Operations that wait for a job to change or to end, and that stream its events.
 
 use std::{sync::Arc, time::Duration};
 
@@ -16,7 +16,7 @@ use tokio::time::{Instant, sleep_until, timeout_at};
 use super::{jobs, service::Service};
 use crate::{error::ApiError, parameters::Parameter, queue::News};
 
-/// How long to wait for a job.
+/// The parameter of how long to wait for a job.
 pub const WAIT: Parameter<Seconds> = Parameter {
     name: "wait",
     meaning: "Seconds to wait until the job's version differs from If-None-Match or, without that header, from the current version",
@@ -25,24 +25,24 @@ pub const WAIT: Parameter<Seconds> = Parameter {
 /// Longest time that a request may wait for a job, in seconds.
 pub const MAX_WAIT_S: f64 = 60.0;
 
-/// The condition to wait for.
+/// The parameter of the condition to wait for.
 pub const UNTIL: Parameter<Words<Until>> = Parameter {
     name: "until",
     meaning: "Wait until the job has ended",
     values: Words(|| vec![("terminal", Until::Terminal)]),
 };
 
-/// The number of the event after which a stream begins.
+/// The parameter of the number of the event after which a stream begins.
 pub const AFTER_SEQ: Parameter<Integers> = Parameter {
     name: "after_seq",
     meaning: "Number of the last event already received; default 0: all events",
     values: Integers(0..=i64::MAX),
 };
 
-/// The number of events that are read before the stream of a watcher begins.
+/// The number of events that are read before the answer to a watcher begins.
 const FIRST_EVENTS: i64 = 64;
 
-/// The pause of each of many watchers of one job between two reads. It equals the time that the recorder may wait
+/// If one job has many watchers, the pause of each between two reads. It equals the time that the recorder may wait
 /// before it commits events, so that events are at most twice as late.
 const CROWDED_PAUSE: Duration = Duration::from_millis(50);
 
@@ -51,15 +51,15 @@ const CROWDED_PAUSE: Duration = Duration::from_millis(50);
 pub enum Until {
     /// The job has ended.
     Terminal,
-    /// The version differs from this one.
+    /// The version of the job differs from this one.
     Changed(i64),
-    /// The version has changed since the request, or the job has ended, after which no change will come: for a client
-    /// that knows no version.
+    /// The version of the job has changed since the request, or the job has ended, after which no change will come: for
+    /// a client that knows no version.
     NextChange,
 }
 
-/// The job when the condition is met, or in its state after `seconds` or when the service stops; and whether the
-/// condition is met.
+/// Returns the job once the condition is met, after `seconds`, or when the service stops; and whether the condition is
+/// met.
 pub fn wait<'a>(
     service: &'a Service,
     caller: &'a Caller,
@@ -96,8 +96,8 @@ pub fn wait<'a>(
 
 /// Streams the stored events after number `after`, then live ones; the stream ends after `done`, or when the job ends
 /// if `after` is beyond that. `None`: the job has ended, and there are no events after that number. When the service
-/// stops, or the job is deleted before, the stream ends with an error, so that it is not mistaken for the end of the
-/// job.
+/// stops, or the job is deleted before it ends, the stream ends with an error, so that it is not mistaken for the end
+/// of the job.
 pub async fn watch(
     service: &Arc<Service>,
     caller: &Caller,

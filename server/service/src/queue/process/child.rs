@@ -27,7 +27,7 @@ use super::{
 };
 
 /// The memory that a process may use beyond its share before the system refuses more: its program, buffers, and memory
-/// kept by the allocator. The solver's own thread checks the share itself, and can say how much it needed.
+/// kept by the allocator. The solver checks the share itself, and can then say how much memory it needed.
 const MARGIN_BYTES: u64 = 64 << 20;
 
 /// Solves tasks until the input ends.
@@ -116,13 +116,13 @@ fn solve_task(
     }
 }
 
-/// The connection to the service, which supervises the task.
+/// The connection of a worker process to the service, which supervises the task.
 struct Connection<'a> {
     service: &'a mut UnixStream,
-    /// Set when the service has asked to stop.
+    /// Set when the service has asked the process to stop.
     stop: &'a AtomicBool,
     threads: usize,
-    /// The first error of sending; after it nothing is sent.
+    /// The first error of sending to the service; after an error nothing is sent.
     sent: io::Result<()>,
 }
 

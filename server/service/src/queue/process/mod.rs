@@ -1,9 +1,10 @@
 //! Solves jobs in separate processes, so that a crash of the solver costs only its job.
 //!
 //! A worker process is the same program (`signorini worker`), started in advance and kept for many jobs. It
-//! communicates with the service over a socket, which is its standard input, so that printed text cannot get in
-//! between. It ends when the service closes that socket, or dies. In the service, the blocking task of a worker serves
-//! the process: it passes on what the process tells its supervisor, and kills a process that does not stop when asked.
+//! communicates with the service over a socket, which is its standard input, so that text that the program prints
+//! cannot get between the messages. It ends when the service closes that socket, or dies. In the service, the blocking
+//! task of a worker serves the process: it passes on what the process tells its supervisor, and kills a process that
+//! does not stop when asked.
 
 mod child;
 mod parent;
@@ -22,7 +23,7 @@ pub use parent::Processes;
 /// A message to a worker process.
 #[derive(Debug, Serialize, Deserialize)]
 enum Order {
-    /// Solve a problem; if it is on a stored mesh, the mesh follows.
+    /// Solve a problem; if the problem refers to a stored mesh, the mesh follows the message.
     Solve { task: Task, on_mesh: bool },
     /// Stop solving, and report the last state.
     Stop,
@@ -32,29 +33,29 @@ enum Order {
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Task {
     pub(super) problem: String,
-    /// The members of a sweep that are solved together with it.
+    /// The members of a sweep that are solved together with the problem.
     pub(super) members: Option<MembersTask>,
-    /// The stored mesh that the problem refers to; it follows the order.
+    /// The stored mesh that the problem refers to; it is sent after the `Order`.
     #[serde(skip)]
     pub(super) mesh: Option<Vec<u8>>,
-    /// The memory that it may use (bytes).
+    /// The memory that the task may use (bytes).
     pub(super) share: u64,
-    /// How many threads may share its work, by the processors that were free when the task began.
+    /// How many threads may share the work of the task, according to the processors that were free when it began.
     pub(super) threads: usize,
 }
 
-/// A message from a worker process: what it tells its supervisor, and the end of its task.
+/// A message from a worker process: a report for its supervisor, or the end of its task.
 #[derive(Debug, Serialize, Deserialize)]
 enum Reply {
     /// The process has started, and waits for a task.
     Ready,
-    /// An event. The service sets its time, since clocks of processes may differ.
+    /// An event of the job. The service sets its time, since clocks of processes may differ.
     Event(Payload),
-    /// A member of a sweep. The service sets its time.
+    /// The result of a member of a sweep. The service sets its time.
     Member(Box<MemberRow>),
     /// The problem has one load level on one grid.
     OneLevel,
-    /// A part of a result; its content follows.
+    /// A part of a result; the content of the part follows.
     Part(Part),
     /// The parts so far are a partial result.
     Partial,
@@ -64,11 +65,11 @@ enum Reply {
         unverified: bool,
         iterations: usize,
     },
-    /// There is no result.
+    /// The task has ended without a result.
     NoSolution(NoSolution),
 }
 
-/// The size of a message's header: its length, and the length of the bytes that follow it.
+/// The size of a message's header (bytes): the length of the message, and the length of the bytes that follow it.
 const HEADER: usize = 16;
 
 /// Writes a message and the bytes that follow it.
@@ -83,8 +84,8 @@ fn send(out: &mut impl Write, message: &impl Serialize, content: &[u8]) -> io::R
     out.write_all(content)
 }
 
-/// Removes the first message and the bytes that follow it from the received data; none if it is not complete yet. A
-/// message of more than `longest` bytes is an error at once.
+/// Removes the first message and the bytes that follow it from the received data; `None` if they are not complete yet.
+/// A message that is, with its bytes, longer than `longest` is an error at once.
 fn take<T: DeserializeOwned>(
     received: &mut Vec<u8>,
     longest: u64,

@@ -23,24 +23,24 @@ use super::{
     Order, Reply, Task, send, take,
 };
 
-/// How often it is checked whether to stop while a process reports nothing.
+/// How often the service checks whether to stop a process that reports nothing.
 const PULSE: Duration = Duration::from_millis(20);
-/// How long a process may take to stop when asked; after that it is killed. A solver takes less (see `Interrupt` in
-/// `solver`), and its worker is free a second after the end of the job.
+/// How long a process may take to stop when asked; after that it is killed. A solver stops sooner (see `Interrupt` in
+/// `solver`), and the worker is free a second after the end of the job.
 const STOP_GRACE: Duration = Duration::from_millis(750);
-/// How long a process may take to start; on a busy machine it takes some ten milliseconds.
+/// How long a process may take to start; on a busy machine a start takes some ten milliseconds.
 const LONGEST_START: Duration = Duration::from_secs(10);
-/// The pause before a process that could not be started is tried again.
+/// The pause before starting a process is tried again.
 const START_PAUSE: Duration = Duration::from_secs(1);
-/// The longest message without the bytes that follow it: the row of an iteration, a warning, the end of a job.
+/// The longest message without the bytes that follow it (bytes): the row of an iteration, a warning, the end of a job.
 const LONGEST_MESSAGE: u64 = 16 << 20;
-/// How long a process may leave a message unread.
+/// How long a process may leave a message from the service unread.
 const UNREAD: Duration = Duration::from_secs(10);
 
 /// Makes the command that starts a worker process.
 pub(super) type Start = fn() -> Command;
 
-/// Worker processes; those without a task are kept for the next one.
+/// The worker processes of the service; idle ones are kept for later tasks.
 #[derive(Debug)]
 pub struct Processes {
     start: Start,
@@ -48,7 +48,7 @@ pub struct Processes {
 }
 
 impl Processes {
-    /// No processes yet.
+    /// A collection of no processes, which starts processes by `start`.
     pub fn new(start: Start) -> Processes {
         Processes {
             start,
@@ -56,7 +56,7 @@ impl Processes {
         }
     }
 
-    /// Starts some processes, so that the first tasks need not wait for them.
+    /// Starts `count` processes, so that the first tasks need not wait for them.
     pub(in crate::queue) fn prepare(&self, count: u16) {
         // they start at the same time
         let spawned: Vec<_> = (0..count).map(|_| Process::spawn(self.start)).collect();
@@ -69,7 +69,7 @@ impl Processes {
         }
     }
 
-    /// Solves a task in a process, as `solve_task` does on this thread. Call this on a blocking thread.
+    /// Solves a task in a worker process, as `solve_task` does on the calling thread. Call this on a blocking thread.
     pub(in crate::queue) fn solve(
         &self,
         task: Task,
@@ -91,7 +91,7 @@ impl Processes {
         }
     }
 
-    /// A waiting process, or a new one. The machine may temporarily have no process, file or memory left: starting is
+    /// An idle process, or a new one. The machine may temporarily have no process, file or memory left: starting is
     /// retried until the job is to stop.
     fn take(&self, supervisor: &mut dyn Supervisor) -> Result<Process, NoSolution> {
         loop {
@@ -127,9 +127,10 @@ impl Processes {
 struct Process {
     child: Child,
     socket: UnixStream,
-    /// The received data that were not used yet.
+    /// The received bytes that are not part of a complete message yet.
     received: Vec<u8>,
-    /// Reads the process's standard error; returns how many bytes the system refused, if the process died of that.
+    /// The thread that reads the process's standard error; it returns how many bytes of memory the system refused, if
+    /// the process died of that.
     stderr: Option<JoinHandle<Option<u64>>>,
 }
 
@@ -243,7 +244,7 @@ impl Process {
         }
     }
 
-    /// The next reply, of at most `longest` bytes; `None` if there has been none for a while.
+    /// Receives the next reply, of at most `longest` bytes; `None` if none comes for a while.
     fn next(&mut self, longest: u64) -> io::Result<Option<(Reply, Vec<u8>)>> {
         let mut some = [0; 64 << 10];
         loop {
@@ -292,8 +293,8 @@ impl Drop for Process {
     }
 }
 
-/// Logs the output of a process; returns how many bytes the system refused, which the standard library prints before it
-/// aborts.
+/// Logs what a process writes to its standard error; returns how many bytes of memory the system refused, which the
+/// standard library prints before it aborts.
 fn log_lines(stderr: ChildStderr) -> Option<u64> {
     const LONGEST: u64 = 1 << 10;
     let mut stderr = BufReader::new(stderr);
