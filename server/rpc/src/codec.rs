@@ -1,8 +1,8 @@
 //! The gRPC codec, which limits the memory that messages take when they are decoded.
 //!
 //! A limit on the bytes of a message is not enough: two bytes make an empty submessage, which takes a kilobyte when it
-//! is decoded. The parts are therefore counted first, by the contract, without decoding them. The build makes the
-//! generated services use this codec.
+//! is decoded. The parts of a message are therefore counted first, by the contract, without decoding the message. The
+//! build makes the generated services use this codec.
 
 use std::{collections::HashMap, marker::PhantomData, sync::LazyLock};
 
@@ -28,11 +28,11 @@ use crate::pb;
 /// takes a few MiB.
 const MOST_BYTES: usize = 32 << 20;
 
-/// The codec of the generated services and clients.
+/// The codec of the generated services and clients, with a limit on the memory of decoded messages.
 #[derive(Debug, Default)]
 pub struct Codec<T, U>(PhantomData<(T, U)>);
 
-/// A decoder of messages within the limit.
+/// A decoder of messages whose memory is at most `MOST_BYTES`.
 #[derive(Debug, Default)]
 pub struct LimitedDecoder<U>(PhantomData<U>);
 
@@ -83,22 +83,22 @@ static CONTRACT: LazyLock<Contract> = LazyLock::new(Contract::read);
 /// The memory that the messages of the contract take when they are decoded.
 struct Contract {
     kinds: Vec<Kind>,
-    /// The numbers of messages by their full names.
+    /// The indices in `kinds` of the types of messages, by their full names.
     numbers: HashMap<String, usize>,
 }
 
-/// A type of message.
+/// A type of message of the contract.
 struct Kind {
     name: String,
     fields: HashMap<u32, Field>,
-    /// The size of an empty message (bytes).
+    /// The memory of an empty message of this type (bytes).
     bytes: usize,
 }
 
 /// The kind of content of a field.
 #[derive(Clone, Copy)]
 enum Field {
-    /// A message, or an entry of a map.
+    /// A message, by its index in `Contract::kinds`, or an entry of a map.
     Message(usize),
     /// Text or bytes.
     Text,
@@ -106,9 +106,9 @@ enum Field {
     Number,
 }
 
-/// The size of a `String`, a `Vec` or a map (bytes).
+/// The memory of an empty `String`, `Vec` or map (bytes).
 const CONTAINER: usize = 24;
-/// The size of a number, or of an absent one (bytes).
+/// The memory of a number, present or absent (bytes).
 const NUMBER: usize = 16;
 
 impl Contract {
@@ -150,7 +150,7 @@ impl Contract {
         }
     }
 
-    /// Subtracts the memory of a message's fields from `left`, and fails when nothing is left.
+    /// Subtracts the memory of a message's fields from `left`, and fails when `left` is used up.
     fn count(&self, kind: usize, mut bytes: Bytes, left: &mut usize) -> Result<(), ApiError> {
         let Some(kind) = self.kinds.get(kind) else {
             return Ok(());
@@ -214,7 +214,7 @@ fn unknown_field(number: u32, message: &str) -> ApiError {
     ))
 }
 
-/// Collects a message and those that are defined inside it, with their full names.
+/// Collects a message type and the types that are defined inside it, with their full names.
 fn collect<'a>(
     scope: &str,
     message: &'a DescriptorProto,
@@ -227,7 +227,8 @@ fn collect<'a>(
     all.push((name, message));
 }
 
-/// The size of an empty message (bytes): it contains its single messages, but not repeated ones.
+/// The memory of an empty message of a type (bytes): it contains the memory of its single messages, but not of its
+/// repeated ones.
 fn size(
     number: usize,
     all: &[(String, &DescriptorProto)],

@@ -24,6 +24,6 @@ pub mod grpc;
 pub mod pb {
     tonic::include_proto!("signorini.v1");
 
-    /// The contract in binary form, served by reflection.
+    /// The contract in binary form, as the reflection service serves it.
     pub const DESCRIPTORS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/descriptors.bin"));
 }

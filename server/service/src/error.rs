@@ -159,7 +159,7 @@ pub enum ApiError {
     },
     /// The request body becomes much larger when its Content-Encoding is undone.
     #[error(
-        "the body becomes more than {ratio} times larger when its Content-Encoding is undone; send it without"
+        "the body becomes more than {ratio} times larger when its Content-Encoding is undone; send the body without one"
     )]
     EncodedTooLarge {
         /// The largest allowed ratio of the decoded size to the encoded size.

@@ -432,7 +432,7 @@ impl Checks {
                             Reason::Conflict,
                             format!("node {node} at ({x}, {y}) held at {u} by a support"),
                             format!("{wanted}, where the bonded obstacle holds it"),
-                            "End the contact one edge before the support with `from` or `to`, or let both agree.",
+                            "Use `from` or `to` to let the contact end one edge before the support, or let the support and the obstacle agree.",
                         ));
                     }
                 }
@@ -447,7 +447,7 @@ impl Checks {
                         Reason::Impossible,
                         format!("node {node} at ({x}, {y}) held at u_n = {u_n} by a support, {} inside the obstacle", u_n - gap),
                         "supports that leave the body outside the obstacle",
-                        "End the obstacle before the support with `from` or `to`.",
+                        "Use `from` or `to` to let the obstacle end before the support.",
                     ));
                 }
             }

@@ -1,5 +1,5 @@
-//! Parts of answers whose shape differs from that of their messages: points in time, names, words, events, and
-//! what the service adds to a summary.
+//! Converts parts of answers whose shape differs from the shape of their messages: points in time, names, words,
+//! events, and what the service adds to a summary.
 
 use std::collections::BTreeSet;
 
@@ -43,7 +43,7 @@ impl<K: Kind> IntoMessage<String> for Id<K> {
     }
 }
 
-/// Converts enums that are texts both in JSON and in messages.
+/// Implements the conversion to a text for enums that are texts both in JSON and in messages.
 macro_rules! words {
     ($($type:ty),*) => {
         $(impl IntoMessage<String> for $type {
@@ -111,7 +111,7 @@ impl From<Event> for pb::Event {
     }
 }
 
-/// Converts values of any type to JSON.
+/// Converts the value of a parameter of any type to its JSON.
 impl IntoMessage<String> for base::sweep::ParameterValue {
     fn into_message(self) -> String {
         self.json().to_owned()

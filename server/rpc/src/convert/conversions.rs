@@ -1,5 +1,5 @@
-//! The generated conversions: the list of types is `server/rpc/build/mirrors.rs`, the generator `conversions.rs` beside
-//! it.
+//! The generated conversions: the list of types is `server/rpc/build/mirrors.rs`, the generator
+//! `server/rpc/build/conversions.rs`.
 #![allow(clippy::too_many_lines)] // generated: a line for each member
 
 use std::collections::BTreeMap;
@@ -15,7 +15,7 @@ use solver::{element::Element, problem, solution};
 use super::{FromMessage, IntoMessage, Reader};
 use crate::pb;
 
-/// Converts a type to a message, by itself and as a field that is always set.
+/// Implements the conversion of a type to a message, by itself and as a field that is always set.
 macro_rules! written {
     ($ours:ty => $message:ty) => {
         impl IntoMessage<$message> for $ours {
@@ -32,7 +32,7 @@ macro_rules! written {
     };
 }
 
-/// Reads a type from a message that must be set.
+/// Implements reading a type from a message that must be set.
 macro_rules! required {
     ($message:ty => $ours:ty, $expected:literal) => {
         impl FromMessage<Option<$message>> for $ours {
@@ -46,7 +46,7 @@ macro_rules! required {
     };
 }
 
-/// Reads a type from a message that may be absent.
+/// Implements reading a type from a message that may be absent, which gives the type's default.
 macro_rules! defaulted {
     ($message:ty => $ours:ty) => {
         impl FromMessage<Option<$message>> for $ours {

@@ -1,5 +1,5 @@
-//! Parts of a problem whose shape differs from that of its message: alternatives that JSON distinguishes by their
-//! form or by which of them is set, and lists of a fixed length.
+//! Converts parts of a problem whose shape differs from the shape of their message: alternatives that JSON
+//! distinguishes by their form or by which field is set, and lists of a fixed length.
 
 use solver::{
     element::Element,
@@ -82,7 +82,8 @@ impl From<MeshInput> for pb::Mesh {
     }
 }
 
-/// Reads a type whose message has fields that exclude each other.
+/// Implements the conversions of a type whose message has fields that exclude each other, by a struct with all of these
+/// fields.
 macro_rules! checked {
     ($($message:ty => $fields:ty => $ours:ty),*) => { $(
         impl FromMessage<$message> for $ours {
@@ -102,7 +103,7 @@ macro_rules! checked {
 
 checked!(pb::Material => MaterialFields => Material, pb::Load => LoadFields => Load);
 
-/// Reads one number, or two.
+/// Reads a boundary value: one number, or two.
 impl FromMessage<pb::BoundaryValue> for BoundaryValue {
     fn from_message(message: pb::BoundaryValue, read: &mut Reader) -> Option<Self> {
         let pb::BoundaryValue { start, end } = message;
@@ -126,7 +127,7 @@ impl From<BoundaryValue> for pb::BoundaryValue {
     }
 }
 
-/// Reads a number, or a table.
+/// Reads a prescribed bound: a number, or a table.
 impl FromMessage<Bound> for PrescribedBound {
     fn from_message(message: Bound, read: &mut Reader) -> Option<Self> {
         match message {

@@ -5,20 +5,20 @@ use std::collections::BTreeMap;
 
 use solver::error::{Findings, Reason, Violation, escape};
 
-/// A type that can be read from a message, or from a field of one.
+/// A type that can be read from a message, or from a field of a message.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not read from `{M}`",
     note = "a field of a message and the field of its name in our struct have types that do not fit",
     note = "`server/rpc/build/mirrors.rs` lists what is converted field by field, `server/rpc/src/convert` has the rest"
 )]
 pub trait FromMessage<M>: Sized {
-    /// Reads the message. `None` if that fails; `read` then has the violation.
+    /// Reads a value from the message. `None` if this fails; `read` then has the violation.
     fn from_message(message: M, read: &mut Reader) -> Option<Self>;
 }
 
-/// A field that a message may leave out.
+/// A type of a field that a message may leave out.
 pub trait FromOptional<M>: Sized {
-    /// Reads the field; `default` if it is left out.
+    /// Reads the field; returns `default` if it is left out.
     fn from_optional(message: Option<M>, default: Self, read: &mut Reader) -> Option<Self>;
 }
 
@@ -29,7 +29,7 @@ pub fn read<M, T: FromMessage<M>>(message: M) -> Result<T, Vec<Violation>> {
     read.found(value)
 }
 
-/// The current place in a message, and the violations found so far.
+/// Reads a message: holds the current place in the message, and the violations found so far.
 #[derive(Debug, Default)]
 pub struct Reader {
     place: Vec<Token>,
@@ -45,12 +45,12 @@ enum Token {
 }
 
 impl Reader {
-    /// Reads a field.
+    /// Reads the value of the field `name` from `message`.
     pub fn field<M, T: FromMessage<M>>(&mut self, name: &'static str, message: M) -> Option<T> {
         self.at(Token::Name(name), |read| T::from_message(message, read))
     }
 
-    /// Reads a field that may be left out.
+    /// Reads the field `name`, which may be left out.
     pub fn optional<M, T: FromOptional<M>>(
         &mut self,
         name: &'static str,
@@ -61,17 +61,17 @@ impl Reader {
         self.at(Token::Name(name), read)
     }
 
-    /// Reads an entry of a list.
+    /// Reads the entry `index` of a list.
     pub fn place<M, T: FromMessage<M>>(&mut self, index: usize, message: M) -> Option<T> {
         self.at(Token::Index(index), |read| T::from_message(message, read))
     }
 
-    /// Reads the parts of a field.
+    /// Calls `read` to read the parts of the field `name`, with this field as the current place.
     pub fn inside<T>(&mut self, name: &'static str, read: impl FnOnce(&mut Self) -> T) -> T {
         self.at(Token::Name(name), read)
     }
 
-    /// Reads the parts of an entry of a list.
+    /// Calls `read` to read the parts of the entry `index` of a list, with this entry as the current place.
     pub fn item<T>(&mut self, index: usize, read: impl FnOnce(&mut Self) -> T) -> T {
         self.at(Token::Index(index), read)
     }
@@ -81,13 +81,13 @@ impl Reader {
         self.wrong(Reason::Missing, "nothing", expected)
     }
 
-    /// Reports that none of the alternatives of `kind` is set.
+    /// Reports that none of the alternatives `kinds` of the field `kind` is set.
     pub fn no_kind<T>(&mut self, kinds: &str) -> Option<T> {
         let kinds = format!("one of {kinds}");
         self.at(Token::Name("kind"), |read| read.missing(&kinds))
     }
 
-    /// Reports a number that the enum does not have.
+    /// Reports a number that is no value of the enum `name`.
     pub fn unknown<T>(&mut self, number: i32, name: &str) -> Option<T> {
         self.wrong(
             Reason::UnknownAlternative,
@@ -121,7 +121,7 @@ impl Reader {
         None
     }
 
-    /// The value, if there are no violations.
+    /// Returns the value if there are no violations, otherwise the violations.
     pub fn found<T>(self, value: Option<T>) -> Result<T, Vec<Violation>> {
         match value {
             Some(value) => self.found.into_result(value),
@@ -159,7 +159,7 @@ macro_rules! as_it_is {
 
 as_it_is!(bool, u32, String);
 
-/// A name that is left out is empty.
+/// Reads a name: an empty text means that it is left out.
 impl FromMessage<String> for Option<String> {
     fn from_message(name: String, _: &mut Reader) -> Option<Self> {
         Some(Some(name).filter(|name| !name.is_empty()))
@@ -184,7 +184,7 @@ impl<M, T: FromMessage<M>> FromMessage<Vec<M>> for Vec<T> {
     }
 }
 
-/// A list that is left out is empty.
+/// Reads a list: an empty list means that it is left out.
 impl<M, T: FromMessage<M>> FromMessage<Vec<M>> for Option<Vec<T>> {
     fn from_message(messages: Vec<M>, read: &mut Reader) -> Option<Self> {
         let some = !messages.is_empty();

@@ -24,7 +24,7 @@ use store::{Edit, Filter, job_filters};
 use super::{Reader, read};
 use crate::pb;
 
-/// Reads the request for a job. Pointers refer to the request.
+/// Reads the request for a job. Pointers of violations begin at the request.
 pub fn job_request(request: pb::CreateJobRequest) -> JobRequest {
     let pb::CreateJobRequest {
         problem,
@@ -55,7 +55,7 @@ pub fn job_request(request: pb::CreateJobRequest) -> JobRequest {
     JobRequest { envelope, problem }
 }
 
-/// A sweep as it is asked for. Pointers go into the request.
+/// Reads the request for a sweep. Pointers of violations begin at the request.
 pub fn sweep_request(request: pb::CreateSweepRequest) -> SweepRequest {
     let pb::CreateSweepRequest {
         base,
@@ -108,7 +108,7 @@ pub fn sweep_request(request: pb::CreateSweepRequest) -> SweepRequest {
     }
 }
 
-/// Each item; what cannot be read is noted at its place.
+/// Reads each entry of the list `name` by `item`; what cannot be read is reported at the place of its entry.
 fn read_each<M, T>(
     name: &'static str,
     messages: Vec<M>,
@@ -180,7 +180,7 @@ fn point(message: pb::SweepPoint, read: &mut Reader) -> Option<Box<RawValue>> {
     to_raw_value(&members).ok().filter(|_| sound)
 }
 
-/// A text that is a value as JSON, and nested no deeper than a problem may be.
+/// Reads a text that is a value as JSON, and nested no deeper than a problem may be.
 fn json_text(text: String, read: &mut Reader) -> Option<Box<RawValue>> {
     if let Some(place) = files::json::too_deep(&text) {
         return read.wrong(Reason::Malformed, place, "a value as JSON");
@@ -191,7 +191,7 @@ fn json_text(text: String, read: &mut Reader) -> Option<Box<RawValue>> {
     }
 }
 
-/// A field of the message of filters.
+/// Reads a field of the message of filters, as a filter of type `T`.
 trait Criterion<T> {
     fn read(self, name: &'static str) -> Result<T, ApiError>;
 }
@@ -229,7 +229,7 @@ impl Criterion<Option<Time>> for Option<Timestamp> {
 
 macro_rules! reader {
     ($($field:ident: $type:ty, $name:ident, $column:literal $comparison:literal, $index:expr, $meaning:literal;)*) => {
-        /// Which jobs.
+        /// Reads a filter of jobs; without a message every job matches.
         pub fn filter(message: Option<pb::JobFilter>) -> Result<Filter, ApiError> {
             let pb::JobFilter { labels, $($name,)* } = message.unwrap_or_default();
             filters::checked(Filter {

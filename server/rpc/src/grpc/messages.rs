@@ -16,12 +16,12 @@ use tonic::{Request, Response, Status, metadata::MetadataValue};
 
 use crate::convert::invalid_field;
 
-/// The largest number of rows of a history in one answer, some 200 bytes each, so that it fits into a message.
+/// The largest number of rows of a history in one answer, some 200 bytes each, so that the answer fits into a message.
 pub(super) const MAX_ROWS: usize = 4000;
-/// The largest number of points of a profile in one answer, some 90 bytes each.
+/// The largest number of points of a profile in one answer, some 90 bytes each, so that the answer fits into a message.
 const MAX_PLACES: usize = 10_000;
 
-/// How many of these messages fit into one; at least one.
+/// How many of these messages, from the first on, fit into one message together; at least 1.
 pub(super) fn messages_that_fit<M: Message>(messages: &[M]) -> usize {
     const AROUND: usize = 16; // tag and length of each, and the page's token
     let mut bytes = 0;
@@ -32,8 +32,8 @@ pub(super) fn messages_that_fit<M: Message>(messages: &[M]) -> usize {
     messages.iter().take_while(fits).count().max(1)
 }
 
-/// An answer that cannot be divided into pages; if it is larger than a message may be, an error that says where REST
-/// has it.
+/// Answers with a message that cannot be divided into pages; if it is larger than a message may be, with an error that
+/// says in `instead` where REST has the same data.
 pub(super) fn one_message<M: Message>(
     message: M,
     instead: &'static str,
@@ -44,7 +44,7 @@ pub(super) fn one_message<M: Message>(
     Ok(Response::new(message))
 }
 
-/// The caller and the message of a request.
+/// Splits a request into its caller and its message.
 pub(super) fn caller_and_message<T>(mut request: Request<T>) -> Result<(Caller, T), ApiError> {
     let caller = request.extensions_mut().remove::<Caller>();
     let caller =
@@ -52,7 +52,7 @@ pub(super) fn caller_and_message<T>(mut request: Request<T>) -> Result<(Caller, 
     Ok((caller, request.into_inner()))
 }
 
-/// The value of a text field; `None` if it is empty, which means left out.
+/// Reads the value of a text field; `None` if the text is empty, which means left out.
 pub(super) fn read_if_set<V: Values>(
     parameter: &Parameter<V>,
     text: &str,
@@ -63,7 +63,7 @@ pub(super) fn read_if_set<V: Values>(
     }
 }
 
-/// The requested part of a list; a size of 0 means the default.
+/// Reads which part of a list is requested; a size of 0 means the default.
 pub(super) fn paging(size: i32, token: String) -> Result<Paging, ApiError> {
     let size = match size {
         0 => None,
@@ -75,13 +75,13 @@ pub(super) fn paging(size: i32, token: String) -> Result<Paging, ApiError> {
     })
 }
 
-/// The idempotency key of a request.
+/// Reads the idempotency key of a request.
 pub(super) fn key(request_id: Option<String>) -> Result<Option<Key>, ApiError> {
     let key = request_id.map(|key| IDEMPOTENCY_KEY.read(&key));
     key.transpose()
 }
 
-/// The points at which a profile is requested; an error if they do not fit into a message.
+/// Reads the points at which a profile is requested; an error if they do not fit into a message.
 pub(super) fn points(text: Option<&str>) -> Result<Points, ApiError> {
     let Some(text) = text else {
         return Ok(Points::default());
@@ -97,7 +97,8 @@ pub(super) fn points(text: Option<&str>) -> Result<Points, ApiError> {
     }
 }
 
-/// Adds the metadata that corresponds to the header over REST, if the request is a repetition.
+/// Marks the response in its metadata if the request was a repetition, as the header `Idempotency-Replayed` does over
+/// REST.
 pub(super) fn noting_replay<T>(mut response: Response<T>, replayed: bool) -> Response<T> {
     if replayed {
         let value = MetadataValue::from_static("true");
@@ -108,7 +109,7 @@ pub(super) fn noting_replay<T>(mut response: Response<T>, replayed: bool) -> Res
     response
 }
 
-/// Refuses an offset after the end.
+/// Refuses an offset after the end of the data, which has `total` bytes.
 pub(super) fn check_offset(offset: u64, total: u64) -> Result<(), ApiError> {
     if offset > total {
         Err(ApiError::RangeNotSatisfiable(total))

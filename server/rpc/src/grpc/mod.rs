@@ -1,4 +1,4 @@
-//! gRPC: the same verbs as over REST, with health and reflection.
+//! gRPC: the same operations as over REST, with health and reflection.
 
 mod messages;
 mod router;

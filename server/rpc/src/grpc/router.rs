@@ -1,4 +1,4 @@
-//! The routes of gRPC: the service, its health, its reflection.
+//! Makes the routes of gRPC: the service, its health, its reflection.
 
 use std::{sync::Arc, time::Duration};
 
@@ -14,7 +14,7 @@ use tonic_health::server::HealthReporter;
 use super::service::Grpc;
 use crate::pb::{self, job_service_server::JobServiceServer};
 
-/// The gRPC routes, which share a port with REST, and the handle that sets the reported health.
+/// Makes the gRPC routes, which share a port with REST, and the handle that sets the reported health.
 pub fn router(
     service: Arc<Service>,
 ) -> BoxFuture<'static, Result<(Router, HealthReporter), tonic_reflection::server::Error>> {
@@ -42,8 +42,8 @@ async fn routes(
     Ok((router.layer(map_response(too_large)), reporter))
 }
 
-/// Adds the details that every error has to tonic's refusal of a message over the limit, which tonic gives without
-/// details before the message reaches a method.
+/// Adds the usual details of errors to the response by which tonic refuses a message over the limit: tonic refuses it
+/// without details, before it reaches a method.
 async fn too_large(response: axum::response::Response) -> axum::response::Response {
     let bare = Status::from_header_map(response.headers())
         .is_some_and(|status| status.code() == Code::OutOfRange && status.details().is_empty());
@@ -57,7 +57,7 @@ async fn too_large(response: axum::response::Response) -> axum::response::Respon
     }
 }
 
-/// Reports the health of the store, until the service stops.
+/// Reports whether the service is healthy, until it stops.
 async fn report_health(reporter: HealthReporter, service: Arc<Service>) {
     const INTERVAL: Duration = Duration::from_secs(1);
     let mut serving = true;
@@ -82,7 +82,7 @@ async fn report_health(reporter: HealthReporter, service: Arc<Service>) {
     }
 }
 
-/// Reports NOT_SERVING, before the listener closes.
+/// Reports NOT_SERVING, which must happen before the listener closes.
 pub async fn report_draining(reporter: &HealthReporter) {
     reporter.set_not_serving::<JobServiceServer<Grpc>>().await;
     reporter

@@ -1,4 +1,4 @@
-//! The rpcs, translated to verbs.
+//! The rpcs: each is translated to an operation of the service.
 
 use std::{pin::Pin, sync::Arc};
 
@@ -46,7 +46,7 @@ use crate::{
     pb::{self, job_service_server::JobService},
 };
 
-/// The methods of the contract, translated to verbs.
+/// The methods of the contract, each translated to an operation of the service.
 #[derive(Debug)]
 pub(super) struct Grpc {
     service: Arc<Service>,
@@ -642,7 +642,7 @@ impl JobService for Grpc {
 
 type EventStream = Pin<Box<dyn Stream<Item = Result<pb::Event, Status>> + Send>>;
 
-/// Adds metadata that says whether the answer is from a partial or a final result.
+/// Makes a response whose metadata say whether the answer is from a partial or a final result.
 fn marked<T>(answer: T, available: ResultAvailable) -> Response<T> {
     let mut response = Response::new(answer);
     let words: &'static str = available.into();
@@ -651,7 +651,7 @@ fn marked<T>(answer: T, available: ResultAvailable) -> Response<T> {
     response
 }
 
-/// Events as messages; `None` becomes a stream that has ended.
+/// Converts events to messages; `None` becomes a stream that has ended.
 fn messages(
     events: Option<impl Stream<Item = Result<Event, ApiError>> + Send + 'static>,
 ) -> EventStream {
@@ -683,7 +683,7 @@ impl Grpc {
     }
 }
 
-/// The answer to a call that has changed tokens.
+/// Makes the response to a call that has changed tokens, with the mark that says so.
 fn of_changed_tokens<T>(message: T) -> Response<T> {
     let mut response = Response::new(message);
     response.extensions_mut().insert(TokensChanged);

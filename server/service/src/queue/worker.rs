@@ -251,7 +251,7 @@ async fn end_with_retries(
         && let Some(parts) = parts
         && let Err(cause) = queue.store.discard_parts(&parts).await
     {
-        warn!(%cause, "what was written of the result of job {} stays until the next start: {cause}", job.id);
+        warn!(%cause, "the unused result of job {} stays in the store until the next start: {cause}", job.id);
     }
 }
 

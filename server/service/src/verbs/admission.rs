@@ -170,7 +170,7 @@ pub(super) fn time_violation(run_s: Option<f64>, limits: &Limits) -> Option<Viol
             Reason::OutOfRange,
             format!("{} s", limits.timeout_s),
             format!("at least {:.0} s: the job is estimated to take {run_s:.0} s", run_s / MOST_OVER),
-            "Raise it to the estimated time, or use a coarser mesh, less refinement or fewer increments.",
+            "Raise this limit to the estimated time, or use a coarser mesh, less refinement or fewer increments.",
         )
     })
 }

@@ -70,7 +70,7 @@ impl Envelope {
                     reason: Reason::OutOfRange,
                     got: seconds.to_string(),
                     expected: format!("more than 0, at most {most} seconds"),
-                    hint: "Remove it for the default.".into(),
+                    hint: "Without this limit the default applies.".into(),
                 });
             }
         }
@@ -86,7 +86,7 @@ pub(super) fn name_violation(name: &str) -> Option<Violation> {
         reason: Reason::OutOfRange,
         got: format!("{length} characters"),
         expected: format!("at most {MAX_NAME} characters"),
-        hint: "Shorten it.".into(),
+        hint: "Shorten the name.".into(),
     })
 }
 
@@ -97,7 +97,7 @@ pub(super) fn priority_violation(priority: i32) -> Option<Violation> {
         reason: Reason::OutOfRange,
         got: priority.to_string(),
         expected: PRIORITIES.expected(),
-        hint: "Higher runs first; 0 is usual.".into(),
+        hint: "Jobs of higher priority run first; 0 is usual.".into(),
     })
 }
 
@@ -108,7 +108,7 @@ pub(super) fn label_changes_violation(changes: usize) -> Option<Violation> {
         reason: Reason::OutOfRange,
         got: changes.to_string(),
         expected: format!("changes of at most {} labels", 2 * MAX_LABELS),
-        hint: "Change some at a time, or set null for all labels.".into(),
+        hint: "Change fewer labels at a time, or set null for all labels.".into(),
     })
 }
 
@@ -127,7 +127,7 @@ pub(super) fn label_violations(labels: &BTreeMap<String, String>) -> Vec<Violati
             "/labels".into(),
             labels.len().to_string(),
             format!("at most {MAX_LABELS} labels"),
-            "Remove some.",
+            "Remove some labels.",
         ));
     }
     for (key, value) in labels.iter().take(MAX_LABELS) {
@@ -142,7 +142,7 @@ pub(super) fn label_violations(labels: &BTreeMap<String, String>) -> Vec<Violati
         if length > MAX_LABEL {
             let got = format!("a value of {length} characters");
             let expected = format!("at most {MAX_LABEL}");
-            found.push(violation(pointer(), got, expected, "Shorten it."));
+            found.push(violation(pointer(), got, expected, "Shorten the value."));
         }
     }
     found

@@ -350,6 +350,6 @@ pub(super) fn missing(hash: &str) -> Violation {
         reason: Reason::UnknownMesh,
         got: violations::quoted(hash).to_owned(),
         expected: "the hash of a mesh that this service has stored".to_owned(),
-        hint: "Upload it first: POST /v1/meshes, or UploadMesh.".to_owned(),
+        hint: "Upload the mesh first: POST /v1/meshes, or UploadMesh.".to_owned(),
     }
 }

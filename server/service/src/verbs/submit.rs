@@ -133,7 +133,7 @@ pub fn create_batch<'a>(
                 hint: if requests.is_empty() {
                     "Send {\"jobs\": [{\"problem\": {…}}, …]}.".into()
                 } else {
-                    "Submit them in several batches.".into()
+                    "Submit the jobs in several batches.".into()
                 },
             }]));
         }

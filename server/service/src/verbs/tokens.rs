@@ -112,7 +112,7 @@ fn checked(request: &TokenRequest, first: bool) -> Result<BTreeSet<Scope>, ApiEr
             Reason::OutOfRange,
             &format!("{:?}", request.owner),
             format!("1 … {MAX_OWNER} of the characters A-Z a-z 0-9 . _ @ + -"),
-            "The name of the person, or of the program, whose jobs it submits.",
+            "The name of the person, or of the program, that submits jobs with the token.",
         );
     }
     let mut scopes = BTreeSet::new();
@@ -126,7 +126,7 @@ fn checked(request: &TokenRequest, first: bool) -> Result<BTreeSet<Scope>, ApiEr
                 Reason::UnknownName,
                 &format!("{word:?}"),
                 "read, submit, cancel or admin".into(),
-                "admin includes the others, for the jobs of all owners.",
+                "The scope admin includes the other scopes, for the jobs of all owners.",
             ),
         }
     }
@@ -155,7 +155,7 @@ fn checked(request: &TokenRequest, first: bool) -> Result<BTreeSet<Scope>, ApiEr
             Reason::OutOfRange,
             &seconds.to_string(),
             format!("{MIN_EXPIRES_IN_S} … {MAX_EXPIRES_IN_S} seconds"),
-            "Remove it for a token that does not expire.",
+            "Without expires_in_s the token does not expire.",
         );
     }
     found.into_result(scopes).map_err(ApiError::InvalidProblem)
@@ -177,7 +177,7 @@ pub fn create<'a>(
                 Reason::TooMany,
                 format!("{valid} valid tokens"),
                 format!("at most {MAX_TOKENS}"),
-                "Revoke those that are no longer used, or let tokens expire.",
+                "Revoke tokens that are no longer used, or let tokens expire.",
             )]));
         }
         let id = new_id().map_err(ApiError::internal)?;

@@ -1,4 +1,4 @@
-//! The activity of one connection: its open requests, and how long there has been none.
+//! The activity of one connection: its open requests, and for how long it has had none.
 
 use parking_lot::{Mutex, MutexGuard};
 use std::{collections::HashMap, sync::Arc, time::Duration};
@@ -12,7 +12,7 @@ use tokio_util::sync::CancellationToken;
 const LONGEST_HEAD: Duration = Duration::from_secs(30);
 /// How long a connection without a request is kept open.
 const LONGEST_IDLE: Duration = Duration::from_secs(75);
-/// How often a connection is checked.
+/// How often a connection is checked for requests that do not come and for answers that are not read.
 const INTERVAL: Duration = Duration::from_secs(5);
 
 /// The activity of one connection.
@@ -25,16 +25,16 @@ pub(super) struct Activity {
 
 #[derive(Debug)]
 struct State {
-    /// The requests whose answers are not complete, with the speed at which these are read.
+    /// The requests whose answers are not complete, with the speed at which the client reads these answers.
     under_way: HashMap<u64, Arc<Mutex<Delivery>>>,
     last: u64,
-    /// The time since which there has been no request.
+    /// The time when the last open request ended; until the first request, the time when the connection was opened.
     idle_since: Instant,
-    /// The time at which the connection is closed if no request has begun.
+    /// The time at which the connection is closed if no request has begun by then.
     deadline: Instant,
 }
 
-/// An open request, until its answer is sent to the last byte or given up.
+/// An open request, until its answer is sent to the last byte or given up; then it is dropped.
 #[derive(Debug)]
 pub(super) struct UnderWay {
     activity: Arc<Activity>,
@@ -42,11 +42,11 @@ pub(super) struct UnderWay {
     delivery: Arc<Mutex<Delivery>>,
 }
 
-/// The progress of sending an answer.
+/// The progress of sending one answer.
 #[derive(Debug, Default)]
 struct Delivery {
     pace: Pace,
-    /// The number of pieces that wait to be sent.
+    /// The number of the answer's pieces that wait to be sent.
     waiting: usize,
 }
 
@@ -83,7 +83,7 @@ impl Activity {
         }
     }
 
-    /// Records that bytes have arrived: if no request is open, they are the head of one.
+    /// Records that bytes have arrived. If no request is open they are the beginning of a request's head.
     pub(super) fn received(&self) {
         let mut state = self.state();
         if state.under_way.is_empty() {
@@ -91,19 +91,19 @@ impl Activity {
         }
     }
 
-    /// The time since which there has been no request; `None` while there is one.
+    /// The time since which the connection has had no open request; `None` while it has one.
     pub(super) fn idle_since(&self) -> Option<Instant> {
         let state = self.state();
         state.under_way.is_empty().then_some(state.idle_since)
     }
 
-    /// Returns when no request has begun for too long.
+    /// Waits until no request has begun for too long.
     pub(super) async fn idle_too_long(&self) {
         self.until(|state, now| state.under_way.is_empty() && now >= state.deadline)
             .await;
     }
 
-    /// Returns when the client reads an answer too slowly.
+    /// Waits until the client reads an answer too slowly.
     pub(super) async fn is_read_too_slowly(&self) {
         let slow = |delivery: &Arc<Mutex<Delivery>>| locked(delivery).pace.is_too_slow();
         self.until(|state, _| state.under_way.values().any(slow))
@@ -121,7 +121,7 @@ impl Activity {
         self.cut.cancel();
     }
 
-    /// Returns when the connection must be closed at once.
+    /// Waits until the connection must be closed at once.
     pub(super) async fn is_cut(&self) {
         self.cut.cancelled().await;
     }
@@ -136,8 +136,8 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl UnderWay {
-    /// Wraps bytes of the answer that wait to be sent: the request is open until they are sent, although hyper may have
-    /// dropped the body.
+    /// Wraps bytes of the request's answer that wait to be sent: the request is open until they are sent, although
+    /// hyper may have dropped the answer's body.
     pub(super) fn deliver(self: &Arc<Self>, bytes: Bytes) -> Bytes {
         let mut delivery = locked(&self.delivery);
         delivery.waiting += 1;

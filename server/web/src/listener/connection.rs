@@ -1,4 +1,5 @@
-//! Serves one connection: passes its requests to the router and the answers back, until it ends or is closed.
+//! Serves one connection: passes its requests to the router and the answers back, until the connection ends or is
+//! closed.
 
 use std::{
     convert::Infallible,
@@ -37,12 +38,12 @@ use crate::rest;
 
 /// The largest number of simultaneous requests on one connection; a client with more waits or opens another one.
 const MOST_STREAMS: u32 = 100;
-/// Bytes of answers that one stream buffers until the client reads them, and the size of the pieces in which answers
-/// are sent.
+/// The number of bytes of an answer that one stream buffers until the client reads them, and the size of the pieces in
+/// which answers are sent.
 const PIECE_BYTES: usize = 64 << 10;
 /// The largest head of a request (bytes).
 const HEAD_BYTES: usize = 64 << 10;
-/// The time that open requests have to finish when the client has sent no further one for too long.
+/// The time that open requests have to finish when the client has sent no further request for too long.
 const FAREWELL: Duration = Duration::from_secs(2);
 /// How often a silent client over HTTP/2 is asked whether it is still there.
 const PING: Duration = Duration::from_secs(60);
@@ -121,7 +122,7 @@ pub(super) async fn serve(
     }
 }
 
-/// Returns when there has been no request for this time.
+/// Waits until the connection has had no request for this time.
 async fn idle_for(activity: &Activity, time: Duration) {
     while activity
         .idle_since()

@@ -1,17 +1,18 @@
-//! Limits the frames of HTTP/2 that carry no data, so that a client cannot flood the service with them.
+//! Limits the control frames of HTTP/2, which carry no data, so that a client cannot flood the service with them.
 //!
 //! Each PING and SETTINGS requires an answer, each PRIORITY, WINDOW_UPDATE and empty DATA frame some work. The h2
 //! library limits streams that are reset and headers that never end, but not these.
 
 use tokio::time::Instant;
 
-/// The bytes that every connection over HTTP/2 begins with.
+/// The bytes with which every connection over HTTP/2 begins.
 const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
-/// The largest number of control frames at once.
+/// The largest number of control frames that a client may send at once.
 const MOST: f64 = 1000.0;
 /// The number of control frames per second that a client may send without requesting anything.
 const PER_SECOND: f64 = 100.0;
-/// The number of sent bytes that allow one more control frame: a client acknowledges the answers that it reads.
+/// The number of bytes sent to the client that allow one more control frame: a client acknowledges the answers that it
+/// reads.
 const BYTES_PER_FRAME: f64 = 64.0;
 
 const DATA: u8 = 0;
@@ -22,12 +23,12 @@ const END_STREAM: u8 = 1;
 #[derive(Debug)]
 pub(super) struct ControlFrames {
     position: Position,
-    /// How many more frames the client may send now.
+    /// How many more control frames the client may send now.
     credit: f64,
     counted: Instant,
 }
 
-/// The place of the next byte in the protocol.
+/// The place in the protocol of the next byte that arrives.
 #[derive(Debug)]
 enum Position {
     /// Inside the preface, after this many bytes.

@@ -3,7 +3,8 @@
 use axum::body::Bytes;
 use service::error::ApiError;
 
-/// The answer with a document, if `head` is one of hyper's own answers: an error without content.
+/// hyper's answer `head` with an error document added; `None` if `head` is not an error without content, and so not
+/// hyper's own answer.
 pub(super) fn with_document(head: &[u8]) -> Option<Bytes> {
     let status = head.strip_prefix(b"HTTP/1.1 ")?.get(..3)?;
     let head = std::str::from_utf8(head).ok()?.to_ascii_lowercase();

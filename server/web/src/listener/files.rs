@@ -1,16 +1,16 @@
-//! The limit of open files: the store, uploads and every connection need one each.
+//! The limit of open files: each connection needs one, the store and uploads need some.
 
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use tracing::{debug, warn};
 
-/// The number of files that are not connections: the database with its log for each connection to it, uploads, standard
-/// streams, the runtime, and files that a command writes.
+/// The number of open files other than connections: the database with its log for each connection to the database,
+/// uploads, standard streams, the runtime, and files that a command writes.
 const RESERVED: u64 = 128;
 /// The smallest number of connections, even if hardly any files may be open.
 const FEWEST: u64 = 16;
 
-/// Raises the limit to the highest that the system allows, since the usual one, 1024, is soon reached by connections.
-/// Returns the limit.
+/// Raises the limit of open files to the highest that the system allows, since connections soon reach the usual limit,
+/// 1024. Returns the new limit.
 fn raise_file_limit() -> u64 {
     let before = getrlimit(Resource::Nofile);
     let highest = Rlimit {
@@ -26,7 +26,7 @@ fn raise_file_limit() -> u64 {
     limit
 }
 
-/// The number of connections: as many as wanted, if the limit of open files allows it.
+/// The largest number of connections: `wanted`, or fewer if the limit of open files is too low.
 pub fn most_connections(wanted: u32) -> usize {
     let limit = raise_file_limit();
     let rest = limit.saturating_sub(RESERVED).max(FEWEST);

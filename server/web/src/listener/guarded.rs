@@ -1,5 +1,5 @@
-//! The stream of a connection with checks: it records arriving data, limits HTTP/2 control frames, and adds documents
-//! to hyper's own errors.
+//! The stream of a connection with checks: it records arriving data, limits HTTP/2 control frames, and adds error
+//! documents to hyper's own answers.
 
 use std::{
     io::{self, IoSlice},
@@ -13,12 +13,12 @@ use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 
 use super::{activity::Activity, control_frames::ControlFrames, error_document, tls::Stream};
 
-/// The stream of a connection.
+/// The stream of a connection, with checks.
 pub(super) struct Guarded {
     stream: Stream,
     activity: Arc<Activity>,
     frames: ControlFrames,
-    /// Bytes that are written in place of others.
+    /// The rest of an answer with an error document, written in place of hyper's own answer.
     instead: Bytes,
 }
 
@@ -32,7 +32,7 @@ impl Guarded {
         }
     }
 
-    /// Writes the bytes that replace others.
+    /// Writes the bytes of `instead`.
     fn poll_instead(&mut self, context: &mut Context<'_>) -> Poll<io::Result<()>> {
         while !self.instead.is_empty() {
             let stream = Pin::new(&mut self.stream);
@@ -44,7 +44,8 @@ impl Guarded {
         Poll::Ready(Ok(()))
     }
 
-    /// The answer with a document if hyper gave it by itself; it is the last one on its connection.
+    /// hyper's answer `head` with an error document added, if hyper gave it by itself. Such an answer is the last one
+    /// on its connection.
     fn document(&self, head: &[u8]) -> Option<Bytes> {
         // while a request is under way, this is a piece of its answer, whatever it looks like
         self.activity.idle_since()?;

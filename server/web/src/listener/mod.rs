@@ -45,12 +45,13 @@ pub use tls::{BadCertificate, Tls, reload_on};
 
 /// The number of connections that may wait to be accepted.
 const BACKLOG: u32 = 1024;
-/// Bytes of an answer that the system buffers for a slow reader. By default it would buffer up to some megabytes.
+/// The number of bytes of an answer that the system buffers for a slow reader; by default it would buffer up to some
+/// megabytes.
 const SEND_BUFFER_BYTES: u32 = 256 << 10;
 /// How often the same problem with connections is logged.
 const LOG_INTERVAL: Duration = Duration::from_secs(60);
 
-/// A socket that listens, and the limit on its connections.
+/// A listening socket, and the limit on its connections.
 #[derive(Debug)]
 pub struct Listener {
     socket: TcpListener,
@@ -59,7 +60,8 @@ pub struct Listener {
 }
 
 impl Listener {
-    /// Listens at this address, with TLS if there is a certificate; at most `most` connections are open at the same time.
+    /// Listens at this address, with TLS if `tls` has a certificate; at most `most` connections are open at the same
+    /// time.
     pub fn bind(address: SocketAddr, most: usize, tls: Option<Arc<Tls>>) -> io::Result<Listener> {
         let socket = match address {
             SocketAddr::V4(_) => TcpSocket::new_v4()?,
@@ -76,12 +78,12 @@ impl Listener {
         })
     }
 
-    /// The address, with the port that was chosen.
+    /// The address of the socket, with the port that was chosen for it.
     pub fn address(&self) -> io::Result<SocketAddr> {
         self.socket.local_addr()
     }
 
-    /// Serves until `closing` is canceled, and then until every connection has answered its requests.
+    /// Serves connections until `closing` is canceled, and then until every connection has answered its requests.
     pub fn serve(self, router: Router, closing: CancellationToken) -> BoxFuture<'static, ()> {
         Box::pin(self.accept_until(closing, router))
     }
@@ -141,7 +143,7 @@ impl Listener {
             return;
         };
         if slot.is_reserved() && is_due(logged) {
-            info!("all connections are busy; further ones can only ask for the probes");
+            info!("all connections are busy; further connections can only ask for the probes");
         }
         let (tls, router) = (self.tls.clone(), router.clone());
         let serving = connection::serve((stream, peer), tls, router, slot, closing.clone());
@@ -149,7 +151,7 @@ impl Listener {
     }
 }
 
-/// Whether an error of `accept` concerns only the connection that was to be accepted.
+/// Whether an error of `accept` concerns only the connection that was to be accepted, and not the socket.
 fn of_connection(error: &io::Error) -> bool {
     matches!(
         error.kind(),

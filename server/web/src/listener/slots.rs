@@ -7,7 +7,8 @@ use base::metrics::METRICS;
 
 use super::activity::Activity;
 
-/// The number of additional connections when all others are busy: for the probes, and for refusing further ones.
+/// The number of additional connections when all other slots are busy: for the probes, and for refusing further
+/// connections.
 const RESERVED: usize = 16;
 
 /// The open connections, and their limit.
@@ -23,7 +24,7 @@ struct Open {
     connections: HashMap<u64, Arc<Activity>>,
 }
 
-/// The slot of one connection, which is free again when it is dropped.
+/// The slot of one connection; the slot is free again when this is dropped.
 #[derive(Debug)]
 pub(super) struct Slot {
     slots: Arc<Slots>,
@@ -33,7 +34,7 @@ pub(super) struct Slot {
 }
 
 impl Slots {
-    /// A limit of `most` connections.
+    /// Slots for `most` connections, and the reserved ones.
     pub(super) fn new(most: usize) -> Arc<Slots> {
         let open = Mutex::default();
         Arc::new(Slots { most, open })
@@ -60,7 +61,7 @@ impl Slots {
         })
     }
 
-    /// Closes the connection that has been without a request for the longest time, if there is one.
+    /// Closes the connection that has been without a request for the longest time, if any connection is without one.
     pub(super) fn close_longest_idle(&self) {
         self.open().close_longest_idle();
     }

@@ -1,4 +1,4 @@
-//! TLS: the certificate and its key, which can be read again while the service runs, and the handshake.
+//! TLS for connections: the handshake, and the certificate and its key, which can be read again while the service runs.
 
 use parking_lot::RwLock;
 use std::{
@@ -28,9 +28,10 @@ use tokio_rustls::{TlsAcceptor, server::TlsStream};
 use tracing::{info, warn};
 use webpki::{EndEntityCert, KeyUsage};
 
-/// The largest size of a file of certificates, which has some kilobytes; another file may have no end.
+/// The largest size of a file of certificates (bytes): such files have some kilobytes, but another file may have no
+/// end.
 const MOST_BYTES: u64 = 1 << 20;
-/// How long before its end the expiry of a certificate is logged.
+/// How long before the end of a certificate's validity a warning about it is logged.
 const SOON: Duration = Duration::from_secs(14 * 86400);
 /// How often the expiry of the certificate is checked.
 const DAY: Duration = Duration::from_secs(86400);
@@ -41,19 +42,20 @@ pub struct Tls {
     in_use: RwLock<Arc<CertificateInUse>>,
 }
 
-/// A certificate, and the configuration that uses it.
+/// A certificate, and the TLS configuration that uses it.
 struct CertificateInUse {
     acceptor: TlsAcceptor,
     certificate: CertificateDer<'static>,
 }
 
-/// The certificate or its key cannot be used.
+/// The error that the certificate or its key cannot be used, with the reason.
 #[derive(Clone, Debug, thiserror::Error)]
 #[error("--tls-cert, --tls-key: {0}")]
 pub struct BadCertificate(String);
 
 impl Tls {
-    /// Reads both files. A certificate that has expired is used with a warning: jobs continue, and clients are told.
+    /// Reads the files of the certificate and its key. A certificate that has expired is used, with a warning: jobs
+    /// continue, and clients notice that it has expired.
     pub fn read(files: TlsFiles) -> Result<Arc<Tls>, BadCertificate> {
         let read = CertificateInUse::read(&files)?;
         if let Err(bad) = read.check_time(UnixTime::now()) {
@@ -65,7 +67,8 @@ impl Tls {
         }))
     }
 
-    /// Reads both files again, for new connections; after an error the present certificate remains in use.
+    /// Reads the files of the certificate and its key again, for new connections; after an error the present
+    /// certificate remains in use.
     pub fn reload(&self) -> Result<(), BadCertificate> {
         let read = CertificateInUse::read(&self.files)?;
         read.check_time(UnixTime::now())?;
@@ -74,7 +77,7 @@ impl Tls {
         Ok(())
     }
 
-    /// Logs a warning each day while the certificate has expired, or will soon. Never returns.
+    /// Logs a warning each day while the certificate has expired, or will expire soon. Never returns.
     pub async fn watch_expiry(&self) {
         loop {
             let (in_use, now) = (self.in_use(), UnixTime::now());
@@ -94,7 +97,7 @@ impl Tls {
         current.clone()
     }
 
-    /// The TLS handshake; an error if the client does not complete it.
+    /// Performs the TLS handshake; an error if the client does not complete it.
     pub(super) async fn accept(&self, mut stream: TcpStream) -> io::Result<Stream> {
         const HANDSHAKE: u8 = 22;
         let mut first = [0];
@@ -236,7 +239,7 @@ fn read(path: &Path) -> Result<Vec<u8>, BadCertificate> {
     }
 }
 
-/// Reads the files again at every signal.
+/// Reads the files of the certificate again at every signal.
 pub async fn reload_on(mut signals: tokio::signal::unix::Signal, tls: Arc<Tls>) {
     while signals.recv().await.is_some() {
         match tls.reload() {
@@ -254,7 +257,8 @@ impl fmt::Debug for Tls {
     }
 }
 
-/// The stream of a connection, encrypted or not. Written by hand, since `tokio_util::either` writes pieces one by one.
+/// The stream of a connection, encrypted or not. `tokio_util::either` is not used, since it writes the pieces of a
+/// vectored write one by one.
 pub(super) enum Stream {
     Plain(TcpStream),
     Tls(Box<TlsStream<TcpStream>>),

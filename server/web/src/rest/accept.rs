@@ -1,4 +1,4 @@
-//! Content negotiation: `Accept`, and the parameter `format`.
+//! Content negotiation: the format of an answer, chosen by the header `Accept` or the parameter `format`.
 
 use axum::http::{HeaderMap, header};
 use serde_json::json;
@@ -11,11 +11,12 @@ use service::{
 
 use super::input::{Input, RawInput};
 
-/// The choice of one of these formats, by the parameter `format`, else by `Accept`, else the first.
+/// An input that chooses one of these formats: by the parameter `format`, otherwise by `Accept`, otherwise the first
+/// format.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FormatOf(pub(super) &'static [Format]);
 
-/// The name of the parameter.
+/// The name of the parameter that chooses a format.
 const FORMAT: &str = "format";
 
 impl Input for FormatOf {
@@ -37,7 +38,7 @@ impl Input for FormatOf {
     }
 }
 
-/// The format of the answer: the parameter overrides the header, the first format is the default.
+/// Chooses the format of an answer: the parameter takes precedence over `Accept`, and the first format is the default.
 fn choose(
     formats: &[Format],
     parameter: Option<&str>,
@@ -77,8 +78,8 @@ pub(super) fn accepted(headers: &HeaderMap) -> Vec<&str> {
         .collect()
 }
 
-/// How much a media type is preferred: the weight of the most specific range that covers it; how specific that range
-/// is; and its place in the list, the first one highest.
+/// How much a media type is preferred by these media ranges: the weight of the most specific range that covers it; how
+/// specific that range is; and the range's place in the list, as a negative number.
 pub(super) fn weight(accepted: &[&str], media: &str) -> (f32, u8, isize) {
     let group = media.split('/').next().unwrap_or_default();
     let mut found = (0.0, 0, 0);

@@ -1,5 +1,5 @@
-//! The one place where the caller of a request is identified and the access rules of the operations are applied: for
-//! both protocols, streams, documents and probes.
+//! The one place where the caller of a request is identified and the access rules of the operations are applied, for
+//! both protocols, also for streams, documents and probes.
 
 use std::{collections::BTreeMap, sync::Arc, sync::LazyLock};
 
@@ -77,7 +77,7 @@ fn identified(
     }
 }
 
-/// The refusal of a caller without the required scope.
+/// The error for a caller who lacks the scope that `access` requires; `None` if the caller has it.
 fn lacks(access: Access, caller: &Caller, by: &By) -> Option<ApiError> {
     let Access::Needs(scope) = access else {
         return None;
@@ -98,7 +98,7 @@ fn lacks(access: Access, caller: &Caller, by: &By) -> Option<ApiError> {
 }
 
 /// The access rule of a request. Requests that match no operation are answered by 404, 405 or UNIMPLEMENTED, which
-/// reveals only what `/openapi.json` of any installation does.
+/// reveals no more than `/openapi.json` of any installation.
 fn access(request: &Request) -> Access {
     static OPERATIONS: LazyLock<BTreeMap<(&str, &str), Access>> = LazyLock::new(|| {
         let all = operations::all().into_iter();
@@ -145,7 +145,8 @@ fn access(request: &Request) -> Access {
     }
 }
 
-/// The credentials of a request: a bearer token, or a token as the password that a browser asks for.
+/// The credentials of a request: a bearer token, or a token as the password that a browser asks for, and the users
+/// named in `user_header`.
 fn credentials(headers: &HeaderMap, user_header: &header::HeaderName) -> Credentials {
     let mut sent = headers.get_all(header::AUTHORIZATION).iter();
     let token = sent.next().map(|value| {

@@ -1,9 +1,9 @@
-//! Bodies of requests in JSON: each is a type, whose schema every body is checked against, with all violations at once,
-//! before serde reads it (`files::body`). How large what was read may be is checked by the operation, which checks
-//! the same for requests over gRPC.
+//! Bodies of requests in JSON. Each kind of body is a type. Every body is checked against the schema of its type, with
+//! all violations at once, before serde reads it (`files::body`). Limits such as the length of a name are checked by
+//! the operation, which also checks them for requests over gRPC.
 //!
-//! A body is kept whole until it is read (16 MiB by default), since the problem may stand before what is said about it, and
-//! violations quote their places. Larger meshes are uploaded.
+//! A body is kept in memory as a whole until it is read (16 MiB by default), since the problem may stand before the
+//! fields that concern it, and violations quote their places. Larger meshes are uploaded.
 
 use std::collections::BTreeMap;
 
@@ -32,11 +32,11 @@ use service::{
 use solver::{error::Violation, problem::Problem};
 use store::Edit;
 
-/// A body that submits a job.
+/// The body of a request that submits a job.
 #[derive(Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub(super) struct Submission {
-    /// What to solve.
+    /// The problem to solve.
     #[serde(rename = "problem")]
     _problem: Embedded,
     /// A name for people, at most 256 characters.
@@ -59,7 +59,7 @@ pub(super) struct Submission {
     cache: Option<Cache>,
 }
 
-/// A body that submits many jobs.
+/// The body of a request that submits many jobs.
 #[derive(Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub(super) struct Submissions {
@@ -68,21 +68,22 @@ pub(super) struct Submissions {
     jobs: Vec<Submission>,
 }
 
-/// A body that submits a sweep.
+/// The body of a request that submits a sweep.
 #[derive(Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub(super) struct SweepSubmission {
-    /// The problem that members differ from. It must be valid itself.
+    /// The problem from which the members differ. It must be valid itself.
     #[serde(rename = "base")]
     _base: Embedded,
-    /// What members differ in, with the modes grid and zip.
+    /// The values in which the members differ, with the modes grid and zip.
     #[serde(default)]
     #[schemars(length(min = 1, max = MOST_PATHS))]
     axes: Option<Vec<Axis>>,
     /// How the values of several axes are combined; absent: grid.
     #[serde(default)]
     mode: Option<sweep::Mode>,
-    /// With the mode list: the values of each member by JSON Pointer; what a point leaves out is as in the base.
+    /// With the mode list: the values of each member by JSON Pointer; values that a point leaves out are those of the
+    /// base.
     #[serde(default)]
     #[schemars(with = "Option<Points>", length(min = 1, max = MOST_MEMBERS))]
     points: Option<Vec<Box<RawValue>>>,
@@ -94,17 +95,17 @@ pub(super) struct SweepSubmission {
     #[serde(default)]
     #[schemars(extend("maxProperties" = MAX_LABELS))]
     labels: Option<Labels>,
-    /// Its jobs run before those of lower priority; absent: 0.
+    /// The jobs of the sweep run before jobs of lower priority; absent: 0.
     #[serde(default)]
     #[schemars(range(min = MIN_PRIORITY, max = MAX_PRIORITY))]
     priority: Option<i32>,
-    /// Time limits of each of its jobs; absent: 600 s to solve the first member and 6 s for each further one of the job,
-    /// at most a week.
+    /// Time limits of each job of the sweep; absent: 600 s to solve the first member of the job and 6 s for each
+    /// further one, at most a week.
     #[serde(default)]
     limits: Option<Limits>,
 }
 
-/// A body that changes a job: absent fields stay unchanged.
+/// The body of a request that changes a job: absent fields stay unchanged.
 #[derive(Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub(super) struct Edits {
@@ -112,7 +113,7 @@ pub(super) struct Edits {
     #[serde(default, deserialize_with = "given")]
     #[schemars(length(max = MAX_NAME))]
     name: Option<Option<String>>,
-    /// The new labels, all of them, at most 64: they replace the old ones; null removes them.
+    /// All labels of the job, at most 64: they replace the old labels; null removes all labels.
     #[serde(default, deserialize_with = "given")]
     #[schemars(extend("maxProperties" = MAX_LABELS))]
     labels: Option<Option<Labels>>,
@@ -120,12 +121,12 @@ pub(super) struct Edits {
     #[serde(default)]
     #[schemars(range(min = MIN_PRIORITY, max = MAX_PRIORITY))]
     priority: Option<i32>,
-    /// Never deleted because of its age; it can still be deleted on request.
+    /// Whether the job is kept whatever its age; it can still be deleted on request.
     #[serde(default)]
     pinned: Option<bool>,
 }
 
-/// A body that changes a job, as a merge patch (RFC 7396): absent fields and labels stay unchanged.
+/// The body of a request that changes a job, as a merge patch (RFC 7396): absent fields and labels stay unchanged.
 #[derive(Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub(super) struct MergePatch {
@@ -133,7 +134,7 @@ pub(super) struct MergePatch {
     #[serde(default, deserialize_with = "given")]
     #[schemars(length(max = MAX_NAME))]
     name: Option<Option<String>>,
-    /// Labels that are set, or removed by null; null for all of them removes all.
+    /// Labels to be set, or removed if their value is null; null in place of all labels removes all.
     #[serde(default, deserialize_with = "given")]
     #[schemars(extend("maxProperties" = 2 * MAX_LABELS))]
     labels: Option<Option<BTreeMap<Label, Option<Label>>>>,
@@ -141,16 +142,16 @@ pub(super) struct MergePatch {
     #[serde(default, deserialize_with = "given")]
     #[schemars(range(min = MIN_PRIORITY, max = MAX_PRIORITY))]
     priority: Option<Option<i32>>,
-    /// Never deleted because of its age; null is false.
+    /// Whether the job is kept whatever its age; null is false.
     #[serde(default, deserialize_with = "given")]
     pinned: Option<Option<bool>>,
 }
 
-/// A body that changes the new job of a retry: absent fields stay unchanged.
+/// The body of a request for a retry, with changes for the new job: absent fields stay unchanged.
 #[derive(Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub(super) struct Retry {
-    /// Time limits; absent ones stay unchanged.
+    /// Time limits; absent limits stay unchanged.
     #[serde(default)]
     limits: Option<NewLimits>,
     /// Jobs of higher priority run first.
@@ -164,36 +165,36 @@ pub(super) struct Retry {
 #[serde(default)]
 #[schemars(deny_unknown_fields)]
 pub(super) struct NewLimits {
-    /// Seconds from a start to the end.
+    /// The largest number of seconds from the start of an attempt to its end.
     timeout_s: Option<f64>,
-    /// Seconds that the job may wait in the queue.
+    /// The largest number of seconds that the job may wait in the queue.
     queue_ttl_s: Option<f64>,
 }
 
-/// Key or value of a label.
+/// The key or the value of a label.
 #[derive(Deserialize, JsonSchema, PartialEq, Eq, PartialOrd, Ord)]
 #[schemars(inline)]
 struct Label(#[schemars(length(max = MAX_LABEL))] String);
 
 type Labels = BTreeMap<Label, Label>;
 
-/// A body that makes a token.
+/// The body of a request that creates a token.
 #[derive(Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub(super) struct TokenFields {
-    /// For people: where it is used.
+    /// A name for people, such as where the token is used.
     #[schemars(length(min = 1, max = tokens::MAX_NAME))]
     name: String,
-    /// The owner of the jobs that it submits: letters, digits and . _ @ + -
+    /// The owner of the jobs that are submitted with the token: letters, digits and . _ @ + -
     #[schemars(length(min = 1, max = MAX_OWNER), regex(pattern = r"^[A-Za-z0-9._@+-]+$"))]
     owner: String,
-    /// What it allows; the first token of a service must have admin.
+    /// The scopes of the token; the first token of a service must have admin.
     #[schemars(
         length(min = 1),
         inner(regex(pattern = r"^(read|submit|cancel|admin)$"))
     )]
     scopes: Vec<String>,
-    /// Seconds until it expires; absent: it does not expire.
+    /// Seconds until the token expires; absent: it does not expire.
     #[serde(default)]
     #[schemars(range(min = tokens::MIN_EXPIRES_IN_S, max = tokens::MAX_EXPIRES_IN_S))]
     expires_in_s: Option<f64>,
@@ -208,7 +209,7 @@ pub(super) struct BareProblem {
     _problem: Embedded,
 }
 
-/// Reads a value that null stands for, too: without it the value is absent.
+/// Reads the value of a present field, which may be null: an outer `None` then means only that the field is absent.
 fn given<'de, T: Deserialize<'de>, D: Deserializer<'de>>(reader: D) -> Result<Option<T>, D::Error> {
     T::deserialize(reader).map(Some)
 }
@@ -238,7 +239,7 @@ fn texts(labels: Labels) -> BTreeMap<String, String> {
     texts.collect()
 }
 
-/// A body of this type that has no problem in it.
+/// Reads a body of type `T`, which has no problem in it.
 fn whole<T: DeserializeOwned + JsonSchema>(
     body: &'static Body<T>,
     text: &str,
@@ -250,14 +251,14 @@ fn whole<T: DeserializeOwned + JsonSchema>(
     }
 }
 
-/// The one problem of a body, or all that is wrong with the body.
+/// Reads the one problem of a body; the error has all violations of the body.
 fn problem<T>(mut content: Content<'_, T>) -> Result<Problem, Vec<Violation>> {
     let read = content.parse_problems().pop();
     read.filter(|_| content.violations.is_empty())
         .ok_or_else(|| content.into_violations())
 }
 
-/// A body with a problem and what comes beside it.
+/// Reads a body that submits a job: its problem and its other fields.
 pub(super) fn submission(text: &str) -> Result<JobRequest, ApiError> {
     static BODY: Body<Submission> = Body::new();
     let mut content = BODY.read(text).map_err(ApiError::MalformedJson)?;
@@ -268,7 +269,7 @@ pub(super) fn submission(text: &str) -> Result<JobRequest, ApiError> {
     })
 }
 
-/// A body with many submissions.
+/// Reads a body that submits many jobs.
 pub(super) fn batch(text: &str) -> Result<Vec<JobRequest>, ApiError> {
     static BODY: Body<Submissions> = Body::new();
     let mut content = BODY.read(text).map_err(ApiError::MalformedJson)?;
@@ -286,7 +287,7 @@ pub(super) fn batch(text: &str) -> Result<Vec<JobRequest>, ApiError> {
     }
 }
 
-/// A body with a sweep and what comes beside it.
+/// Reads a body that submits a sweep: its definition and its other fields.
 pub(super) fn sweep(text: &str) -> Result<SweepRequest, ApiError> {
     static BODY: Body<SweepSubmission> = Body::new();
     let mut content = BODY.read(text).map_err(ApiError::MalformedJson)?;
@@ -323,7 +324,7 @@ pub(super) fn sweep(text: &str) -> Result<SweepRequest, ApiError> {
     })
 }
 
-/// A body with changes of a job: absent fields stay unchanged; null removes a name or labels.
+/// Reads a body that changes a job: absent fields stay unchanged; null removes a name or labels.
 pub(super) fn edit(text: &str) -> Result<Edit, ApiError> {
     static BODY: Body<Edits> = Body::new();
     let Edits {
@@ -340,7 +341,8 @@ pub(super) fn edit(text: &str) -> Result<Edit, ApiError> {
     })
 }
 
-/// The same as a merge patch (RFC 7396): labels that are absent stay, and null removes what it stands for, or resets it.
+/// Reads a merge patch (RFC 7396) that changes a job: absent fields and labels stay unchanged; null removes a name or
+/// labels, and resets a priority or pinning.
 pub(super) fn merge_patch(text: &str) -> Result<(Edit, LabelChanges), ApiError> {
     static BODY: Body<MergePatch> = Body::new();
     let MergePatch {
@@ -360,7 +362,7 @@ pub(super) fn merge_patch(text: &str) -> Result<(Edit, LabelChanges), ApiError> 
     Ok((edit, changes.collect()))
 }
 
-/// A body with changes for a retry: absent fields stay unchanged.
+/// Reads a body with changes for a retry: absent fields stay unchanged.
 pub(super) fn retry(text: &str) -> Result<Changes, ApiError> {
     static BODY: Body<Retry> = Body::new();
     let Retry { limits, priority } = whole(&BODY, text)?;
@@ -375,7 +377,7 @@ pub(super) fn retry(text: &str) -> Result<Changes, ApiError> {
     })
 }
 
-/// A body with a new token.
+/// Reads a body that creates a token.
 pub(super) fn token(text: &str) -> Result<TokenRequest, ApiError> {
     static BODY: Body<TokenFields> = Body::new();
     let TokenFields {

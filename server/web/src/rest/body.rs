@@ -1,4 +1,4 @@
-//! Bodies of requests as bytes and as text.
+//! Reads bodies of requests as bytes and as text.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ use service::{error::ApiError, transfer::Received};
 
 use super::coding;
 
-/// The declared content type of the body.
+/// The content type of a request's body, as its headers declare it.
 pub(super) fn content_type(headers: &HeaderMap) -> &str {
     let value = headers.get(header::CONTENT_TYPE);
     value
@@ -19,18 +19,18 @@ pub(super) fn content_type(headers: &HeaderMap) -> &str {
         .unwrap_or("nothing")
 }
 
-/// The content type without parameters.
+/// The content type without its parameters, in lower case.
 fn essence(content_type: &str) -> String {
     let essence = content_type.split(';').next().unwrap_or_default();
     essence.trim().to_ascii_lowercase()
 }
 
-/// Whether the body is declared as a merge patch (RFC 7396).
+/// Whether the headers declare the body as a merge patch (RFC 7396).
 pub(super) fn is_merge_patch(headers: &HeaderMap) -> bool {
     essence(content_type(headers)) == "application/merge-patch+json"
 }
 
-/// The headers, if they declare the body as JSON.
+/// Checks that the headers declare the body as JSON, and returns them.
 pub(super) fn is_json(headers: &HeaderMap) -> Result<&HeaderMap, ApiError> {
     let content_type = content_type(headers);
     let essence = essence(content_type);
@@ -47,7 +47,7 @@ pub(super) fn is_json(headers: &HeaderMap) -> Result<&HeaderMap, ApiError> {
     Ok(headers)
 }
 
-/// The body as text; an error if it is too large, alone or together with those of other requests.
+/// Reads a body as text; an error if it is too large, alone or together with the bodies of other requests.
 pub(super) async fn json_text(
     headers: &HeaderMap,
     body: Body,

@@ -22,7 +22,7 @@ use super::{
 #[derive(Clone, Debug)]
 pub(super) struct AppState {
     pub(super) service: Arc<Service>,
-    /// The description of the API, made from all operations and served by one of them.
+    /// Returns the OpenAPI document, which is made from all operations and served by one of them.
     pub(super) openapi: fn() -> &'static Value,
 }
 
@@ -32,13 +32,13 @@ pub(super) struct Call {
     pub(super) caller: Caller,
     pub(super) headers: HeaderMap,
     pub(super) body: Body,
-    /// The part of the body that is in memory.
+    /// Counts the part of the body that is in memory.
     pub(super) received: Received,
     pub(super) openapi: fn() -> &'static Value,
 }
 
 impl Call {
-    /// The body as text, if it is declared as JSON and is not too large.
+    /// Reads the body as text; an error if it is not declared as JSON or is too large.
     pub(super) async fn json(&mut self) -> Result<String, ApiError> {
         let body = std::mem::take(&mut self.body);
         body::json_text(
@@ -50,7 +50,7 @@ impl Call {
         .await
     }
 
-    /// The body as text, if it is declared as a merge patch and is not too large.
+    /// Reads the body as text; an error if it is not declared as a merge patch or is too large.
     pub(super) async fn merge_patch(&mut self) -> Result<String, ApiError> {
         let body = std::mem::take(&mut self.body);
         let limit_bytes = self.service.config.max_body_bytes;
@@ -63,8 +63,8 @@ impl Call {
     }
 }
 
-/// The handler of an operation: an async function of the call and of the operation's input, in the order of its
-/// entry in the list.
+/// The handler of an operation: an async function of the call and of the operation's input values, in the order in
+/// which the operation lists them.
 pub(super) trait Handler<Values>: Clone + Send + Sync + 'static {
     /// Runs the operation.
     fn handle(
@@ -91,7 +91,8 @@ macro_rules! functions {
 }
 functions!(() (A) (A B) (A B C) (A B C D) (A B C D E) (A B C D E G) (A B C D E G H));
 
-/// The route of an operation. A `strict` one refuses unknown parameters.
+/// Makes the route of an operation: it reads and checks the input, and calls the handler. A `strict` route refuses
+/// unknown parameters.
 pub(super) fn route<T, H>(
     method: MethodFilter,
     input: T,

@@ -1,5 +1,5 @@
-//! Content codings of bodies, gzip and zstd (RFC 9110, 8.4): chosen for an answer, and decoded for a request within
-//! limits.
+//! Content codings of bodies, gzip and zstd (RFC 9110, 8.4): a coding is chosen for an answer, and undone for a request
+//! within limits.
 
 use std::{
     io,
@@ -34,21 +34,21 @@ pub(super) enum Coding {
     Zstd,
 }
 
-/// The supported codings, as told to a refused request.
+/// The names of the supported codings, for the refusal of a request with another one.
 pub(super) const UNDERSTOOD: &str = "gzip, zstd";
 
-/// The number of bytes that are passed on at once: few, so that one answer of very regular text does not occupy a
-/// thread.
+/// The number of bytes that are encoded or decoded at once: few, so that one answer of very regular text does not
+/// occupy a thread.
 const PIECE_BYTES: usize = 8 << 10;
 /// The largest window that a frame of zstd may request, as a power of two: the limit of RFC 9659 for HTTP.
 const MOST_WINDOW_LOG: u32 = 23;
-/// The largest ratio of decompression. Text of a mesh becomes 3 to 20 times smaller; a body with a higher ratio, apart
-/// from its first bytes, is no mesh, and costs its sender nothing.
+/// The largest ratio of the decoded size to the encoded size. Encoding makes the text of a mesh 3 to 20 times smaller;
+/// a body with a higher ratio, apart from its first bytes, is no mesh, and costs its sender nothing.
 const MOST_RATIO: usize = 32;
-/// The number of first bytes without a limit on the ratio, for a body that is collected in memory: jobs that differ in
-/// few numbers become much smaller.
+/// The number of first decoded bytes without a limit on the ratio, for a body that is collected in memory: the text of
+/// jobs that differ in few numbers becomes much smaller.
 pub(super) const FREE_COLLECTED: usize = 16 << 20;
-/// The number of first bytes without a limit on the ratio, for an upload, which goes to the disk.
+/// The number of first decoded bytes without a limit on the ratio, for an upload, which goes to the disk.
 pub(super) const FREE_UPLOADED: usize = 256 << 10;
 
 /// A decoded body in pieces.
@@ -64,7 +64,7 @@ impl Coding {
         }
     }
 
-    /// The name in headers.
+    /// The name of the coding in headers.
     pub(super) fn name(self) -> &'static str {
         match self {
             Coding::Gzip => "gzip",
@@ -72,7 +72,7 @@ impl Coding {
         }
     }
 
-    /// The memory of an encoder, as measured for an answer of several MB.
+    /// The memory of an encoder (bytes), as measured for an answer of several MB.
     pub(super) fn encoder_bytes(self) -> usize {
         match self {
             Coding::Gzip => 280 << 10,
@@ -80,7 +80,7 @@ impl Coding {
         }
     }
 
-    /// The memory of a decoder without its window, as measured.
+    /// The memory of a decoder without its window (bytes), as measured.
     fn decoder_bytes(self) -> usize {
         match self {
             Coding::Gzip => 48 << 10,
@@ -88,7 +88,7 @@ impl Coding {
         }
     }
 
-    /// The largest window of a decoder, whose memory is taken as it fills.
+    /// The largest window of a decoder (bytes), which takes memory as it fills.
     fn window_bytes(self) -> usize {
         match self {
             Coding::Gzip => 0, // a part of the decoder
@@ -96,7 +96,8 @@ impl Coding {
         }
     }
 
-    /// The coding that the client prefers, zstd before gzip; `*` is gzip, and the weight 0 refuses (RFC 9110, 12.5.3).
+    /// The coding that the client prefers, zstd if both are equal; `*` is gzip, and the weight 0 refuses a coding (RFC
+    /// 9110, 12.5.3). `None`: no coding.
     pub(super) fn accepted(headers: &HeaderMap) -> Option<Coding> {
         let (mut gzip, mut zstd, mut any) = (None, None, 0.0);
         let values = headers.get_all(header::ACCEPT_ENCODING).iter();
@@ -121,7 +122,8 @@ impl Coding {
         }
     }
 
-    /// The body in this coding, encoded as it is sent. The share is that of the encoder, and is returned with it.
+    /// Encodes a body in this coding as it is sent. `share` is the memory of the encoder, and is given back with the
+    /// encoder.
     pub(super) fn encoded(self, body: Body, share: Share) -> Body {
         let reader = StreamReader::new(body.into_data_stream().map_err(io::Error::other));
         match self {
@@ -139,9 +141,9 @@ fn from_reader(reader: impl AsyncRead + Send + 'static, share: Share) -> Body {
     }))
 }
 
-/// The decoded body of a request. The caller limits its bytes; in addition, those beyond the first `free` ones may not
-/// be many times more than those that arrived. The decoder's memory counts for the limit of `received` while it exists.
-/// An error if the coding is not supported, or if there are several.
+/// Decodes the body of a request. The caller limits the decoded bytes; in addition, after the first `free` decoded
+/// bytes there may be at most `MOST_RATIO` more for each byte that has arrived. The decoder's memory counts for the
+/// limit of `received` while it exists. An error if the coding is not supported, or if there are several.
 pub(super) fn decoded<'a>(
     headers: &HeaderMap,
     body: &'a mut BodyDataStream,
@@ -184,7 +186,7 @@ pub(super) fn decoded<'a>(
         let piece = piece.map_err(|error| match error.downcast::<axum::Error>() {
             Ok(error) => incomplete(error),
             Err(error) => ApiError::MalformedJson(format!(
-                "the body is not as its Content-Encoding {} says: {error}",
+                "the body cannot be decoded by its Content-Encoding {}: {error}",
                 coding.name()
             )),
         })?;
@@ -200,7 +202,7 @@ pub(super) fn decoded<'a>(
     Ok(Box::pin(pieces))
 }
 
-/// Why a body could not be read to its end.
+/// The error for a body that could not be read to its end.
 fn incomplete(error: axum::Error) -> ApiError {
     transfer::cause(error)
         .unwrap_or_else(|error| ApiError::MalformedJson(format!("the body is incomplete: {error}")))

@@ -1,6 +1,6 @@
 //! Compresses answers with gzip or zstd, if the client accepts it and the answer is large text. Streams of events are
-//! not compressed, nor is compressed data; a range refers to the uncompressed bytes. Written by hand instead of using
-//! tower-http's layer, which answers 406 after the handler has run, and leaves entity tags strong.
+//! not compressed, nor are data that are compressed already; a range refers to the uncompressed bytes. tower-http's
+//! layer is not used, since it answers 406 after the handler has run, and leaves entity tags strong.
 
 use axum::{
     body::HttpBody,
@@ -13,11 +13,12 @@ use service::transfer::{Limit, Share};
 
 use super::coding::Coding;
 
-/// The smallest answer that is compressed; smaller ones, such as jobs, fit into a few packets anyway.
+/// The smallest size of an answer that is compressed (bytes); smaller answers, such as jobs, fit into a few packets
+/// anyway.
 const SMALLEST: u64 = 16 << 10;
 
-/// Compresses the answer if that is worth it and there is memory for an encoder: it stays in memory as long as the
-/// answer, also if the client reads nothing.
+/// Compresses an answer if that is worth it and there is memory for an encoder: the encoder stays in memory as long as
+/// the answer, even if the client reads nothing.
 pub(super) async fn compressed(
     State(sent): State<Limit>,
     request: Request,

@@ -1,4 +1,4 @@
-//! Data as files: entity tags, digests, ranges.
+//! Answers with data as files: entity tags, digests, ranges.
 
 use std::ops::Range;
 
@@ -19,14 +19,14 @@ use super::{
     input::{Input, RawInput},
 };
 
-/// The part of a file that is requested.
+/// The input that says which part of a file is requested.
 pub(super) const PART: PartHeaders = PartHeaders;
 
 /// The headers that request a part of a file, or a file only if the client does not have it yet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PartHeaders;
 
-/// The requested part of a file, and the version that the client has, as sent.
+/// The requested part of a file, and the version of the file that the client has, as the headers say it.
 #[derive(Debug, Default)]
 pub(super) struct Part {
     known: Option<Tags>,
@@ -70,17 +70,17 @@ impl Input for PartHeaders {
     }
 }
 
-/// The description of a file, known before its bytes are read.
+/// The properties of a file that are known before its bytes are read.
 pub(super) struct File {
     pub(super) format: Format,
-    /// The name without the extension.
+    /// The name of the file without its extension.
     pub(super) name: String,
     pub(super) bytes: u64,
     /// The SHA-256 of the file.
     pub(super) digest: Vec<u8>,
 }
 
-/// Answers with bytes in memory.
+/// Answers with a file whose bytes are in memory, or with the requested part of it.
 pub(super) fn whole(
     part: &Part,
     format: Format,
@@ -160,7 +160,7 @@ pub(super) fn answer(
     ))
 }
 
-/// The answer with the header that says whether its result is partial or final.
+/// Adds to an answer the header that says whether its result is partial or final.
 pub(super) fn marked(response: impl IntoResponse, available: ResultAvailable) -> Response {
     let words: &str = available.into();
     let header = [(RESULT_AVAILABLE, words)];
@@ -185,8 +185,8 @@ enum Selection {
     Nothing,
 }
 
-/// The range that a request selects, unless it belongs to another version of the file. Several ranges, and invalid
-/// ones, select the whole file, as RFC 9110 specifies.
+/// The part of a file of `length` bytes that a request selects; the whole file if the range was requested of another
+/// version than `tag`. Several ranges, and invalid ones, select the whole file, as RFC 9110 specifies.
 fn select(part: &Part, tag: &str, length: u64) -> Selection {
     if part.if_range.as_ref().is_some_and(|of| of != tag) {
         return Selection::All;

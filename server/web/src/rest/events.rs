@@ -25,7 +25,7 @@ use super::{
     call::Call,
 };
 
-/// Interval of the comments that keep the connection open through proxies and clients.
+/// The interval of the comments that keep a connection open through proxies and clients.
 const PING: Duration = Duration::from_secs(15);
 /// The media type of server-sent events.
 const SSE: &str = "text/event-stream";
@@ -50,7 +50,7 @@ pub(super) async fn events(
     answer(&call.headers, events)
 }
 
-/// A stream of events in the format that the client asks for, or the answer that there are none.
+/// Answers with a stream of events in the format that the client asks for; `None` is answered with *no content*.
 pub(super) fn answer<E: Numbered>(
     headers: &HeaderMap,
     events: Option<impl Stream<Item = Result<E, ApiError>> + Send + 'static>,
@@ -61,7 +61,8 @@ pub(super) fn answer<E: Numbered>(
     Ok(write(events, chosen(headers)?))
 }
 
-/// The format that the client prefers; of equal ones, and without `Accept`, server-sent events.
+/// The format of events that the client prefers; server-sent events if it prefers both formats equally, or sends no
+/// `Accept`.
 fn chosen(headers: &HeaderMap) -> Result<Encoding, ApiError> {
     let accepted = accepted(headers);
     let most = |media: &[&str]| {
@@ -117,7 +118,7 @@ pub(super) enum Encoding {
     Lines,
 }
 
-/// The format in which the client prefers the events of a job to a JSON answer, if it does.
+/// The format of events that the client prefers to an answer in JSON; `None` if it prefers JSON.
 pub(super) fn preferred(headers: &HeaderMap) -> Option<Encoding> {
     if prefers(headers, &[SSE]) {
         return Some(Encoding::Stream);
@@ -125,10 +126,11 @@ pub(super) fn preferred(headers: &HeaderMap) -> Option<Encoding> {
     prefers(headers, &LINES).then_some(Encoding::Lines)
 }
 
-/// A header for nginx, which as a proxy would otherwise hold back events until it has four kilobytes of them.
+/// A header for nginx, which as a proxy would otherwise hold back events until they have four kilobytes.
 const UNBUFFERED: [(&str, &str); 1] = [("x-accel-buffering", "no")];
 
-/// A stream of events. An error ends the stream without `done`, so that the client knows that it is incomplete.
+/// Answers with a stream of events. An error ends the stream without `done`, so that the client knows that it is
+/// incomplete.
 pub(super) fn write<E: Numbered>(
     events: impl Stream<Item = Result<E, ApiError>> + Send + 'static,
     encoding: Encoding,

@@ -9,10 +9,10 @@ use store::Filter;
 
 use super::input::{Input, RawInput};
 
-/// All filters; without any, every job matches.
+/// The input of all filters; a request without filters selects every job.
 pub(super) const FILTERS: Filters = Filters;
 
-/// The input of all filters.
+/// An input that reads all filters.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Filters;
 

@@ -13,7 +13,8 @@ use axum::{
 use base::caller::Peer;
 use service::{config::ProxyTrust, error::ApiError};
 
-/// The request without this path in front; unchanged if its path does not begin with it.
+/// Removes `prefix` from the beginning of the request's path; the request is unchanged if its path does not begin with
+/// it.
 pub(super) fn without_prefix(mut request: Request, prefix: &str) -> Request {
     let rest = request.uri().path_and_query().and_then(|whole| {
         let rest = whole.as_str().strip_prefix(prefix)?;
@@ -33,7 +34,8 @@ pub(super) fn without_prefix(mut request: Request, prefix: &str) -> Request {
     request
 }
 
-/// The host that the client has used, according to a trusted proxy; `None` if it names none.
+/// The host that the client has used, according to a trusted proxy; `None` if the proxy names none, or there is no
+/// proxy.
 pub(super) fn host(request: &Request, trust: &ProxyTrust) -> Result<Option<Authority>, ApiError> {
     const OLDER: HeaderName = HeaderName::from_static("x-forwarded-host");
     if !is_from_proxy(request, trust) {
@@ -60,7 +62,7 @@ pub(super) fn host(request: &Request, trust: &ProxyTrust) -> Result<Option<Autho
 }
 
 /// Reads a host with an optional port, and nothing else (RFC 9110, 7.2): `Authority` also accepts users, and text after
-/// an address in brackets, which is not part of its `host`.
+/// an address in brackets, which is not part of `Authority::host`.
 pub(super) fn authority(text: &[u8]) -> Option<Authority> {
     let named = Authority::try_from(text).ok()?;
     let rest = named.as_str().strip_prefix(named.host())?;
@@ -69,7 +71,8 @@ pub(super) fn authority(text: &[u8]) -> Option<Authority> {
     (whole && !named.host().is_empty()).then_some(named)
 }
 
-/// Whether the client has used https, according to a trusted proxy; `None` if it does not say.
+/// Whether the client has used https, according to a trusted proxy; `None` if the proxy does not say, or there is no
+/// proxy.
 pub(super) fn https(request: &Request, trust: &ProxyTrust) -> Option<bool> {
     const OLDER: HeaderName = HeaderName::from_static("x-forwarded-proto");
     if !is_from_proxy(request, trust) {
@@ -86,14 +89,14 @@ fn is_from_proxy(request: &Request, trust: &ProxyTrust) -> bool {
     peer.is_some_and(|Peer(address)| trust.includes(*address))
 }
 
-/// The last item of a list in a header.
+/// The last item of the list in this header.
 fn last(headers: &HeaderMap, name: &HeaderName) -> Option<String> {
     let value = headers.get_all(name).iter().next_back()?;
     let text = value.to_str().ok()?;
     split(text, ',').last().map(str::to_owned)
 }
 
-/// A parameter of a `Forwarded` header, without its quotes.
+/// The value of a parameter in an element of a `Forwarded` header, without its quotes.
 fn parameter(element: &str, wanted: &str) -> Option<String> {
     split(element, ';').find_map(|pair| {
         let (name, value) = pair.split_once('=')?;
@@ -105,7 +108,8 @@ fn parameter(element: &str, wanted: &str) -> Option<String> {
     })
 }
 
-/// The parts of a text between separators outside quotes. A host has no character that needs a backslash.
+/// The parts of a text between separators outside quotes. Backslashes in quotes are not interpreted, since no host
+/// needs one.
 fn split(text: &str, separator: char) -> impl Iterator<Item = &str> {
     let mut quoted = false;
     text.split(move |c| {

@@ -12,7 +12,7 @@ use service::{
 
 use super::input::{Input, RawInput};
 
-/// A parameter in a header.
+/// An input that reads a parameter from a header.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Header<V>(pub(super) Parameter<V>);
 
@@ -43,7 +43,7 @@ impl<V: Values> Input for Header<V> {
     }
 }
 
-/// The description of a header, of a request or of an answer.
+/// Describes a header of a request or of an answer.
 pub(super) fn header(name: &'static str, schema: Value, meaning: &'static str) -> Description {
     Description {
         location: Location::Header,
@@ -54,23 +54,24 @@ pub(super) fn header(name: &'static str, schema: Value, meaning: &'static str) -
     }
 }
 
-/// Any text.
+/// The schema of any text.
 pub(super) fn text() -> Value {
     json!({ "type": "string" })
 }
 
-/// A text for which a pattern is recommended: preferences and ranges in another form are ignored, not refused.
+/// The schema of a text for which a pattern is recommended: preferences and ranges in another form are ignored, not
+/// refused.
 pub(super) fn recommended_pattern(pattern: &str) -> Value {
     json!({ "type": "string", "anyOf": [{ "pattern": pattern }, {}] })
 }
 
-/// The condition that the job has changed.
+/// The header of a request for a job only if the job has changed.
 pub(super) const IF_NONE_MATCH: Condition = Condition {
     name: "If-None-Match",
     meaning: "ETag that the client has; 304 if it is still current",
 };
 
-/// The condition that the job has not changed.
+/// The header of a change that is made only if the job has not changed before.
 pub(super) const IF_MATCH: Condition = Condition {
     name: "If-Match",
     meaning: "ETag of the job; the change is made only if it is still current",
@@ -82,7 +83,7 @@ pub(super) fn version_tag(version: i64) -> String {
     format!("W/\"{version}\"")
 }
 
-/// A header of entity tags.
+/// An input that reads a header of entity tags, which is a condition of the request.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Condition {
     name: &'static str,
@@ -106,7 +107,7 @@ impl Input for Condition {
 pub(super) struct Tags(Vec<String>);
 
 impl Tags {
-    /// The tags of this header; `None` if it is absent.
+    /// Reads the tags of the header `name`; `None` if the header is absent.
     pub(super) fn of(headers: &HeaderMap, name: &str) -> Option<Tags> {
         headers.get(name)?;
         let values = headers.get_all(name).iter();
@@ -117,26 +118,26 @@ impl Tags {
         Some(Tags(tags.collect()))
     }
 
-    /// Whether this tag is among them, compared weakly as for `If-None-Match`.
+    /// Whether `tag` is among these tags, compared weakly as for `If-None-Match`.
     pub(super) fn contain(&self, tag: &str) -> bool {
         let same = |own: &String| own == "*" || opaque(own) == opaque(tag);
         self.0.iter().any(same)
     }
 
-    /// The versions among them; `None`: all versions. `If-Match` compares strongly, so that by the RFC the weak tag of
-    /// a job would match nothing; versions are compared instead, of which each change makes a new one.
+    /// The versions in these tags; `None`: all versions. By the RFC `If-Match` compares strongly, so that the weak tag
+    /// of a job would match nothing; versions are compared instead, since each change of a job makes a new version.
     pub(super) fn versions(&self) -> Option<Vec<i64>> {
         let any = self.0.iter().any(|tag| tag == "*");
         (!any).then(|| self.0.iter().filter_map(|tag| number(tag)).collect())
     }
 
-    /// The first version among them.
+    /// The first version in these tags.
     pub(super) fn version(&self) -> Option<i64> {
         self.0.iter().find_map(|tag| number(tag))
     }
 }
 
-/// The tag in its quotes, weak or not.
+/// The tag in its quotes, without the mark of a weak tag.
 fn opaque(tag: &str) -> &str {
     tag.strip_prefix("W/").unwrap_or(tag)
 }
@@ -149,10 +150,11 @@ fn number(tag: &str) -> Option<i64> {
         .ok()
 }
 
-/// The preference to wait for the end of a submitted job, in whole seconds (RFC 7240).
+/// The input that reads for how long the client prefers to wait for the end of a submitted job, in whole seconds (RFC
+/// 7240).
 pub(super) const PREFER: PreferWait = PreferWait;
 
-/// The `wait` in a `Prefer` header.
+/// An input that reads the `wait` of a `Prefer` header.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PreferWait;
 
@@ -174,7 +176,7 @@ impl Input for PreferWait {
     }
 }
 
-/// The first valid `wait`, in seconds.
+/// The first valid `wait` in the `Prefer` headers, in seconds.
 fn preferred_wait_s(headers: &HeaderMap) -> Option<u64> {
     headers
         .get_all("prefer")

@@ -17,7 +17,7 @@ pub(super) trait Input {
     /// The value that a handler receives.
     type Value;
 
-    /// The description of the input for the API; several if inputs belong together.
+    /// Describes the input for the API: as one parameter, or as several that belong together.
     fn descriptions(&self) -> Vec<Description>;
 
     /// Reads and checks the input.
@@ -99,7 +99,7 @@ impl<'a> RawInput<'a> {
         named.map(|(_, value)| value.as_str())
     }
 
-    /// Keys and values of the query parameters whose names match this one with `{key}`.
+    /// Keys and values of the query parameters whose names match `name`, in which `{key}` stands for any key.
     pub(super) fn keyed(&self, name: &str) -> impl Iterator<Item = (String, String)> {
         let start = name.trim_end_matches(ANY_KEY);
         self.query.iter().filter_map(move |(own, value)| {
@@ -109,7 +109,8 @@ impl<'a> RawInput<'a> {
     }
 }
 
-/// Whether `name` belongs to this parameter; one with `{key}` has a name for each key.
+/// Whether a query's `name` is that of this parameter; the name of a parameter may end in `{key}`, which stands for any
+/// key.
 fn matches(parameter: &str, name: &str) -> bool {
     match parameter.strip_suffix(ANY_KEY) {
         Some(start) => name.starts_with(start),

@@ -24,7 +24,7 @@ use super::{
     request_target::is_probe,
 };
 
-/// The path of uploads, whose bytes are written to a file as they arrive and not kept in memory.
+/// The path of the gRPC method for uploads, whose bytes are written to a file as they arrive and not kept in memory.
 const UPLOAD: &str = "/signorini.v1.JobService/UploadMesh";
 
 pub(super) async fn limits(
@@ -90,7 +90,7 @@ fn only_reads(grpc: bool, method: &Method, path: &str) -> bool {
     }
 }
 
-/// Records a gRPC refusal that was answered before any message.
+/// Records the status with which a gRPC request was refused before any message, for the log of refused requests.
 fn note_status(status: &tonic::Status, path: &str) {
     if status.code() != tonic::Code::Ok {
         let kind = status.get_details_error_info().map(|info| info.reason);

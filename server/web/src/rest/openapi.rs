@@ -18,7 +18,7 @@ use solver::error::Violation;
 
 use super::operations::{self, Answer, Content, Operation};
 
-/// The document; it does not change while the service runs.
+/// Returns the OpenAPI document, which does not change while the service runs.
 pub fn openapi() -> &'static Value {
     static DOCUMENT: LazyLock<Value> = LazyLock::new(document);
     &DOCUMENT
@@ -135,7 +135,7 @@ impl Schemas {
         described
     }
 
-    /// All errors of one status; their codes distinguish them.
+    /// Describes the answer with one status, for all errors that have this status; their codes distinguish them.
     fn failure(&mut self, codes: &[Kind]) -> Value {
         let kinds: Vec<String> = codes
             .iter()
@@ -202,7 +202,7 @@ fn by_status(codes: &[Code]) -> BTreeMap<u16, Vec<Kind>> {
     found
 }
 
-/// The schema of `ApiError::document`; a test compares the two.
+/// The schema of the document that `ApiError::document` makes; a test compares the two.
 fn error_schema(violation: &Value) -> Value {
     json!({
         "title": "Error",

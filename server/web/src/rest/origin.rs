@@ -1,6 +1,6 @@
-//! Checks where a browser's request comes from: it must name a host that this service answers for, and not come from a
+//! Checks where a browser's request comes from: it must name a host for which this service answers, and not come from a
 //! page of another site. Otherwise any page that a user opens could submit, cancel and read jobs with that user's
-//! access: by a form or a script, or after leading its own name to this address (DNS rebinding).
+//! access: by a form or a script, or after leading its own host name to the address of this service (DNS rebinding).
 
 use std::{
     net::{Ipv4Addr, Ipv6Addr},
@@ -26,7 +26,7 @@ use super::{
     reply::{is_grpc, refusal},
 };
 
-/// Refuses requests that name no host or a foreign one, or come from a page of another site.
+/// Refuses requests that name no host or a host of others, or that come from a page of another site.
 pub(super) async fn own_site(
     State(service): State<Arc<Service>>,
     request: Request,
@@ -39,7 +39,8 @@ pub(super) async fn own_site(
     }
 }
 
-/// Refuses such requests. `tls`: whether the service itself uses TLS.
+/// Returns an error if a request names no host or a host of others, or comes from a page of another site. `tls`:
+/// whether the service itself uses TLS.
 fn check(request: &Request, web: &Web, trust: &ProxyTrust, tls: bool) -> Result<(), ApiError> {
     // the one that is believed has talked to the browser: its account replaces the name that it calls us by
     let named = host_of(request)?;
@@ -64,8 +65,8 @@ fn check(request: &Request, web: &Web, trust: &ProxyTrust, tls: bool) -> Result<
     check_origin(request.headers(), (https, &host), web)
 }
 
-/// The host of a request. By RFC 9112, 3.2 a request over HTTP/1.1 has exactly one Host; two could mean different
-/// things to a proxy and to this service.
+/// The host that a request names. By RFC 9112, 3.2 a request over HTTP/1.1 has exactly one Host header; two could mean
+/// different things to a proxy and to this service.
 fn host_of(request: &Request) -> Result<Option<Authority>, ApiError> {
     let hosts: Vec<_> = request.headers().get_all(header::HOST).iter().collect();
     let authority = request.uri().authority();
@@ -94,8 +95,8 @@ fn host_of(request: &Request) -> Result<Option<Authority>, ApiError> {
     }
 }
 
-/// Whether a host is this service's own: numeric addresses cannot be led elsewhere, nor can the names that this machine
-/// has for itself.
+/// Whether a host is this service's own. Numeric addresses and the names that this machine has for itself are its own,
+/// since no other site can make them lead to this service.
 fn is_own_host(host: &Authority, web: &Web) -> bool {
     static MACHINE: LazyLock<String> = LazyLock::new(|| {
         let system = rustix::system::uname();
@@ -114,7 +115,8 @@ fn is_own_host(host: &Authority, web: &Web) -> bool {
 }
 
 /// Checks the origin of a page, which a browser adds to all but the safest requests. If clients reach the service by
-/// https, a page from http is not its own: anyone on the way may have changed it.
+/// https, a page that was loaded by http does not count as the service's own: anyone on the way may have changed the
+/// page.
 fn check_origin(
     headers: &HeaderMap,
     (https, host): (bool, &Authority),

@@ -82,7 +82,8 @@ fn inline(saved: &HeaderValue) -> Option<HeaderValue> {
     HeaderValue::from_str(&shown).ok()
 }
 
-/// Headers of a figure, which may not run scripts or load anything, since its texts come from clients.
+/// The headers of an answer with a figure, which may not run scripts or load anything, since its texts come from
+/// clients.
 const HEADERS: [(HeaderName, HeaderValue); 1] = [(
     header::CONTENT_SECURITY_POLICY,
     HeaderValue::from_static("default-src 'none'; style-src 'unsafe-inline'"),

@@ -11,7 +11,7 @@ use strum::VariantArray;
 
 use super::operations::{self, Operation};
 
-/// The whole page.
+/// The text of `docs/api.md`.
 pub fn reference() -> String {
     let mut out = String::from(INTRODUCTION);
     let all = operations::all();
@@ -127,7 +127,7 @@ fn statuses(operation: &Operation) -> String {
     words.join(" ")
 }
 
-/// The anchor that GitHub makes from a heading: lower case, spaces to hyphens, punctuation dropped.
+/// The anchor that GitHub makes from an operation's heading: lower case, spaces to hyphens, punctuation dropped.
 fn anchor(operation: &Operation) -> String {
     let heading = format!("{} {}", operation.method, operation.path);
     heading

@@ -1,4 +1,4 @@
-//! Logs refused requests: at most one line for each kind every ten seconds, however many there are.
+//! Logs refused requests: at most one line for each kind of error every ten seconds, however many requests there are.
 
 use parking_lot::Mutex;
 use std::{
@@ -9,12 +9,13 @@ use std::{
 
 use tracing::info;
 
-/// How often a kind is logged.
+/// The shortest time between two lines about the same kind of error.
 const INTERVAL: Duration = Duration::from_secs(10);
-/// The longest path that is logged, since a client chooses it.
+/// The largest number of characters of a path that are logged, since a client chooses the path.
 const LONGEST_PATH: usize = 100;
 
-/// By kind: when it was last logged, and how many requests were refused since then. There are as many kinds as errors.
+/// For each kind of error: when it was last logged, and how many requests were refused with it since. There are only as
+/// many entries as kinds of errors.
 static KINDS: LazyLock<Mutex<BTreeMap<String, Kind>>> = LazyLock::new(Mutex::default);
 
 struct Kind {
@@ -41,8 +42,8 @@ pub(super) fn note(kind: &str, path: &str) {
     }
 }
 
-/// After a line, logs the requests that were refused since then, until there are none: no later request may come that
-/// would do so.
+/// After a line about a kind of error, logs how many further requests were refused, every ten seconds until there are
+/// none: perhaps no later request comes that would cause a line.
 async fn tell_the_rest(kind: String) {
     loop {
         tokio::time::sleep(INTERVAL).await;
@@ -57,7 +58,7 @@ async fn tell_the_rest(kind: String) {
     }
 }
 
-/// The number of requests that were refused since the last line, which is reset.
+/// Returns the number of requests that were refused since the last line about this kind of error, and resets it.
 fn rest(kind: &str, now: Instant) -> u64 {
     let mut kinds = KINDS.lock();
     match kinds.get_mut(kind) {
@@ -69,7 +70,7 @@ fn rest(kind: &str, now: Instant) -> u64 {
     }
 }
 
-/// The number of requests for which a line is due.
+/// Counts a refused request; returns the number of requests to be logged if a line about this kind of error is due.
 fn due(kind: &str, now: Instant) -> Option<u64> {
     let mut kinds = KINDS.lock();
     match kinds.get_mut(kind) {

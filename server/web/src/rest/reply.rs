@@ -21,7 +21,7 @@ pub(super) async fn errors_as_documents(request: Request, next: Next) -> Respons
     with_document(response, &path)
 }
 
-/// What the headers of an answer say of an error.
+/// Adds the headers that belong to an error to the headers of an answer.
 fn add_headers(headers: &mut HeaderMap, error: &ApiError) {
     if let Some(seconds) = error.retry_after_s() {
         headers.insert(header::RETRY_AFTER, HeaderValue::from(seconds));
@@ -44,7 +44,7 @@ fn add_headers(headers: &mut HeaderMap, error: &ApiError) {
     }
 }
 
-/// An error with its headers and its document; any other answer unchanged.
+/// Adds to an answer that is an error its headers and its document; any other answer is unchanged.
 fn with_document(mut response: Response, path: &str) -> Response {
     let Some(error) = response.extensions_mut().remove::<ApiError>() else {
         return response;
@@ -84,7 +84,7 @@ pub fn refuse(request: &Request, error: ApiError) -> Response {
     refusal(is_grpc(request), path, error)
 }
 
-/// The answer to an unknown path: a gRPC status for a gRPC client, an error document for others.
+/// Answers a request for an unknown path: with a gRPC status for a gRPC client, with an error document for others.
 pub(super) async fn not_found(request: Request) -> Response {
     if is_grpc(&request) {
         let name = request.uri().path();
@@ -93,7 +93,7 @@ pub(super) async fn not_found(request: Request) -> Response {
     ApiError::NotFound(format!("there is no resource at {}", request.uri().path())).into_response()
 }
 
-/// The answer when a handler has panicked: an incident like any other unexpected error.
+/// The answer to a request whose handler has panicked: an incident like any other unexpected error.
 pub(super) fn panicked(panic: Box<dyn Any + Send>) -> Response {
     let text = panic
         .downcast_ref::<String>()

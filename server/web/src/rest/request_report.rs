@@ -31,17 +31,17 @@ use super::{
     request_target::{RequestTarget, UNKNOWN, name_of},
 };
 
-/// The header in which a client names its request, and receives the name.
+/// The header in which a client may give its request an id; the answer has the same header, with the id of the request.
 pub(super) const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 /// The header with the version of the service, in every answer to an identified caller, so that a client of another
 /// version can explain why it does not understand an answer.
 pub(super) const VERSION: HeaderName = HeaderName::from_static("signorini-version");
-/// The longest name that is accepted from a client.
+/// The largest length of an id that is accepted from a client.
 const LONGEST_ID: usize = 64;
-/// The log target of requests, for filters.
+/// The log target of the lines about requests, for filters of the log.
 const TARGET: &str = "service::request";
 
-/// Runs a request and reports it; the answer has its id.
+/// Runs a request and reports it; the answer has the id of the request.
 pub(super) async fn observe(mut request: Request, next: Next) -> Response {
     let mut observed = Observed::new(&request);
     request.extensions_mut().insert(observed.trace.clone());
@@ -60,13 +60,14 @@ pub(super) async fn observe(mut request: Request, next: Next) -> Response {
     response.map(|body| Body::new(ObservedBody { body, observed }))
 }
 
-/// The limit of lines for requests of callers who are not identified, since anyone who reaches the service could fill
-/// its disk with them. Metrics count all of them, and `refused` logs the refused ones by kind.
+/// Counts the lines about requests of callers who are not identified, whose number is limited, since anyone who reaches
+/// the service could fill its disk with them. Metrics count all of these requests, and `refused` logs the refused ones
+/// by kind of error.
 static BUDGET: Budget = Budget(Mutex::new(None));
-/// The number of such lines in each second.
+/// The largest number of lines about requests of unidentified callers in each second.
 const LINES: u32 = 20;
 
-/// The present second, and the number of its lines.
+/// The beginning of the present second, and the number of lines in it.
 struct Budget(Mutex<Option<(Instant, u32)>>);
 
 impl Budget {
@@ -90,7 +91,7 @@ struct Observed {
     id: String,
     begun: Time,
     start: Instant,
-    /// The status of the answer; none if the client has gone before.
+    /// The HTTP status of the answer; `None` if the client has gone before there was one.
     status: Option<u16>,
     code: Option<Code>,
     owner: String,
@@ -126,7 +127,8 @@ impl Observed {
         self.read_code(response.headers());
     }
 
-    /// Reads the status of a call: in the head of an answer without messages, else after them.
+    /// Reads the gRPC status of a call: from the head of an answer without messages, otherwise from the trailers after
+    /// the messages.
     fn read_code(&mut self, headers: &HeaderMap) {
         if let Some(code) = headers.get(tonic::Status::GRPC_STATUS) {
             self.code = Some(Code::from_bytes(code.as_bytes()));
@@ -264,14 +266,14 @@ info!(target: TARGET, $($fields)*)
 }
 
 impl Drop for Observed {
-    /// Reports the request, also if its client does not wait for the answer, or for its end.
+    /// Reports the request, even if the client does not wait for the answer, or for the end of the answer.
     fn drop(&mut self) {
         METRICS.in_progress.dec();
         self.tell();
     }
 }
 
-/// The name that a client gives its request, if it is readable.
+/// The id that a client gives its request; `None` if it is not a valid one.
 fn given_id(headers: &HeaderMap) -> Option<String> {
     let id = headers.get(REQUEST_ID)?.to_str().ok()?;
     let allowed = |byte: u8| byte.is_ascii_alphanumeric() || b"._-".contains(&byte);

@@ -19,9 +19,9 @@ pub(super) const UNKNOWN: &str = "unknown";
 pub(super) enum RequestTarget {
     /// A method and the template of a route.
     Route(&'static str, MatchedPath),
-    /// A method and a path that is no route.
+    /// A method, and a path that is no route.
     NoRoute(&'static str),
-    /// A method of a service, with its name.
+    /// A gRPC method, by its name after the name of its service; `UNKNOWN` if there is no such method.
     Rpc(&'static str),
 }
 
@@ -58,7 +58,7 @@ impl RequestTarget {
     }
 }
 
-/// One of the usual methods; clients may send any word.
+/// The name of a usual HTTP method, or one name for all others, since clients may send any word.
 fn method(method: &Method) -> &'static str {
     match *method {
         Method::GET => "GET",

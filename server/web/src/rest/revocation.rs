@@ -19,11 +19,11 @@ use service::{
 use store::Store;
 use tokio::time::{Instant, Interval, MissedTickBehavior, interval, sleep};
 
-/// How often the token is checked again.
+/// How often the caller's token is checked.
 const INTERVAL: Duration = Duration::from_secs(1);
 const NO_LONGER: &str = "the token was revoked or has expired";
 
-/// Returns the answer with a body that is cut when the token becomes invalid.
+/// Awaits `answer`, and returns it with a body that is cut when the caller's token becomes invalid.
 ///
 /// # Errors
 ///
@@ -55,8 +55,8 @@ pub(super) async fn end_when_revoked(
     }))
 }
 
-/// Returns when the token has been invalid for a short time, in which a caller who revokes their own token receives the
-/// answer.
+/// Waits until the token is invalid, and then for a short time in which a caller who revokes their own token receives
+/// the answer.
 async fn invalid(store: &Store, by: &By) {
     loop {
         sleep(INTERVAL).await;
@@ -73,7 +73,8 @@ struct UntilRevoked {
     by: By,
     /// When the token was last checked.
     checked: Instant,
-    /// Wakes the task for the next check; made when the body must wait for the first time, which is rare.
+    /// Wakes the task for the next check of the token; made when the body has to wait for the first time, which is
+    /// rare.
     ticks: Option<Interval>,
 }
 

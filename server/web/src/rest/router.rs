@@ -1,4 +1,4 @@
-//! All routes on one port.
+//! Makes the router of the service, with all routes on one port.
 
 use std::sync::Arc;
 

@@ -305,7 +305,7 @@ fn log_lines(stderr: ChildStderr) -> Option<u64> {
             Ok(0) | Err(_) => return refused,
             Ok(_) => {
                 let line = String::from_utf8_lossy(&line);
-                warn!("a worker process: {}", line.trim_end());
+                warn!("a worker process printed: {}", line.trim_end());
                 let bytes = line.strip_prefix("memory allocation of ");
                 refused = refused.or(bytes.and_then(|rest| rest.split(' ').next()?.parse().ok()));
             }

@@ -14,7 +14,7 @@ pub(super) fn json<T: JsonSchema>() -> Content {
     vec![("application/json", SchemaGenerator::subschema_for::<T>)]
 }
 
-/// A merge patch, RFC 7396.
+/// A body that is a merge patch (RFC 7396).
 pub(super) fn merge_patch<T: JsonSchema>() -> Content {
     vec![(
         "application/merge-patch+json",
@@ -26,8 +26,8 @@ pub(super) fn bytes(media: &'static str) -> Content {
     vec![(media, anything)]
 }
 
-/// A stream of server-sent events whose data are `T` as JSON. The schema is that of one event: OpenAPI 3.1 cannot
-/// describe the stream.
+/// A body that is a stream of server-sent events whose data are `T` as JSON. The schema is that of one event: OpenAPI
+/// 3.1 cannot describe a stream.
 pub(super) fn stream<T: JsonSchema>() -> Content {
     vec![("text/event-stream", |generator| {
         let data = generator.subschema_for::<T>();
@@ -43,12 +43,12 @@ pub(super) fn stream<T: JsonSchema>() -> Content {
     })]
 }
 
-/// A stream of events as JSON Lines.
+/// A body that is a stream of events as JSON Lines.
 pub(super) fn lines() -> Content {
     vec![("application/jsonl", anything)]
 }
 
-/// A problem, by the JSON Schema of `files::schema`.
+/// A body that is a problem, by the JSON Schema of `files::schema`.
 pub(super) fn the_problem() -> Content {
     vec![(
         "application/json",
@@ -75,12 +75,12 @@ pub(super) fn sweep() -> Value {
     })
 }
 
-/// The schema of content that JSON Schema cannot describe.
+/// The schema of a body that JSON Schema cannot describe.
 pub(super) fn anything(_: &mut SchemaGenerator) -> Schema {
     Schema::default()
 }
 
-/// Data in each of the formats; `T` is their JSON form.
+/// A body that is data in one of the formats; `T` is the JSON form of the data.
 pub(super) fn data<T: JsonSchema>(formats: &[Format]) -> Content {
     let schema = |format: &Format| -> SchemaOf {
         match format {

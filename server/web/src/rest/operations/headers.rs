@@ -1,16 +1,16 @@
-//! Headers of answers.
+//! Describes the headers of answers.
 
 use serde_json::json;
 use service::parameters::Description;
 
 use crate::rest::headers::{header, text};
 
-/// The path of a new resource.
+/// The header with the path of a new resource.
 pub(super) fn location() -> Description {
     header("Location", text(), "The path of the resource")
 }
 
-/// The version of a job or sweep.
+/// The header with the version of a job or sweep.
 pub(super) fn etag() -> Description {
     header(
         "ETag",
@@ -19,23 +19,23 @@ pub(super) fn etag() -> Description {
     )
 }
 
-/// Whether a result is partial or final.
+/// The header that says whether a result is partial or final.
 pub(super) fn result_available() -> Description {
     let words = json!({ "type": "string", "enum": ["none", "partial", "final"] });
     header(
         "Result-Available",
         words,
-        "As in the job: partial if it has not ended or has not converged; none while there are only iterations",
+        "As in the job: partial if the job has not ended or has not converged; none while it has only iterations",
     )
 }
 
-/// How long to wait before polling.
+/// The header that says how long to wait before polling.
 pub(super) fn retry_after() -> Description {
     let seconds = json!({ "type": "integer", "minimum": 0, "maximum": u32::MAX });
     header("Retry-After", seconds, "Seconds after which to poll")
 }
 
-/// Marks the answer to a repeated request.
+/// The header that marks the answer to a repeated request.
 pub(super) fn replayed() -> Description {
     let yes = json!({ "type": "string", "enum": ["true"] });
     header(
@@ -45,7 +45,7 @@ pub(super) fn replayed() -> Description {
     )
 }
 
-/// Confirms that the client's preference to wait was applied.
+/// The header that confirms that the client's preference to wait was applied.
 pub(super) fn preference_applied() -> Description {
     header(
         "Preference-Applied",

@@ -45,7 +45,7 @@ pub(super) fn operations() -> Vec<Operation> {
         get(READ, "/v1/jobs", (FILTERS, PAGE_SIZE, PAGE_TOKEN, ORDER_BY), list_jobs)
             .rpcs(&["ListJobs"])
             .summary("Lists jobs, newest first")
-            .answers(200, "A page of jobs. It may be short or empty before the list ends, since only so many jobs are checked for each page: the list ends where there is no next_page_token", json::<List>())
+            .answers(200, "A page of jobs. It may be short or empty before the list ends, since a limited number of jobs is checked for each page: the list ends where there is no next_page_token", json::<List>())
             .fails(&[Code::BadPageToken]),
         get(READ, "/v1/jobs/count", (FILTERS, GROUP_BY), count_jobs)
             .rpcs(&["CountJobs"])
@@ -84,7 +84,7 @@ pub(super) fn operations() -> Vec<Operation> {
         delete(CANCEL, "/v1/jobs/{id}", (ID,), delete_job)
             .rpcs(&["DeleteJob"])
             .summary("Deletes a job that has ended, with its events and its result")
-            .answers(204, "Deleted; its id answers 410 for 7 days (kept for the last 100,000 deleted jobs)", nothing())
+            .answers(204, "Deleted; the job's id answers 410 for 7 days (kept for the last 100,000 deleted jobs)", nothing())
             .fails(&[Code::JobActive, Code::StorageFull]),
         post(CANCEL, "/v1/jobs/cancel", (FILTERS,), cancel_jobs)
             .rpcs(&["CancelJobs"])
@@ -207,7 +207,7 @@ async fn delete_jobs(call: Call, filter: Filter) -> Result<Json<BulkResult>, Api
     Ok(Json(many))
 }
 
-/// One job with its version as entity tag.
+/// Answers with one job, and its version as entity tag.
 pub(super) fn job_response(job: &Job) -> Response {
     ([(header::ETAG, tag(job))], Json(job)).into_response()
 }
@@ -216,7 +216,7 @@ pub(super) fn tag(job: &Job) -> String {
     version_tag(job.version)
 }
 
-/// The effect of asking a job to stop, and the job.
+/// The job that was asked to stop, and the effect of asking.
 #[derive(Serialize, JsonSchema)]
 struct Canceled {
     outcome: Cancellation,

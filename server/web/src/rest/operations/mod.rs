@@ -2,9 +2,9 @@
 //! answers. The router, `/openapi.json`, `docs/api.md` and the test of parity with gRPC
 //! are all made from this list, so that all of them have the same operations.
 //!
-//! The document is not generated from the handlers by a crate (utoipa, aide): these describe what extractors read,
-//! while bodies are read here by hand, since all errors of a request are reported together. The parity test and the
-//! reference need the list as well.
+//! The OpenAPI document is not generated from the handlers by a crate (utoipa, aide): such crates describe what
+//! extractors read, while bodies are read here by hand, since all errors of a request are reported together. The parity
+//! test and the reference need the list as well.
 
 // An entry, and the bodies and headers that entries name.
 mod content;
@@ -27,7 +27,7 @@ pub(super) use operation::{Answer, Content, Operation};
 
 use super::call::AppState;
 
-/// The access to the description of the API, over either protocol.
+/// The access rule of the description of the API, over either protocol.
 pub(super) const DESCRIPTION: Access = operation::READ;
 
 /// The groups in the order in which they are documented: name, subject and operations.
@@ -71,7 +71,7 @@ pub(super) fn all() -> Vec<Operation> {
     list
 }
 
-/// The routes: there are no others.
+/// The routes of all operations. The service has no other routes over REST.
 pub(super) fn routes() -> Router<AppState> {
     all().into_iter().fold(Router::new(), |router, operation| {
         router.route(operation.path, operation.route)

@@ -1,4 +1,4 @@
-//! One entry of the list: an operation, its route and its description.
+//! An entry of the list of operations: an operation, its route and its description.
 
 use axum::routing::{MethodFilter, MethodRouter};
 use base::{
@@ -32,15 +32,15 @@ pub(in crate::rest) struct Operation {
     /// Who may use the operation.
     pub(in crate::rest) access: Access,
     pub(super) route: MethodRouter<AppState>,
-    /// The name of its group.
+    /// The name of the group that the operation belongs to.
     pub(in crate::rest) group: &'static str,
     /// The corresponding rpcs, the closest one first; empty for an operation over REST only.
     pub(in crate::rest) rpcs: &'static [&'static str],
-    /// The name of the operation: that of the first rpc, if there is one.
+    /// The name of the operation: the name of its first rpc, if it has one.
     pub(in crate::rest) id: &'static str,
     /// The summary: one line, without a full stop.
     pub(in crate::rest) summary: &'static str,
-    /// The parameters, as its input describes them.
+    /// The parameters of the operation, as its input describes them.
     pub(in crate::rest) parameters: Vec<Description>,
     /// The body of a request.
     pub(in crate::rest) body: Option<Content>,
@@ -59,17 +59,18 @@ pub(in crate::rest) struct Answer {
     pub(in crate::rest) status: u16,
     pub(in crate::rest) meaning: &'static str,
     pub(in crate::rest) content: Content,
-    /// Each header, and whether it is always sent.
+    /// The headers of the answer, and whether each of them is always sent.
     pub(in crate::rest) headers: Vec<(Description, bool)>,
 }
 
-/// A body: its schema by media type.
+/// A kind of body: its schema by media type.
 pub(in crate::rest) type Content = Vec<(&'static str, SchemaOf)>;
 
 /// Makes the schema of a type with a generator, which collects the schemas that it refers to.
 pub(in crate::rest) type SchemaOf = fn(&mut SchemaGenerator) -> Schema;
 
-/// An operation. The handler receives the values of `input`, so that it cannot use a parameter that is not listed.
+/// Makes an operation. The handler receives the values of `input`, so that it cannot use a parameter that is not
+/// listed.
 fn operation<T, H>(
     access: Access,
     (method, filter): (&'static str, MethodFilter),
@@ -114,7 +115,7 @@ macro_rules! methods {
 }
 methods!(get "GET" GET, post "POST" POST, put "PUT" PUT, patch "PATCH" PATCH, delete "DELETE" DELETE);
 
-/// A probe: open to everyone, and clients may add parameters of their own.
+/// Makes a probe, an operation that is open to everyone; clients may add parameters of their own.
 pub(super) fn probe<H: Handler<()>>(path: &'static str, handler: H) -> Operation {
     operation(
         Access::Open,
@@ -134,13 +135,13 @@ impl Operation {
         self
     }
 
-    /// Makes this an operation over REST only, with this name.
+    /// Makes the operation one over REST only, with the name `id`.
     pub(super) fn rest_only(mut self, id: &'static str) -> Self {
         self.id = id;
         self
     }
 
-    /// Sets the name of a second operation for the same rpc.
+    /// Sets the name of the operation if another operation has the same rpc.
     pub(super) fn named(mut self, id: &'static str) -> Self {
         self.id = id;
         self
@@ -152,13 +153,13 @@ impl Operation {
         self
     }
 
-    /// Sets the body of a request.
+    /// Sets the kind of body that requests have.
     pub(super) fn body(mut self, body: Content) -> Self {
         self.body = Some(body);
         self
     }
 
-    /// Sets a body that may be left out.
+    /// Sets the kind of body that requests may have.
     pub(super) fn optional_body(self, body: Content) -> Self {
         Operation {
             needs_body: false,

@@ -41,7 +41,7 @@ pub(super) fn operations() -> Vec<Operation> {
     vec![
         get(READ, "/v1/jobs/{id}/result", (ID,), get_result)
             .rpcs(&["GetResult"])
-            .summary("Returns the summary of a job's result, and one for each load step")
+            .summary("Returns the summary of a job's result, and a summary for each load step")
             .answers(200, "The summary", json::<JobResult>())
             .with([result_available()])
             .fails(NO_RESULT),
@@ -97,18 +97,18 @@ fn figures() -> Content {
     media.flat_map(bytes).collect()
 }
 
-/// The errors if there is no result.
+/// The errors of an operation on a result if there is no result.
 const NO_RESULT: &[Code] = &[Code::NoResult, Code::ResultNotReady];
 
 impl Operation {
-    /// Adds the answers with a file, with a part of it, or with 304 if the client has it.
+    /// Adds the answers with a file, with a part of it, or with 304 if the client has the file.
     pub(super) fn file(self, meaning: &'static str, content: Content) -> Self {
         let tag = || header("ETag", text(), "The file's SHA-256");
         let name = || header("Content-Disposition", text(), "A name for the file");
         let whole_file = header(
             "Content-Digest",
             text(),
-            "Its SHA-256 (RFC 9530); absent from a compressed answer",
+            "The file's SHA-256 (RFC 9530); absent from a compressed answer",
         );
         let parts = content.iter().flat_map(|(media, _)| bytes(media)).collect();
         let part = header(
@@ -126,7 +126,8 @@ impl Operation {
             .fails(&[Code::NotAcceptable, Code::RangeNotSatisfiable])
     }
 
-    /// As `file`, of a job: the answers say whether its result is partial or final.
+    /// Adds the answers of `file` for a file of a job, with the header that says whether the result is partial or
+    /// final.
     fn file_of_result(mut self, meaning: &'static str, content: Content) -> Self {
         let others = self.answers.len();
         self = self.file(meaning, content);

@@ -42,7 +42,7 @@ pub(super) fn operations() -> Vec<Operation> {
             .summary("Checks a problem and estimates its cost; stores nothing; an invalid problem is also answered with 200")
             .body(json::<BareProblem>())
             .example(submission())
-            .answers(200, "Whether it is valid, and its estimated cost", json::<Validation>())
+            .answers(200, "Whether the problem is valid, and its estimated cost", json::<Validation>())
             .fails(&[Code::InvalidProblem]),
         get(READ, "/v1/queue", (), get_queue)
             .rpcs(&["GetQueue"])
@@ -114,7 +114,7 @@ pub(super) fn operations() -> Vec<Operation> {
     ]
 }
 
-/// The media types of the files of the page.
+/// The media types of the files that the page at `/docs` loads.
 const PARTS: [&str; 3] = ["text/css", "text/javascript", "text/plain"];
 
 async fn validate_problem(mut call: Call) -> Result<Json<Validation>, ApiError> {
@@ -159,7 +159,7 @@ async fn list_owners(call: Call) -> Result<Json<Owners>, ApiError> {
     Ok(Json(Owners { owners }))
 }
 
-/// A kind of error in a path.
+/// The variable of a path that names a kind of error.
 const CODE: Variable<Words<Code>> = Variable {
     name: "code",
     kind: "error",
@@ -167,7 +167,7 @@ const CODE: Variable<Words<Code>> = Variable {
     values: Words::all(),
 };
 
-/// The explanation of a kind of error: as JSON for programs, or as a page for people.
+/// Answers with the explanation of a kind of error: as JSON for programs, or as a page for people.
 async fn get_error(call: Call, code: Code) -> Result<Response, ApiError> {
     let kind = code.kind();
     let vary = [(header::VARY, "Accept")];
@@ -184,7 +184,8 @@ async fn get_error(call: Call, code: Code) -> Result<Response, ApiError> {
     Ok((vary, Json(kind)).into_response())
 }
 
-/// The explanation as a page. Its texts are constants without any character that HTML would interpret.
+/// The explanation of a kind of error as a page. Its texts are constants without any character that HTML would
+/// interpret.
 fn page(kind: &Kind) -> String {
     let Kind {
         code,
@@ -206,7 +207,7 @@ fn page(kind: &Kind) -> String {
     )
 }
 
-/// A warning in a path.
+/// The variable of a path that names a kind of warning.
 const WARNING: Variable<Words<WarningCode>> = Variable {
     name: "code",
     kind: "warning",
@@ -214,7 +215,7 @@ const WARNING: Variable<Words<WarningCode>> = Variable {
     values: Words::all(),
 };
 
-/// The explanation of a warning.
+/// Answers with the explanation of a kind of warning.
 async fn get_warning(_: Call, code: WarningCode) -> Result<Json<WarningKind>, ApiError> {
     Ok(Json(catalog::warning(code)))
 }
@@ -249,8 +250,8 @@ async fn live(_: Call) -> Result<&'static str, ApiError> {
     Ok("ok\n")
 }
 
-/// Answers whether the service works; further lines say what does not. A damaged record is not an error here, since a
-/// proxy would then send no more requests, not even for intact records.
+/// Answers whether the service works; further lines say what does not work. A damaged record is not an error here,
+/// since a proxy would then send no more requests, not even for intact records.
 async fn ready(call: Call) -> Result<String, ApiError> {
     let health = call.service.health().await?;
     let mut text = String::from(if health.is_whole() {

@@ -37,7 +37,7 @@ use crate::rest::{
     headers::{Header, PREFER},
 };
 
-/// The header that makes a request safe to repeat.
+/// The input that reads the idempotency key, the header that makes a request safe to repeat.
 pub(super) const KEY: Header<Keys> = Header(IDEMPOTENCY_KEY);
 
 pub(super) fn operations() -> Vec<Operation> {
@@ -90,7 +90,7 @@ pub(super) const SUBMITTING: &[Code] = &[
 ];
 
 impl Operation {
-    /// Adds the answers with the submitted job: when it has ended, at once, or with its events.
+    /// Adds the answers to a submission: the job at once, the job when it has ended, or a stream of its events.
     pub(super) fn submits(self) -> Self {
         let accepted = [json::<Job>(), stream::<Event>(), lines()].concat();
         self.answers(201, "The job, which has ended within the wait", json::<Job>())
@@ -109,7 +109,7 @@ impl Operation {
     }
 }
 
-/// Seconds after which to poll a job that was accepted.
+/// The number of seconds after which clients should poll a job that was accepted.
 const POLL_AFTER_S: u64 = 1;
 
 async fn create_job(
@@ -159,7 +159,7 @@ async fn retry_job(
     answer(call, submitted, wait_s, false).await
 }
 
-/// Answers with the job: at once, or when it has ended, or as a stream of its events.
+/// Answers a submission with the job: at once, or when it has ended, or as a stream of its events.
 pub(super) async fn answer(
     call: Call,
     submitted: Submitted<Job>,

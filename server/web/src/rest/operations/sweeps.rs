@@ -90,7 +90,7 @@ pub(super) fn operations() -> Vec<Operation> {
         delete(CANCEL, "/v1/sweeps/{id}", (ID,), delete_sweep)
             .rpcs(&["DeleteSweep"])
             .summary("Deletes a sweep that has ended, with its jobs and rows")
-            .answers(204, "Deleted; its id answers 410 for 7 days", nothing())
+            .answers(204, "Deleted; the sweep's id answers 410 for 7 days", nothing())
             .fails(&[Code::JobActive, Code::StorageFull]),
         post(SUBMIT, "/v1/sweeps/{id}/members/{number}/job",
             (ID, NUMBER, KEY, PREFER),
@@ -102,7 +102,7 @@ pub(super) fn operations() -> Vec<Operation> {
     ]
 }
 
-/// Seconds after which to poll a sweep that was accepted.
+/// The number of seconds after which clients should poll a sweep that was accepted.
 const POLL_AFTER_S: u64 = 1;
 
 async fn create_sweep(mut call: Call, key: Option<Key>) -> Result<Response, ApiError> {
@@ -253,7 +253,7 @@ async fn create_member_job(
     submit::answer(call, submitted, wait_s, false).await
 }
 
-/// A sweep with its version as entity tag.
+/// Answers with a sweep, and its version as entity tag.
 fn sweep_response(sweep: &Sweep) -> Response {
     ([(header::ETAG, tag(sweep))], Json(sweep)).into_response()
 }

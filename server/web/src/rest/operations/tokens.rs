@@ -80,7 +80,7 @@ async fn rotate_token(call: Call, id: String) -> Result<Response, ApiError> {
     Ok(shown_once(new).into_response())
 }
 
-/// Answers with a secret that no cache on the way may store.
+/// Answers with a new token and its secret, which no cache on the way may store.
 fn shown_once(new: NewToken) -> impl IntoResponse {
     let headers = [(header::CACHE_CONTROL, "no-store")];
     (Extension(TokensChanged), headers, Json(new))
