@@ -47,7 +47,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     Ok(Exit::Damaged)
 }
 
-/// The content of a backup, in a line.
+/// Describes the content of a backup in one line.
 pub(super) fn summed_up(manifest: &Manifest) -> String {
     let Manifest {
         created_at,

@@ -1,4 +1,4 @@
-//! An HTTP client for a running service.
+//! Makes HTTP clients for a running service.
 
 use std::{
     ffi::OsString,
@@ -19,10 +19,10 @@ use super::pinned;
 
 /// The longest time for making a connection.
 const CONNECT: Duration = Duration::from_secs(10);
-/// The name of this program, which is sent to a service.
+/// The name and version of this program, which requests send to the service.
 const PROGRAM: &str = concat!("signorini/", env!("CARGO_PKG_VERSION"));
-/// The longest silence of a service that waits for the end of a job or streams its events: it sends something at least
-/// every 30 s.
+/// The longest silence of a service that waits for the end of a job or streams its events: such a service sends
+/// something at least every 30 s.
 const SILENCE: Duration = Duration::from_secs(90);
 
 /// The certificates that a client command trusts.
@@ -41,7 +41,7 @@ pub(super) struct Way {
     pub(super) proxy: Option<Proxy>,
 }
 
-/// The address of a proxy that an environment variable names, without a password.
+/// The address of a proxy that an environment variable names, without user name and password.
 #[derive(Clone, Debug)]
 pub(super) struct Proxy(String);
 
@@ -56,7 +56,7 @@ impl Display for Proxy {
 }
 
 impl Trust {
-    /// A client for the service at this address.
+    /// Makes a client for the service at this address.
     pub(super) fn client(&self, url: &str) -> anyhow::Result<Way> {
         provide();
         // an empty variable counts as one that is not set
@@ -85,7 +85,7 @@ impl Trust {
     }
 }
 
-/// The proxy that the environment names for this address, unless it is on this machine.
+/// The proxy that the environment names for this address; `None` if the address is on this machine.
 fn proxy_to(url: &str) -> Option<Proxy> {
     let url: Uri = url.parse().ok()?;
     if url.host().is_none_or(is_this_machine) {
@@ -108,7 +108,7 @@ fn is_this_machine(host: &str) -> bool {
         || number.is_ok_and(|ip| ip.to_canonical().is_loopback())
 }
 
-/// A client for the service on this machine that accepts any certificate: only for data that are not secret.
+/// Makes a client for the service on this machine that accepts any certificate: only for data that are not secret.
 pub(super) fn local() -> anyhow::Result<Client> {
     provide();
     // a local address, which a proxy from the environment could not reach

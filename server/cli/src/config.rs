@@ -54,7 +54,7 @@ pub(super) fn run(
     Ok(Exit::Ok)
 }
 
-/// A setting as `key = value`.
+/// Writes a setting as `key = value`.
 fn value(arg: &Arg, matches: &ArgMatches) -> anyhow::Result<String> {
     let (key, id) = (settings::key(arg), arg.get_id().as_str());
     let mut texts = vec![];
@@ -76,14 +76,14 @@ fn value(arg: &Arg, matches: &ArgMatches) -> anyhow::Result<String> {
     Ok(format!("{key} = {value}"))
 }
 
-/// A text as a TOML string, which differs from a JSON string in one character.
+/// Writes a text as a TOML string, which differs from a JSON string in one character.
 fn quoted(text: impl AsRef<str>) -> String {
     serde_json::Value::from(text.as_ref())
         .to_string()
         .replace('\u{7f}', "\\u007f")
 }
 
-/// A comment for a setting without a value, with the remark of its help.
+/// The comment that stands for a setting without a value, with the remark on its default from its help.
 fn unset(arg: &Arg) -> String {
     let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
     let default = help.rsplit_once("[default: ");

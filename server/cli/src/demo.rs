@@ -23,8 +23,9 @@ use tonic::transport::Channel;
 
 use super::{client, examples, exit::Exit, output, report};
 
-/// The example whose stresses are printed, and the number of places.
+/// The name of the example whose stresses are printed.
 const SHOWN: &str = "cylinder";
+/// The number of places along the contact at which the stresses are printed.
 const PLACES: usize = 21;
 
 pub(super) async fn run() -> anyhow::Result<Exit> {
@@ -253,7 +254,7 @@ async fn watch_grpc(
     bail!("the stream ended before the job")
 }
 
-/// The progress of one job: on a terminal one line that changes, else a line per iteration.
+/// Prints the progress of one job: on a terminal one line that changes, otherwise a line for each iteration.
 struct Line {
     head: String,
     last: String,

@@ -22,8 +22,8 @@ pub(super) struct Arguments {
     #[arg(long, conflicts_with = "salvage")]
     accept: bool,
 
-    /// Rebuild the database without unused space, which temporarily needs as much space again. From then on it returns
-    /// the space of deleted data to the file system
+    /// Rebuild the database without unused space, which temporarily needs as much space again. From then on the space
+    /// of deleted data is returned to the file system
     #[arg(long, conflicts_with_all = ["salvage", "accept"])]
     compact: bool,
 }
@@ -99,7 +99,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     Ok(Exit::Damaged)
 }
 
-/// The summary line: how many jobs are intact.
+/// The summary line of the command: how many jobs are intact.
 fn summed_up(report: &Report) -> String {
     let Report { intact, jobs, .. } = report;
     match (report.incomplete, jobs) {

@@ -10,8 +10,8 @@ use web::listener::BadCertificate;
 
 use super::service::CallError;
 
-/// How a command ends. A signal ends it as usual, for a shell with 128 plus its number: Ctrl-C during `solve` gives
-/// 130; a panic gives 101.
+/// How a command ends. If a signal ends it, a shell sees 128 plus the number of the signal, such as 130 for Ctrl-C
+/// during `solve`; a panic gives 101.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, VariantArray)]
 pub(super) enum Exit {
     /// Success.
@@ -64,7 +64,7 @@ impl Exit {
         }
     }
 
-    /// The meaning, for `--help` and the README.
+    /// The meaning of this end of a command, for `--help` and the README.
     fn meaning(self) -> &'static str {
         match self {
             Exit::Ok => {
@@ -99,14 +99,14 @@ impl Exit {
         }
     }
 
-    /// All exit codes, one line each.
+    /// Lists all exit codes, one on each line.
     pub(super) fn list() -> String {
         let line = |exit: &Exit| format!("\n  {}  {}", exit.code(), exit.meaning());
         let lines: String = Exit::VARIANTS.iter().map(line).collect();
         format!("Exit codes:{lines}")
     }
 
-    /// The exit code of a command that ended with this error.
+    /// The end of a command that failed with this error.
     pub(super) fn of(error: &anyhow::Error) -> Exit {
         if let Some(Ended(exit)) = error.downcast_ref() {
             return *exit;
@@ -127,7 +127,7 @@ impl Exit {
     }
 }
 
-/// The error of a command whose message has been printed.
+/// The error of a command whose message has been printed already.
 #[derive(Debug, thiserror::Error)]
 #[error("the exit code is {}", .0.code())]
 pub(super) struct Ended(pub(super) Exit);
@@ -138,7 +138,7 @@ pub(super) fn refuse(message: impl Display) -> anyhow::Error {
     Ended(Exit::Invalid).into()
 }
 
-/// The exit code of a failed call to a running service.
+/// The end of a command whose call to a running service failed.
 fn of_call(error: &anyhow::Error) -> Exit {
     let Some(CallError::Refused(refusal)) = error.downcast_ref() else {
         return Exit::Unreachable;

@@ -15,8 +15,8 @@ const WIDTH: usize = 28;
     after_help = "Examples:\n  signorini explain not_converged\n  signorini explain queue-full"
 )]
 pub(super) struct Arguments {
-    /// A code: the `code` or `type` of an error, the `reason` of a job, or the `code` of a warning; without it, all are
-    /// listed
+    /// A code: the `code` or `type` of an error, the `reason` of a job, or the `code` of a warning; without a code, all
+    /// codes are listed
     code: Option<String>,
 }
 

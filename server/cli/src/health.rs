@@ -19,7 +19,7 @@ use super::{
 
 /// The longest time to wait for the answer; the service itself takes two seconds at most.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// The largest number of characters of the answer; a longer one does not come from this program.
+/// The largest number of characters of the answer; an answer that is longer does not come from this program.
 const MOST_CHARS: usize = 2000;
 
 #[derive(Debug, Args)]
@@ -84,7 +84,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     Ok(Exit::Ok)
 }
 
-/// The address at which a service that listens on this address is reached from its own machine.
+/// The address at which a service that listens on `address` is reached from its own machine.
 fn reachable(mut address: SocketAddr) -> SocketAddr {
     match address.ip() {
         IpAddr::V4(ip) if ip.is_unspecified() => address.set_ip(Ipv4Addr::LOCALHOST.into()),

@@ -1,4 +1,4 @@
-//! The commands, one file each.
+//! The commands of the program, one file each.
 //!
 //! # Where to look
 //!
@@ -85,8 +85,8 @@ enum Command {
     /// ready, or no answer within five seconds
     Health(health::Arguments),
     /// Create, list, revoke and rotate the tokens that identify clients. Exit code: 0 done, 4 the folder cannot be
-    /// used, 5 a server uses it (give its address with --url), 2 an invalid option, 1 anything else; with --url those
-    /// of client commands
+    /// used, 5 a server uses it (give its address with --url), 2 an invalid option, 1 anything else; with --url the
+    /// codes of client commands
     Token(token::Arguments),
     /// Solve one problem without a service. Exit code: 0 converged, 9 not converged (the result is written), 2 invalid
     /// or too large, 1 anything else, such as a file that cannot be read, or contacts that do not hold the body

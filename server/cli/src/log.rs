@@ -11,19 +11,20 @@ use tracing_subscriber::{filter::Targets, prelude::*};
 
 use super::log_line::Lines;
 
-/// The largest number of lines that wait to be written; further lines are lost, and counted. A line has some 200 bytes.
+/// The largest number of lines that wait to be written; further lines are lost, and counted. An average line has some
+/// 200 bytes.
 const MOST_WAITING: usize = 10_000;
 /// How often lost lines are reported.
 const INTERVAL: Duration = Duration::from_secs(10);
 
-/// The log of this process, written to its end when it is dropped.
+/// The log of this process. When this is dropped the waiting lines are written.
 pub(super) struct Log {
     lost: ErrorCounter,
     _writing: WorkerGuard,
 }
 
-/// Starts the log of a command, filtered by SIGNORINI_LOG or RUST_LOG. An invalid filter is reported and ignored: it
-/// may be intended for another program.
+/// Starts the log of a command, filtered by SIGNORINI_LOG or RUST_LOG. An invalid filter is reported and ignored: the
+/// variable may be intended for another program.
 pub(super) fn start(default: LevelFilter) -> Log {
     let filter = of_variable("SIGNORINI_LOG").or_else(|| of_variable("RUST_LOG"));
     // a certificate that is not accepted is the command's own message
@@ -51,7 +52,8 @@ pub(super) fn start_as(settings: &Telemetry) -> Log {
     write(filter.unwrap_or_else(usual), settings.log_format)
 }
 
-/// The filter without messages of the drawing library about the letters of figures, which clients choose.
+/// Removes from a filter the messages of the drawing library about the letters of figures, since clients choose these
+/// letters.
 fn quiet(filter: Targets) -> Targets {
     filter.with_target("usvg", LevelFilter::OFF)
 }

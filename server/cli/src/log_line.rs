@@ -1,5 +1,5 @@
-//! Cleans a line of the log: one line, whatever names, paths and headers of clients are in it; without the secrets of
-//! tokens; not too long.
+//! Cleans a line of the log: it stays one line, whatever names, paths and headers of clients are in it; it loses the
+//! secrets of tokens, and is not too long.
 
 use std::{
     borrow::Cow,
@@ -11,19 +11,19 @@ use service::config::LogFormat;
 use tracing_appender::non_blocking::NonBlocking;
 use tracing_subscriber::fmt::MakeWriter;
 
-/// The longest line, in bytes.
+/// The largest length of a line (bytes).
 const LONGEST_LINE: usize = 4096;
-/// The longest text in a long line of JSON, which could not be parsed if it was cut anywhere.
+/// The largest length of a text in a long line of JSON, which could not be parsed if it was cut anywhere.
 const LONGEST_TEXT: usize = 500;
-/// The length of a token's id after `sgn_`, which is not secret.
+/// The length of a token's id, which follows `sgn_` and is not secret.
 const ID: usize = 12;
 
-/// Writes lines, each in one call, as the layer of `tracing_subscriber` requires.
+/// Writes lines of the log after cleaning them, each in one call, as the layer of `tracing_subscriber` requires.
 #[derive(Clone, Debug)]
 pub(super) struct Lines {
     pub(super) to: NonBlocking,
     pub(super) format: LogFormat,
-    /// Whether to keep colours: escape sequences, which the layer removes from its input.
+    /// Whether to keep colours, which are escape sequences; the layer removes escape sequences from its input.
     pub(super) colours: bool,
 }
 
@@ -48,7 +48,7 @@ impl MakeWriter<'_> for Lines {
     }
 }
 
-/// The clean line, with its end.
+/// Cleans a line; the result ends with a line feed.
 fn clean(line: &str, format: LogFormat, colours: bool) -> Cow<'_, str> {
     let body = line.strip_suffix('\n').unwrap_or(line);
     let harmless = |character| !breaks(character) || (colours && character == '\u{1b}');
@@ -91,7 +91,7 @@ fn breaks(character: char) -> bool {
         || matches!(character, '\u{2028}' | '\u{2029}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// The line without the secrets of tokens. No token is ever logged here, but a client may have put one into a path.
+/// Removes the secrets of tokens from a line. This program logs no token, but a client may have put one into a path.
 fn without_secrets(line: &str) -> String {
     let mut text = String::with_capacity(line.len());
     let mut rest = line;

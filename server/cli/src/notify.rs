@@ -21,8 +21,8 @@ pub(super) fn stopping() {
     tell(&[NotifyState::Stopping, NotifyState::Status(status)]);
 }
 
-/// Reports that the service is alive, as often as the watchdog expects (`WatchdogSec=`), each time only when its store
-/// has answered; also its status.
+/// Reports that the service is alive, as often as the watchdog expects (`WatchdogSec=`), each time only if its store
+/// answers. Also reports the status of the service when it changes.
 pub(super) async fn keep_alive(url: String, pulse: Pulse) {
     let watchdog = sd_notify::watchdog_enabled();
     // three in the time that the watchdog allows, of which one may be late

@@ -50,7 +50,7 @@ impl Look {
         }
     }
 
-    /// The options as parameters of a request.
+    /// The options as parameters of a request for a figure.
     pub(super) fn query(self) -> String {
         format!(
             "theme={}&size={}",
@@ -60,7 +60,7 @@ impl Look {
     }
 }
 
-/// One file to be written.
+/// An output of a command: one file to be written.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Output {
     /// The file's path; `None` is standard output.
@@ -84,7 +84,7 @@ pub(super) enum Part {
 
 impl Output {
     /// Reads the name of a file for a problem with these contact boundaries; the error is the reason why the file
-    /// cannot be written. Called before the problem is solved, which may take hours.
+    /// cannot be written. This is called before the problem is solved, which may take hours.
     pub(super) fn parse(path: &Path, contacts: &[&str]) -> Result<Output, String> {
         if path.as_os_str() == "-" {
             return Ok(Output {
@@ -188,7 +188,7 @@ impl Output {
     }
 }
 
-/// The part named before the extension, or the default part of the extension.
+/// The part of a result that the name of a file has before its extension, or the usual part for the extension.
 fn part(format: Format, stem: &str, contacts: &[&str]) -> Result<Part, String> {
     let words: Vec<&str> = stem.split('.').collect();
     let last = words.last().copied().unwrap_or_default();
@@ -248,8 +248,8 @@ fn one_of(contacts: &[&str], asked: Option<String>, ending: &str) -> Result<Stri
     }
 }
 
-/// Writes a temporary file beside `path` and renames it, so that a file of that name is never incomplete, and an older
-/// one is kept until the new one is complete. A pipe or device is written directly.
+/// Writes a temporary file beside `path` and renames it, so that the file at `path` is never incomplete, and an older
+/// file is kept until the new one is complete. A pipe or device is written directly.
 pub(super) fn replace(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> anyhow::Result<()>,
@@ -278,7 +278,7 @@ pub(super) fn replace(
     Ok(())
 }
 
-/// Writes to standard output. It is no error if the reader has ended, like `head` after its last line.
+/// Writes to standard output. It is no error if the reader has closed it, as `head` does after its last line.
 pub(super) fn print(text: &str) -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {

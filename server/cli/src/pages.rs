@@ -48,7 +48,7 @@ pub(super) fn man(arguments: &Man, command: clap::Command) -> anyhow::Result<Exi
     Ok(Exit::Ok)
 }
 
-/// Writes the page of a command, and those of its subcommands.
+/// Writes the manual pages of a command and of its subcommands.
 fn write(command: clap::Command, name: &str, folder: &PathBuf) -> anyhow::Result<()> {
     for subcommand in command.get_subcommands().filter(|one| !one.is_hide_set()) {
         write(
@@ -66,7 +66,7 @@ fn write(command: clap::Command, name: &str, folder: &PathBuf) -> anyhow::Result
     })
     .with_context(|| {
         format!(
-            "cannot write {}; is {} a folder?",
+            "cannot write {}; check that {} is a folder",
             path.display(),
             folder.display()
         )

@@ -1,6 +1,6 @@
-//! Trust in given certificates only: in everything they have issued, and in each of them as the service's own
-//! certificate. A certificate that a service has made for itself is usually also that of an authority, which `webpki`
-//! does not accept as that of a service.
+//! Trusts given certificates only: every certificate that they have issued, and each of them as the certificate of the
+//! service itself. A certificate that a service has made for itself is usually marked as the certificate of an
+//! authority, which `webpki` does not accept from a service.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use rustls::{
     server::ParsedCertificate,
 };
 
-/// A TLS configuration that trusts only these certificates.
+/// Makes a TLS configuration that trusts only these certificates.
 pub(super) fn trusting(pinned: Vec<CertificateDer<'static>>) -> anyhow::Result<ClientConfig> {
     let provider = Arc::new(ring::default_provider());
     let mut roots = RootCertStore::empty();

@@ -1,4 +1,4 @@
-//! Shows the progress of a solution: a line for each iteration and, on a terminal, the present state below them.
+//! Shows the progress of a solution: a line for each iteration and, on a terminal, the present state below these lines.
 
 use std::{collections::VecDeque, io::IsTerminal, time::Duration};
 
@@ -7,19 +7,19 @@ use solver::solution::{Iteration, Phase, Warning};
 
 use super::{output, report};
 
-/// The number of residuals that the curve shows.
+/// The largest number of residuals that the curve in the state shows.
 const CURVE: usize = 24;
 
-/// The stream that lines are written to.
+/// The stream to which lines are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum To {
-    /// Standard output: they are the output of the command.
+    /// Standard output: the lines are the output of the command.
     Output,
-    /// Standard error: they accompany the output of the command.
+    /// Standard error: the lines accompany the output of the command.
     Error,
 }
 
-/// The lines of one solution, and its present state.
+/// Shows one solution: prints its lines, and shows its present state.
 pub(super) struct View {
     to: To,
     bar: ProgressBar,
@@ -72,8 +72,8 @@ impl View {
         self.bar.set_message(format!("{}{curve}", self.state));
     }
 
-    /// Shows that a phase begins: as the state on a terminal, else as a line, unless lines are the output of the
-    /// command.
+    /// Shows that a phase begins: as the state on a terminal, otherwise as a line, unless the lines are the output of
+    /// the command.
     pub(super) fn phase(&mut self, phase: Phase) -> std::io::Result<()> {
         let words = report::phase(phase);
         if self.to == To::Error && !std::io::stderr().is_terminal() {
@@ -109,7 +109,7 @@ impl View {
         ))
     }
 
-    /// Starts over, when the job is solved again.
+    /// Starts the curve of residuals anew, when the job is solved again.
     pub(super) fn anew(&mut self) {
         self.residuals.clear();
     }
@@ -120,8 +120,8 @@ impl View {
     }
 }
 
-/// Numbers as a curve of block characters, by their logarithms: the highest block is the largest number. No crate draws
-/// one in a line of text without managing a whole screen.
+/// Draws numbers as a curve of block characters, by their logarithms: the highest block is the largest number. No crate
+/// draws a curve in a line of text without managing the whole screen.
 fn sparkline(numbers: &VecDeque<f64>) -> String {
     const BLOCKS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
     let logarithms: Vec<f64> = numbers

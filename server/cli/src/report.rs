@@ -1,4 +1,4 @@
-//! Results as text: a line for each iteration, a summary, a table of stresses.
+//! Writes results as text: a line for each iteration, a summary, a table of stresses.
 
 use std::fmt::{Display, Write};
 
@@ -13,7 +13,7 @@ use super::table::harmless;
 /// The largest number of reasons of a verdict that are shown.
 const MOST_REASONS: usize = 5;
 
-/// The text for a phase that begins.
+/// The text that says that a phase begins.
 pub(super) fn phase(phase: Phase) -> &'static str {
     match phase {
         Phase::Verify => "verify: solving once more on the refined mesh",
@@ -21,7 +21,7 @@ pub(super) fn phase(phase: Phase) -> &'static str {
     }
 }
 
-/// The text for the present mesh of adaptive refinement.
+/// The text that says that adaptive refinement begins with a mesh; `error`: the largest error on the mesh before.
 pub(super) fn mesh(number: u32, elements: u64, error: Option<f64>) -> String {
     let before = error.map_or(String::new(), |error| {
         format!("; largest error before {:.2} %", 100.0 * error)
@@ -29,7 +29,7 @@ pub(super) fn mesh(number: u32, elements: u64, error: Option<f64>) -> String {
     format!("mesh {number}: {elements} elements{before}")
 }
 
-/// One row of the history on one line.
+/// Writes a row of the history as one line.
 pub(super) fn iteration(row: &Iteration) -> String {
     let mut line = format!(
         "{:>4}  {:<12}  residual {:8.2e}  friction {:8.2e}  contact {:>3} (+{} -{})",
@@ -54,21 +54,21 @@ pub(super) fn iteration(row: &Iteration) -> String {
     line
 }
 
-/// Facts, one on each line after its name.
+/// Writes facts, each on a line after its name.
 pub(super) fn lines(facts: impl Iterator<Item = (impl Display, String)>) -> String {
     facts
         .map(|(name, value)| format!("{name:<20}{}\n", harmless(&value)))
         .collect()
 }
 
-/// The text of a document: its summary with a title.
+/// Writes a document: its summary with a title.
 pub(super) fn document(title: Option<&str>, document: &Document) -> String {
     let steps = document.steps.iter();
     let steps = steps.map(|step| (step.name.as_str(), &step.summary));
     result(title, &document.summary, steps)
 }
 
-/// How reliable a result is, for readers of its files: verdict and warnings.
+/// Writes how reliable a result is, for readers of its files: verdict and warnings.
 pub(super) fn trust(document: &Document) -> String {
     let solution = &document.summary.solution;
     let verdict = solution.accuracy.iter().map(|accuracy| {
@@ -86,7 +86,7 @@ pub(super) fn trust(document: &Document) -> String {
     lines(verdict.chain(warnings))
 }
 
-/// The text of a summary, and of those of its load steps by their names.
+/// Writes the summary of a result and the summaries of its load steps, each after the name of its step.
 pub(super) fn result<'a>(
     title: Option<&str>,
     summary: &Summary,
@@ -139,7 +139,7 @@ pub(super) fn result<'a>(
     lines.0
 }
 
-/// A text of facts, one on each line after its name.
+/// A text of facts, each on a line after its name.
 #[derive(Default)]
 struct Lines(String);
 
@@ -285,7 +285,7 @@ impl Lines {
     }
 }
 
-/// A number with six digits, without an exponent where that is readable.
+/// Writes a number with up to seven digits, without an exponent where that is readable.
 pub(super) fn number(value: f64) -> String {
     if value == 0.0 {
         "0".to_string()
@@ -297,8 +297,8 @@ pub(super) fn number(value: f64) -> String {
     }
 }
 
-/// The error of a quantity of a contact, or of its sum over all contacts, as a text after the value; empty if errors
-/// were not assessed.
+/// The text after a value that states the error of this quantity of a contact, or of its sum over all contacts; empty
+/// if errors were not assessed.
 fn stated(accuracy: Option<&Accuracy>, name: QuantityName, contact: Option<&str>) -> String {
     let all = accuracy.iter().flat_map(|accuracy| &accuracy.quantities);
     let of_contact = |q: &EstimatedQuantity| contact.is_none_or(|contact| contact == q.contact);
@@ -318,14 +318,14 @@ fn stated(accuracy: Option<&Accuracy>, name: QuantityName, contact: Option<&str>
     }
 }
 
-/// The lines about one contact.
+/// Writes the lines about one contact.
 pub(super) fn contact(name: &str, contact: &ContactSummary, accuracy: Option<&Accuracy>) -> String {
     let mut lines = Lines::default();
     lines.add_contact(name, contact, accuracy);
     lines.0
 }
 
-/// The stresses along a contact boundary as a table.
+/// Writes the stresses along a contact boundary as a table.
 pub(super) fn profile(profile: &ContactProfile) -> String {
     let p = profile;
     let mut text = format!(

@@ -48,7 +48,7 @@ pub(super) async fn run(config: &Config, lost: ErrorCounter) -> anyhow::Result<E
 }
 
 /// Runs a worker process: solves the tasks that the service sends. A signal to stop that reaches the service and its
-/// processes together is ignored here: the service decides about its jobs, and this process ends with it.
+/// processes together is ignored here: the service decides about its jobs, and this process ends when the service ends.
 pub(super) async fn work() -> anyhow::Result<Exit> {
     for kind in [
         SignalKind::terminate(),
@@ -63,7 +63,7 @@ pub(super) async fn work() -> anyhow::Result<Exit> {
     Ok(Exit::Ok)
 }
 
-/// Logs a signal that would end the process otherwise.
+/// Logs each signal of a kind that would end the process otherwise.
 fn survive(kind: SignalKind, text: &'static str) -> anyhow::Result<()> {
     log_signals(signal(kind).context("a signal cannot be caught")?, text);
     Ok(())
@@ -79,7 +79,7 @@ fn log_signals(mut signals: Signals, text: &'static str) {
     });
 }
 
-/// Prints the address as the first line of standard output; with port 0 it is not known beforehand.
+/// Prints the address of the service as the first line of standard output; with port 0 it is not known beforehand.
 fn announce(url: &str) -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
     writeln!(out, "{url}")?;

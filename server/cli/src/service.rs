@@ -1,4 +1,4 @@
-//! Calls from client commands to a running service.
+//! Calls a running service for client commands.
 
 use std::{
     error::Error as _,
@@ -18,11 +18,11 @@ use uuid::Uuid;
 
 use super::client::{Proxy, Trust, Way};
 
-/// The header with which a repeated submission finds the job that the first one created.
+/// The header by which a repeated submission finds the job that the first submission created.
 const IDEMPOTENCY_KEY: &str = "Idempotency-Key";
 /// The number of times that a repeatable request is sent if its answer does not arrive.
 const TRIES: u32 = 4;
-/// The pause before the first repetition; doubled before each further one.
+/// The pause before a request is sent a second time; it is doubled before each further time.
 const FIRST_PAUSE: Duration = Duration::from_millis(250);
 
 /// The options for reaching the service.
@@ -58,16 +58,16 @@ pub(super) struct Service {
 /// Why a call has no usable answer.
 #[derive(Debug, Error)]
 pub(super) enum CallError {
-    /// There is no connection.
+    /// The service did not answer, or not completely.
     #[error("cannot reach {way}: {cause}. {advice}")]
     Unreachable {
-        /// The address of the service, and the proxy on the way to it.
+        /// The address of the service, and the proxy on the way to the service.
         way: String,
-        /// The innermost cause.
+        /// The innermost cause of the error.
         cause: String,
         /// Advice on what to do.
         advice: &'static str,
-        /// Whether there was a connection, which broke: something is or was there.
+        /// Whether there was a connection, which broke: then the address is or was that of some server.
         connected: bool,
     },
     /// The service has refused the request.
@@ -78,7 +78,7 @@ pub(super) enum CallError {
 /// The document by which the service refuses a request (RFC 9457).
 #[derive(Debug, Deserialize)]
 pub(super) struct Refusal {
-    /// HTTP status.
+    /// The HTTP status of the answer.
     pub(super) status: u16,
     /// Whether the service says that the same request may succeed later; absent if the answer does not come from this
     /// service.
@@ -89,7 +89,7 @@ pub(super) struct Refusal {
     title: String,
     #[serde(default)]
     detail: Option<String>,
-    /// All faults of the problem or of the request.
+    /// All violations of the problem or of the request.
     #[serde(default, rename = "errors")]
     pub(super) violations: Vec<Violation>,
 }
@@ -114,7 +114,7 @@ impl Display for Refusal {
 impl std::error::Error for Refusal {}
 
 impl Service {
-    /// The service at this address.
+    /// Prepares calls to the service at this address.
     pub(super) fn at(url: &str, trust: &Trust) -> anyhow::Result<Service> {
         let Way { client, proxy } = trust.client(url)?;
         Ok(Service {
@@ -127,7 +127,7 @@ impl Service {
         })
     }
 
-    /// A request for this path, which begins with a slash.
+    /// Makes a request for this path, which begins with a slash.
     pub(super) fn request(&self, method: Method, path: &str) -> RequestBuilder {
         let request = self.client.request(method, format!("{}{path}", self.url));
         match &self.token {
@@ -136,7 +136,7 @@ impl Service {
         }
     }
 
-    /// Sends a request once. A refusal is a [`CallError`].
+    /// Sends a request once. If the service refuses it, the error is a [`CallError`].
     pub(super) async fn send(&self, request: RequestBuilder) -> anyhow::Result<Response> {
         let answer = request.send().await;
         let answer = answer.map_err(|error| self.unreachable(&error))?;
@@ -152,7 +152,7 @@ impl Service {
         }
     }
 
-    /// The address of the service, and the proxy on the way to it, in words.
+    /// The address of the service, and the proxy on the way to the service, in words.
     fn way(&self) -> String {
         match &self.proxy {
             Some(proxy) => format!("{} through {proxy}", self.url),
@@ -160,8 +160,8 @@ impl Service {
         }
     }
 
-    /// Sends a request that is safe to repeat: again if its answer does not arrive, or the service is temporarily
-    /// unable to answer. A service that does not listen is reported at once.
+    /// Sends a request that is safe to repeat, and sends it again if its answer does not arrive, or the service is
+    /// temporarily unable to answer. If there is no connection to the service the error is returned at once.
     pub(super) async fn send_surely(&self, request: RequestBuilder) -> anyhow::Result<Response> {
         let mut pause = FIRST_PAUSE;
         for _ in 1..TRIES {
@@ -185,18 +185,18 @@ impl Service {
         self.send(request).await
     }
 
-    /// Gets a path; returns the answer.
+    /// Sends a GET request for this path; returns the answer.
     pub(super) async fn fetch(&self, path: &str) -> anyhow::Result<Response> {
         self.send_surely(self.request(Method::GET, path)).await
     }
 
-    /// Gets a document.
+    /// Sends a GET request for this path; returns the document in the answer.
     pub(super) async fn get<T: DeserializeOwned>(&self, path: &str) -> anyhow::Result<T> {
         let answer = self.fetch(path).await?;
         self.document(answer).await
     }
 
-    /// Submits something. A repetition finds what the first request has created.
+    /// Sends a submission. If it is sent again, the service returns what the first request has created.
     pub(super) async fn submit(
         &self,
         path: &str,
@@ -213,7 +213,7 @@ impl Service {
         self.document(answer).await
     }
 
-    /// Calls an operation that is safe to repeat.
+    /// Calls an operation that is safe to repeat; returns the document in the answer.
     pub(super) async fn call(&self, method: Method, path: &str) -> anyhow::Result<Value> {
         let answer = self.send_surely(self.request(method, path)).await?;
         match answer.status() {
@@ -222,7 +222,7 @@ impl Service {
         }
     }
 
-    /// The document in an answer.
+    /// Reads the document in an answer.
     pub(super) async fn document<T: DeserializeOwned>(
         &self,
         answer: Response,
@@ -233,7 +233,7 @@ impl Service {
         serde_json::from_slice(&text).with_context(misunderstood)
     }
 
-    /// The error that there was no answer, or no complete one.
+    /// The error that no answer arrived, or no complete one.
     pub(super) fn unreachable(&self, error: &reqwest::Error) -> CallError {
         let mut cause: &dyn std::error::Error = error;
         while let Some(inner) = cause.source() {
@@ -245,10 +245,14 @@ impl Service {
         };
         let advice = match &self.proxy {
             _ if cause.contains("UnknownIssuer") || cause.contains("CaUsedAsEndEntity") => {
-                "--ca or SIGNORINI_CA must name a file with its certificate, or with that of the authority that issued it"
+                "--ca or SIGNORINI_CA must name a file with the certificate of the service, or of the authority that issued it"
             }
-            Some(_) => "Does the proxy reach it? --url or SIGNORINI_URL gives another address",
-            None => "Is the service running there? --url or SIGNORINI_URL gives another address",
+            Some(_) => {
+                "Check that the proxy reaches the service; --url or SIGNORINI_URL gives another address"
+            }
+            None => {
+                "Check that the service is running there; --url or SIGNORINI_URL gives another address"
+            }
         };
         CallError::Unreachable {
             way: self.way(),
@@ -260,7 +264,7 @@ impl Service {
 }
 
 impl Refusal {
-    /// Whether waiting may help: the service says so, or something in front of it has lost it.
+    /// Whether waiting may help: the service says so, or a proxy in front of it cannot reach it.
     pub(super) fn may_pass(&self) -> bool {
         let of_proxy = matches!(self.status, 429 | 502..=504);
         self.retryable.unwrap_or(of_proxy)
@@ -275,19 +279,19 @@ impl Refusal {
     }
 }
 
-/// A new key for one submission.
+/// Makes an idempotency key for one submission.
 pub(super) fn new_key() -> String {
     format!("command-line-{}", Uuid::now_v7())
 }
 
-/// A name as a segment of a path.
+/// Escapes a name as a segment of a path.
 pub(super) fn segment(name: &str) -> String {
     let escaped: String = form_urlencoded::byte_serialize(name.as_bytes()).collect();
     // a plus is a space in a query only
     escaped.replace('+', "%20")
 }
 
-/// A remark that the service has another version than this program, once that is known.
+/// The remark that the service has another version than this program, once a service of another version has answered.
 static OTHER_VERSION: OnceLock<String> = OnceLock::new();
 
 fn note_version(answer: &Response) {
@@ -304,7 +308,7 @@ fn note_version(answer: &Response) {
     }
 }
 
-/// The error that an answer of the service cannot be read.
+/// The message that `what`, which came from the service, cannot be read.
 pub(super) fn misunderstood(what: &str) -> String {
     match OTHER_VERSION.get() {
         Some(other) => format!("{what} is not understood: {other}"),
@@ -312,7 +316,8 @@ pub(super) fn misunderstood(what: &str) -> String {
     }
 }
 
-/// The refusal for an answer that does not come from this service, but from something else or in front of it.
+/// The refusal for an answer that does not come from this service, but from another server at its address or in front
+/// of it.
 fn foreign(way: &str, status: StatusCode) -> Refusal {
     Refusal {
         status: status.as_u16(),
@@ -320,7 +325,7 @@ fn foreign(way: &str, status: StatusCode) -> Refusal {
         code: String::new(),
         title: String::new(),
         detail: Some(format!(
-            "{way} answers {status}, but not like a signorini service: is the address right?"
+            "{way} answers {status}, but not like a signorini service: check the address"
         )),
         violations: vec![],
     }

@@ -1,10 +1,10 @@
 //! The settings of `serve`, from the command line, the environment and a file, in this order of precedence. Other
-//! commands that need some of them, such as the folder of the store, read them in the same way.
+//! commands that need some settings, such as the folder of the store, read these in the same way.
 //!
-//! The struct `Config` is the only list of them: the flag, variable, type and values of a setting are taken from clap's
-//! description of it. Values of the file become defaults of the command line, so that clap decides the precedence. No
-//! crate that merges sources is used: it would need a second, serializable form of that struct, and its messages would
-//! differ from those of flags.
+//! The struct `Config` is the only list of the settings: the flag, variable, type and values of a setting are taken
+//! from clap's description of it. Values of the file become defaults of the command line, so that clap decides the
+//! precedence. No crate that merges sources is used: it would need a second, serializable form of that struct, and its
+//! messages would differ from those of flags.
 
 use std::{
     any::TypeId,
@@ -27,7 +27,7 @@ use toml::{
     de::{DeTable, DeValue},
 };
 
-/// The settings, and the file they are read from.
+/// The settings, and the file that they are read from.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -37,17 +37,17 @@ pub(super) struct Arguments {
     pub(super) settings: Config,
 }
 
-/// The file that a command reads its settings from. Other arguments of such a command that have the variables of
-/// settings also take their values from the file.
+/// The option for the file that a command reads its settings from. Other arguments of such a command also take their
+/// values from the file if they have the environment variable of a setting.
 #[derive(Debug, Args)]
 pub(super) struct File {
     /// File of settings, in TOML; each key is the name of an environment variable of `signorini serve --help` without
-    /// SIGNORINI_ and in small letters. Flags and environment variables take precedence over it
+    /// SIGNORINI_ and in small letters. Flags and environment variables take precedence over the file
     #[arg(id = FILE, long = "config", env = "SIGNORINI_CONFIG", value_name = "FILE")]
     path: Option<PathBuf>,
 }
 
-/// The folder of the store, read like the service's setting.
+/// The option for the folder of the store, which is read like the service's setting.
 #[derive(Debug, Args)]
 pub(super) struct Folder {
     #[command(flatten)]
@@ -65,14 +65,14 @@ impl Folder {
 
 /// The id of the argument that names the file; it is not itself a setting.
 const FILE: &str = "settings_file";
-/// The beginning of the names of all variables.
+/// The beginning of the names of all environment variables of settings.
 const PREFIX: &str = "SIGNORINI_";
-/// The largest size of a file of settings.
+/// The largest size of a file of settings (bytes).
 const LARGEST_FILE: u64 = 1 << 20;
-/// The similarity of names from which one is proposed for an unknown one.
+/// The least similarity with an unknown name that a known name must have to be proposed in its place.
 const SIMILAR: f64 = 0.85;
 
-/// An invalid setting, and its place.
+/// An invalid setting: its place, and what is wrong.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Wrong {
     place: String,
@@ -88,9 +88,9 @@ impl fmt::Display for Wrong {
 /// The place `file:line` of each value of the file, by the key of its setting.
 pub(super) type Lines = BTreeMap<String, String>;
 
-/// The command with the values of the file as defaults, and their places; or all errors in the file and in the
-/// variables that the command takes. A command line that is itself invalid, or whose command reads no file, is not
-/// changed.
+/// Makes the values of the file the defaults of the command, and returns the command with the places of these values;
+/// or all errors in the file and in the environment variables that the command takes. The command is unchanged if its
+/// command line is invalid, or it reads no file.
 pub(super) fn with_file(
     command: Command,
     line: &[OsString],
@@ -145,7 +145,7 @@ pub(super) fn with_file(
     Ok((command, lines.collect()))
 }
 
-/// The subcommand that is run, at any depth, and its arguments.
+/// The innermost subcommand of a command line, and its arguments.
 pub(super) fn innermost<'a>(
     command: &'a Command,
     matches: &'a ArgMatches,
@@ -185,7 +185,8 @@ pub(super) fn key(arg: &Arg) -> String {
     name.trim_start_matches(PREFIX).to_ascii_lowercase()
 }
 
-/// Whether a variable is empty, which counts as not set, since many programs that start services write empty variables.
+/// Whether the environment variable of a setting is empty, which counts as not set, since many programs that start
+/// services write empty variables.
 fn is_empty_variable(arg: &Arg) -> bool {
     let value = arg.get_env().and_then(env::var_os);
     value.is_some_and(|value| value.is_empty())
@@ -208,7 +209,7 @@ fn wrong_variables<'a>(settings: impl Iterator<Item = &'a Arg>) -> Vec<Wrong> {
     wrong
 }
 
-/// Variables that look like settings but are none, each with the most similar setting.
+/// Environment variables that look like settings but are none, each with the most similar setting.
 pub(super) fn unknown_variables() -> Vec<(String, String)> {
     const OTHERS: [&str; 3] = ["SIGNORINI_CONFIG", "SIGNORINI_URL", "SIGNORINI_TOKEN"];
     let settings = settings();
@@ -304,10 +305,10 @@ fn check(arg: &Arg, value: &OsStr) -> Result<(), String> {
     })
 }
 
-/// A setting in a file.
+/// The value of a setting in a file.
 #[derive(Debug)]
 struct Value {
-    /// The text, or the texts of a list.
+    /// The text of the value, or the texts of a list.
     texts: Vec<String>,
     place: String,
 }
@@ -327,7 +328,7 @@ fn read(path: &Path) -> Result<String, String> {
     Ok(text)
 }
 
-/// The values of a file by the keys of their settings.
+/// Reads the values of a file, by the keys of their settings; adds errors to `wrong`.
 fn values_of(
     text: &str,
     path: &Path,
@@ -380,7 +381,7 @@ fn values_of(
     values
 }
 
-/// The texts of a value, checked.
+/// Reads the texts of a value, and checks them; the error says what was found and expected.
 fn texts(arg: &Arg, value: &DeValue<'_>) -> Result<Vec<String>, String> {
     let kind = Kind::of(arg);
     let mismatch = |found: &DeValue<'_>| format!("found {}, {}", shown(found), kind.expected());
@@ -420,7 +421,7 @@ fn texts(arg: &Arg, value: &DeValue<'_>) -> Result<Vec<String>, String> {
     Ok(texts)
 }
 
-/// A value for a message, itself if it is short.
+/// Writes a value for a message: the value itself if it is short, otherwise its type.
 fn shown(value: &DeValue<'_>) -> String {
     match value {
         DeValue::String(text) if text.len() <= 60 => format!("{text:?}"),

@@ -56,7 +56,7 @@ pub(super) struct Arguments {
     threads: Threads,
 }
 
-/// The option for the number of processors that a large problem may use. The result is the same, bit for bit.
+/// The option for the number of threads that may solve a large problem. The result does not depend on it in any bit.
 #[derive(Clone, Copy, Debug, Args)]
 pub(super) struct Threads {
     /// Threads for a large problem: 1, or 2 where there are two processors [default: 2]
@@ -65,7 +65,7 @@ pub(super) struct Threads {
 }
 
 impl Threads {
-    /// How many threads may be used.
+    /// The number of threads that may be used.
     pub(super) fn count(self) -> usize {
         let processors = || std::thread::available_parallelism().map_or(1, usize::from);
         self.threads.map_or_else(processors, usize::from)
@@ -141,7 +141,7 @@ pub(super) fn run(
     })
 }
 
-/// Shows a solution in the terminal. Nothing stops it: Ctrl-C ends the process.
+/// Shows a solution in the terminal. It never stops the solver: Ctrl-C ends the process.
 struct Shown<'a> {
     view: &'a mut View,
     threads: &'a Threads,
@@ -170,7 +170,7 @@ impl Observer for Shown<'_> {
     }
 }
 
-/// Refuses what needs more memory than there is; `what` names it.
+/// Refuses to solve something that needs more memory than there is; `what` names it in the message.
 pub(super) fn check_memory(
     estimate: Estimate,
     memory: &MemoryBudget,
@@ -187,7 +187,7 @@ pub(super) fn check_memory(
     Err(refuse(format_args!("{what}: {too_large}")))
 }
 
-/// The mesh that a problem names by the hash of its file, from that file; `None` if it names none.
+/// Reads the mesh that a problem names by the hash of its file; `None` if it names none.
 fn stored_mesh(
     problem: &Problem,
     problem_file: &Path,
@@ -231,7 +231,7 @@ fn stored_mesh(
     Ok(Some((info, mesh)))
 }
 
-/// The hash of the rest of a file, and its number of bytes.
+/// Reads the rest of a file; returns its hash and its number of bytes.
 fn hashed(opened: &mut File) -> std::io::Result<(String, u64)> {
     let mut hash = Sha256::new();
     let (mut piece, mut bytes) = (vec![0; 1 << 16], 0);
@@ -282,7 +282,7 @@ fn only_a_mesh(file: &Path) -> anyhow::Result<Ended> {
     Ok(Ended(Exit::Invalid))
 }
 
-/// The problem in a file, and warnings about deviations from its deck.
+/// Reads the problem in a file; returns it with warnings about what it does not take over from a deck.
 fn problem(file: &Path) -> anyhow::Result<(Problem, Vec<Warning>)> {
     match read(file) {
         Ok(Some(found)) => Ok(found),
@@ -302,8 +302,8 @@ fn problem(file: &Path) -> anyhow::Result<(Problem, Vec<Warning>)> {
     }
 }
 
-/// Reads a file, depending on its extension; `None` for a mesh, or a deck without a step. For a JSON file with a mesh,
-/// only the mesh is held in memory, not its text.
+/// Reads a problem from a file, depending on the file's extension; `None` for a mesh, or a deck without a step. Of a
+/// JSON file with a mesh, only the mesh is held in memory, not its text.
 fn read(file: &Path) -> Result<Option<(Problem, Vec<Warning>)>, ReadError> {
     let mut opened = File::open(file).map_err(ReadError::Io)?;
     let is = |wanted: &str| {
@@ -335,13 +335,13 @@ fn read(file: &Path) -> Result<Option<(Problem, Vec<Warning>)>, ReadError> {
     Ok(Some((problem, warnings)))
 }
 
-/// The command `signorini schema`.
+/// Runs the command `signorini schema`.
 pub(super) fn schema() -> anyhow::Result<Exit> {
     output::print(&format!("{:#}\n", files::schema()))?;
     Ok(Exit::Ok)
 }
 
-/// Prints why a file cannot be used if it could be read.
+/// Prints the violations in a file that could be read; otherwise the error says that it cannot be read.
 fn unreadable(file: &Path, error: ReadError) -> anyhow::Error {
     match error {
         ReadError::Invalid(violations) => invalid(file, &violations),

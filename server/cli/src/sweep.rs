@@ -34,7 +34,7 @@ use super::{
 
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Example:\n  signorini sweep examples/sweeps/stick_width.json -o study.csv\n\nIt is solved on this machine, without a service; `signorini submit` accepts the same file."
+    after_help = "Example:\n  signorini sweep examples/sweeps/stick_width.json -o study.csv\n\nThe sweep is solved on this machine, without a service; `signorini submit` accepts the same file."
 )]
 pub(super) struct Arguments {
     /// The sweep: a JSON file as for POST /v1/sweeps; `base` may also be the path of a problem, relative to that file's
@@ -53,7 +53,7 @@ pub(super) struct Arguments {
     threads: Threads,
 }
 
-/// A file with a sweep. What is for the service only is not used.
+/// The fields of a file with a sweep; fields that only the service uses are ignored.
 #[derive(Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 struct Definition {
@@ -80,7 +80,7 @@ struct Definition {
     _limits: IgnoredAny,
 }
 
-/// How often progress is printed.
+/// The time between two reports of progress.
 const PAUSE: Duration = Duration::from_millis(500);
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
@@ -158,7 +158,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
     })
 }
 
-/// Observes members whose iterations are not shown.
+/// Observes the solution of members, whose iterations are not shown.
 struct Unseen(Threads);
 
 impl Observer for Unseen {
@@ -169,7 +169,7 @@ impl Observer for Unseen {
     }
 }
 
-/// The format of a table by the name of its file; the error says why there is none.
+/// The format of a table according to the name of its file; the error says why there is none.
 pub(super) fn format_of(path: &Path) -> Result<Format, String> {
     if path.as_os_str() == "-" {
         return Ok(Format::Json);
@@ -197,7 +197,7 @@ pub(super) fn format_of(path: &Path) -> Result<Format, String> {
     }
 }
 
-/// The base of a sweep in this file, if it names a file instead of being a problem.
+/// Reads the base of the sweep in `file` from the file that `base` names; `None` if `base` is a problem itself.
 pub(super) fn base_from_file(file: &Path, base: &str) -> anyhow::Result<Option<Box<RawValue>>> {
     if !base.starts_with('"') {
         return Ok(None);
@@ -223,7 +223,7 @@ fn malformed(pointer: &str, found: String) -> Vec<Violation> {
     )]
 }
 
-/// Reads a sweep from a file's text.
+/// Reads a sweep from the text of its file.
 fn read(file: &Path, text: &str) -> anyhow::Result<Sweep> {
     static BODY: Body<Definition> = Body::new();
     let refused = |violations: Vec<Violation>| invalid(file, &violations);

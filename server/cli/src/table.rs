@@ -2,12 +2,12 @@
 
 use unicode_width::UnicodeWidthStr;
 
-/// A text from elsewhere made safe for a terminal: without control characters.
+/// Makes a text from elsewhere safe for a terminal: without control characters.
 pub(super) fn harmless(text: &str) -> String {
     text.replace(char::is_control, "\u{fffd}")
 }
 
-/// A table with a line for each row, below the headings. Columns are as wide as their widest cell.
+/// Writes a table with a line for each row, below the headings. Columns are as wide as their widest cell.
 pub(super) fn table<const N: usize>(headings: [&str; N], rows: &[[String; N]]) -> String {
     let rows: Vec<[String; N]> = rows
         .iter()

@@ -27,13 +27,13 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Create a token and print it; it is not stored and cannot be printed again. The first one must have the scope
+    /// Create a token and print it; it is not stored and cannot be printed again. The first token must have the scope
     /// admin; once there is a token, every request needs one
     Create {
         /// A name for people, such as where the token is used
         #[arg(long)]
         name: String,
-        /// Owner of the jobs that it submits: letters, digits and . _ @ + -
+        /// Owner of the jobs that are submitted with the token: letters, digits and . _ @ + -
         #[arg(long)]
         owner: String,
         /// read, submit, cancel or admin, which includes the others for the jobs of all owners; can be repeated, or a list
@@ -62,7 +62,7 @@ enum Command {
         #[command(flatten)]
         at: TokenStore,
     },
-    /// Give a token a new secret and print it; the old one is refused from then on
+    /// Give a token a new secret and print it; the old secret is refused from then on
     Rotate {
         /// The token's id, as `list` shows it
         id: String,
@@ -71,14 +71,14 @@ enum Command {
     },
 }
 
-/// The options for the place of the tokens.
+/// The options that say where the tokens are: in the folder of a store, or in a running service.
 #[derive(Debug, Args)]
 struct TokenStore {
     #[command(flatten)]
     folder: Folder,
 
     /// Address of a running service, such as http://127.0.0.1:8080. Requests carry the token in SIGNORINI_TOKEN.
-    /// Without it, no server may be using the store
+    /// Without this address, no server may be using the store
     #[arg(long, env = "SIGNORINI_URL", value_name = "URL")]
     url: Option<String>,
 
@@ -86,13 +86,14 @@ struct TokenStore {
     trust: Trust,
 }
 
-/// Whether the command line names a folder and no address, which takes precedence over an address in the environment.
+/// Whether the command line names a folder and no address; the folder then takes precedence over an address in the
+/// environment.
 pub(super) fn names_folder(given: &ArgMatches) -> bool {
     let named = |id: &str| given.value_source(id) == Some(ValueSource::CommandLine);
     named("data") && !named("url")
 }
 
-/// Runs the command. `folder`: the tokens are those of a store, and not of a running service.
+/// Runs the command. `folder`: whether the tokens are in a store, even if the environment has the address of a service.
 pub(super) async fn run(arguments: Arguments, folder: bool) -> anyhow::Result<Exit> {
     match arguments.command {
         Command::Create {
@@ -193,14 +194,15 @@ fn new_token(mut answer: Value) -> anyhow::Result<(Token, String)> {
     Ok((token, secret))
 }
 
-/// Where tokens are changed.
+/// Where tokens are changed: in a store, or in a running service.
 enum Target {
     Store(Arc<Store>),
     Service(Service),
 }
 
 impl TokenStore {
-    /// Opens the store, or connects to the service. `create`: a store may be created; `folder`: the address is ignored.
+    /// Opens the store, or connects to the service. `create`: whether a store may be created; `folder`: whether the
+    /// address is ignored.
     async fn open(&self, create: bool, folder: bool) -> anyhow::Result<Target> {
         let Some(url) = self.url.as_ref().filter(|url| !folder && !url.is_empty()) else {
             let folder = self.folder.path();
@@ -256,7 +258,7 @@ fn state(token: &Token, now: Time) -> String {
     }
 }
 
-/// A table of the tokens, below headings.
+/// Writes a table of the tokens, below headings.
 fn listed(tokens: &[Token]) -> String {
     let now = Time::of_the_machine();
     let row = |token: &Token| {

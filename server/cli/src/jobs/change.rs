@@ -72,7 +72,7 @@ pub(crate) struct Retry {
     #[arg(required = true, value_parser = job)]
     ids: Vec<JobId>,
 
-    /// The most seconds that a new job may run [default: those of the first job]
+    /// The largest number of seconds that a new job may run [default: the limit of the first job]
     #[arg(long, value_name = "SECONDS")]
     timeout: Option<f64>,
 

@@ -18,19 +18,19 @@ pub(super) struct Curve {
     pub(super) points: Vec<(f64, f64)>,
 }
 
-/// Curves over one axis.
+/// A chart: curves over one horizontal axis.
 pub(super) struct Chart {
     pub(super) title: String,
     /// The name of the horizontal axis.
     pub(super) across: String,
     pub(super) curves: Vec<Curve>,
-    /// The vertical axis.
+    /// The kind and the range of the vertical axis.
     pub(super) scale: Scale,
     /// A line of text below the title.
     pub(super) note: Option<String>,
 }
 
-/// The vertical axis.
+/// The kind of a vertical axis.
 pub(super) enum Scale {
     /// A range; parts of a curve beyond it are not drawn.
     Within(Range<f64>),
@@ -38,7 +38,7 @@ pub(super) enum Scale {
     Logarithmic,
 }
 
-/// The colours of curves in their order; they can be distinguished without red or green.
+/// The colours of the first, second and third curve of a chart; they can be distinguished without red or green.
 const COLOURS: [(Color, &str); 3] = [
     (Color::Cyan, "36"),
     (Color::Yellow, "33"),
@@ -46,7 +46,7 @@ const COLOURS: [(Color, &str); 3] = [
 ];
 
 impl Chart {
-    /// The chart as `height` lines of `width` characters.
+    /// Draws the chart as `height` lines of `width` characters.
     pub(super) fn draw(&self, width: u16, height: u16, in_colour: bool) -> String {
         let visible: Vec<Vec<(f64, f64)>> = self
             .curves
@@ -112,7 +112,7 @@ impl Chart {
         )
     }
 
-    /// The title, and the names of the curves in their colours, with the note below them.
+    /// The lines above the chart: the title, and the names of the curves in their colours, with the note below them.
     fn heading(&self, in_colour: bool) -> String {
         let names = self.curves.iter().zip(COLOURS);
         let names =
@@ -137,7 +137,7 @@ impl Chart {
     }
 }
 
-/// The range from the smallest to the largest value, wider than a point.
+/// The range from the smallest to the largest value, widened if both are equal.
 fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
         (low.min(value), high.max(value))
@@ -150,7 +150,7 @@ fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     [low - pad, high + pad]
 }
 
-/// A number with three digits.
+/// Writes a number with up to three digits, or with two and an exponent if it is very small or large.
 fn short(value: f64) -> String {
     match value.abs() {
         0.0 => "0".into(),
@@ -162,7 +162,7 @@ fn short(value: f64) -> String {
     }
 }
 
-/// A text with the escape sequence of its colour.
+/// Puts the escape sequence of a colour around a text, if `in_colour`.
 fn coloured(text: &str, code: &str, in_colour: bool) -> String {
     if in_colour {
         format!("\x1b[{code}m{text}\x1b[0m")
@@ -171,7 +171,7 @@ fn coloured(text: &str, code: &str, in_colour: bool) -> String {
     }
 }
 
-/// The characters of a buffer, with the escape sequences of their colours.
+/// The text of a drawn buffer, with the escape sequences of its colours if `in_colour`.
 fn text_of(buffer: &Buffer, in_colour: bool) -> String {
     let mut text = String::new();
     for y in 0..buffer.area.height {

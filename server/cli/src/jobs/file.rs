@@ -20,7 +20,7 @@ use super::super::{
 /// The largest number of violations that are printed.
 const MOST_TOLD: usize = 100;
 
-/// What a file submits.
+/// What a file submits: a job or a sweep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Job,
@@ -33,9 +33,10 @@ pub(super) struct Submitted {
     /// The text of the file, for counting lines.
     text: String,
     pub(super) kind: Kind,
-    /// The fields of the request as text, so that every number is sent as written.
+    /// The fields of the request as JSON text, so that every number is sent as it is written in the file.
     pub(super) fields: BTreeMap<String, Box<RawValue>>,
-    /// The prefix of pointers in the request that is not part of pointers in the file.
+    /// The beginning of pointers into the request that pointers into the file lack: `/problem` if the file is the
+    /// problem itself, otherwise empty.
     envelope: &'static str,
 }
 
@@ -135,12 +136,12 @@ impl Submitted {
         Ok(serde_json::to_string(&self.fields)?)
     }
 
-    /// Converts a pointer into the request to one into the file.
+    /// Converts a pointer into the request to a pointer into the file.
     pub(super) fn in_file<'a>(&self, pointer: &'a str) -> &'a str {
         pointer.strip_prefix(self.envelope).unwrap_or(pointer)
     }
 
-    /// Prints the violations, with the line of each.
+    /// Prints violations, with the line of the file for each.
     pub(super) fn tell(&self, violations: &[Violation]) {
         let many = match violations.len() {
             1 => "violation",
@@ -172,7 +173,8 @@ impl Submitted {
         }
     }
 
-    /// Prints the violations for which the service has refused the file, if there are any; returns the error unchanged.
+    /// Prints the violations for which the service has refused the file, if `error` has any; returns the error
+    /// unchanged.
     pub(super) fn refused(&self, error: anyhow::Error) -> anyhow::Error {
         if let Some(CallError::Refused(refusal)) = error.downcast_ref() {
             let Refusal { violations, .. } = &**refusal;

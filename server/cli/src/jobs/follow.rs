@@ -18,24 +18,26 @@ use super::{
     id::Id,
 };
 
-/// How long a service that was reached before is tried again, with growing pauses.
+/// The longest time for which a service that was reached before is tried again.
 const PATIENCE: Duration = Duration::from_secs(300);
+/// The pause before the first further attempt; it is doubled before each one after that.
 const FIRST_PAUSE: Duration = Duration::from_millis(250);
+/// The longest pause before a further attempt.
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
-/// The longest time of one waiting request, in seconds, within the limit of the service: a proxy may cut a connection
-/// that is silent for a minute.
+/// The longest time that one request waits for the end of a job (seconds), within the limit of the service: a proxy may
+/// cut a connection that is silent for a minute.
 const WAIT_S: f64 = 30.0;
 
-/// How much later an answer that is due at the end of the time to wait may come.
+/// How much later than the deadline an answer that is due at the deadline may come.
 const GRACE: Duration = Duration::from_secs(5);
 
-/// A time in which the service cannot be reached.
+/// The state of following a service that may be out of reach for a time.
 struct Outage {
-    /// Whether the service has answered before, or a connection to it was open.
+    /// Whether the service has answered before, or a connection to the service was open.
     known: bool,
     since: Option<Instant>,
     pause: Duration,
-    /// The end of the time to wait.
+    /// The time when waiting for the job ends; `None`: never.
     deadline: Option<Instant>,
 }
 
@@ -56,7 +58,7 @@ impl Outage {
         };
     }
 
-    /// Waits before the next attempt, at most until the deadline; or gives up, if the error is permanent or the service
+    /// Pauses before the next attempt, at most until the deadline; returns the error if it is permanent or the service
     /// was never reached.
     async fn bear(&mut self, error: anyhow::Error) -> anyhow::Result<()> {
         let passing = match error.downcast_ref() {
@@ -84,11 +86,11 @@ impl Outage {
     }
 }
 
-/// The result of waiting.
+/// The result of waiting for a job or a sweep.
 pub(super) enum Waited {
-    /// The job or sweep has ended.
+    /// The job or sweep has ended; this is its document.
     Ended(Value),
-    /// The time to wait is over; the last answer of the service, if there was one.
+    /// The deadline has passed; this is the last document from the service, if it sent any.
     TimedOut(Option<Value>),
 }
 
@@ -123,7 +125,7 @@ pub(super) async fn wait(
             Ok(document) => {
                 let Some(status) = status_of(&document) else {
                     bail!(
-                        "the answer to {path} has no status: is this the address of a signorini service?"
+                        "the answer to {path} has no status: check that this is the address of a signorini service"
                     );
                 };
                 if status.is_terminal() {
@@ -143,12 +145,12 @@ pub(super) async fn wait(
     }
 }
 
-/// The status of a job or a sweep.
+/// The status in the document of a job or a sweep.
 fn status_of(document: &Value) -> Option<Status> {
     document["status"].as_str()?.parse().ok()
 }
 
-/// Passes on all events, each once, until there are no more.
+/// Passes each event of a job or sweep to `heard` once, until there are no more or `heard` breaks.
 pub(super) async fn events(
     service: &Service,
     id: Id,
@@ -170,7 +172,7 @@ pub(super) async fn events(
         let kind = answer.headers().get(header::CONTENT_TYPE);
         if !kind.is_some_and(|kind| kind.as_bytes().starts_with(b"text/event-stream")) {
             bail!(
-                "the answer to {path} is no stream of events: is this the address of a signorini service?"
+                "the answer to {path} is no stream of events: check that this is the address of a signorini service"
             );
         }
         outage.over();
@@ -207,7 +209,7 @@ pub(super) fn exit_of(job: &Job) -> Exit {
     }
 }
 
-/// The exit code of a command that waited for the end of this job or sweep.
+/// The exit code of a command that waited for the end of the job or sweep in this document.
 pub(super) fn exit_of_document(id: Id, document: &Value) -> anyhow::Result<Exit> {
     if let Id::Job(_) = id {
         return Ok(exit_of(&super::listing::job(document)?));
@@ -226,7 +228,8 @@ pub(super) fn exit_of_sweep(document: &Value) -> Exit {
     }
 }
 
-/// Ends the process at Ctrl-C, as the signal itself would, and says that the job or sweep continues.
+/// Runs `work`, and ends the process at Ctrl-C as the signal itself would, after printing that the job or sweep
+/// continues.
 pub(super) async fn detached<T>(
     id: Id,
     work: impl Future<Output = anyhow::Result<T>>,

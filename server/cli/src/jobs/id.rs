@@ -1,4 +1,4 @@
-//! The id that a client command takes: that of a job or a sweep.
+//! The id of a job or of a sweep, as client commands take it.
 
 use std::{fmt, str::FromStr};
 

@@ -43,7 +43,7 @@ pub(super) enum Found {
 }
 
 impl Found {
-    /// The documents for this many ids.
+    /// The documents for the ids of a command, a single one if it has one id.
     pub(super) fn of(mut documents: Vec<Value>) -> Found {
         match documents.len() {
             1 => Found::One(documents.remove(0)),
@@ -64,7 +64,7 @@ impl Shown {
         self.format == Format::Table && !self.quiet
     }
 
-    /// Prints jobs or sweeps, one row each.
+    /// Prints jobs or sweeps, with a row for each in a table.
     pub(super) fn print(&self, found: &Found) -> anyhow::Result<()> {
         let documents = found.documents();
         let text = match (self.format, found) {
@@ -78,7 +78,7 @@ impl Shown {
         Ok(output::print(&text)?)
     }
 
-    /// Prints jobs or sweeps; as a table with everything that is known about each.
+    /// Prints jobs or sweeps; in place of a table, everything that is known about each.
     pub(super) fn print_whole(&self, found: &Found) -> anyhow::Result<()> {
         if !self.is_table() {
             return self.print(found);
@@ -95,7 +95,7 @@ impl Shown {
     }
 }
 
-/// A job, read from the service's document.
+/// Reads a job from the service's document.
 pub(super) fn job(document: &Value) -> anyhow::Result<Job> {
     let job = serde_json::from_value(document.clone());
     job.with_context(|| misunderstood("the job"))
@@ -105,7 +105,7 @@ fn is_sweep(document: &Value) -> bool {
     document["members"].is_object()
 }
 
-/// The text of a field: empty if it is absent, without quotation marks.
+/// The value of a field as text, without quotation marks; empty if it is absent.
 fn text(document: &Value, key: &str) -> String {
     match &document[key] {
         Value::Null => String::new(),
@@ -147,7 +147,7 @@ fn lines(documents: &[Value]) -> anyhow::Result<String> {
     Ok(table(headings, &rows))
 }
 
-/// The most important remarks about a job.
+/// The most important remarks about a job, for its row in a table.
 fn notes(job: &Job) -> String {
     let mut notes = vec![];
     match (&job.queue, &job.progress) {
@@ -191,7 +191,7 @@ fn members(sweep: &Value) -> String {
     }
 }
 
-/// A duration for people.
+/// Writes a duration for people.
 pub(super) fn seconds(seconds: f64) -> String {
     match seconds {
         s if s < 10.0 => format!("{s:.3} s"),
@@ -307,7 +307,7 @@ fn sweep_card(sweep: &Value) -> String {
     report::lines(lines.into_iter().flatten())
 }
 
-/// The list as CSV: the columns are the simple values of a job or sweep, but no lists.
+/// Writes jobs or sweeps as CSV: the columns are their simple values, but no lists.
 fn csv(documents: &[Value]) -> anyhow::Result<String> {
     const TEXTS: [&str; 14] = [
         "id",

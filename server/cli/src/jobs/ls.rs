@@ -26,7 +26,7 @@ pub(crate) struct Arguments {
     #[arg(long = "label", value_name = "KEY=VALUE", value_parser = label)]
     labels: Vec<(String, String)>,
 
-    /// At most so many, the newest first; 0: all
+    /// The largest number of jobs or sweeps to list, the newest first; 0: all
     #[arg(short = 'n', long, default_value_t = 20, value_name = "N")]
     limit: usize,
 
@@ -37,7 +37,7 @@ pub(crate) struct Arguments {
     service: Connection,
 }
 
-/// The filters that the service has, each as an option: names and values for a query.
+/// The filters that the service has, each with an option: the names and values for a query.
 #[derive(Debug)]
 struct Filters(Vec<(&'static str, String)>);
 

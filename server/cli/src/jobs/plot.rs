@@ -38,15 +38,15 @@ pub(crate) struct Arguments {
     /// in the terminal
     plot: Option<Plot>,
 
-    /// Write it to this file instead: .svg, .png or .pdf
+    /// Write the figure to this file instead: .svg, .png or .pdf
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
 
-    /// Open it with the program that this machine uses for such a file
+    /// Open the figure with the program that this machine uses for such a file
     #[arg(long)]
     open: bool,
 
-    /// At the end of this load step, by its name or its number from 0 [default: the last]
+    /// Draw the state at the end of this load step, given by its name or its number from 0 [default: the last]
     #[arg(long)]
     step: Option<String>,
 
@@ -61,7 +61,7 @@ pub(crate) struct Arguments {
     service: Connection,
 }
 
-/// The size of a figure in characters if the output is no terminal.
+/// The width and height of a figure in characters if the output is no terminal.
 const SIZE: (u16, u16) = (80, 18);
 
 pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
@@ -163,7 +163,8 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     Ok(Exit::Ok)
 }
 
-/// The number of a load step, given by its name or that number. A problem without load steps has step 0.
+/// The number of a load step that is given by its name or its number; `None` if there is no such step. A problem
+/// without load steps has step 0.
 fn number_of_step(result: &Value, wanted: &str) -> Option<u32> {
     let names = names_of_steps(result);
     let number = names.iter().position(|name| *name == wanted);
@@ -172,7 +173,7 @@ fn number_of_step(result: &Value, wanted: &str) -> Option<u32> {
     number.and_then(|number| u32::try_from(number).ok())
 }
 
-/// The message that there is no such load step, with the existing ones.
+/// The message that a job has no such load step, with the names of the existing steps.
 fn no_step(result: &Value, id: JobId, wanted: &str) -> String {
     let names = names_of_steps(result);
     if names.is_empty() {
@@ -190,8 +191,8 @@ fn names_of_steps(result: &Value) -> Vec<&str> {
     steps.filter_map(|step| step["name"].as_str()).collect()
 }
 
-/// Charts of the stresses along each contact boundary at the end of this step, or of the last one, with the same range
-/// as figures.
+/// Makes charts of the stresses along each contact boundary at the end of load step `step`, or of the last step, with
+/// the range that figures have.
 async fn profiles(
     service: &Service,
     id: JobId,
@@ -260,7 +261,7 @@ async fn profiles(
     Ok(figures)
 }
 
-/// A chart of the residuals by iteration, of this step or of all.
+/// Makes a chart of the residuals by iteration, of load step `step` or of all steps.
 async fn convergence(service: &Service, id: JobId, step: Option<u32>) -> anyhow::Result<Chart> {
     // of one step all rows are wanted, of all steps no more than can be seen
     let thinned = if step.is_some() {
@@ -294,7 +295,7 @@ async fn convergence(service: &Service, id: JobId, step: Option<u32>) -> anyhow:
     })
 }
 
-/// Opens a file with the desktop's program for it.
+/// Opens a file with the desktop's program for files of its type.
 fn open(path: &Path) -> anyhow::Result<()> {
     let program = if cfg!(target_os = "macos") {
         "open"

@@ -53,7 +53,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "STEP")]
     step: Option<String>,
 
-    /// How to print it: csv and jsonl print the profile, unless --history is given
+    /// How to print the result: csv and jsonl print the profile, unless --history is given
     #[arg(short, long, value_enum, default_value_t = Format::Table)]
     format: Format,
 
@@ -69,11 +69,11 @@ pub(crate) struct Arguments {
     service: Connection,
 }
 
-/// The remark about a partial result.
+/// The remark that is printed with a partial result.
 pub(super) const PARTIAL: &str =
     "signorini: the result is partial: the job has not ended, or did not converge";
 
-/// The scalars in the service's answer for a result.
+/// The scalars of a result, as the service answers them.
 #[derive(Deserialize)]
 struct Scalars {
     summary: Summary,
@@ -182,7 +182,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
 }
 
 impl Arguments {
-    /// The query for a profile.
+    /// The query of a request for a profile.
     fn of_profile(&self, format: &str) -> String {
         let mut query = Serializer::new(String::new());
         query.append_pair("format", format);
@@ -191,8 +191,8 @@ impl Arguments {
         query.finish()
     }
 
-    /// The path below the job where the service has the content of a file; `None`: it is in the result. The error names
-    /// the invalid option.
+    /// The path below the job's path at which the service has the content of a file; `None`: the content is part of the
+    /// result. The error names an invalid option.
     fn route(&self, output: &Output) -> Result<Option<String>, String> {
         let part = &output.part;
         let profile = matches!(part, Part::Profile(_));
@@ -232,7 +232,7 @@ impl Arguments {
     }
 }
 
-/// The service's name for a format of rows; a table is made from JSON.
+/// The name of a format of rows in the service; a table is made from JSON.
 fn of_rows(format: Format) -> &'static str {
     match format {
         Format::Table | Format::Json => "json",
@@ -241,7 +241,7 @@ fn of_rows(format: Format) -> &'static str {
     }
 }
 
-/// Prints an answer as it arrives, or as a table.
+/// Prints the answer at this path as it arrives, or as a table.
 async fn print(
     service: &Service,
     path: &str,
@@ -304,8 +304,8 @@ async fn of_sweep(service: &Service, base: &str, arguments: &Arguments) -> anyho
     Ok(Exit::Ok)
 }
 
-/// Writes the table of a sweep to a file, or to standard output: with all members, although the service returns JSON in
-/// pages.
+/// Writes the table of a sweep to a file, or to standard output. JSON, too, has all members, although the service
+/// returns it in pages.
 async fn table(
     service: &Service,
     base: &str,
@@ -345,7 +345,7 @@ struct Page {
     next_page_token: Option<String>,
 }
 
-/// Writes one part of the result to its file.
+/// Writes one part of the result to its file; `route` is the path of the part in the service, `document` the result.
 async fn save(
     service: &Service,
     output: &Output,
@@ -367,13 +367,14 @@ async fn save(
     }
 }
 
-/// Writes a file; it appears when the whole answer has arrived.
+/// Writes an answer to a file, which appears when the whole answer has arrived.
 pub(super) fn download(service: &Service, path: &Path, answer: Response) -> anyhow::Result<()> {
     output::replace(path, |out| write(service, answer, out))
         .with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// Writes an answer piece by piece, since fields may be larger than the memory. This blocks, like `replace`.
+/// Writes an answer piece by piece, since fields may be larger than the memory. This function blocks, as `replace`
+/// does.
 fn write(service: &Service, mut answer: Response, out: &mut dyn Write) -> anyhow::Result<()> {
     loop {
         let piece = block_in_place(|| Handle::current().block_on(answer.chunk()));

@@ -54,11 +54,11 @@ pub(crate) struct Arguments {
     #[arg(long, value_enum)]
     cache: Option<Cache>,
 
-    /// The idempotency key: a submission with the same key finds what the first one created
+    /// The idempotency key: a submission with the same key returns what the first submission has created
     #[arg(long, value_name = "KEY")]
     key: Option<String>,
 
-    /// Wait until all have ended; the exit code is that of `signorini wait`
+    /// Wait until all jobs and sweeps have ended; the exit code is that of `signorini wait`
     #[arg(long)]
     wait: bool,
 
@@ -150,7 +150,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
 }
 
 impl Arguments {
-    /// Puts the options into the request, in place of those that it has.
+    /// Puts the options into the request; an option replaces the value that the file has for it.
     fn add_to(&self, submitted: &mut Submitted) -> anyhow::Result<()> {
         let fields = &mut submitted.fields;
         let mut set = |name: &str, value: Box<RawValue>| fields.insert(name.into(), value);
@@ -184,7 +184,7 @@ impl Arguments {
     }
 }
 
-/// An object in the request, to which an option adds an entry.
+/// Reads the object in the request to which an option adds an entry; empty if the request has none.
 fn object<T: serde::de::DeserializeOwned>(
     found: Option<&RawValue>,
 ) -> anyhow::Result<BTreeMap<String, T>> {

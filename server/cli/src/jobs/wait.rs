@@ -24,7 +24,7 @@ pub(crate) struct Arguments {
     #[arg(required = true)]
     ids: Vec<Id>,
 
-    /// The most seconds to wait for all of them together [default: until they end]
+    /// The largest number of seconds to wait for all jobs and sweeps together [default: until they end]
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     timeout: Option<Duration>,
 
@@ -47,7 +47,8 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     all(&service, &arguments.ids, deadline, &arguments.shown).await
 }
 
-/// Waits for all, prints their final state, and exits with the worst of their codes.
+/// Waits until all jobs and sweeps have ended, or until the deadline, and prints their documents; returns the worst of
+/// their exit codes.
 pub(super) async fn all(
     service: &Service,
     ids: &[Id],

@@ -53,7 +53,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     follow(&service, arguments.id, arguments.format).await
 }
 
-/// Runs the command: prints the events until the last one.
+/// Runs the command: prints the events of a job or sweep until the last one.
 pub(super) async fn follow(service: &Service, id: Id, format: Format) -> anyhow::Result<Exit> {
     let mut watched = Watched {
         view: View::new(To::Output),
