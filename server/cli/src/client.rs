@@ -85,7 +85,7 @@ impl Trust {
     }
 }
 
-/// The proxy that the environment names for this address; `None` if the address is on this machine.
+/// The proxy that the environment names for this address; `None` if it names none, or the address is on this machine.
 fn proxy_to(url: &str) -> Option<Proxy> {
     let url: Uri = url.parse().ok()?;
     if url.host().is_none_or(is_this_machine) {

@@ -19,7 +19,7 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Print the settings that `serve` would have with the same options, as a file that it can read
+    /// Print the settings that `serve` would have with the same options, as a file that `serve` can read
     Show {
         /// Add to each setting where its value comes from: a flag, an environment variable, a line of the file, or the
         /// default

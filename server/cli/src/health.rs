@@ -38,7 +38,7 @@ pub(super) struct Arguments {
     )]
     listen: SocketAddr,
 
-    /// The certificate of `serve`, if no --url is given: TLS is used then. The certificate is not checked, since it
+    /// The certificate of `serve`, if no --url is given: with it TLS is used. The certificate is not checked, since it
     /// need not name this machine, and nothing secret is sent
     #[arg(long, env = "SIGNORINI_TLS_CERT", value_name = "FILE")]
     tls_cert: Option<PathBuf>,

@@ -188,7 +188,7 @@ impl Output {
     }
 }
 
-/// The part of a result that the name of a file has before its extension, or the usual part for the extension.
+/// The part of a result that a file's name states before its extension, or the usual part for the extension.
 fn part(format: Format, stem: &str, contacts: &[&str]) -> Result<Part, String> {
     let words: Vec<&str> = stem.split('.').collect();
     let last = words.last().copied().unwrap_or_default();

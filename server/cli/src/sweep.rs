@@ -41,8 +41,8 @@ pub(super) struct Arguments {
     /// folder
     file: PathBuf,
 
-    /// Write the table to this file, in the format of its extension: .json, .csv, .jsonl, .arrow or .npz; - writes JSON to
-    /// standard output. Without it the table is printed as CSV
+    /// Write the table to this file, in the format of its extension: .json, .csv, .jsonl, .arrow or .npz; - writes JSON
+    /// to standard output. Without a file the table is printed as CSV
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
 

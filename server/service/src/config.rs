@@ -413,7 +413,7 @@ impl ProxyTrust {
         !self.proxies.is_empty()
     }
 
-    /// Whether the proxy at this address is trusted.
+    /// Whether this is the address of a trusted proxy.
     pub fn includes(&self, address: IpAddr) -> bool {
         let address = address.to_canonical();
         self.proxies

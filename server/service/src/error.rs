@@ -273,7 +273,8 @@ pub enum QuotaOf {
 }
 
 impl Quota {
-    /// Seconds after which the same request may succeed; `None` if it exceeds the limit alone, or would store bytes.
+    /// Seconds after which the same request may succeed; `None` if the request exceeds the limit by itself, or would
+    /// store bytes.
     fn retry_after_s(&self, code: Code) -> Option<u64> {
         match self.of {
             _ if self.asked > self.limit => None,

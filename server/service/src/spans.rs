@@ -2,8 +2,8 @@
 //! receive in time are dropped and counted.
 //!
 //! Spans are reported when they have ended, with their times, so that the SDK's layer that follows the code is not
-//! needed. Its queue is not used either, since it does not say how many spans it has dropped. Conversion and transport
-//! are those of the SDK.
+//! needed. The SDK's queue is not used either, since it does not say how many spans it has dropped. The SDK converts
+//! and transports the spans.
 
 use std::{
     borrow::Cow,

@@ -27,7 +27,7 @@ use crate::{
 
 /// The first bytes of each request, up to this number, count for the room of small requests.
 const SMALL_RECEIVED: usize = 16 << 10;
-/// The largest size of a small answer.
+/// The largest size of an answer that takes its share from the room of small answers (bytes).
 const SMALL_SENT: usize = 64 << 10;
 /// The room for small requests together (bytes), and the room for small answers together: each is enough for some
 /// thousand at the same time.

@@ -72,7 +72,7 @@ pub(crate) struct Retry {
     #[arg(required = true, value_parser = job)]
     ids: Vec<JobId>,
 
-    /// The largest number of seconds that a new job may run [default: the limit of the first job]
+    /// The largest number of seconds that a new job may run [default: the limit of the job that is retried]
     #[arg(long, value_name = "SECONDS")]
     timeout: Option<f64>,
 

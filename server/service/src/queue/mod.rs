@@ -1,7 +1,7 @@
 //! The queue: its tasks, and what wakes each of them.
 //!
 //! `workers` slots each hold one job at a time. The dispatcher claims the next job of the store whenever a slot is
-//! free; a submit that finds one free does that in its own transaction, and starts the claimed job in that slot. Each
+//! free; a submission that finds a free slot claims a job in its own transaction, and starts this job in the slot. Each
 //! claim is solved on a blocking thread, or in a process that such a thread feeds (`process`). For each running solver
 //! a recorder task commits its events in batches and then announces that there are new ones; watchers read them from
 //! the store, together. No event travels through a channel to a watcher, so none is repeated, missed, or undone by a
@@ -10,17 +10,17 @@
 //! The solver tells an observer each phase and iteration, and asks it repeatedly, also within long factorisations. The
 //! observer of a job (`solving`) keeps it within its share of memory, and passes its events to a supervisor: the worker
 //! of the job, or, in a worker process, the connection to the service. The worker answers *stop* when the job was
-//! canceled or has reached its time limit. The solver asks for memory before it makes large matrices; where it cannot do
-//! without, the job ends; on a later mesh of adaptive refinement it returns the result of the mesh before. After each
-//! load step but the last the supervisor receives the results so far, which are served while the job runs and kept if it
-//! does not finish.
+//! canceled or has reached its time limit. The solver asks whether there is memory before it makes large matrices; if
+//! there is none for a matrix that it needs, the job ends; on a later mesh of adaptive refinement the solver returns
+//! the result of the mesh before. After each load step but the last the supervisor receives the results so far, which
+//! are served while the job runs and kept if it does not finish.
 //!
 //! A write to the store that fails is repeated until it succeeds, unless the job's own record is damaged.
 //!
 //! A panic costs one job at most: a panic of a worker's task ends its job, tasks of the queue are restarted, and a job
 //! without a worker is requeued (`base::failpoint` lists the places where this is tested).
 //!
-//! A job may be ended by its worker, by a cancel, by a time limit, or requeued when the service stops. Several of them
+//! A job may be ended by its worker, by a cancel, by a time limit, or requeued when the service stops. Several of these
 //! may happen at the same time: the store accepts the first, since it checks in the same transaction that the attempt
 //! is still the current one.
 //!

@@ -31,7 +31,7 @@ const MOST_UNRECORDED: usize = 256;
 /// How long the solver of a job that has reached its time limit may take to return its last state (see `Limits`).
 const TIMEOUT_GRACE: Duration = Duration::from_secs(2);
 
-/// One attempt to solve a job, from claim to end. A panic costs this job alone.
+/// Makes one attempt to solve a job, from the claim to the end. A panic costs this job alone.
 pub(super) async fn run_attempt(
     queue: &Arc<Queue>,
     claim: Claim,

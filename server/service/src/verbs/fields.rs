@@ -29,7 +29,7 @@ pub struct StoredFields {
     pub info: PartInfo,
     id: JobId,
     key: i64,
-    /// The fields in memory, if they had to be read to find their length and fingerprint.
+    /// The fields in memory, if they had to be read to check that they are intact.
     loaded: Option<Arc<LoadedFields>>,
 }
 

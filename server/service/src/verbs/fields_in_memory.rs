@@ -38,7 +38,7 @@ impl FieldsInMemory {
     }
 }
 
-/// Shared fields, as the writer of JSON takes them.
+/// The fields in memory in the form in which the writer of their JSON takes them.
 pub(super) struct Shared(pub(super) Arc<LoadedFields>);
 
 impl Deref for Shared {

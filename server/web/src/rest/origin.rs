@@ -95,8 +95,8 @@ fn host_of(request: &Request) -> Result<Option<Authority>, ApiError> {
     }
 }
 
-/// Whether a host is this service's own. Numeric addresses and the names that this machine has for itself are its own,
-/// since no other site can make them lead to this service.
+/// Whether a host is this service's own: a numeric address or a name that this machine has for itself, neither of which
+/// another site can use for itself, or an allowed host.
 fn is_own_host(host: &Authority, web: &Web) -> bool {
     static MACHINE: LazyLock<String> = LazyLock::new(|| {
         let system = rustix::system::uname();
