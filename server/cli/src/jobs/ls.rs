@@ -15,7 +15,7 @@ use super::{
 #[command(after_help = "Examples:\n  signorini ls --status queued,running\n  \
     signorini ls --label study=radius -n 0 -f csv > study.csv\n  signorini rm $(signorini ls --status failed -q)")]
 pub(crate) struct Arguments {
-    /// Sweeps instead of jobs
+    /// List sweeps instead of jobs
     #[arg(long, conflicts_with_all = ["filters", "labels"])]
     sweeps: bool,
 

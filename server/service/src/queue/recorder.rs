@@ -96,7 +96,7 @@ pub(super) async fn record(
 }
 
 /// Stores a batch, and retries until it is stored; false when the attempt is no longer the current one, the service
-/// stops, or the store cannot be written.
+/// stops, or further attempts are useless.
 async fn store_with_retries(
     queue: &Queue,
     job: &Job,
