@@ -62,7 +62,7 @@ pub fn run(
     Ok(solved)
 }
 
-/// Solves all steps on one body and returns the load history.
+/// A function that solves all steps on one body, and returns the result with the load history.
 type SolveOn<'s, T> = dyn for<'a> FnMut(
         LoadHistory<'a>,
         &ElasticBody,
@@ -256,11 +256,11 @@ pub struct Shared {
     region: Region,
 }
 
-/// The end of a problem without load steps, from which problems with slightly different numbers can start.
+/// The final state of a problem without load steps, from which problems with slightly different numbers can start.
 #[derive(Clone)]
 pub struct End {
     finished: Finished,
-    /// The displacements v of the end before it, if that was the neighbour it started from.
+    /// The displacements v of the final state that this problem started from by [`Start::Next`], if it did.
     before: Option<Vec<f64>>,
     extent: Extent,
 }
@@ -270,10 +270,11 @@ pub struct End {
 pub enum Start<'a> {
     /// The problem's own start.
     Anew,
-    /// The end of a neighbour.
+    /// The final state of a neighbour.
     Near(&'a End),
-    /// The end of a neighbour that was solved just before: its factors may be reused, and if it started from a
-    /// neighbour itself, both are extrapolated. Whether this or [`Start::Near`] is used decides about the last bits.
+    /// The final state of a neighbour that was solved just before: its factors may be reused, and if the neighbour
+    /// itself started from [`Start::Next`], both states are extrapolated. Whether this or [`Start::Near`] is used
+    /// decides about the last bits.
     Next(&'a End),
 }
 
@@ -283,14 +284,14 @@ pub struct Numbers {
     pub finished: Finished,
     /// The scalars by the names of the contacts.
     pub contacts: BTreeMap<String, ContactSummary>,
-    /// The number of rows of the history, or of steps from the neighbour.
+    /// The number of rows of the history, or of iterations from a neighbour.
     pub iterations: u32,
     /// What to consider before relying on the numbers.
     pub warnings: Vec<Warning>,
 }
 
-/// Solves all steps for the numbers at the end only; also returns the end, if others can start from it. If a problem
-/// does not converge well from its start, it is solved as [`run`] does.
+/// Solves all steps for the numbers at the end only; also returns the final state, if other problems can start from it.
+/// If a problem does not converge well from its start, it is solved as [`run`] does.
 pub fn run_to_numbers(
     model: &Model,
     body: &ElasticBody,
@@ -431,19 +432,19 @@ fn steps_of(model: &Model) -> Cow<'_, [Step]> {
     }
 }
 
-/// The result of the same path in other increments.
+/// The result of following a load path again in other increments.
 #[derive(Default)]
 struct Again {
-    /// The quantities at its end; none if it did not converge.
+    /// The quantities at the end of the path; empty if the path did not converge.
     quantities: Vec<Quantity>,
     /// The forces at the end of every step.
     forces: Vec<EndForces>,
     rounding: Option<Rounding>,
 }
 
-/// Solves the same path in these steps, without reporting to the observer. It restores the load history afterwards: the
-/// finer path must not change any result through the common ends of contacts, so that results do not depend on whether
-/// errors are requested.
+/// Follows the load path of `first` again in `steps`, without reporting to the observer. It restores the load history
+/// afterwards: the finer path must not change any result through the common ends of contacts, so that results do not
+/// depend on whether errors are requested.
 fn again_in<'a>(
     first: LoadHistory<'a>,
     steps: &[Step],
@@ -470,7 +471,7 @@ fn again_in<'a>(
     (LoadHistory { system, ..first }, again)
 }
 
-/// Records how much twice the increments change the forces. The load history is restored afterwards.
+/// Records how much the forces change with twice as many increments. The load history is restored afterwards.
 fn note_doubled<'a>(
     model: &Model,
     first: LoadHistory<'a>,
@@ -494,8 +495,8 @@ fn note_doubled<'a>(
     first
 }
 
-/// Whether a next increment can start from this end: the thesis's own iteration may converge to false states and
-/// continue from them.
+/// Whether another increment can start after one with this outcome: the thesis's own iteration may converge to false
+/// states and continue from them.
 fn can_continue(outcome: Outcome) -> bool {
     matches!(outcome, Outcome::Converged | Outcome::FalseConvergence)
 }
@@ -508,17 +509,18 @@ struct LoadHistory<'a> {
     region: Region,
     /// The end of the last increment.
     last: Option<Finished>,
-    /// The load level of that end.
+    /// The load level at the end of the last increment.
     level: Level,
-    /// Whether the anchors have moved since that end.
+    /// Whether the anchors have moved since the end of the last increment.
     anchors_moved: bool,
     rows: Vec<Iteration>,
     row_count: u32,
     increments: u32,
     cut_backs: u32,
-    /// Common ends of contacts that were assigned to one alone, and where both touch in some increment.
+    /// Common ends of contacts that were assigned to one contact alone, although both contacts touch there in some
+    /// increment.
     of_both: BTreeSet<u32>,
-    /// The rounding of that increment so far where it leaves the largest residual.
+    /// The rounding of the increment, of those so far, where rounding leaves the largest residual.
     rounding: Option<Rounding>,
 }
 
@@ -555,7 +557,7 @@ impl<'a> LoadHistory<'a> {
         })
     }
 
-    /// Solves one step after another until one does not converge; returns the last end.
+    /// Solves one step after another until one does not converge; returns the end of the last one solved.
     fn follow(&mut self, steps: &[Step], observer: &mut dyn Observer) -> Option<Finished> {
         let mut last = None;
         for (number, step) in steps.iter().enumerate() {
@@ -601,7 +603,7 @@ impl<'a> LoadHistory<'a> {
         unreachable!("a step has at least one increment: Model::new checks it")
     }
 
-    /// Solves from one part of a step to another, in halves if that does not converge.
+    /// Solves from one part of a step to another; if this does not converge, in two halves.
     fn advance(
         &mut self,
         path: &StepPath<'_>,
@@ -643,7 +645,7 @@ impl<'a> LoadHistory<'a> {
         }
     }
 
-    /// Solves at one level; the next increment starts from a converged end.
+    /// Solves at one load level; the next increment starts from its end if that is converged.
     fn increment(
         &mut self,
         path: &StepPath<'_>,

@@ -8,9 +8,9 @@ const SMALL_FORCE: f64 = 1e-3;
 /// The results that are compared from mesh to mesh.
 pub(super) struct MeshResults<'a> {
     solution: &'a Solution,
-    /// Whether the peak of σ_n has a limit.
+    /// Whether the peak of σ_n has a limit as the mesh is refined.
     normal_peak: bool,
-    /// Whether the peak of σ_t has a limit.
+    /// Whether the peak of σ_t has a limit as the mesh is refined.
     tangential_peak: bool,
 }
 
@@ -56,7 +56,7 @@ impl<'a> MeshResults<'a> {
         }
     }
 
-    /// Largest relative change of the forces, and of the peaks that converge.
+    /// The largest relative change of the forces, and of the peaks that converge, since the mesh of `before`.
     pub(super) fn change(&self, before: &Refinement) -> f64 {
         let now = self.row(None, 0.0);
         let relative = |a: f64, b: f64| {

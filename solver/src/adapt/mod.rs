@@ -33,11 +33,11 @@ const PART_OF_RADIUS: f64 = 0.25;
 pub type Solve<'a> =
     dyn Fn(Model, &mut Origins, &mut dyn Observer) -> Result<Solution, SolveError> + 'a;
 
-/// Solves on finer and finer meshes; returns the solution on the finest, with the sequence of meshes, and that mesh.
+/// Solves on finer and finer meshes; returns the solution on the finest, with the sequence of meshes, and this mesh.
 ///
-/// `first`: the problem on its own mesh. `solve`: solves it there, and on the others. The observer sees the phases of
-/// every mesh, its iterations (but no load steps) as tentative ones, and those of the last mesh again once it is known
-/// to be the last.
+/// `first`: the problem on its own mesh. `solve`: solves the problem on one mesh. The observer sees the phases of every
+/// mesh, its iterations (but no load steps) as tentative ones, and the iterations of the last mesh once more when it is
+/// known to be the last.
 pub fn run(
     problem: &Problem,
     goal: &AdaptiveRefine,
@@ -132,15 +132,15 @@ pub fn run(
 struct Solved {
     solution: Solution,
     mesh: Mesh,
-    /// The warnings while it was solved.
+    /// The warnings that were given while the mesh was solved, not yet passed to the observer.
     warnings: Vec<Warning>,
     /// The largest error by truncation, [`Truncation::error`].
     truncation: f64,
 }
 
 impl Solved {
-    /// The final result: with the sequence of meshes, the reason for its end, and the iterations that the observer has
-    /// not seen yet.
+    /// The final result, with the sequence of meshes and the warning of [`unfinished`], if there is one. Tells the
+    /// observer the warnings and iterations of this mesh.
     fn ended(
         mut self,
         problem: &Problem,
@@ -168,7 +168,7 @@ impl Solved {
     }
 }
 
-/// What was told and answered while one mesh was solved.
+/// The warnings of the solution on one mesh, and what stopped it.
 #[derive(Default)]
 struct OnMesh {
     warnings: Vec<Warning>,
@@ -181,8 +181,8 @@ struct OnMesh {
 /// Observes the solution on one mesh, which may not be the last.
 struct MeshObserver<'a> {
     observer: &'a mut dyn Observer,
-    /// Whether this is not the first mesh: if it needs too much memory, the solution before remains, and that is no
-    /// error.
+    /// Whether this is not the first mesh: if it needs too much memory, the solution on the mesh before is kept, and
+    /// this is no error.
     later: bool,
     on_mesh: OnMesh,
 }
@@ -214,7 +214,7 @@ impl Observer for MeshObserver<'_> {
 }
 
 impl OnMesh {
-    /// Why the solution on this mesh cannot replace the one before.
+    /// Why the solution on this mesh cannot replace the solution on the mesh before; `None` if it can, or was stopped.
     fn failed(&self, solved: &Result<Solution, SolveError>, unknowns: u64) -> Option<StopReason> {
         match (self.short, solved) {
             _ if self.stopped => None,
@@ -229,7 +229,7 @@ impl OnMesh {
     }
 }
 
-/// Why an outcome is no solution; none if it is one, or was stopped.
+/// Why an outcome is no solution; `None` if it is a solution, or was stopped.
 fn unsolved(outcome: Outcome) -> Option<&'static str> {
     match outcome {
         Outcome::Converged | Outcome::Canceled => None,
@@ -268,7 +268,7 @@ fn most_elements(contact: &ContactModel) -> usize {
     MOST_ADAPTIVE_CONTACT_ELEMENTS.max(contact.boundary.edge_count())
 }
 
-/// The next mesh. `parts`: for each of its elements, the element of `graded` that contains it.
+/// Makes the next mesh. `parts`: for each element of the mesh, the element of `graded` that contains it.
 fn finer(
     problem: &Problem,
     graded: &mut GradedMesh,
@@ -310,7 +310,7 @@ fn finer(
 struct Truncation {
     /// The largest such part, divided by the length of its contact.
     error: f64,
-    /// Elements at edges where that part is above the tolerance.
+    /// The elements at edges of which the part left out is above the tolerance.
     elements: Vec<usize>,
 }
 
@@ -375,7 +375,8 @@ fn marks(
     marked
 }
 
-/// The fewest entries that together hold `BULK` of the sum, or the largest few where those are fewer.
+/// Marks the fewest entries that together hold `BULK` of the sum, the largest first, but at least `LEAST_MARKED` of all
+/// entries if so many are not 0.
 fn bulk(parts: &[f64]) -> Vec<bool> {
     let mut order: Vec<usize> = (0..parts.len()).collect();
     order.sort_by(|&a, &b| parts[b].total_cmp(&parts[a]).then(a.cmp(&b)));

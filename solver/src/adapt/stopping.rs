@@ -45,7 +45,7 @@ pub(super) enum StopReason {
 }
 
 impl StopReason {
-    /// Why refinement did not go on; none if there is nothing to say of the last mesh.
+    /// The reason in words, for the last mesh; `None` if the tolerance is met or the first mesh has no solution.
     fn why(&self) -> Option<String> {
         Some(match self {
             StopReason::Elements(count) => format!(
@@ -75,7 +75,7 @@ impl StopReason {
     }
 }
 
-/// Why more meshes would not help; none if they may.
+/// Why more meshes would not help; `None` if they may help.
 pub(super) fn given_up(sequence: &[Refinement], tolerance: f64) -> Option<StopReason> {
     let errors: Vec<Option<f64>> = sequence.iter().map(|row| row.error).collect();
     let recent = |count: usize| &errors[errors.len().saturating_sub(count)..];

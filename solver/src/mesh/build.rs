@@ -275,11 +275,11 @@ fn drop_unused(raw: &mut RawMesh, of_file: usize) -> (u32, BTreeMap<String, u32>
     (remaining as u32, left_out)
 }
 
-/// The elements on each side, which is identified by its midside node.
+/// For each side, identified by its midside node, the elements that have it.
 struct Owners {
-    /// The number of elements that have this node as a midside.
+    /// For each node, the number of elements that have it as a midside.
     count: Vec<u8>,
-    /// The first element that has this node as a midside.
+    /// For each node, the first element that has it as a midside.
     first: Vec<u32>,
 }
 
@@ -324,12 +324,13 @@ fn surface(elements: &[Element], count: &[u8]) -> Vec<Edge> {
 /// The sides of the body's surface.
 struct Surface {
     sides: Vec<Edge>,
-    /// The corners of the sides with their places in `sides`, in order.
+    /// The two corners of each side with its index in `sides`, sorted.
     by_corners: Vec<((u32, u32), u32)>,
 }
 
 impl Surface {
-    /// Two sides between the same corners are neighbours that do not share their midside.
+    /// Finds the surface. Reports two sides between the same corners: they belong to neighbours that do not share a
+    /// midside.
     fn new(raw: &RawMesh, found: &mut Findings) -> Checked<Self> {
         let owners = Owners::new(raw, found)?;
         let sides = surface(&raw.elements, &owners.count);
@@ -390,7 +391,7 @@ impl Surface {
         boundaries
     }
 
-    /// Adds the sides of which a set has all nodes, for each set whose name is free.
+    /// Adds a boundary for each set of nodes whose name is free: the sides all of whose nodes are in the set.
     fn add_sets(
         &self,
         raw: &RawMesh,
@@ -418,7 +419,8 @@ impl Surface {
     }
 }
 
-/// The note that `inside` lines of a name are no sides of the surface; `sides` of them are, under another name.
+/// The note that `inside` of the lines of `name` are no sides of the surface; the other `sides` lines are the boundary
+/// `at_surface`.
 fn lines_inside(name: &str, inside: usize, at_surface: &str, sides: usize) -> Warning {
     let rest = match sides {
         0 => "There is no boundary of that name.".to_owned(),

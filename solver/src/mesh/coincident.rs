@@ -6,15 +6,16 @@ use super::Mesh;
 /// never intended, and files have six digits.
 const SAME_PLACE: f64 = 3e-4;
 
-/// The number of nodes that each one is compared with: in any useful mesh far fewer are as close along one direction.
+/// The largest number of nodes that each node is compared with: in any useful mesh far fewer are as close along
+/// `DIRECTION`.
 const MOST_COMPARED: usize = 200;
 
 /// A unit vector that hardly any line of nodes is perpendicular to, so that nodes next to each other in the order along
 /// it are mostly close to each other.
 const DIRECTION: [f64; 2] = [0.618_181_9, 0.786_035_2];
 
-/// Pairs of nodes on the surface of the body at the same place, within rounding: each node with the one before it, so
-/// that three nodes make two pairs; in the order of the second nodes.
+/// Pairs of nodes on the surface of the body at the same place, within rounding, in the order of the second nodes. Each
+/// node is paired with the one before it, so that three nodes at one place make two pairs.
 pub fn coincident_nodes(mesh: &Mesh) -> Vec<[u32; 2]> {
     let sizes = surface_sizes(mesh);
     let at = |node: u32| mesh.nodes[node as usize];

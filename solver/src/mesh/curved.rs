@@ -8,11 +8,11 @@ use crate::spline::Spline;
 /// Corners of elements lie on a circle if their distance from it is at most this part of its radius.
 const OFF_CIRCLE: f64 = 1e-4;
 
-/// A smooth curve is laid through the corners of a boundary if it turns by less than this (cosine): 45°.
+/// A smooth curve is laid through the corners of a boundary if the boundary turns by less than 45° at each (cosine).
 const SHARPEST: f64 = 0.7;
 
-/// The number of points by which a closed curve is continued beyond its ends; the influence of each is a quarter of
-/// that of the one before.
+/// The number of points by which a closed curve is continued beyond its ends; the influence of each point is a quarter
+/// of the influence of the one before.
 const AROUND: usize = 16;
 
 /// Why a boundary does not lie on its curve.
@@ -31,8 +31,8 @@ pub enum OffCurve {
     Turns(u32, f64),
 }
 
-/// Moves the nodes of a boundary onto its curve: radially onto a circle; for a spline through the corners of its sides,
-/// the midside nodes to the middle between these.
+/// Moves the nodes of a boundary onto its curve: all nodes radially onto a circle; only the midside nodes onto a spline
+/// through the corners, half-way between them.
 pub(super) fn put_on_curve(
     nodes: &mut [[f64; 2]],
     boundary: &[Edge],

@@ -3,8 +3,8 @@
 use crate::element::{Element, Family, edge3};
 use crate::mesh::{Edge, Mesh};
 
-/// The smallest part of a side on either side of the place: smaller ones make needle-shaped elements, whose stiffness
-/// hides that of the others.
+/// The smallest fraction of a side on either side of the place where it is divided: smaller ones make needle-shaped
+/// elements, whose stiffness hides the stiffness of the others.
 const LEAST_PART: f64 = 1e-4;
 
 impl Mesh {

@@ -14,13 +14,14 @@ impl Mesh {
         self.lineage.first_nodes.unwrap_or(all)
     }
 
-    /// The part of a side of the first mesh that this side is, both in its direction; none for a side inside an element
-    /// of the first mesh.
+    /// The part of a side of the first mesh that `edge` is, with the part and the side in the direction of `edge`;
+    /// `None` for a side inside an element of the first mesh.
     pub fn part(&self, edge: &Edge) -> Option<Part> {
         self.lineage.part(edge)
     }
 
-    /// Whether a side has a midside that the mesh's file did not have: displacements of the file are linear there.
+    /// Whether a side has a midside that the mesh's file did not have: displacements given by the file are linear along
+    /// it.
     pub fn is_raised(&self, side: &Edge) -> bool {
         self.added_midsides
             .is_some_and(|first| (first..self.first_nodes()).contains(&side[2]))

@@ -30,7 +30,7 @@ const MOST_UNFOLDING: u32 = 4;
 /// A mesh whose elements are refined one by one, again and again.
 #[derive(Clone)]
 pub struct GradedMesh {
-    /// Nodes, split sides and node sets, without those of closures.
+    /// The nodes, split sides and node sets, without what closures add.
     finer: Finer,
     /// The elements; some have split sides.
     elements: Vec<Part>,
@@ -50,7 +50,7 @@ struct Part {
     element: Element,
     /// The element of the first mesh that contains this part.
     origin: u32,
-    /// How often that element was halved to give this part.
+    /// How often the element of the first mesh was halved to give this part.
     halved: u32,
 }
 
@@ -75,7 +75,8 @@ impl GradedMesh {
         }
     }
 
-    /// The number of elements; each is one element of the mesh or, if closed, several.
+    /// The number of elements before closing; each is one element of the closed mesh or, if its sides are split,
+    /// several.
     pub fn elements(&self) -> usize {
         self.elements.len()
     }
@@ -229,7 +230,7 @@ impl GradedMesh {
     }
 }
 
-/// The unsplit pieces of an edge, in order.
+/// Appends the unsplit pieces of an edge to `into`, in order.
 fn pieces(finer: &Finer, [a, b, mid]: Edge, into: &mut Vec<Edge>) {
     match finer.halves(mid, a) {
         None => into.push([a, b, mid]),
@@ -240,7 +241,7 @@ fn pieces(finer: &Finer, [a, b, mid]: Edge, into: &mut Vec<Edge>) {
     }
 }
 
-/// Divides an element with split sides into elements without; returns the element itself if it has none.
+/// Divides an element with split sides into elements without split sides; returns the element itself if none is split.
 fn closure(finer: &mut Finer, element: &Element) -> Vec<Element> {
     let split: Vec<usize> = element
         .sides()

@@ -1,8 +1,8 @@
 //! How often the quadrilaterals of a mesh are halved across their length before they are divided into four.
 //!
-//! A halved quadrilateral is split along two of its sides once more than along the others. A division passes this on:
-//! to follow its neighbour at a short side by one level, it gets another level ahead at a long one. Where triangles,
-//! whose sides are all split equally, lead from there back to the short side, divisions would never end.
+//! A halved quadrilateral is split along two of its sides once more than along the others. A division passes this on: a
+//! quadrilateral that follows its neighbour at a short side by one level gets another level ahead at a long side. Where
+//! triangles, whose sides are all split equally, lead from there back to the short side, divisions would never end.
 //!
 //! Halvings are therefore limited in advance, such that the elements of the first mesh have *levels* at which none must be
 //! divided because of its neighbours. Adding the same number to all levels keeps this property. No division can then

@@ -160,7 +160,7 @@ fn directed(
                 Reason::RepeatedEdge,
                 format!("{a}–{b} once more"),
                 "each edge once".to_owned(),
-                "A load on it would count twice.",
+                "A load on the edge would count twice.",
             ),
             Some(side) if side.elements == 1 && side.mid == mid => {
                 directed.push(side.directed);
@@ -194,7 +194,7 @@ fn directed(
 struct Side {
     elements: u32,
     mid: u32,
-    /// The same edge, with the body on its right.
+    /// The side as an edge with the body on its right.
     directed: [u32; 3],
 }
 

@@ -4,7 +4,7 @@ use super::Mesh;
 use crate::error::{AllChecks, Findings, Reason, Violation};
 
 /// Checks that no element of an otherwise valid mesh is inverted. `pointer`: makes a JSON Pointer from an element's
-/// number. `of`: the words for the mesh after that number. `at_nodes`: as for [`Mesh::inverted_elements`].
+/// number. `of`: the words for the mesh that follow this number. `at_nodes`: as for [`Mesh::inverted_elements`].
 pub fn check_inverted(
     mesh: &Mesh,
     at_nodes: bool,

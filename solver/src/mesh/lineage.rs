@@ -10,9 +10,9 @@ use super::edge::Edge;
 /// How a mesh was made from the first one.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lineage {
-    /// The number of nodes of the first mesh; none: this is the first mesh.
+    /// The number of nodes of the first mesh; `None` if this is the first mesh.
     pub(super) first_nodes: Option<u32>,
-    /// The parts of its sides that are split, by their midside nodes.
+    /// The parts of split sides of the first mesh, by the midside nodes of the parts.
     parts: HashMap<u32, Part>,
 }
 
@@ -21,7 +21,7 @@ pub struct Lineage {
 pub struct Part {
     /// The side of the first mesh.
     pub side: Edge,
-    /// The part of it, as a side of this mesh.
+    /// The part, as a side of the refined mesh.
     pub edge: Edge,
     /// The range of the part on the side, −1 … 1 from the side's start to its end.
     pub range: [f64; 2],
@@ -43,7 +43,7 @@ impl Part {
         }
     }
 
-    /// The part with the side in the direction of `side`.
+    /// This part with its side of the first mesh in the direction of `side`.
     pub(super) fn of(mut self, side: &Edge) -> Part {
         if self.side[0] != side[0] {
             self.range = self.range.map(|place| -place);
@@ -65,7 +65,7 @@ impl Lineage {
         self.first_nodes.get_or_insert(nodes as u32);
     }
 
-    /// The lineage of a mesh that is made from this one, which has this many nodes.
+    /// The lineage of a mesh that is made from this one; `nodes`: the number of nodes of this mesh.
     pub(super) fn of_finer(&self, nodes: usize) -> Lineage {
         let mut finer = self.clone();
         finer.leave_first(nodes);

@@ -72,7 +72,7 @@ pub struct Mesh {
     /// other fields.
     #[serde(skip)]
     pub nodes_left_out: BTreeMap<String, u32>,
-    /// The relation to the first mesh, which is the one that is stored.
+    /// The relation to the first mesh. It is not stored, since every stored mesh is a first one.
     #[serde(skip)]
     pub lineage: Lineage,
 }

@@ -3,8 +3,8 @@
 use crate::elasticity::Section;
 use crate::mesh::Mesh;
 
-/// A radius below this part of the body's largest counts as 0: mesh generators place nodes on the axis up to rounding,
-/// and the contact area of such a node is pure rounding error.
+/// A radius below this fraction of the body's largest radius counts as 0: mesh generators place nodes on the axis up to
+/// rounding, and the contact area of such a node would be pure rounding error.
 const ROUNDING: f64 = 1e-12;
 
 /// The axis of a body.
@@ -21,7 +21,8 @@ impl Axis {
         Axis { reach }
     }
 
-    /// The ends of a contact that lie on the axis, each with the midside node beside it: numbers along the contact.
+    /// The end nodes of a contact that lie on the axis, each with the midside node beside it, as indices into
+    /// `positions`.
     pub fn ends(&self, positions: &[[f64; 2]]) -> Vec<[usize; 2]> {
         let Some(last) = positions.len().checked_sub(1).filter(|last| *last > 0) else {
             return Vec::new();
@@ -31,7 +32,7 @@ impl Axis {
             .collect()
     }
 
-    /// Whether a place (r, z) lies on the axis; never in the plane.
+    /// Whether the point (r, z) lies on the axis; never true for a body in the plane.
     pub fn holds(&self, [r, _]: [f64; 2]) -> bool {
         self.reach.is_some_and(|reach| r <= reach)
     }

@@ -15,12 +15,12 @@ const SAME_DIRECTION: f64 = 1.0;
 /// The largest number of refinements: more exceed any memory. The caller limits the size itself.
 const MOST_REFINEMENTS: u32 = 20;
 
-/// Stated errors are never below this part of a force: a smaller tolerance is never met.
+/// Stated errors are never below this fraction of a force, so that a smaller tolerance would never be met.
 const LEAST_TOLERANCE: f64 = 1e-4;
 
 impl Checks {
-    /// Makes the mesh with all its names, which refer to the first mesh, and refines it. A fault that concerns only a
-    /// name is recorded in `all`.
+    /// Makes the mesh with all its names, which refer to the mesh before refinement, and refines it. A fault that
+    /// concerns only a name is recorded in `all`.
     pub(super) fn mesh(
         &mut self,
         input: &MeshInput,
@@ -211,7 +211,7 @@ impl Checks {
         })
     }
 
-    /// Reports that the caller passed no mesh for the one that the problem names or contains as text.
+    /// Reports that the caller passed no mesh, although the problem only names its mesh or contains it as text.
     fn absent(&mut self, source: &MeshSource) -> Refused {
         match source {
             MeshSource::Stored(hash) => self.report(
@@ -315,8 +315,8 @@ impl Checks {
                 format!("{pointer}/angle"),
                 Reason::NotUsed,
                 "an angle without a `normal`",
-                "both or neither",
-                "It is the largest angle between a side's normal and `normal`.",
+                "both `normal` and `angle`, or neither",
+                "`angle` is the largest angle between a side's normal and `normal`.",
             ));
         }
         let angle = part.angle.unwrap_or(SAME_DIRECTION);
@@ -326,7 +326,7 @@ impl Checks {
                 Reason::OutOfRange,
                 angle,
                 "0 … 180 degrees",
-                "The largest angle between a side's normal and `normal`.",
+                "`angle` is the largest angle between a side's normal and `normal`.",
             ));
         }
         Ok(())
@@ -383,7 +383,7 @@ impl Checks {
         Err(self.report(pointer, Reason::NotAChain, got, expected, hint))
     }
 
-    /// A boundary value at start, end and midside of each of its edges.
+    /// The values of a boundary value at the start, end and midside of each edge.
     pub(super) fn along(
         &mut self,
         mesh: &Mesh,
@@ -412,7 +412,7 @@ fn within(ranges: &[Option<[f64; 2]>; 2], place: &[f64; 2], size: f64) -> bool {
     })
 }
 
-/// Whether the normal of a side has the direction that its part requires.
+/// Whether the normal of a side, given by its nodes, has the direction that the boundary part requires.
 fn faces(part: &BoundaryPart, nodes: &[[f64; 2]; 3]) -> bool {
     let Some([x, y]) = part.normal else {
         return true;

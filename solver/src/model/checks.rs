@@ -54,7 +54,7 @@ impl Checks {
     }
 }
 
-/// The expected value where a name is unknown: one of those that the mesh has, or the remark that it has none of the
+/// The expected value where a name is unknown: one of the names that the mesh has, or the remark that the mesh has no
 /// `kind`.
 pub(super) fn one_of<'a>(kind: &str, names: impl ExactSizeIterator<Item = &'a String>) -> String {
     match names.len() {
@@ -63,7 +63,7 @@ pub(super) fn one_of<'a>(kind: &str, names: impl ExactSizeIterator<Item = &'a St
     }
 }
 
-/// The existing names in a list, or the first of them.
+/// A list of the existing names, cut after the first ones if there are many.
 pub(super) fn known<'a>(names: impl ExactSizeIterator<Item = &'a String>) -> String {
     const SHOWN: usize = 20;
     let count = names.len();

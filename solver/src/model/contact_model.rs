@@ -15,8 +15,8 @@ use crate::problem::{Condition, NormalOf, Obstacle};
 pub struct AlongDirection {
     /// The direction, a unit vector.
     pub direction: [f64; 2],
-    /// The obstacle that is pushed. Gaps are of first order in the indentation; those of the displaced obstacle are
-    /// not.
+    /// The obstacle that is pushed. [`ContactModel::gap`] is of first order in the indentation; the gap to the
+    /// displaced obstacle is not.
     pub obstacle: Arc<Obstacle>,
 }
 
@@ -33,16 +33,18 @@ pub struct ContactModel {
     pub profile: Vec<f64>,
     /// The obstacle between the nodes and at its corners, in order of s.
     pub places: Vec<Place>,
-    /// Whether the obstacle is a curve with a place of its own; else it follows the body's surface at a distance.
+    /// Whether the obstacle is a curve in space; otherwise it is given by its distance from the body's surface.
     pub in_space: bool,
     /// The slope of the obstacle along the body's t, at the first and at the last node.
     pub end_slopes: [f64; 2],
-    /// Edges inside which the obstacle ends, which are not part of Γ_C, and the length of each that it covers.
+    /// The edges inside which the obstacle ends, each with the length of it that the obstacle covers; they are not part
+    /// of Γ_C.
     pub cut: Vec<(Edge, f64)>,
     /// How far the obstacle is pushed against the body (length).
     pub indentation: f64,
-    /// The components of a unit push against the contact's normal and along its t, at each node. Without a direction
-    /// they are 1 and 0 for the body's normal, and the cosine and minus the sine of the slope for the obstacle's.
+    /// The components of a unit push against the contact's normal and along its tangent t, at each node. Without a
+    /// given direction they are 1 and 0 where the contact uses the body's normal, and the cosine and minus the sine of
+    /// the obstacle's slope where it uses the obstacle's normal.
     pub push: Vec<[f64; 2]>,
     /// The direction of the indentation, if one is given.
     pub along: Option<AlongDirection>,
@@ -50,14 +52,14 @@ pub struct ContactModel {
     pub outward: Vec<[f64; 2]>,
     /// The obstacle's own displacement along the contact's t (length).
     pub tangential_displacement: f64,
-    /// Whether sliding changes neither gap nor place: a straight obstacle without ends along a whole straight side of
-    /// the body.
+    /// Whether sliding of the obstacle changes neither the gap nor the place of contact: a straight obstacle without
+    /// ends along a whole straight side of the body.
     pub endless: bool,
     /// Which normal the contact uses.
     pub normal: NormalOf,
     /// The contact condition.
     pub condition: Condition,
-    /// The exponent m if the profile is a power |c|^m: a contact's width then grows like δ^(1/m).
+    /// The exponent m if the obstacle's profile is a power |c|^m: the contact's width then grows like δ^(1/m).
     pub power: Option<f64>,
     /// The friction law; absent: frictionless.
     pub friction: Option<FrictionLaw<Average>>,

@@ -19,7 +19,7 @@ use crate::mesh::{self, Edge, Mesh};
 use crate::problem::{Algorithm, Condition, Contact, NormalOf, Problem, Step};
 use crate::solution::WarningCode;
 
-/// The friction law of a contact; none: frictionless.
+/// The friction law of a contact; `None` if the contact is frictionless.
 pub(super) type Law = Option<FrictionLaw<Average>>;
 
 /// The sharpest corner between two contact edges without a warning: 20° (angle).
@@ -32,7 +32,7 @@ const SHARPEST_CORNER: f64 = 0.795;
 /// on the contact, and between two lines of symmetry its cost grows with the radius.
 const LARGEST_RADIUS: f64 = 10.0;
 
-/// Slopes of obstacles above this do not come from rounded coordinates in a file.
+/// An obstacle's slope above this is intended, not an effect of rounded coordinates in a file.
 const NO_SLOPE: f64 = 1e-3;
 
 /// The sine of the smallest angle between two normals at a common node, or between a normal and a support: 6°. Below it
@@ -68,7 +68,7 @@ impl Checks {
         (models, all.finish(()))
     }
 
-    /// Contact number i, without regard to the others.
+    /// Checks contact number `i` without regard to the other contacts, and makes its model.
     #[allow(clippy::too_many_arguments)] // all that a contact is made from
     fn contact(
         &mut self,
@@ -141,8 +141,8 @@ impl Checks {
         })
     }
 
-    /// Checks nodes of two contacts. Two contacts may have a common end, a corner, where the two normals are its axes;
-    /// no other node may belong to two contacts.
+    /// Checks the nodes that belong to two contacts. Two contacts may have a common end at a corner, where the two
+    /// normals are the node's axes; no other node may belong to two contacts.
     fn shared_nodes(
         &mut self,
         model: &ContactModel,
@@ -172,7 +172,7 @@ impl Checks {
                         Reason::SharedNode,
                         format!("node {node} at ({x}, {y}), also in contact `{}`", other.name),
                         "contacts without common nodes, or with a common end at which two normals differ by more than 6°; none bonded, and not with algorithm `thesis`",
-                        "End one of them one edge earlier with `from` or `to`.",
+                        "End one of the contacts one edge earlier with `from` or `to`.",
                     ));
                 }
                 corners.push(*node);
@@ -225,7 +225,7 @@ impl Checks {
         all.finish(())
     }
 
-    /// Checks that the chain can carry a pressure, and that its obstacle and friction are valid on it.
+    /// Checks that a contact boundary can carry a pressure, and that its obstacle and friction are valid on it.
     fn sound(
         &mut self,
         boundary: &ContactBoundary,
@@ -305,7 +305,8 @@ impl Checks {
         }
     }
 
-    /// The part of the boundary that faces the obstacle, one chain, and the edges inside which the obstacle ends.
+    /// The part of a boundary that faces the obstacle, which must be one chain, and the edges inside which the obstacle
+    /// ends.
     pub(super) fn facing_run(
         &mut self,
         mesh: &Mesh,
@@ -333,7 +334,7 @@ impl Checks {
                 Reason::NotAChain,
                 "a closed loop",
                 "a chain of edges with two ends",
-                "Name a part of it.",
+                "Name a part of the loop under /mesh/boundaries.",
             ));
         }
         let mut facing = obstacle::facing(mesh, run, held, &contact.obstacle);
@@ -500,7 +501,7 @@ impl Checks {
     }
 }
 
-/// The directions, with their errors, of nodes that supports hold along one direction.
+/// The nodes that supports hold along one direction only, each with this direction and its error.
 fn along_one_direction(fixed: &BTreeMap<u32, Held>) -> HeldDirections {
     let one = |(node, held): (&u32, &Held)| match *held {
         Held::Along {
@@ -512,13 +513,13 @@ fn along_one_direction(fixed: &BTreeMap<u32, Held>) -> HeldDirections {
 }
 
 /// Divides sides of contacts where their obstacles end, so that the ends are at nodes and no edge is left out.
-/// Obstacles that are not `sound` are skipped, since the problem is refused anyway.
+/// `contacts`: each with whether its obstacle is sound; the others are skipped, since the problem is refused anyway.
 pub(super) fn put_nodes_at_ends<'a>(
     mesh: &mut Mesh,
     contacts: impl Iterator<Item = (&'a Contact, bool)>,
     steps: &[Step],
 ) {
-    /// The most ends inside edges: two of an obstacle, and where a curve is hidden.
+    /// The largest number of ends of one obstacle inside edges: its two ends, and the places where a curve is hidden.
     const MOST_ENDS: usize = 16;
     let factors = steps
         .iter()
@@ -586,9 +587,9 @@ fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }
 
-/// Turns the normals to those of the obstacle if the contact uses them; returns the components of a unit push along
-/// normal and tangent. At the angle whose tangent is the slope p′ of the profile, m = (n − p′ t)/√(1 + p′²); the push
-/// is along −n.
+/// Turns the normals of the boundary to those of the obstacle, if the contact uses the obstacle's normals. Returns the
+/// components of a unit push along normal and tangent at each node. The obstacle's normal is m = (n − p′ t)/√(1 + p′²),
+/// with the slope p′ of the profile; the push is along −n.
 fn turn_normals(
     boundary: &mut ContactBoundary,
     run: &FacingRun,

@@ -9,11 +9,11 @@ use super::level::Level;
 use super::supports::Held;
 use crate::problem::Step;
 
-/// For each common node that belongs to one contact alone: that contact, by its place in the model.
+/// Each common node of two contacts that belongs to one of them alone, with the index of this contact in the model.
 pub type Alone = BTreeMap<u32, usize>;
 
-/// A first guess of the contact that each common node belongs to: the one whose obstacle overlaps the body there; if
-/// neither does, the nearer one; both if both do. A prescribed friction bound acts wherever the body is.
+/// A first guess of the contact that each common node belongs to: the one whose obstacle overlaps the body there; both
+/// if both obstacles do; the nearer one if none does. A contact with a prescribed friction bound counts as overlapping.
 pub(super) fn guess(
     contacts: &[ContactModel],
     fixed: &BTreeMap<u32, Held>,
@@ -45,7 +45,8 @@ pub(super) fn guess(
     alone
 }
 
-/// The nodes of two contacts, with both by their places in `contacts`; without supported nodes, which need both.
+/// The nodes that belong to two contacts, with the indices of both in `contacts`; without supported nodes, which always
+/// belong to both.
 pub(super) fn common(
     contacts: &[ContactModel],
     fixed: &BTreeMap<u32, Held>,

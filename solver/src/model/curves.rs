@@ -6,8 +6,8 @@ use crate::mesh::{self, Mesh, OffCurve};
 use crate::problem::{Curve, CurveKind, MeshInput};
 
 impl Checks {
-    /// Moves nodes of boundaries onto their curves. `of`: the words for the mesh, for messages about an element that
-    /// this inverts.
+    /// Moves nodes of boundaries onto their curves. `of`: the words for the mesh in messages about an element that is
+    /// inverted by the move.
     pub(super) fn curves(&mut self, mesh: &mut Mesh, input: &MeshInput, of: &str) -> Checked {
         let mut all = AllChecks::default();
         for (name, curve) in &input.curves {
@@ -75,7 +75,7 @@ impl Checks {
                     "node {node} at {:?}, {distance:.3e} from the circle",
                     at(node)
                 ),
-                format!("corners of elements within {most:.3e} of it, 1e-4 of the radius"),
+                format!("corners of elements within {most:.3e} of the circle, 1e-4 of its radius"),
                 "Check the center and the radius; name the part of the boundary that lies on the circle.",
             ),
             OffCurve::Turns(node, angle) => (

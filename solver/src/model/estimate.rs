@@ -16,15 +16,16 @@ pub struct Estimate {
     pub dofs: u64,
     /// The peak memory (bytes), overestimated rather than underestimated.
     pub memory_bytes: u64,
-    /// The time on one thread (seconds), between the actual time and several times that on a machine of 2024, if
-    /// friction needs no more iterations than usual. For adaptive refinement: the time of the largest mesh.
+    /// The time on one thread of a machine of 2024 (seconds): between one and several times the actual time, if
+    /// friction needs no more iterations than usual. For adaptive refinement, the time of the largest mesh.
     pub run_s: f64,
 }
 
 /// The most elements of a mesh of adaptive refinement.
 pub const MOST_ADAPTIVE_ELEMENTS: usize = 60_000;
 
-/// The most elements of such a mesh at one contact: the dense system of the contact grows with their square.
+/// The most elements at one contact of a mesh of adaptive refinement: the dense system of a contact grows with their
+/// square.
 pub const MOST_ADAPTIVE_CONTACT_ELEMENTS: usize = 600;
 
 /// The most elements of the mesh on which the last mesh of adaptive refinement is verified: as many as refinement
@@ -38,7 +39,7 @@ pub struct MostElements {
 }
 
 impl MostElements {
-    /// The limits for refinement that starts from this model.
+    /// The limits for adaptive refinement that starts from the model `first`.
     pub fn of(first: &Model) -> Self {
         let at_contact = |contact: &ContactModel| {
             MOST_ADAPTIVE_CONTACT_ELEMENTS.max(2 * contact.boundary.edge_count())
@@ -63,19 +64,19 @@ pub struct MeshSize {
 #[derive(Clone, Copy, Debug, Default)]
 struct Size {
     nodes: f64,
-    /// The unknowns on all contacts.
+    /// The number of unknowns on all contacts.
     contact: f64,
-    /// The entries of all averages.
+    /// The number of entries of all averages.
     weights: f64,
-    /// The friction points on all contacts.
+    /// The number of friction points on all contacts.
     points: f64,
-    /// The nodes and friction points on all contacts, with results for each step.
+    /// The number of nodes and friction points on all contacts, which have results for each step.
     profile: f64,
-    /// The contacts, each with a summary and warnings for each step.
+    /// The number of contacts, each with a summary and warnings for each step.
     contacts: f64,
     steps: f64,
     increments: f64,
-    /// How many more times the solution is computed.
+    /// How many times the contacts are solved: once, and again for comparisons.
     repeats: f64,
 }
 
@@ -86,8 +87,8 @@ const BYTES_PER_ELEMENT: f64 = 80.0;
 /// The most elements that can be numbered, with up to eight nodes each.
 const MOST_ELEMENTS: f64 = u32::MAX as f64 / 8.0;
 
-/// Estimates memory and time by the number of elements alone: a first bound, not above [`Model::estimate`], which
-/// refuses what would be too large to mesh. `stored` is the size of the mesh that the problem names by its hash.
+/// Estimates memory and time from the number of elements alone: a lower bound of [`Model::estimate`], by which a
+/// problem is refused before it is meshed. `stored`: the size of the mesh that the problem names by its hash.
 ///
 /// # Errors
 ///
@@ -151,7 +152,7 @@ pub fn estimate(problem: &Problem, stored: Option<&MeshSize>) -> Result<Estimate
 
 impl Model {
     /// Estimates the cost of solving this model of `problem`, overestimated rather than underestimated. For adaptive
-    /// refinement it is that of the largest mesh. With `accuracy: verify` the refined mesh is counted too.
+    /// refinement it is the cost of the largest mesh. With `accuracy: verify` the refined mesh is counted too.
     pub fn estimate(&self, problem: &Problem) -> Estimate {
         let adaptive = matches!(problem.mesh.refine, Refine::Adaptive(_));
         let own = self.size(adaptive);
@@ -186,7 +187,8 @@ impl Model {
         self.size(false).estimate(MARGIN)
     }
 
-    /// The largest mesh on which the last mesh of adaptive refinement is verified.
+    /// The size of the largest mesh on which the last mesh of adaptive refinement is verified. `own`: the size of this
+    /// model.
     fn largest_halved(&self, own: &Size) -> Size {
         let most = MostElements::of(self);
         let at_contacts: f64 = most.at_contacts.iter().map(|most| *most as f64).sum();
@@ -237,7 +239,8 @@ impl Model {
 /// The number of nodes for each element of a large mesh, overestimated.
 const NODES: f64 = 3.1;
 
-/// How far the factors of meshes of other shapes exceed those that the estimate is fitted to.
+/// By how much the factors of meshes of other shapes may exceed the factors of the meshes that the estimate is fitted
+/// to.
 const MARGIN: f64 = 1.2;
 
 impl Size {
@@ -255,7 +258,7 @@ impl Size {
         }
     }
 
-    /// The memory for a solution with its mesh and all steps, while another one is computed (bytes).
+    /// The memory that a solution takes, with its mesh and all steps, while another solution is computed (bytes).
     fn held(&self) -> u64 {
         (500.0 * self.nodes + self.history()) as u64
     }
@@ -301,7 +304,7 @@ const PER_CONTACT: f64 = 4e3;
 /// The memory for the smallest problem, most of it for compressing its result (bytes).
 const FLOOR: f64 = 393_216.0;
 
-/// The numbers of the size that come from contacts.
+/// The numbers of [`Size`] that come from contacts.
 #[derive(Clone, Copy, Debug, Default)]
 struct Along {
     nodes: f64,
@@ -357,7 +360,7 @@ fn acts(contact: &ContactModel) -> bool {
     law.is_some_and(|law| law.bound.acts())
 }
 
-/// The numbers of a contact with this many elements where every average reaches all nodes.
+/// The numbers of a contact with `elements` elements, if every average reaches all nodes.
 fn every_average(elements: f64) -> Along {
     let (nodes, points) = (2.0 * elements + 1.0, 3.0 * elements);
     Along {

@@ -119,7 +119,7 @@ impl Checks {
                         Reason::RepeatedPoint,
                         format!("{:?} twice", points[i]),
                         "points that differ from the previous ones",
-                        "Remove one of them.",
+                        "Remove one of the two equal points.",
                     ));
                 }
             }
@@ -214,7 +214,7 @@ impl Checks {
         }
     }
 
-    /// Checks a table: increasing places, and one value for each.
+    /// Checks a table: at least two strictly increasing places `x`, and one value of `y` for each.
     fn table(&mut self, x_at: &str, x: &[f64], y_at: &str, y: &[f64], what: &str) -> Checked {
         let mut all = AllChecks::default();
         if x.len() < 2 {
@@ -333,7 +333,7 @@ impl Checks {
             at("cohesion"),
             friction.cohesion,
             "a stress ≥ 0",
-            "It is added to the friction bound in contact.",
+            "Cohesion is added to the friction bound in contact.",
         ));
         if let Some(cap) = friction.shear_cap {
             let hint = "The largest tangential stress that the surface can bear.";
@@ -356,7 +356,7 @@ impl Checks {
         (law, all.finish(()))
     }
 
-    /// Checks a prescribed bound, which excludes the fields that would determine one.
+    /// Checks a prescribed friction bound, with which the fields that a bound would be computed from are not allowed.
     fn prescribed_bound(
         &mut self,
         friction: &Friction,
@@ -376,7 +376,7 @@ impl Checks {
                     at(name),
                     Reason::NotUsed,
                     "a value in addition to `bound`",
-                    "one of the two",
+                    "either this field or `bound`",
                     "A prescribed bound does not depend on pressure; remove this field or `bound`.",
                 ));
             }

@@ -13,7 +13,7 @@ struct Stress {
     /// The sign: −1 for a pressure, which pushes against the normal.
     sign: f64,
     values: [BoundaryValue; 2],
-    /// The names of the two values in the load.
+    /// The names of the fields in the load that have the two values.
     fields: [&'static str; 2],
 }
 
@@ -146,8 +146,8 @@ impl Checks {
         Ok(())
     }
 
-    /// The nodes of a boundary from its start. There must be `count` of them, on the first mesh (`true`) or on this
-    /// one.
+    /// The nodes of a boundary from its start on, if there are `count` of them on the first mesh (then with `true`) or
+    /// on this mesh (then with `false`).
     fn nodes_in_order(
         &mut self,
         mesh: &Mesh,

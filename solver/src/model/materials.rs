@@ -125,7 +125,7 @@ impl Checks {
         })
     }
 
-    /// The material of every element: that of its group, else the one without a group.
+    /// The material of every element: that of the element's group, else the material without a group.
     fn elements_of(&mut self, materials: &[Material], mesh: &Mesh) -> Checked<Vec<u16>> {
         const NONE: u16 = u16::MAX;
         let mut all = AllChecks::default();
@@ -192,7 +192,7 @@ impl Checks {
     }
 }
 
-/// A constant with its name, if it is given.
+/// The name and value of a material constant, for a list in a message; empty if the constant is not given.
 fn named(name: &str, value: Option<f64>) -> String {
     value.map_or(String::new(), |value| format!(", {name} = {value}"))
 }

@@ -96,7 +96,7 @@ pub struct Model {
     pub open_on_axis: BTreeSet<u32>,
     /// Whether the supports leave a rigid motion free, which contact must prevent.
     pub held_by_contact: bool,
-    /// The load steps; none: one step to the given values.
+    /// The load steps; if empty, one step leads to the given values.
     pub steps: Vec<Step>,
     /// The tolerance and limits of the solver.
     pub controls: SolverControls,
@@ -136,12 +136,13 @@ impl Model {
         self.loads.body_force.map(|f| level.loads * f)
     }
 
-    /// The nodes of two contacts, with both by their places in the model; without supported nodes, which need both.
+    /// The nodes that belong to two contacts, with the indices of both in `contacts`; without supported nodes, which
+    /// always belong to both.
     pub fn common_nodes(&self) -> BTreeMap<u32, [usize; 2]> {
         corners::common(&self.contacts, &self.fixed)
     }
 
-    /// The same problem with other common nodes assigned to one contact alone.
+    /// A copy of the model with `alone` as the common nodes that belong to one contact alone.
     pub fn with_alone(&self, alone: Alone) -> Model {
         Model {
             oblique: contacts::oblique(&self.contacts, &self.fixed, &alone),
@@ -150,7 +151,7 @@ impl Model {
         }
     }
 
-    /// The same problem with other open nodes on the axis.
+    /// A copy of the model with `open_on_axis` as the contact nodes on the axis that stay open.
     pub fn with_open_on_axis(&self, open_on_axis: BTreeSet<u32>) -> Model {
         Model {
             open_on_axis,
@@ -158,8 +159,8 @@ impl Model {
         }
     }
 
-    /// Whether an obstacle is hollow at the axis: before deformation the node there is further from it than the midside
-    /// node beside it.
+    /// Whether an obstacle is hollow at the axis: before deformation the node there is further from the obstacle than
+    /// the midside node beside it.
     pub fn hollow_at_axis(&self) -> bool {
         self.contacts.iter().any(|contact| {
             let ends = self.axis.ends(&contact.boundary.positions);

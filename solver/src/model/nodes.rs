@@ -23,7 +23,7 @@ pub(super) struct FirstSides<'a> {
 }
 
 impl<'a> FirstSides<'a> {
-    /// Finds these sides; only if the problem gives anything at nodes.
+    /// Finds the sides, if the problem gives forces or displacements at nodes; else none.
     pub(super) fn new(mesh: &'a Mesh, problem: &Problem) -> Self {
         let at_nodes = |load: &Load| matches!(load, Load::Force(..) | Load::Nodal(..));
         let given = problem.loads.iter().any(at_nodes)
@@ -39,8 +39,8 @@ impl<'a> FirstSides<'a> {
         FirstSides { mesh, sides }
     }
 
-    /// Transfers forces at nodes of the first mesh to this mesh: first each load on sides of the surface all of whose
-    /// nodes it names, then the rest of all loads, which may be given node by node.
+    /// Transfers forces at nodes of the first mesh to this mesh: first, for each load, the forces on surface sides all
+    /// of whose nodes the load names; then the remaining forces of all loads together, which may be given node by node.
     pub(super) fn carried(&self, loads: Vec<Forces>) -> Vec<(u32, [f64; 2])> {
         let mut found = Vec::new();
         let mut left = Forces::new();
@@ -63,7 +63,8 @@ impl<'a> FirstSides<'a> {
         found
     }
 
-    /// Removes the forces on all nodes of some of these sides, and adds them as forces on the nodes of their parts.
+    /// Removes from `forces` the forces on all nodes of `sides`, and adds them to `found` as forces on the nodes of the
+    /// sides' parts.
     fn spread(
         &self,
         forces: &mut Forces,
@@ -129,7 +130,7 @@ impl<'a> FirstSides<'a> {
         found
     }
 
-    /// Whether all nodes of a side are given, apart from a midside that its file did not have.
+    /// Whether all nodes of a side are given, apart from a midside that the mesh's file did not have.
     fn is_given(&self, [a, b, mid]: &Edge, given: impl Fn(u32) -> bool) -> bool {
         let raised = || self.mesh.is_raised(&[*a, *b, *mid]);
         given(*a) && given(*b) && (given(*mid) || raised())
@@ -141,7 +142,8 @@ impl<'a> FirstSides<'a> {
 /// side.
 ///
 /// With the side's shape functions h_i(ξ), −1 ≤ ξ ≤ 1, and the forces F_i on its nodes, the traction per dξ is the
-/// combination q of the h_i with ∫ q h_i dξ = F_i. On a part of it, it has the forces ∫ q H_k dξ with the part's H_k.
+/// combination q of the h_i with ∫ q h_i dξ = F_i. The forces on the nodes of a part of the side are ∫ q H_k dξ, with
+/// the shape functions H_k of the part.
 fn on_part([start, end]: [f64; 2], middle: Option<f64>, places: [f64; 3]) -> [f64; 3] {
     if places == [-1.0, 1.0, 0.0]
         && let Some(middle) = middle

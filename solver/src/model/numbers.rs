@@ -10,8 +10,8 @@ use crate::problem::{
     Problem, Step, ThesisOptions, ThesisPressure, Units,
 };
 
-/// What the thesis's own iteration does not support in a contact: how to find it, and the field, what it is, what is
-/// supported, and why.
+/// What the thesis's own iteration does not support in a contact: the test for it, the field, what was found, what is
+/// supported, and the reason.
 #[rustfmt::skip] // a table
 const NOT_OF_THE_THESIS: [(OfContact, [&str; 4]); 7] = [
     (|contact| contact.condition != Condition::Unilateral, [
@@ -115,7 +115,7 @@ impl Checks {
                     Reason::TooLong,
                     format!("{characters} characters"),
                     format!("at most {MOST} characters"),
-                    "It is a label on axes, such as mm or MPa.",
+                    "A unit is a label on axes, such as mm or MPa.",
                 ));
             }
         }
@@ -129,7 +129,7 @@ impl Checks {
                 "/analysis/thickness",
                 thickness,
                 "a length > 0",
-                "Forces are proportional to it.",
+                "Forces are proportional to the thickness.",
             ),
             Analysis::PlaneStrain {} | Analysis::Axisymmetric {} => Ok(()),
         }
@@ -162,7 +162,7 @@ impl Checks {
                 Reason::NotUsed,
                 "`verify` without a contact",
                 "`verify` with `contacts` only",
-                "It verifies the forces, peak stresses and extents of contacts.",
+                "`verify` is about the forces, peak stresses and extents of contacts.",
             ));
         }
         all.check(self.require(
@@ -170,7 +170,7 @@ impl Checks {
             "/solver/tolerance",
             controls.tolerance,
             "a number from 1e-14 to below 1",
-            "It bounds dimensionless residuals; 1e-10 is the default.",
+            "The tolerance bounds dimensionless residuals; 1e-10 is the default.",
         ));
         all.check(self.require(
             (1..=100_000).contains(&controls.max_iterations),
@@ -222,7 +222,7 @@ impl Checks {
                 Reason::NotUsed,
                 format!("`thesis` with triangles (element {e} is one)"),
                 "a mesh of quadrilaterals",
-                "Its rows of Gauss points exist in quadrilaterals only; choose another algorithm.",
+                "The rows of Gauss points that it uses exist in quadrilaterals only; choose another algorithm.",
             ));
         }
         Ok(())
@@ -239,7 +239,7 @@ impl Checks {
                     Reason::NotUsed,
                     "`thesis` options with another algorithm",
                     "no `thesis` options unless \"algorithm\" is \"thesis\"",
-                    "Choose that algorithm, or remove the options.",
+                    "Choose the algorithm `thesis`, or remove the options.",
                 ));
             }
             return Ok(());

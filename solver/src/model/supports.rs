@@ -27,7 +27,7 @@ pub enum Held {
         direction: [f64; 2],
         /// The displacement along it (length).
         value: f64,
-        /// How far the direction may deviate from that of the surface (angle); 0 along x and y.
+        /// How far the direction may deviate from the direction of the surface (angle); 0 along x and y.
         #[serde(skip)]
         error: f64,
     },
@@ -49,8 +49,8 @@ impl Held {
         }
     }
 
-    /// Adds a displacement prescribed along a direction with an error. `Err`: a different value is prescribed already.
-    /// Directions that differ by no more than their errors are equal.
+    /// Adds a displacement prescribed along a direction with an error. `Err`: the different value that is already
+    /// prescribed. Directions that differ by no more than their errors are equal.
     fn and(self, along: [f64; 2], value: f64, error: f64, rounding: f64) -> Result<Self, f64> {
         let ([a, b], first, own) = match self {
             Held::Along {

@@ -34,7 +34,8 @@ impl Checks {
         );
     }
 
-    /// A possible cause where a body falls into parts, or a boundary into pieces; empty where all nodes are merged.
+    /// A hint for messages about a body that falls into parts, or a boundary into pieces: nodes that are not merged may
+    /// be the cause. Empty if all nodes are merged.
     pub(super) fn hint_to_merge(&self, mesh: &Mesh) -> String {
         let Some(&[first, second]) = self.unmerged.first() else {
             return String::new();

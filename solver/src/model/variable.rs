@@ -11,7 +11,7 @@ pub struct VariableModel {
     model: Model,
     /// The model's problem, without the mesh.
     problem: Problem,
-    /// Warnings that do not depend on these numbers.
+    /// The warnings that do not depend on the variable numbers.
     lasting: Vec<Warning>,
 }
 
@@ -122,7 +122,7 @@ fn same_boundary((a, b): (&Contact, &Contact)) -> bool {
 }
 
 impl Checks {
-    /// The laws of a problem on the contacts of a model, with checks of everything that may differ.
+    /// The friction laws of `problem` on the contacts of `model`; checks every number that may differ.
     fn numbers(
         &mut self,
         problem: &Problem,

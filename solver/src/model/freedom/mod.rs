@@ -40,8 +40,8 @@ impl Checks {
         all.finish(true)
     }
 
-    /// Checks that a body which only contact holds along a motion, all of it on one side, is pressed there by a load:
-    /// pushing an obstacle against it would only move it away. `loads`: at every node.
+    /// Checks that a load presses a body which along some motion is held by contact on one side only: pushing an
+    /// obstacle against the body would only move it away. `loads`: the forces at every node.
     pub(super) fn pressed(
         &mut self,
         mesh: &Mesh,
@@ -130,7 +130,8 @@ impl Checks {
     }
 }
 
-/// The motions in words, after "free to move"; a node that moves most by one of them; whether that is a rotation.
+/// The free motions in words that follow "free to move"; a node that moves most by one of the motions; whether the
+/// motions are only a rotation.
 fn in_words(parts: &Parts<'_>, free: &Free) -> (String, u32, bool) {
     let (words, motion, turns) = parts.words(&free.moved, &free.motions);
     let moved = |node: &u32| {
@@ -181,7 +182,7 @@ fn works(moves: &BTreeMap<u32, [f64; 2]>, loads: &[[f64; 2]]) -> bool {
     power.abs() > ALIGNED * most
 }
 
-/// The support that prevents a translation.
+/// The support that prevents the translation described by `words`.
 fn towards(words: &str) -> &'static str {
     match words {
         "along x" => "`ux`",
@@ -216,11 +217,11 @@ pub(super) fn motion_left(
 pub struct RigidMotion {
     /// The motion in words, after "free to move".
     pub words: String,
-    /// The nodes that move, and how: by 1 in a translation; in a rotation the node farthest from the centre of the part
-    /// by 1.
+    /// The nodes that move, with their displacements: of length 1 in a translation; in a rotation, of length 1 at the
+    /// node farthest from the centre of the part.
     pub moves: Vec<(u32, [f64; 2])>,
-    /// In a rotation, the distance of that node from the centre (length): multiplied by the power of a force it is the
-    /// moment.
+    /// In a rotation, the distance of the farthest node from the centre (length): the work of a force in the motion,
+    /// times `arm`, is the force's moment.
     pub arm: Option<f64>,
 }
 

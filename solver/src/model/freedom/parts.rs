@@ -17,11 +17,11 @@ use crate::mesh::Mesh;
 /// The largest number of parts in one mechanism that are examined: the elimination is cubic in them.
 pub(super) const MOST_HINGED: usize = 64;
 
-/// The largest number of parts in all mechanisms together.
+/// The largest number of parts in all mechanisms together that are examined.
 pub(super) const MOST_IN_MECHANISMS: usize = 10 * MOST_HINGED;
 
-/// The number of rows for each part of a mechanism. Parts that do not overlap share nodes in at most 3 k pairs, and a
-/// pair gives four rows at most; each part has two of its own.
+/// The number of rows for each part of a mechanism. k parts that do not overlap share nodes in at most 3 k pairs, and a
+/// pair gives four rows at most; each part has two rows of its own.
 const MOST_ROWS: usize = 14;
 
 /// A node, and a direction along which it is held.
@@ -31,7 +31,7 @@ pub struct Hold {
     pub node: u32,
     /// The direction (unit vector).
     pub direction: [f64; 2],
-    /// The error of the direction, where it is that of a curved surface (angle).
+    /// The error of the direction, if it is the direction of a curved surface (angle).
     pub error: f64,
 }
 
@@ -66,11 +66,11 @@ pub(super) struct Free {
     /// The part that moves, or several that move as one.
     pub(super) moved: Part,
     pub(super) motions: Vec<Motion>,
-    /// The number of the part, or of the first one.
+    /// The number of the part that moves, or of the first of several.
     pub(super) number: usize,
     /// The number of parts that move as one.
     pub(super) together: usize,
-    /// The number of further motions of parts hinged to these.
+    /// The number of further motions of parts hinged to the moving ones.
     pub(super) more: usize,
 }
 
@@ -83,7 +83,7 @@ pub(super) struct Parts<'a> {
     pub(super) parts: Vec<Part>,
     /// The first part that each node belongs to.
     first: Vec<u32>,
-    /// All parts of the nodes that belong to several.
+    /// For each node that belongs to several parts, all its parts.
     pub(super) shared: BTreeMap<u32, Vec<u32>>,
     /// Motions that no part can have: in axisymmetry the first and the last.
     pub(super) never: &'static [Motion],
@@ -135,7 +135,7 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// The remainder of a row orthogonal to others, which are orthonormal.
+/// The component of `row` orthogonal to `rows`, which are orthonormal.
 fn rest(rows: &[Motion], mut row: Motion) -> Motion {
     // twice is enough
     for _ in 0..2 {
@@ -147,7 +147,7 @@ fn rest(rows: &[Motion], mut row: Motion) -> Motion {
     row
 }
 
-/// Makes a row orthonormal to others and adds it; a row that they contain adds nothing.
+/// Makes `row` orthonormal to `rows` and adds it to them; a row in their span adds nothing.
 pub(super) fn add(rows: &mut Vec<Motion>, row: Motion, tolerance: f64) {
     let row = rest(rows, row);
     let length = dot(&row, &row).sqrt();
@@ -200,7 +200,7 @@ impl<'a> Parts<'a> {
         }
     }
 
-    /// The free motions that remain if these nodes are held.
+    /// The free motions that remain if the nodes `held` are held.
     pub(super) fn unheld(&self, held: &[Hold]) -> Vec<Unheld> {
         let rows = self.rows(held);
         let mut found = Vec::new();
@@ -280,8 +280,8 @@ impl<'a> Parts<'a> {
         rows
     }
 
-    /// The two rows of a part that are all that holds it, where a third row is only an error of directions: as for a
-    /// ring that can turn in a sleeve, whose mesh is not an exact circle.
+    /// The two rows that alone hold a part, if its third row is only an error of directions, as for a ring that can
+    /// turn in a sleeve whose mesh is not an exact circle.
     fn firm(&self, part: &Part, exact: &[&Hold], inexact: &[&Hold]) -> Option<Vec<Motion>> {
         let at = |one: &Hold| self.mesh.nodes[one.node as usize];
         let row = |one: &Hold| part.row(at(one), one.direction);

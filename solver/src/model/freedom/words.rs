@@ -3,7 +3,7 @@
 use super::parts::{Motion, Part, Parts, add, dot};
 
 impl Parts<'_> {
-    /// One to three motions in words, one of them, and whether they are only a rotation.
+    /// One to three motions in words, one of these motions, and whether the motions are only a rotation.
     pub(super) fn words(&self, part: &Part, motions: &[Motion]) -> (String, Motion, bool) {
         if !self.never.is_empty() {
             return ("along the axis".to_owned(), [0.0, 1.0, 0.0], false);
@@ -61,7 +61,7 @@ impl Parts<'_> {
         (words, first, turns)
     }
 
-    /// The centre of a rotation (by 1) of a part, in words: a node that it shares, or a position.
+    /// The centre of a rotation (by 1) of a part, in words: a node that the part shares with another, or a position.
     fn centre(&self, part: &Part, rotation: &Motion) -> String {
         let centre = [
             part.centre[0] - rotation[1] * part.size,
