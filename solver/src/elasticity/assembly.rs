@@ -1,4 +1,4 @@
-//! `assemble_element`, `ElementStiffness`, `assemble_loads`: thesis (2.18), (2.20), (2.27), (2.28).
+//! The stiffness and loads of elements on the unknowns of a body, thesis (2.18), (2.20), (2.27), (2.28).
 
 use std::collections::HashMap;
 
@@ -27,8 +27,8 @@ pub enum Dof {
 pub struct Axes {
     /// The unit vectors along which the displacement is measured.
     pub along: [[f64; 2]; 2],
-    /// The displacement vectors for which one component is 1 and the other 0: equal to `along` if those vectors are
-    /// perpendicular, otherwise their dual basis. Components of a force are taken along these.
+    /// The displacement vectors for which one component is 1 and the other 0: equal to `along` if the vectors of
+    /// `along` are perpendicular, otherwise their dual basis. Components of a force are taken along `moves`.
     pub moves: [[f64; 2]; 2],
 }
 
@@ -57,14 +57,15 @@ impl Axes {
 pub struct DofMap {
     /// The two components of every node.
     pub dofs: Vec<[Dof; 2]>,
-    /// The axes of a node's two components; absent: x and y.
+    /// The axes of the two components of every node; `None` where they are x and y.
     pub axes: Vec<Option<Axes>>,
     /// The number of unknowns.
     pub unknowns: usize,
 }
 
 impl DofMap {
-    /// Displacements of every node along x and y, from the unknowns and from the prescribed ones times `supports`.
+    /// The displacements of every node along x and y, from the unknown components and from `supports` times the
+    /// prescribed ones.
     pub fn displacements(&self, unknown: impl Fn(usize) -> f64, supports: f64) -> Vec<[f64; 2]> {
         let node = |(dofs, axes): (&[Dof; 2], &Option<Axes>)| {
             let [a, b] = dofs.map(|dof| match dof {
@@ -82,7 +83,7 @@ impl DofMap {
         self.dofs.iter().zip(&self.axes).map(node).collect()
     }
 
-    /// Displacements of every node along x and y for several fields at once, without prescribed displacements.
+    /// The displacements of every node along x and y for several fields at once; prescribed components count as 0.
     pub fn displacements_together<const FIELDS: usize>(
         &self,
         unknowns: &[[f64; FIELDS]],
@@ -99,7 +100,7 @@ impl DofMap {
         self.dofs.iter().zip(&self.axes).map(node).collect()
     }
 
-    /// The node of an unknown, and its direction.
+    /// The node that an unknown belongs to, and the direction of the unknown.
     pub fn place_of(&self, unknown: usize) -> (u32, [f64; 2]) {
         let is_it = |dof: &Dof| matches!(dof, Dof::Free(i) if *i == unknown);
         let places = self.dofs.iter().zip(&self.axes).enumerate();
@@ -114,7 +115,7 @@ impl DofMap {
         }
     }
 
-    /// Converts a force on a node along x and y to forces on its two components.
+    /// Converts a force on a node along x and y to forces on the node's two components.
     pub fn to_axes(&self, node: usize, [x, y]: [f64; 2]) -> [f64; 2] {
         match self.axes[node] {
             None => [x, y],
@@ -129,9 +130,9 @@ impl DofMap {
 /// Element stiffness k_ij = ∫ B_iᵀ D B_j, along x and y; 16 × 16, symmetric. The last four rows and columns of a
 /// triangle are zero.
 ///
-/// `material`: its number in the section; one that is nearly incompressible has the element of [`Mixed`], with the full
-/// rule. `quadrature`: with 3 only the rigid modes have no stiffness; with 2 a quadrilateral has another mode without
-/// stiffness, which its neighbours may or may not suppress.
+/// `material`: the number of the material in the section; a nearly incompressible one has the element of [`Mixed`],
+/// with the full rule. `quadrature`: with 3 only the rigid modes have no stiffness; with 2 a quadrilateral has another
+/// mode without stiffness, which its neighbours may or may not suppress.
 pub fn assemble_element(
     family: Family,
     nodes: &[[f64; 2]; 8],
@@ -155,12 +156,12 @@ fn stiffness(masters: &Masters, section: &Section, shape: &Shape) -> [[f64; 16];
 pub struct ElementStiffness<'a> {
     elements: Elements<'a>,
     map: &'a DofMap,
-    /// The matrices of the shapes that several elements have.
+    /// The matrices of the shapes that several elements share.
     of_shapes: Vec<[[f64; 16]; 16]>,
 }
 
 impl<'a> ElementStiffness<'a> {
-    /// The stiffness of these elements on the unknowns of `map`.
+    /// The stiffness of `elements` on the unknowns of `map`.
     pub fn new(elements: Elements<'a>, map: &'a DofMap) -> Self {
         let (tables, section) = (elements.tables, elements.section);
         let of_shape = |shape| stiffness(&tables.masters, section, shape);
@@ -201,7 +202,7 @@ impl<'a> ElementStiffness<'a> {
         }
     }
 
-    /// Forces on the unknowns due to the prescribed displacements, −K_fp u_p.
+    /// The forces on the unknowns due to the prescribed displacements u_p, −K_fp u_p.
     pub fn load_of_supports(&self) -> Vec<f64> {
         let (mesh, map) = (self.elements.mesh, self.map);
         let mut load = vec![0.0; map.unknowns];
@@ -231,8 +232,8 @@ impl<'a> ElementStiffness<'a> {
 }
 
 impl Elements<'_> {
-    /// Numbers that are equal for elements with the same matrix on the same unknown components of their nodes; none for
-    /// an element with a unique shape.
+    /// A number for each element; elements with the same number have the same matrix on the same unknown components of
+    /// their nodes. `None` for an element with a unique shape.
     pub fn kinds(self, map: &DofMap) -> Vec<Option<u32>> {
         let (mut known, mut turned) = (HashMap::new(), HashMap::new());
         let mut kind = |(e, element): (usize, &Element)| {
@@ -255,7 +256,7 @@ impl Elements<'_> {
     }
 }
 
-/// Turns rows and columns of node `i` to its axes: k ← Q k Qᵀ.
+/// Turns the rows and columns of node `i` in a stiffness matrix to the node's axes: k ← Q k Qᵀ.
 fn rotate(k: &mut [[f64; 16]; 16], i: usize, [n, t]: [[f64; 2]; 2]) {
     let (a, b) = (2 * i, 2 * i + 1);
     for column in 0..16 {
@@ -335,8 +336,9 @@ pub fn assemble_loads(
     forces
 }
 
-/// Adds the effect of the body force on the bubbles of nearly incompressible elements to the nodes: `forces` of
-/// [`assemble_loads`] add up to the load, and become the right-hand side of the stiffness, whose bubbles are condensed.
+/// Adds the effect of the body force on the bubbles of nearly incompressible elements to the forces on the nodes: the
+/// `forces` of [`assemble_loads`] add up to the load, and become the right-hand side of the stiffness, from which the
+/// bubbles are eliminated.
 pub fn condense_body_force(mesh: &Mesh, section: &Section, loads: &Loads, forces: &mut [[f64; 2]]) {
     if loads.body_force == [0.0; 2] || !section.has_split() {
         return;

@@ -76,8 +76,8 @@ pub(super) struct Stations {
     pub(super) rule: Vec<Station>,
     /// Stations at the superconvergent points.
     pub(super) stress: Vec<Station>,
-    /// The weights of the superconvergent points in the linear extrapolation to each node; zero beyond the element's
-    /// nodes.
+    /// The weights of the superconvergent points in the linear extrapolation to each node; zero for the two entries
+    /// that a triangle has no nodes for.
     pub(super) to_nodes: AtNodes<[f64; 4]>,
 }
 
@@ -111,7 +111,7 @@ impl Master {
 }
 
 impl Masters {
-    /// The places for a number of Gauss points; `quadrature` as in `assemble_element`.
+    /// Tabulates the master elements for a number of Gauss points; `quadrature` as in `assemble_element`.
     pub(super) fn new(quadrature: u32) -> Self {
         Masters {
             families: [Family::Quad, Family::Triangle].map(|f| Master::new(f, quadrature)),
@@ -165,7 +165,8 @@ fn symmetric(k: &[[[[f64; 8]; 2]; 2]; 8]) -> [[f64; 16]; 16] {
     whole
 }
 
-/// Adds weight Bᵀ D B to k_ij, by the directions of i and j and then by j, so that eight values are computed at once.
+/// Adds weight Bᵀ D B to k_ij; `k` is ordered by node and direction of i, then by direction and node of j, so that
+/// eight values are computed at once.
 #[inline(always)]
 fn add_stiffness(station: &Station, moduli: &Moduli, k: &mut [[[[f64; 8]; 2]; 2]; 8]) {
     let Station {
@@ -201,12 +202,12 @@ pub struct ElementTables {
     pub quadrature: u32,
     pub(super) shapes: Shapes,
     pub(super) masters: Masters,
-    /// The stations of every shape.
+    /// The stations of every shape that several elements share.
     stations: Vec<Stations>,
 }
 
 impl ElementTables {
-    /// The tables for the elements of a mesh; `quadrature` as in `assemble_element`.
+    /// The tables for the elements of `mesh`; `quadrature` as in `assemble_element`.
     pub fn new(mesh: &Mesh, section: &Section, quadrature: u32) -> Self {
         let (shapes, masters) = (Shapes::new(mesh, section), Masters::new(quadrature));
         let stations = |shape| masters.stations(section, shape);
@@ -218,7 +219,7 @@ impl ElementTables {
         }
     }
 
-    /// The elements of the mesh and section that these tables are for.
+    /// The elements of the mesh and section that the tables were made for.
     pub fn elements<'a>(&'a self, mesh: &'a Mesh, section: &'a Section) -> Elements<'a> {
         Elements {
             mesh,

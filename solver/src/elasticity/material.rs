@@ -15,16 +15,17 @@ pub type Moduli = [[f64; COMPONENTS]; COMPONENTS];
 /// 1, 0, 1) (2G and λ for an isotropic material).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Split {
-    /// The resistance to all strains except that of `bulk`; positive definite.
+    /// The resistance to strains without the part of `bulk`; positive definite.
     pub rest: Moduli,
     /// The resistance to a change of volume (stress).
     pub bulk: f64,
 }
 
-/// λ/G = 2ν/(1 − 2ν) of an isotropic material with ν = .48: above it a material is nearly incompressible.
+/// The limit of λ/G = 2ν/(1 − 2ν), the value of an isotropic material with ν = .48: above it a material is nearly
+/// incompressible.
 const NEARLY_INCOMPRESSIBLE: f64 = 24.0;
 
-/// About λ/G for ν = .49999: a larger bulk modulus is not used as a measure of forces.
+/// The largest λ/G in a measure of forces, about the value for ν = .49999.
 const STIFFEST: f64 = 1e5;
 
 impl Split {
@@ -51,9 +52,9 @@ impl Split {
 pub struct Section {
     analysis: Analysis,
     moduli: Vec<Moduli>,
-    /// The split of every material that is nearly incompressible.
+    /// The two parts of the moduli of every material; `None` for one that is not nearly incompressible.
     splits: Vec<Option<Split>>,
-    /// The material of every element; empty: the first for all.
+    /// The number of every element's material; empty if all elements have the first material.
     material_of: Vec<u16>,
 }
 
@@ -63,7 +64,7 @@ impl Section {
         Section::by_element(analysis, vec![moduli], Vec::new())
     }
 
-    /// A body of several materials, with the number of the material for every element.
+    /// A body of several materials. `material_of`: the number of the material of every element.
     pub fn by_element(analysis: Analysis, moduli: Vec<Moduli>, material_of: Vec<u16>) -> Self {
         Section {
             analysis,
@@ -104,8 +105,8 @@ impl Section {
         self.splits.iter().any(Option::is_some)
     }
 
-    /// The factor of every integral over the section at the first coordinate x: thickness, or r.
-    /// The 2π of axisymmetry is left out here and enters totals only.
+    /// The factor of every integral over the section at the first coordinate x: the thickness, or the radius r. The 2π
+    /// of axisymmetry is left out here and enters totals only.
     pub fn depth(&self, x: f64) -> f64 {
         match self.analysis {
             Analysis::PlaneStrain {} => 1.0,
@@ -114,7 +115,7 @@ impl Section {
         }
     }
 
-    /// The factor from an integral with `depth` to a total: 2π in axisymmetry, else 1.
+    /// The factor that turns an integral with [`Section::depth`] into a total: 2π in axisymmetry, else 1.
     pub fn circumference(&self) -> f64 {
         if self.axisymmetric() {
             2.0 * std::f64::consts::PI
@@ -128,7 +129,7 @@ impl Section {
         matches!(self.analysis, Analysis::Axisymmetric {})
     }
 
-    /// Strain of one node's unit displacements (columns ux, uy): the node's part of B.
+    /// The strain by unit displacements of one node (columns ux, uy): the node's part of B.
     #[rustfmt::skip]
     pub fn strain(&self, shape: f64, gradient: [f64; 2], x: f64) -> [[f64; 2]; COMPONENTS] {
         let [dx, dy] = gradient;
@@ -216,8 +217,8 @@ pub fn orthotropic(analysis: &Analysis, material: &Orthotropic) -> Option<Moduli
     Some(moduli)
 }
 
-/// The inverse of a symmetric matrix whose last row and column may be zero (σ_zz = 0) and then
-/// stay so; `None` when the rest is not positive definite.
+/// The inverse of a symmetric matrix. A last row and column of zeros (σ_zz = 0) is left out and stays zero; `None` if
+/// the remaining matrix is not positive definite.
 pub fn inverse(matrix: &Moduli) -> Option<Moduli> {
     let n = if matrix[COMPONENTS - 1][COMPONENTS - 1] == 0.0 {
         COMPONENTS - 1

@@ -75,7 +75,7 @@ impl<'a> Mixed<'a> {
         family.rule(3)
     }
 
-    /// The element with these nodes, of a material with this split.
+    /// The element with the node positions `nodes`, of a material with the given split.
     pub fn new(
         section: &Section,
         split: &'a Split,
@@ -85,7 +85,7 @@ impl<'a> Mixed<'a> {
         Self::integrate(section, split, family, nodes, |_, _| {})
     }
 
-    /// Integrates over the element. `visit`: called at every integration point, with its weight.
+    /// Integrates over the element. `visit`: called at every integration point with its weight and strain matrix.
     fn integrate(
         section: &Section,
         split: &'a Split,
@@ -160,7 +160,7 @@ impl<'a> Mixed<'a> {
         std::array::from_fn(|j| (0..3).map(|k| own[k] * self.dilatation[k][j]).sum())
     }
 
-    /// The stiffness of the nodes, along x and y; zero beyond the nodes of a triangle.
+    /// The stiffness of the nodes, along x and y; the last rows and columns are zero for a triangle.
     pub fn stiffness(
         section: &Section,
         split: &Split,
@@ -244,7 +244,7 @@ pub struct Inside<'a> {
 }
 
 impl Inside<'_> {
-    /// Adds the bubble's part to the strain of the nodes at a place.
+    /// Adds the bubble's part to `strain`, the strain by the nodes' displacements at a place.
     pub fn add_strain(
         &self,
         section: &Section,
@@ -277,9 +277,9 @@ impl Inside<'_> {
 pub(super) struct OfNodes<'a> {
     split: &'a Split,
     frame: Frame,
-    /// The displacement a of the bubble by each of the nodes' displacements.
+    /// The displacement a of the bubble by a unit displacement of each node along x and y.
     bubble: [[f64; 16]; 2],
-    /// The coefficients of the projected dilatation θ̄ by each of the nodes' displacements.
+    /// The coefficients of the projected dilatation θ̄ by a unit displacement of each node along x and y.
     dilatation: [[f64; 16]; 3],
 }
 
@@ -311,8 +311,8 @@ impl<'a> OfNodes<'a> {
         }
     }
 
-    /// The functions at a place in master coordinates, which is mapped to `m`; `nodes`: the positions of the element's
-    /// nodes.
+    /// The strain and dilatation at a place in master coordinates, which is mapped to `m`; `nodes`: the positions of
+    /// the element's nodes.
     #[inline(always)]
     pub(super) fn at(
         &self,

@@ -12,7 +12,8 @@ use crate::mesh::Mesh;
 pub struct Recovered {
     /// Stress at every node: xx, yy, xy, zz (hoop), averaged over all elements that meet there.
     pub stress: Vec<[f64; COMPONENTS]>,
-    /// Stress at every element's nodes, averaged over the elements of its own material; empty if there is one material.
+    /// Stress at the nodes of every element, averaged over the elements of the same material; empty if there is one
+    /// material.
     element_stress: Vec<[[f64; COMPONENTS]; 8]>,
     /// Positions (x and y) of the integration points, element by element, as in [`Family::rule`].
     pub points: [Vec<f64>; 2],
@@ -30,7 +31,7 @@ pub struct Recovered {
 }
 
 impl Recovered {
-    /// Stress at the nodes of an element, averaged over the elements of its own material.
+    /// Stress at the nodes of an element, averaged over the elements of the same material.
     pub fn at_nodes_of(&self, e: usize, element: &Element) -> [[f64; COMPONENTS]; 8] {
         match self.element_stress.get(e) {
             Some(stress) => *stress,
@@ -193,7 +194,7 @@ impl Recovered {
     }
 }
 
-/// The mean at every node of the stresses of its elements: of one material, or of all.
+/// The mean of the elements' stresses at every node, over all elements or those of one `material`.
 fn average(
     mesh: &Mesh,
     section: &Section,
@@ -215,7 +216,7 @@ fn average(
     sum.iter().zip(&count).map(mean).collect()
 }
 
-/// The number of elements between two calls that ask whether to continue.
+/// The number of elements between two calls of the function that may stop the work.
 pub(super) const ELEMENTS_PER_QUESTION: usize = 1 << 14;
 
 /// The work for the stresses of one element, in multiplications.
@@ -359,7 +360,7 @@ pub struct Deformed<'a> {
     family: Family,
     nodes: &'a AtNodes<[f64; 2]>,
     u: &'a AtNodes<[f64; 2]>,
-    /// The inside of an element of a nearly incompressible material; else none.
+    /// The state inside an element of a nearly incompressible material; `None` for other materials.
     inside: Option<Inside<'a>>,
     work_on_bubble: f64,
 }
@@ -374,8 +375,8 @@ struct DeformedAt {
 }
 
 impl<'a> Deformed<'a> {
-    /// A displaced element. `material`: its number in the section; `body_force`: the body force (force/volume) under
-    /// which the displacements occur.
+    /// An element with displaced nodes. `material`: the number of its material in the section; `body_force`: the body
+    /// force (force/volume) under which the displacements occur.
     pub fn new(
         section: &'a Section,
         material: usize,

@@ -6,13 +6,13 @@ use crate::elasticity::Section;
 use crate::element::{AtNodes, Family};
 use crate::mesh::Mesh;
 
-/// The shape of an element with its material: elements with equal shapes differ by a shift that changes no integral.
+/// The shape of an element with its material: elements with equal shapes are shifted copies with the same integrals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shape {
     pub(super) family: Family,
     /// The number of the element's material.
     pub(super) material: u16,
-    /// Positions relative to the first node; in axisymmetry along the axis only.
+    /// Positions of the nodes relative to the first one; in axisymmetry relative along the axis only.
     pub(super) nodes: AtNodes<[f64; 2]>,
 }
 
@@ -56,7 +56,7 @@ impl Shape {
         area.abs() / longest
     }
 
-    /// Whether every node has the same place up to `tolerance`.
+    /// Whether every node has the same relative position in both shapes, up to `tolerance`.
     fn is_near(&self, other: &Shape, tolerance: f64) -> bool {
         let pairs = self
             .nodes
@@ -68,7 +68,8 @@ impl Shape {
             && pairs.fold(true, |near, (a, b)| near & ((a - b).abs() <= tolerance))
     }
 
-    /// A hash that is the same for shapes that differ by far less than `cell`, unless one lies at the edge of a cell.
+    /// A hash that is equal for shapes that differ by far less than `cell`, unless a coordinate lies at the edge of a
+    /// cell.
     fn hash(&self, cell: f64) -> u64 {
         /// An offset so that no simple fraction lies at an edge of a cell.
         const OFFSET: f64 = 0.367_879;
@@ -81,14 +82,14 @@ impl Shape {
     }
 }
 
-/// The shapes that several elements of a mesh have, up to the rounding of their coordinates: a grid between equidistant
-/// lines has one.
+/// The shapes that several elements of a mesh share, up to the rounding of their coordinates: a grid between
+/// equidistant lines has one shape.
 ///
-/// An element of such a shape is treated as if it had exactly the shape of the first one. This moves its nodes by no
+/// An element is treated as if it had exactly the shape of the first element that shares it. This moves its nodes by no
 /// more than the error of their coordinates after a few rounded operations.
 #[derive(Debug)]
 pub(super) struct Shapes {
-    /// The number of each element's shape, if shared.
+    /// The number of each element's shape; `None` if no other element shares it.
     of: Vec<Option<u16>>,
     /// The shapes that at least two elements share.
     pub(super) shared: Vec<Shape>,
@@ -107,7 +108,7 @@ const MOST: usize = 512;
 const MOST_COMPARED: usize = 4;
 
 impl Shapes {
-    /// The shapes of a mesh.
+    /// Finds the shapes that elements of a mesh share.
     pub(super) fn new(mesh: &Mesh, section: &Section) -> Self {
         let largest = mesh.nodes.iter().flatten();
         let largest = largest.fold(0.0f64, |largest, c| largest.max(c.abs()));
@@ -157,7 +158,7 @@ impl Shapes {
         Shapes { of, shared }
     }
 
-    /// The number of an element's shape; none if no other element has it.
+    /// The number of an element's shape; `None` if no other element shares it.
     pub(super) fn of(&self, e: usize) -> Option<usize> {
         self.of[e].map(usize::from)
     }

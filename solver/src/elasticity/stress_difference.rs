@@ -22,7 +22,7 @@ pub struct StressDifference {
 }
 
 impl StressDifference {
-    /// The difference for stresses recovered from the same elements.
+    /// The difference for the stresses `recovered`, which were recovered from the same `elements`.
     pub fn new(
         elements: Elements<'_>,
         recovered: &Recovered,
@@ -54,7 +54,8 @@ impl StressDifference {
         })
     }
 
-    /// ∫ (σ* − σ) : C⁻¹ (σ* − σ)′ of every element, with the difference of another field (force × length, without 2π).
+    /// The product ∫ (σ* − σ) : C⁻¹ (σ* − σ)′ in every element, with the difference (σ* − σ)′ of `other` (force ×
+    /// length, without 2π).
     ///
     /// In nearly incompressible elements the stress does not follow from the strain alone, and the product has more
     /// terms: with g = θ̄ − div u and t = tr C⁻¹ (σ* − σ),
@@ -80,10 +81,11 @@ impl StressDifference {
         })
     }
 
-    /// The products of [`StressDifference::products`] with several other fields, from their displacements at the nodes.
+    /// The products of [`StressDifference::products`] with several other fields, given by their displacements at the
+    /// nodes.
     ///
-    /// Both σ* and σ of those fields are linear in the nodal values, so that each element's integral is a sum over its
-    /// nodes: the integration points are visited once for all fields.
+    /// Both σ* and σ of the other fields are linear in the nodal values, so that each element's integral is a sum over
+    /// its nodes: the integration points are visited once for all fields.
     pub fn products_with_fields<const FIELDS: usize>(
         &self,
         elements: Elements<'_>,
@@ -156,7 +158,7 @@ impl StressDifference {
     }
 }
 
-/// The linear functions that give an element's products with other fields from their nodal values.
+/// The coefficients of an element's products with any other field, as linear functions of the field's nodal values.
 #[derive(Default)]
 struct InCommon {
     /// Coefficients of the recovered stresses: ∫ h_i C⁻¹ (σ* − σ).
@@ -204,7 +206,7 @@ impl InCommon {
         found
     }
 
-    /// Adds `of_stress` : σ* at a point, as a function of the recovered stresses at the nodes.
+    /// Adds the product `of_stress` : σ* at a point, where σ* is interpolated from the recovered stresses at the nodes.
     #[inline(always)]
     fn add_smooth(&mut self, shape: &[f64; 8], of_stress: &[f64; COMPONENTS]) {
         for (by_stress, of_stress) in self.by_stress.iter_mut().zip(of_stress) {
@@ -234,7 +236,7 @@ impl InCommon {
     }
 }
 
-/// Integrates over each element the products of pairs of differences, one pair for each integration point.
+/// For each element, integrates the product of two differences, given as one pair for each integration point.
 fn integrate(
     elements: Elements<'_>,
     mut pairs: impl Iterator<Item = (Difference, Difference)>,
@@ -255,7 +257,7 @@ fn integrate(
     (0..mesh.elements.len()).map(product).collect()
 }
 
-/// The difference Σ h_i σ_i − σ at a point.
+/// The difference σ* − σ = Σ h_i σ_i − σ at a point.
 #[inline(always)]
 fn difference(
     shape: &[f64; 8],
@@ -274,7 +276,7 @@ struct Difference {
     gap: f64,
 }
 
-/// The factors on differences in a material.
+/// The factors on stress differences and dilatation gaps in a material.
 struct Weights {
     /// The compliance C⁻¹.
     compliance: Moduli,
@@ -293,7 +295,7 @@ impl Weights {
         density + of_gap * other.gap
     }
 
-    /// The factors of the other field's stress and gap in [`Weights::density`].
+    /// The factors of the stress and gap of `other` in [`Weights::density`].
     #[inline(always)]
     fn of_other(&self, own: &Difference) -> ([f64; COMPONENTS], f64) {
         let mut strain = stress(&self.compliance, &own.stress);
@@ -307,7 +309,7 @@ impl Weights {
     }
 }
 
-/// The factors for every material.
+/// The factors of [`Weights`] for every material.
 fn weights(section: &Section) -> Vec<Weights> {
     let of = |(material, moduli): (usize, &Moduli)| {
         let compliance = inverse(moduli).unwrap_or_default();

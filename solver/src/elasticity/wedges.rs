@@ -22,7 +22,7 @@ const WIDEST: f64 = PI / 12.0;
 /// The smallest λ that counts: smaller ones are rigid motions, with λ = 0, moved by rounding.
 const LEAST: f64 = 0.05;
 
-/// λ closer to 1 than this count as 1: whatever grows like r^(λ−1) then looks like ln r on any mesh.
+/// A λ closer to 1 than this counts as 1: on any mesh r^(λ−1) then looks like ln r.
 const NEAR_ONE: f64 = 0.015;
 
 /// A wedge of material between two directions (angles, counter-clockwise).
@@ -37,9 +37,9 @@ pub struct Wedge {
 /// The condition on an outer side of the wedges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Side {
-    /// A smooth obstacle or a line of symmetry, with friction as a part of the pressure: the traction along the side,
-    /// positive away from the point on the side where the wedges begin, and towards it where they end, which is the
-    /// same tangent.
+    /// The side slides along a smooth obstacle or a line of symmetry. The number is the traction along the side as a
+    /// part of the pressure: positive away from the point on the side where the wedges begin, and towards the point on
+    /// the side where they end, which is the same tangent.
     Slides(f64),
     /// The side does not move.
     Sticks,
@@ -50,12 +50,13 @@ pub enum Side {
 pub struct Growth {
     /// The smallest exponent λ, if it is below 1.
     pub exponent: Option<f64>,
-    /// The change of the pressure for each factor e of the distance, by a traction 1 along both sides.
+    /// The size of the pressure's change when the distance grows by the factor e, caused by a unit traction along the
+    /// rubbed sides.
     pub logarithm: f64,
 }
 
-/// How the pressure grows where wedges, each beginning where the one before ends, meet. `rubbed`: on which sides the unit
-/// traction of [`Growth::logarithm`] acts. None if it cannot be computed.
+/// How the pressure grows towards the point where wedges meet, each of which begins where the one before ends.
+/// `rubbed`: on which sides the unit traction of [`Growth::logarithm`] acts. `None` if the growth cannot be computed.
 pub fn growth(wedges: &[Wedge], sides: [Side; 2], rubbed: [bool; 2]) -> Option<Growth> {
     let pencil = Pencil::new(wedges, sides);
     let (quadratic, linear, constant) = pencil.restricted();
@@ -73,7 +74,7 @@ pub fn growth(wedges: &[Wedge], sides: [Side; 2], rubbed: [bool; 2]) -> Option<G
     })
 }
 
-/// The matrices E⁰, E¹ᵀ − E¹ and −E² on all unknowns, those of the outer sides turned along normal and tangent.
+/// The matrices E⁰, E¹ᵀ − E¹ and −E² on all unknowns; the unknowns of the outer sides are along normal and tangent.
 struct Pencil {
     quadratic: Rows,
     linear: Rows,
@@ -169,7 +170,7 @@ impl Pencil {
         (0..self.size()).filter(|i| !held.contains(i)).collect()
     }
 
-    /// The matrices on the free unknowns, where tangential tractions follow the pressure.
+    /// The matrices on the free unknowns, where the tractions along sliding sides are parts of the pressure.
     fn restricted(&self) -> (Rows, Rows, Rows) {
         let free = self.free();
         let of = |matrix: &Rows| -> Rows {
@@ -260,7 +261,7 @@ fn energy(moduli: &Moduli, left: &[f64; 3], right: &[f64; 3]) -> f64 {
     (0..3).map(|i| left[i] * of(i)).sum()
 }
 
-/// Turns two unknowns, `first` and the next, to the axes, in rows and columns.
+/// Turns the rows and columns of two unknowns, `first` and the next one, to `axes`.
 fn turn(matrix: &mut Rows, first: usize, axes: [[f64; 2]; 2]) {
     for row in matrix.iter_mut() {
         let old = [row[first], row[first + 1]];

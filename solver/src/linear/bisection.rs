@@ -1,15 +1,15 @@
 //! Improves the two halves of a part of a mesh: elements move to the other half as long as fewer nodes then belong to
 //! both (Fiduccia and Mattheyses, 1982).
 //!
-//! In each round, of all elements with a node in both halves the one that leaves the fewest such nodes moves first,
-//! even if their number increases; each element moves once. Then all moves after the best state are undone. Rounds are
-//! repeated until one brings no improvement.
+//! In each round, of all elements with a node in both halves the element that leaves the fewest such nodes moves first,
+//! even if the number of these nodes increases; each element moves once. Then all moves after the best state are
+//! undone. Rounds are repeated until a round brings no improvement.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::Deref;
 
-/// Each half keeps at least this share of the elements, if it has that many.
+/// The share of the elements that each half keeps at least, unless it has fewer from the start.
 const SMALLEST_SHARE: f64 = 0.4;
 
 /// The largest number of rounds.
@@ -21,18 +21,19 @@ const PATIENCE: usize = 60;
 /// A mesh, and the data of its elements while a part of it is improved.
 pub(super) struct Bisection<'a, E> {
     elements: &'a [E],
-    /// The elements of nodes: those of node n are `around[starts[n]..starts[n + 1]]`.
+    /// The elements of every node: those of node n are `around[starts[n]..starts[n + 1]]`.
     starts: Vec<u32>,
     around: Vec<u32>,
-    /// By element: a number for the part and the half that it was last in.
+    /// By element: a number that identifies the part and the half that the element was last in.
     half: Vec<u32>,
-    /// By element: numbers for the round of its last move, for the round in which its gain was last known, and for the
-    /// move.
+    /// By element: the stamp of the round in which it last moved.
     went: Vec<u32>,
+    /// By element: the stamp of the round in which its gain was last computed.
     known: Vec<u32>,
+    /// By element: the stamp of the last move after which its gain was computed anew.
     seen: Vec<u32>,
     stamp: u32,
-    /// By element: by how much the number of nodes in both halves decreases if it moves.
+    /// By element: by how much the number of nodes in both halves decreases if the element moves.
     gains: Vec<i32>,
     /// By node: the number of its elements in each half.
     counts: Vec<[u32; 2]>,
@@ -78,7 +79,7 @@ impl<'a, E: Deref<Target = [u32]>> Bisection<'a, E> {
         }
     }
 
-    /// Improves the halves of a part, given as the first `middle` of these elements and the others; returns the new
+    /// Improves the halves of a part, given as the first `middle` elements of `part` and the others; returns the new
     /// size of the first half. Only nodes that are `free` count.
     pub(super) fn improve(&mut self, part: &mut [u32], middle: usize, free: &[bool]) -> usize {
         let all = self.elements;
@@ -181,7 +182,7 @@ impl<'a, E: Deref<Target = [u32]>> Bisection<'a, E> {
         best.0 > 0
     }
 
-    /// Adds an element to those that may move, unless it is there already with its gain.
+    /// Adds an element to those that may move, unless it is waiting with the same gain already.
     fn wait(&mut self, e: u32, round: u32, halves: [u32; 2], free: &[bool]) {
         let place = e as usize;
         let half = usize::from(self.half[place] == halves[1]);

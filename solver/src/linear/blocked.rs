@@ -1,6 +1,6 @@
-//! Factorisations of dense matrices that can be interrupted: block by block, as faer computes them, with a call between
-//! blocks that asks whether to continue. faer's own factorisations return only at the end, which takes minutes for the
-//! thousands of unknowns of a long contact.
+//! Factorisations of dense matrices that can be interrupted: block by block, as faer computes them, with interruption
+//! points between blocks. faer's own factorisations return only at the end, which takes minutes for the thousands of
+//! unknowns of a long contact.
 //!
 //! A matrix of at most [`WHOLE`] rows is factored by faer in one piece.
 
@@ -21,19 +21,19 @@ use super::interrupt::{Interrupt, Stopped};
 /// The largest number of rows of a matrix that is factored in one piece.
 const WHOLE: usize = 256;
 
-/// The number of columns of a block. It is faer's own size, so that factors have the same bits as faer's.
+/// The number of columns of a block: the size that faer uses too, so that factors have the same bits as faer's.
 const BLOCK: usize = 128;
 
 /// The number of columns that a block updates before the next interruption point.
 pub(super) const STRIP: usize = 256;
 
-/// Sequential: faer's parallel kernels do not promise the same bits.
+/// No parallelism inside faer: its parallel kernels do not promise the same bits.
 const PAR: Par = Par::Seq;
 
 /// Why there is no Cholesky factor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum NoFactor {
-    /// A pivot is not positive, in this row.
+    /// The pivot in this row is not positive.
     NotPositiveDefinite(usize),
     /// The observer stopped the work.
     Stopped,

@@ -13,7 +13,7 @@ pub struct Dense {
 }
 
 impl Dense {
-    /// A matrix of zeros; none if it does not fit into memory.
+    /// A matrix of zeros; `None` if it does not fit into memory.
     pub fn try_zero(size: usize, interrupt: &mut Interrupt<'_>) -> Result<Option<Self>, Stopped> {
         let values = zeros(size.saturating_mul(size), interrupt)?;
         Ok(values.map(|values| Dense { size, values }))
@@ -29,12 +29,12 @@ impl Dense {
         self.size
     }
 
-    /// A column; being symmetric, also a row.
+    /// Column `j`, which is also row `j`, since the matrix is symmetric.
     pub fn column(&self, j: usize) -> &[f64] {
         &self.values[j * self.size..(j + 1) * self.size]
     }
 
-    /// An entry.
+    /// The entry in row `i` and column `j`.
     pub fn at(&self, i: usize, j: usize) -> f64 {
         self.values[j * self.size + i]
     }
@@ -45,7 +45,7 @@ impl Dense {
         self.values[i * self.size + j] = value;
     }
 
-    /// All values by columns. Only the lower triangle is written here; [`Dense::mirror`] completes the matrix.
+    /// All values by columns. A caller writes the lower triangle only; [`Dense::mirror`] completes the matrix.
     pub(super) fn values_mut(&mut self) -> &mut [f64] {
         &mut self.values
     }
@@ -67,7 +67,7 @@ impl Dense {
         Ok(())
     }
 
-    /// The product A v. Where blocks of v are zero it takes accordingly less time.
+    /// The product A v. It takes less time if blocks of `v` are zero.
     pub fn times(&self, v: &[f64]) -> Vec<f64> {
         let mut product = vec![0.0; self.size];
         pulp::Arch::new().dispatch(|| add_columns(&self.values, v, &mut product));
@@ -75,8 +75,8 @@ impl Dense {
     }
 }
 
-/// Adds the columns a_j of a matrix times v_j to a sum, several columns at once, since each pass over the sum is as
-/// long as a column. The order of the additions does not depend on the machine.
+/// Adds v_j times the columns a_j of a matrix to `sum`, several columns at once, since each pass over `sum` is as long
+/// as a column. The order of the additions does not depend on the machine.
 #[inline(always)]
 fn add_columns(columns: &[f64], v: &[f64], sum: &mut [f64]) {
     /// The number of columns that are added at once.
@@ -135,16 +135,16 @@ impl From<NoFactor> for Unsolved {
     }
 }
 
-/// The Cholesky factor L of A = L Lᵀ, in the lower triangle.
+/// The factor L of Cholesky's factorisation A = L Lᵀ, in the lower triangle.
 pub struct Cholesky {
     size: usize,
     values: Vec<f64>,
 }
 
 impl Cholesky {
-    /// Factors A + Σ aᵢⱼ eᵢeⱼᵀ, with A positive definite, given by its entries, and `additions` a symmetric list of (i,
-    /// j, aᵢⱼ). `room`: the memory of a factor that is no longer needed, since the first touch of memory takes as long
-    /// as the factor of a small matrix.
+    /// Factors A + Σ aᵢⱼ eᵢeⱼᵀ. `entry`: the entries of A; `additions`: the (i, j, aᵢⱼ), a symmetric list; the sum is
+    /// positive definite. `room`: a factor that is no longer needed, whose memory is reused, since the first touch of
+    /// memory takes as long as the factor of a small matrix.
     pub fn new(
         size: usize,
         entry: impl Fn(usize, usize) -> f64,
@@ -182,7 +182,7 @@ impl Cholesky {
     }
 }
 
-/// Solves A x = b, with A positive definite, given by its entries.
+/// Solves A x = b for a positive definite A, given by its entries `entry`.
 pub fn solve_positive_definite(
     size: usize,
     entry: impl Fn(usize, usize) -> f64,
@@ -201,13 +201,13 @@ pub struct General {
 }
 
 impl General {
-    /// A matrix of zeros; none if it does not fit into memory.
+    /// A matrix of zeros; `None` if it does not fit into memory.
     pub fn try_zero(size: usize, interrupt: &mut Interrupt<'_>) -> Result<Option<Self>, Stopped> {
         let values = zeros(size.saturating_mul(size), interrupt)?;
         Ok(values.map(|values| General { size, values }))
     }
 
-    /// One column, to be written.
+    /// Column `j`, to be written.
     pub fn column_mut(&mut self, j: usize) -> &mut [f64] {
         &mut self.values[j * self.size..(j + 1) * self.size]
     }
@@ -225,7 +225,7 @@ impl General {
         Ok(())
     }
 
-    /// Solves A x = b for one b, or for several stored one after another; the factors overwrite A.
+    /// Solves A x = b for one right-hand side `b`, or for several stored one after another; the factors overwrite A.
     pub fn solve(mut self, b: &[f64], interrupt: &mut Interrupt<'_>) -> Result<Vec<f64>, Unsolved> {
         let n = self.size;
         let mut x = b.to_vec();
@@ -241,10 +241,10 @@ impl General {
     }
 }
 
-/// The x with the smallest |Σ x_k a_k − b|, by Gram–Schmidt. Columns that depend almost linearly on the others are left
-/// out. `None` without columns, or if the result is not finite.
+/// The x with the smallest |Σ x_k a_k − b| for the `columns` a_k, by Gram–Schmidt. Columns that depend almost linearly
+/// on the others are left out. `None` without columns, or if the result is not finite.
 pub fn least_squares(columns: &[Vec<f64>], b: &[f64]) -> Option<Vec<f64>> {
-    /// A column whose remainder is below this part of the largest is left out.
+    /// A column whose remainder is below this part of the largest column is left out.
     const SPANNED: f64 = 1e-8;
     let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let largest = columns.iter().map(|c| norm(c)).fold(0.0, f64::max);

@@ -1,6 +1,6 @@
 //! An order of elimination for the nodes of a mesh in the plane: its elements are repeatedly halved by their centres,
-//! and the nodes that two halves share are eliminated after both. In a grid a cut between two lines is the shortest
-//! one; halves of a free mesh are improved (the module `bisection`).
+//! and the nodes that two halves share are eliminated after both. In a grid a cut between two lines of elements is the
+//! shortest; halves of a free mesh are improved (the module `bisection`).
 //!
 //! The result is a binary tree of *parts*. A part owns the nodes that lie in it alone, but in neither of its halves
 //! alone; a part that is not divided owns all that lie in it alone. No part owns the nodes that are never eliminated
@@ -15,14 +15,14 @@ use super::bisection::Bisection;
 /// arithmetic.
 const LARGEST_LEAF: usize = 6;
 
-/// The smaller half of a part has at least this share of its elements, so that the depth of the tree is the logarithm
-/// of their number.
+/// The smaller half of a part has at least this share of the part's elements, so that the depth of the tree is of the
+/// order of the logarithm of the number of elements.
 const SMALLEST_SHARE: f64 = 0.25;
 
-/// Centres whose distance is below this part of the extent lie on the same grid line.
+/// Centres whose distance is below this fraction of the extent lie on the same grid line.
 const SAME_LINE: f64 = 1e-10;
 
-/// Bisection with fewer elements are not improved.
+/// The halves of a part with fewer elements are not improved.
 const SMALLEST_IMPROVED: usize = 12;
 
 /// The directions across which parts are cut: x, y and the diagonals.
@@ -34,37 +34,37 @@ pub struct Cells<'a, E> {
     pub elements: &'a [E],
     /// The positions of the nodes.
     pub positions: &'a [[f64; 2]],
-    /// Whether a node has unknowns; the others are left out.
+    /// Whether a node has unknowns; nodes without unknowns are left out.
     pub unknown: &'a [bool],
 }
 
-/// The dissection of a mesh: a binary tree of parts. Bisection come before the part that they make up, so the last part is
+/// The dissection of a mesh: a binary tree of parts. Halves come before the part that they make up, so the last part is
 /// the whole mesh.
 #[derive(Default)]
 pub struct Dissection {
     /// The parts.
     pub parts: Vec<Part>,
-    /// All elements, those of each part in a row.
+    /// All elements; those of each part are consecutive.
     pub elements: Vec<u32>,
     /// The nodes in the order of their elimination, followed by those that are never eliminated.
     pub nodes: Vec<u32>,
-    /// The boundaries of all parts, as places in `nodes`; each is sorted, unless the module `equal_parts` has put it into the
-    /// order of an equal part.
+    /// The boundaries of all parts, as places in `nodes`. Each is sorted, unless the module `equal_parts` has put it
+    /// into the order of an equal part.
     pub boundaries: Vec<u32>,
 }
 
 /// A part of a mesh: a range of elements, with the nodes it owns and its boundary.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Part {
-    /// The numbers of the two halves; none for a part that is not divided.
+    /// The numbers of the two halves; `None` for a part that is not divided.
     pub halves: Option<[usize; 2]>,
     /// The depth of the part in the tree.
     pub depth: u32,
-    /// The range of its elements in [`Dissection::elements`]: first and end.
+    /// The range of the part's elements in [`Dissection::elements`]: first and end.
     pub elements: [usize; 2],
-    /// The range of the nodes it owns in [`Dissection::nodes`]: first and end.
+    /// The range of the nodes that the part owns in [`Dissection::nodes`]: first and end.
     pub own: [usize; 2],
-    /// The range of its boundary in [`Dissection::boundaries`]: first and end.
+    /// The range of the part's boundary in [`Dissection::boundaries`]: first and end.
     pub boundary: [usize; 2],
 }
 
@@ -128,7 +128,7 @@ impl Dissection {
     }
 }
 
-/// The union of two sorted lists.
+/// Appends the union of two sorted lists to `into`.
 fn merge(a: &[u32], b: &[u32], into: &mut Vec<u32>) {
     let (mut i, mut j) = (0, 0);
     while let (Some(&x), Some(&y)) = (a.get(i), b.get(j)) {
@@ -140,13 +140,13 @@ fn merge(a: &[u32], b: &[u32], into: &mut Vec<u32>) {
     into.extend_from_slice(&b[j..]);
 }
 
-/// The state of the halving.
+/// The state while parts are halved.
 struct Halving<'a, E> {
     cells: &'a Cells<'a, E>,
     centres: Vec<[f64; 2]>,
     /// Whether a node is owned by no part yet and will be eliminated.
     free: Vec<bool>,
-    /// By node: a growing number that marks the half in which it was seen last.
+    /// By node: the stamp of the half in which the node was seen last.
     seen: Vec<u32>,
     stamp: u32,
     keys: Vec<f64>,
@@ -156,7 +156,7 @@ struct Halving<'a, E> {
     nodes: Vec<u32>,
 }
 
-/// A line across a part, perpendicular to one of the directions.
+/// A line across a part, perpendicular to one of the [`DIRECTIONS`].
 #[derive(Clone, Copy)]
 struct Cut {
     direction: usize,
@@ -171,7 +171,7 @@ impl Cut {
     }
 }
 
-/// The coordinate along one of the directions.
+/// The coordinate of a point along one of the [`DIRECTIONS`].
 fn along(direction: usize, [x, y]: [f64; 2]) -> f64 {
     let [a, b] = DIRECTIONS[direction];
     a * x + b * y
@@ -200,7 +200,7 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
         }
     }
 
-    /// Divides the part with these elements, which begin at `first` among all elements, and returns its number.
+    /// Divides the part with `elements`, which begin at `first` among all elements, and returns the part's number.
     fn divide(&mut self, elements: &mut [u32], first: usize, depth: u32) -> usize {
         let mut part = Part {
             depth,
@@ -251,7 +251,7 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
         self.parts.len() - 1
     }
 
-    /// The cut that the fewest nodes lie on; none if all centres coincide.
+    /// The cut that the fewest nodes lie on; `None` if all centres coincide.
     fn best_cut(&mut self, elements: &[u32]) -> Option<Cut> {
         let mut best: Option<(usize, Cut)> = None;
         for direction in 0..DIRECTIONS.len() {
@@ -318,7 +318,7 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
         })
     }
 
-    /// Moves the elements below the cut before the others, and returns their number.
+    /// Moves the elements below the cut before the others, and returns the number of elements below it.
     fn part_by(&self, elements: &mut [u32], cut: Option<Cut>) -> usize {
         let Some(cut) = cut else {
             return elements.len() / 2;
@@ -359,7 +359,7 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
         count
     }
 
-    /// The free nodes that belong to elements of both halves.
+    /// Appends to `into` the free nodes that belong to elements of both halves.
     fn shared(&mut self, low: &[u32], high: &[u32], into: &mut Vec<u32>) {
         let (in_low, in_both) = self.stamps();
         for &e in low {
@@ -379,7 +379,7 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
         }
     }
 
-    /// Two numbers that have not been used to mark nodes yet.
+    /// Two new stamps, which no node has yet.
     fn stamps(&mut self) -> (u32, u32) {
         self.stamp += 2;
         (self.stamp - 1, self.stamp)

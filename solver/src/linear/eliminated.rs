@@ -10,7 +10,7 @@ use super::blocked;
 use super::dense::{Dense, Unsolved};
 use super::interrupt::{Interrupt, zeros};
 
-/// The columns of L for the eliminated unknowns, which are the first ones.
+/// The columns of the Cholesky factor L for the eliminated unknowns, which are the first ones.
 pub struct Eliminated {
     size: usize,
     count: usize,

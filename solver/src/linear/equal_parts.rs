@@ -1,5 +1,5 @@
-//! Equal parts of a dissection: those with elements of the same kinds, connected in the same way. They have the same
-//! Schur complement and the same columns of the factor. A grid between equidistant lines has few different parts.
+//! Finds equal parts of a dissection: parts with elements of the same kinds, connected in the same way. They have the
+//! same Schur complement and the same columns of the factor. A grid between equidistant lines has few different parts.
 
 use std::collections::HashMap;
 use std::ops::Deref;
@@ -9,11 +9,11 @@ use super::dissection::Dissection;
 /// Marks a node that is not in the first half.
 const NEW: u32 = u32::MAX;
 
-/// For each part, the number of the first one that equals it. The parts' own nodes are in the same order already; the
-/// boundaries of later parts are put into the order of the first one.
+/// For each part, the number of the first part that equals it. The own nodes of equal parts are in the same order
+/// already; the boundaries of later parts are put into the order of the first one.
 ///
-/// `kinds`: numbers that are equal for elements with the same matrix and the same unknown nodes; an element without a
-/// number equals no other.
+/// `kinds`: a number for each element; elements with the same number have the same matrix and the same unknown nodes.
+/// An element without a number equals no other.
 pub(super) fn find_equal_parts<E: Deref<Target = [u32]>>(
     dissection: &mut Dissection,
     elements: &[E],
@@ -90,19 +90,19 @@ pub(super) fn find_equal_parts<E: Deref<Target = [u32]>>(
 
 /// The search for equal parts, which are described by keys of numbers.
 struct Search {
-    /// The place of each node.
+    /// The place of each node in the order of elimination; `None` for a node that is left out.
     place: Vec<Option<u32>>,
-    /// By place: when it was last numbered, and its number then.
+    /// By place: the stamp of the part for which the place was last numbered, and its number there.
     numbers: Vec<(u32, u32)>,
     stamp: u32,
-    /// The places of the present part's nodes, in the order of their numbers.
+    /// The places of the nodes of the part being described, in the order of their numbers.
     places: Vec<u32>,
-    /// A key that is equal for parts that are equal up to the order of their own nodes.
+    /// The key of the part being described: it is equal for parts that are equal up to the order of their own nodes.
     key: Vec<u32>,
 }
 
 impl Search {
-    /// Describes a part that is not divided; returns whether others may equal it.
+    /// Describes a part that is not divided; returns whether another part may equal it.
     fn describe_elements<E: Deref<Target = [u32]>>(
         &mut self,
         part: &[u32],
@@ -128,7 +128,7 @@ impl Search {
         true
     }
 
-    /// Describes a part of two halves by the first parts that equal these, and by their boundaries.
+    /// Describes a divided part by the first parts that equal its two halves, and by the boundaries of the halves.
     fn describe_halves(&mut self, firsts: [usize; 2], boundaries: [&[u32]; 2]) {
         self.start();
         // the key of a part that is not divided begins with the number of its elements, which is not 0
@@ -149,7 +149,7 @@ impl Search {
         self.key.clear();
     }
 
-    /// The number of a place; none if the place is new, in which case it gets the next number.
+    /// The number of a place; `None` if the place is new, in which case it gets the next number.
     fn number(&mut self, place: u32) -> Option<u32> {
         let (stamp, number) = &mut self.numbers[place as usize];
         if *stamp == self.stamp {

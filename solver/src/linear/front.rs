@@ -1,5 +1,5 @@
-//! One dense front: the Schur complements of its halves are added, its own unknowns are eliminated, and its boundary is
-//! reduced (the module `multifrontal` explains how fronts make a factor).
+//! One dense front: the Schur complements of its halves are added, the unknowns that it owns are eliminated, and its
+//! boundary is reduced (the module `multifrontal` explains how fronts make a factor).
 
 use std::iter;
 
@@ -15,13 +15,13 @@ use super::parallel::for_each;
 
 /// The lower triangle of a front while it is computed.
 pub(super) struct FrontMatrix<'a> {
-    /// The number of columns that it owns.
+    /// The number of columns that the front owns.
     pub(super) own: usize,
-    /// The number of rows: its own unknowns and its boundary.
+    /// The number of rows: the unknowns that the front owns, and its boundary.
     pub(super) height: usize,
-    /// The columns that it owns, each of `height` rows.
+    /// The columns that the front owns, each of `height` rows.
     pub(super) columns: &'a mut [f64],
-    /// The columns of its boundary, each with one row for each unknown of the boundary.
+    /// The columns of the front's boundary, each with one row for each unknown of the boundary.
     pub(super) left: &'a mut [f64],
 }
 
@@ -35,8 +35,8 @@ impl FrontMatrix<'_> {
         }
     }
 
-    /// Adds the Schur complement of a half to some of the columns. If its unknowns are in another order, parts of its
-    /// lower triangle are above the diagonal here and are added to the entry opposite.
+    /// Adds the Schur complement `from` of a half to some of the front's columns. If the half has its unknowns in
+    /// another order than the front, entries of its lower triangle that are above the diagonal here are added below it.
     pub(super) fn add(&mut self, runs: &[Run], from: &[f64], which: Columns) {
         let size = runs.iter().map(|run| run.len).sum::<usize>();
         for (k, run) in runs.iter().enumerate() {
@@ -60,7 +60,7 @@ impl FrontMatrix<'_> {
         }
     }
 
-    /// Adds to consecutive entries of a column, if it is one of the columns `which`.
+    /// Adds `entries` to consecutive entries of a column, if it is one of the columns `which`.
     #[inline(always)]
     fn add_to_column(&mut self, column: usize, row: usize, entries: &[f64], which: Columns) {
         let boundary = self.height - self.own;
@@ -72,7 +72,7 @@ impl FrontMatrix<'_> {
         add(into, entries);
     }
 
-    /// Replaces F_oo and F_bo by L_oo and L_bo, on `threads` threads.
+    /// Replaces F_oo and F_bo by L_oo and L_bo, on `threads` threads (o: own unknowns, b: boundary).
     pub(super) fn eliminate(
         &mut self,
         threads: usize,
@@ -107,7 +107,8 @@ impl FrontMatrix<'_> {
         Ok(for_each(parts, &mut vec![(); threads], solve, interrupt)?)
     }
 
-    /// Computes F_bb − L_bo L_boᵀ, or its second term alone, in the lower triangle, on `threads` threads.
+    /// Computes F_bb − L_bo L_boᵀ, or −L_bo L_boᵀ alone, in the lower triangle, on `threads` threads (o: own unknowns,
+    /// b: boundary).
     pub(super) fn reduce(
         &mut self,
         accum: Accum,
@@ -165,10 +166,10 @@ impl FrontMatrix<'_> {
 /// kernel.
 const NARROW: usize = 24;
 
-/// The number of rows of a square that is computed as a whole although half of it would be enough.
+/// The largest size of a diagonal block that is computed as a whole, although its lower triangle would be enough.
 const FULL: usize = 64;
 
-/// The number of rows of a product that make one portion of work, if each takes this many multiplications.
+/// The number of rows of a product that make one portion of work. `of_one`: the multiplications for one row.
 fn portion(of_one: usize) -> usize {
     /// With fewer rows at once the work would be far less efficient.
     const FEWEST: usize = 16;
@@ -176,8 +177,8 @@ fn portion(of_one: usize) -> usize {
     lines.clamp(FEWEST, STRIP)
 }
 
-/// Replaces the first `own` columns of the front by columns of L, several at a time, so that each column to their right
-/// is read and written only once for all of them.
+/// Replaces the first `own` columns of the front by columns of L, several at a time, so that each column to the right
+/// of these is read and written only once for all of them.
 fn eliminate_narrow(columns: &mut [f64], height: usize, own: usize) -> Result<(), NoFactor> {
     const AT_ONCE: usize = 4;
     pulp::Arch::new().dispatch(|| {
@@ -227,20 +228,20 @@ fn add(into: &mut [f64], from: &[f64]) {
 pub(super) enum Columns {
     /// The columns that the front owns.
     Own,
-    /// The columns of its boundary.
+    /// The columns of the front's boundary.
     Left,
 }
 
 /// A run of unknowns that are consecutive both in a half and in the front that contains it.
 pub(super) struct Run {
-    /// The place of the first one in the boundary of the half.
+    /// The place of the run's first unknown in the boundary of the half.
     from: usize,
-    /// The place of the first one in the front.
+    /// The place of the run's first unknown in the front.
     to: usize,
     len: usize,
 }
 
-/// The runs of a half's boundary in the front that contains it; `local`: the places of unknowns in the front.
+/// Finds the runs of a half's boundary in the front that contains it. `local`: the places of unknowns in the front.
 pub(super) fn find_runs(half: &[u32], local: &[u32], runs: &mut Vec<Run>) {
     runs.clear();
     for (from, &row) in half.iter().enumerate() {

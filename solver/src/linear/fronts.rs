@@ -1,7 +1,7 @@
 //! The plan of a factor by fronts: which front owns which unknowns, where its columns are stored, and where Schur
 //! complements wait (the module `multifrontal` explains how fronts make a factor).
 //!
-//! Of equal fronts only the first one is computed. If several fronts need its Schur complement, it waits in a *slot*
+//! Of equal fronts only the first one is computed. If several fronts need its Schur complement, this waits in a *slot*
 //! until the last of them has used it.
 
 use std::ops::{Deref, Range};
@@ -9,12 +9,12 @@ use std::ops::{Deref, Range};
 use super::dissection::Dissection;
 use super::equal_parts::find_equal_parts;
 
-/// Fronts of a lower depth are computed one after another, each by all threads. Every branch of the tree below is
-/// computed by one thread; two branches of one front have about the same number of elements. A front that several
-/// others need is computed by one thread, with all that it depends on, at any depth.
+/// The depth in the tree at which branches begin. Fronts above are computed one after another, each by all threads;
+/// every branch is computed by one thread, and two branches of one front have about the same number of elements. A
+/// front that several others need is computed by one thread, with all that it depends on, at any depth.
 const SHARED_DEPTH: u32 = 3;
 
-/// A factor with at least this many numbers takes some tenths of a second.
+/// A factor with more values than this takes some tenths of a second, so that a second thread is worth its start.
 const LARGE: usize = 5_000_000;
 
 /// The plan of a factor by fronts.
@@ -31,8 +31,8 @@ pub struct Fronts {
     pub(super) slots: Vec<Slot>,
     /// The elements in the order of the parts that are not divided.
     pub(super) elements: Vec<u32>,
-    /// The unknowns of all boundaries; those of each front ascending, or in the order of the first front that equals
-    /// it.
+    /// The unknowns of the boundaries of all fronts; those of each front are ascending, or in the order of the first
+    /// front that equals it.
     rows: Vec<u32>,
     pub(super) unknowns: usize,
     pub(super) kept: usize,
@@ -52,32 +52,32 @@ pub struct Fronts {
 pub(super) struct Front {
     pub(super) halves: Option<[usize; 2]>,
     pub(super) elements: [usize; 2],
-    /// The first unknown that it owns.
+    /// The first unknown that the front owns.
     pub(super) first: usize,
-    /// The number of unknowns that it owns.
+    /// The number of unknowns that the front owns.
     pub(super) own: usize,
-    /// The range of its boundary in `rows`: first and end.
+    /// The range of the front's boundary in [`Fronts::rows`]: first and end.
     rows: [usize; 2],
-    /// The place in the factor where its columns begin.
+    /// The place in the factor where the front's columns begin.
     pub(super) values: usize,
-    /// The stack for its Schur complement if it has no slot; those of its halves are on the other stack.
+    /// The stack for the front's Schur complement if it has no slot; those of its halves are on the other stack.
     pub(super) stack: usize,
-    /// The slot for its Schur complement, if several fronts need it.
+    /// The slot for the front's Schur complement, if several fronts need it.
     pub(super) slot: Option<usize>,
 }
 
-/// A place where the Schur complement of a front waits for several others.
+/// A place where the Schur complement of a front waits for several other fronts.
 pub(super) struct Slot {
-    /// The number of values in it.
+    /// The number of values in the slot.
     pub(super) len: usize,
-    /// The stage in which it is used for the last time.
+    /// The stage in which the slot is used for the last time.
     pub(super) last_stage: usize,
 }
 
 /// Fronts with consecutive unknowns.
 pub(super) struct Piece {
     pub(super) fronts: Range<usize>,
-    /// Whether the piece is a branch of the tree rather than one of the fronts above.
+    /// Whether the piece is a branch of the tree rather than a front above the branches.
     pub(super) branch: bool,
 }
 
@@ -100,9 +100,9 @@ impl Stage {
 
 /// Fronts that one thread computes one after another; the last one uses the Schur complements of the others.
 pub(super) struct Task {
-    /// The range of the fronts in `order`.
+    /// The range of the task's fronts in [`Fronts::order`].
     pub(super) fronts: Range<usize>,
-    /// The number of values in their columns of the factor.
+    /// The number of values in the fronts' columns of the factor.
     pub(super) len: usize,
 }
 
@@ -116,7 +116,7 @@ pub(super) struct Space {
 }
 
 impl Space {
-    /// Enlarges the stacks to hold these sizes.
+    /// Enlarges the stacks to hold the sizes `stacks`.
     fn hold(&mut self, stacks: [usize; 2]) {
         for (most, size) in self.stacks.iter_mut().zip(stacks) {
             *most = (*most).max(size);
@@ -144,15 +144,16 @@ impl Front {
         self.own + self.boundary()
     }
 
-    /// The number of values in its columns of L, each from the diagonal on.
+    /// The number of values in the front's columns of L, each from the diagonal on.
     pub(super) fn len(&self) -> usize {
         self.own * self.boundary() + self.own * (self.own + 1) / 2
     }
 }
 
 impl Fronts {
-    /// Plans the factor. `kept`: the number of nodes that the dissection does not eliminate. `unknowns_of`: the
-    /// unknowns of a node. `kinds`: numbers that are equal for elements with the same matrix, if there are any.
+    /// Plans the factor. `kinds`: a number for each element, equal for elements with the same matrix and the same unknown
+    /// nodes, or `None`. `unknowns_of`: the number of unknowns of a node. `kept`: the number of nodes that the dissection
+    /// does not eliminate.
     pub fn new<E: Deref<Target = [u32]>>(
         mut dissection: Dissection,
         elements: &[E],
@@ -237,7 +238,7 @@ impl Fronts {
         }
     }
 
-    /// Plans the stages: first the fronts with slots, each after those that it depends on; then the others.
+    /// Plans the stages: first the fronts with slots, each after the fronts that it depends on; then the others.
     fn find_stages(&mut self, first_equal: &[usize]) {
         let mut stage_of = vec![0; self.fronts.len()];
         let mut stages: Vec<Vec<usize>> = Vec::new();
@@ -286,8 +287,8 @@ impl Fronts {
         self.pieces = pieces;
     }
 
-    /// Appends a front to the order, after those fronts that are not in it yet and whose Schur complements it takes
-    /// from the stacks.
+    /// Appends a front to the order, after the fronts whose Schur complements it takes from the stacks, if these are
+    /// not in the order yet.
     fn place_with_halves(&mut self, top: usize, placed: &mut [bool]) {
         for half in self.fronts[top].halves.into_iter().flatten() {
             if self.fronts[half].slot.is_none() && !placed[half] {
@@ -395,7 +396,7 @@ impl Fronts {
         &self.fronts[self.order[task.fronts.end - 1] as usize]
     }
 
-    /// Adds the Schur complement of a front to its stack; returns the sizes of both stacks.
+    /// Adds the Schur complement of a front to the sizes of the stacks; returns these.
     fn put(&self, front: &Front, stacks: &mut [usize; 2]) -> [usize; 2] {
         if front.slot.is_none() {
             stacks[front.stack] += front.boundary().pow(2);
@@ -403,7 +404,7 @@ impl Fronts {
         *stacks
     }
 
-    /// Removes the Schur complements of both halves of a front from their stacks.
+    /// Removes the Schur complements of both halves of a front from the sizes of the stacks.
     fn take_halves(&self, front: &Front, stacks: &mut [usize; 2]) {
         for half in front.halves.into_iter().flatten() {
             let half = &self.fronts[half];
@@ -413,7 +414,7 @@ impl Fronts {
         }
     }
 
-    /// The memory for the factor and for its computation on this many threads, with the places of unknowns in fronts
+    /// The memory for the factor and for its computation on `threads` threads, with the places of unknowns in fronts
     /// (bytes).
     pub fn bytes(&self, threads: usize) -> u64 {
         let waits = self.above.len() + threads * self.branch.len() + self.in_slots;
@@ -453,7 +454,7 @@ fn firsts(first_equal: &[usize]) -> impl Iterator<Item = usize> {
         .map(|(number, _)| number)
 }
 
-/// Divides fronts into pieces.
+/// Divides the fronts into pieces: branches, and the fronts above them.
 fn divide(dissection: &Dissection) -> Vec<Piece> {
     let mut pieces: Vec<Piece> = Vec::new();
     let mut start = 0;

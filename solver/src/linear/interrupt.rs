@@ -1,13 +1,13 @@
-//! Interruption points in long work, at which it may be stopped.
+//! Interruption points in long work, at which the work may be stopped.
 
-/// Calls a function whenever a portion of work is done; the function may stop the work. Work is counted in operations
-/// and not in seconds, since the solver has no clock.
+/// Calls a function whenever a portion of work is done; the function says whether to stop the work. Work is counted in
+/// operations and not in seconds, since the solver has no clock.
 pub struct Interrupt<'a> {
     stop: &'a mut dyn FnMut() -> bool,
     done: f64,
 }
 
-/// A matrix of zeros, filled with interruption points in between: the first touch of a GiB takes up to a second. `None`
+/// A list of zeros, filled with interruption points in between: the first touch of a GiB takes up to a second. `None`
 /// if there is not enough memory.
 pub(super) fn zeros(
     count: usize,
@@ -28,13 +28,13 @@ pub(super) fn zeros(
     Ok(Some(values))
 }
 
-/// Zeros that take no memory until they are written, since the system provides each page only then. `None` if there is
-/// not enough memory.
+/// A list of zeros that take no memory until they are written, since the system provides each page only then. `None` if
+/// there is not enough memory.
 pub(super) fn untouched_zeros(count: usize) -> Option<Vec<f64>> {
     bytemuck::allocation::try_zeroed_vec(count).ok()
 }
 
-/// The work was stopped on request.
+/// The error of work that was stopped on request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stopped;
 
@@ -42,12 +42,12 @@ pub struct Stopped;
 pub(super) const PORTION: f64 = 5e7;
 
 impl<'a> Interrupt<'a> {
-    /// Interruption points that call `stop`, which answers whether to stop.
+    /// Interruption points that call `stop`, which returns whether to stop.
     pub fn new(stop: &'a mut dyn FnMut() -> bool) -> Self {
         Interrupt { stop, done: 0.0 }
     }
 
-    /// Counts finished work (multiplications), and calls the function if a portion is complete.
+    /// Counts finished work (multiplications), and calls the function `stop` if a portion is complete.
     pub fn worked(&mut self, work: f64) -> Result<(), Stopped> {
         self.done += work;
         if self.done < PORTION {
@@ -57,7 +57,7 @@ impl<'a> Interrupt<'a> {
         self.ask()
     }
 
-    /// Calls the function now.
+    /// Calls the function `stop` now; an error if it says to stop.
     pub fn ask(&mut self) -> Result<(), Stopped> {
         match (self.stop)() {
             true => Err(Stopped),

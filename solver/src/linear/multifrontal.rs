@@ -9,8 +9,8 @@
 //!       | F_bo  F_bb |
 //! ```
 //!
-//! Unknowns are numbered in the order of their elimination, the kept ones last. These are never eliminated, so the
-//! Schur complement of the whole mesh is on them: Ŝ = A_cc − A_ci A_ii⁻¹ A_ic.
+//! Unknowns are numbered in the order of their elimination, the kept ones last. The kept unknowns are never eliminated,
+//! so the Schur complement of the whole mesh is on them: Ŝ = A_cc − A_ci A_ii⁻¹ A_ic.
 
 use faer::Accum;
 
@@ -27,7 +27,8 @@ const ELEMENT: usize = 16;
 /// The matrix of one element with its unknowns.
 #[derive(Clone, Default)]
 pub struct ElementMatrix {
-    /// The unknowns of the element; none where a displacement is prescribed, or the element has fewer nodes.
+    /// The unknowns of the element; `None` where a displacement is prescribed, and for nodes that a triangle does not
+    /// have.
     pub unknowns: [Option<u32>; ELEMENT],
     /// The entries of the symmetric matrix.
     pub entries: [[f64; ELEMENT]; ELEMENT],
@@ -38,7 +39,7 @@ pub struct ElementMatrix {
 pub enum FactorError {
     /// The matrix is not positive definite: a pivot is not positive.
     NotPositiveDefinite {
-        /// The unknown of that pivot.
+        /// The unknown of the pivot that is not positive.
         unknown: usize,
     },
     /// An element's matrix is not finite.
@@ -66,8 +67,8 @@ pub struct Factor {
 }
 
 impl Factor {
-    /// Factors the sum of the elements' matrices on `threads` threads; returns the factor and Ŝ. `element` writes the
-    /// matrix of an element with a given number.
+    /// Factors the sum of the elements' matrices on `threads` threads; returns the factor and Ŝ, the Schur complement
+    /// on the kept unknowns. `element`: writes the matrix of the element with a given number.
     pub fn new(
         fronts: Fronts,
         element: &(impl Fn(u32, &mut ElementMatrix) + Sync),
@@ -139,16 +140,17 @@ impl Factor {
         self.fronts.has_large_fields()
     }
 
-    /// The number of stored entries of L: equal fronts share theirs.
+    /// The number of stored entries of L: equal fronts share their columns.
     pub fn entries(&self) -> usize {
         self.values.len()
     }
 }
 
-/// Memory for fronts that one thread computes one after another; it is reused.
+/// The memory of one thread for the fronts that it computes one after another; it is reused.
 struct Memory {
     /// First the columns that a front owns, then two stacks for the Schur complements of fronts without a slot, until
-    /// another front needs them: those of a front's halves are on one stack, and its own goes to the other.
+    /// another front needs them: the complements of a front's halves are on one stack, and the front's own goes to the
+    /// other.
     values: Vec<f64>,
     space: Space,
     tops: [usize; 2],
@@ -171,7 +173,7 @@ impl Memory {
         })
     }
 
-    /// Where the last fronts of tasks store their Schur complements: on the stacks, or in slots.
+    /// The places where the last fronts of `tasks` store their Schur complements: on the stacks, or in slots.
     fn put<'a>(
         &'a mut self,
         fronts: &Fronts,
@@ -198,8 +200,8 @@ impl Memory {
         left
     }
 
-    /// Computes the columns of a task's fronts. The Schur complement of the last one goes to `left`, or waits on its
-    /// stack.
+    /// Computes the columns of a task's fronts. The Schur complement of the last front goes to `left`; without `left`
+    /// it waits on a stack.
     fn work_on<E: Fn(u32, &mut ElementMatrix)>(
         &mut self,
         task: &Task,
@@ -223,7 +225,7 @@ impl Memory {
         Ok(())
     }
 
-    /// Computes the columns of a front. Its Schur complement goes to `left`, or waits on its stack.
+    /// Computes the columns of a front. Its Schur complement goes to `left`; without `left` it waits on a stack.
     fn eliminate<E: Fn(u32, &mut ElementMatrix)>(
         &mut self,
         front: &Front,
@@ -309,9 +311,9 @@ impl Memory {
 /// The assembly of fronts: which entries are added where.
 struct Assembly {
     matrix: ElementMatrix,
-    /// The places of unknowns in a front.
+    /// By unknown: its place in the front that is being assembled.
     local: Vec<u32>,
-    /// The runs of the boundaries of both halves in the front.
+    /// For each half of the front, the runs of its boundary in the front.
     runs: [Vec<Run>; 2],
 }
 
@@ -334,7 +336,7 @@ impl Assembly {
         }
     }
 
-    /// Adds the matrices of the elements of a part that is not divided.
+    /// Adds the matrices of a front's elements; the front is that of a part that is not divided.
     fn add_elements(
         &mut self,
         fronts: &Fronts,

@@ -11,8 +11,8 @@ use super::interrupt::{Interrupt, Stopped};
 /// Runs all tasks, on as many threads as there are workspaces. Each thread takes the next task as soon as it is free,
 /// so the result of a task must not depend on the earlier use of its workspace.
 ///
-/// The error is the one that a single thread would find first. Only the calling thread asks whether to continue; while
-/// it waits, it does so whenever another thread has done a portion of work.
+/// The error is the one that a single thread would find first. Only the calling thread asks its `interrupt` whether to
+/// continue; while it waits, it asks whenever another thread has done a portion of work.
 pub(super) fn for_each<T: Send, W: Send, E: From<Stopped> + PartialEq + Send>(
     tasks: impl Iterator<Item = T> + Send,
     workspaces: &mut [W],
@@ -88,7 +88,7 @@ pub(super) fn for_each<T: Send, W: Send, E: From<Stopped> + PartialEq + Send>(
     }
 }
 
-/// Stops the other threads if this one panics.
+/// Stops the other threads if the thread that holds it panics.
 struct StopOnPanic<'a>([&'a AtomicBool; 2]);
 
 impl Drop for StopOnPanic<'_> {

@@ -6,8 +6,8 @@ use faer::linalg::solvers::Solve;
 /// A small matrix, by rows.
 pub type Rows = Vec<Vec<f64>>;
 
-/// The eigenvalues λ, as real and imaginary parts, with det(λ² A + λ B + C) = 0, for a regular A. None if their
-/// iterations fail.
+/// The eigenvalues λ, as real and imaginary parts, with det(λ² A + λ B + C) = 0, for a regular A. `None` if the
+/// iterations for them fail, or a matrix is not finite.
 pub fn quadratic_eigenvalues(a: &Rows, b: &Rows, c: &Rows) -> Option<Vec<[f64; 2]>> {
     let n = a.len();
     let [a, b, c] = [a, b, c].map(matrix);
@@ -30,7 +30,8 @@ pub fn quadratic_eigenvalues(a: &Rows, b: &Rows, c: &Rows) -> Option<Vec<[f64; 2
     )
 }
 
-/// The pairs of vectors (w, g) of the `count` smallest singular values: |A g| and |wᵀ A| equal that value.
+/// The pairs of vectors (w, g) of the `count` smallest singular values of A: |A g| and |wᵀ A| equal the singular value.
+/// `None` if A is not finite, or its decomposition fails.
 pub fn near_null(a: &Rows, count: usize) -> Option<Vec<[Vec<f64>; 2]>> {
     let n = a.len();
     let finite = a.iter().flatten().all(|value| value.is_finite());

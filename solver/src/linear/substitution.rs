@@ -1,4 +1,5 @@
-//! Solutions with a factor: upwards through the fronts for the forces, downwards for the displacements.
+//! Solutions of linear systems with a factor: upwards through the fronts for the forces, downwards for the
+//! displacements.
 
 use super::fronts::{Front, Piece};
 use super::interrupt::{Interrupt, Stopped};
@@ -6,8 +7,8 @@ use super::multifrontal::Factor;
 use super::parallel::for_each;
 
 impl Factor {
-    /// Replaces f of all unknowns by y = L⁻¹ f for the eliminated ones, and by f̂ = f_c − A_ci A_ii⁻¹ f_i for the kept
-    /// ones.
+    /// Replaces the forces f on all unknowns by y = L⁻¹ f for the eliminated unknowns, and by f̂ = f_c − A_ci A_ii⁻¹
+    /// f_i for the kept ones.
     pub fn forward(&self, f: &mut [f64]) {
         let mut v = Vec::new();
         for front in &self.fronts.fronts {
@@ -29,8 +30,8 @@ impl Factor {
         }
     }
 
-    /// Replaces y = L⁻¹ f of the eliminated unknowns by their displacements u, given u of the kept ones. Several fields
-    /// at once, on `threads` threads.
+    /// Replaces y = L⁻¹ f of the eliminated unknowns by their displacements u, given u of the kept unknowns. Solves for
+    /// several fields at once, on `threads` threads.
     pub fn backward<const FIELDS: usize>(&self, u: &mut [[f64; FIELDS]], threads: usize) {
         // this thread takes the memory of all: it has to answer for it
         let tallest = self.fronts.tallest();
@@ -61,8 +62,8 @@ impl Factor {
         }
     }
 
-    /// As [`Factor::backward`], in consecutive fronts: `own` are the unknowns that they own, `after` those from `end`
-    /// on.
+    /// Does the work of [`Factor::backward`] for consecutive fronts. `own`: the unknowns that the fronts own; `after`:
+    /// the unknowns from `end` on.
     fn backward_in<const FIELDS: usize>(
         &self,
         fronts: &[Front],
@@ -86,7 +87,7 @@ impl Factor {
         }
     }
 
-    /// Gathers the values of a front's unknowns.
+    /// Gathers the values of a front's unknowns from `all` in `into`.
     fn gather(&self, front: &Front, all: &[f64], into: &mut Vec<f64>) {
         into.clear();
         into.extend_from_slice(&all[front.first..front.first + front.own]);
