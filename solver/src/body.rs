@@ -24,21 +24,21 @@ use crate::solution::Phase;
 pub struct ElasticBody {
     /// The condensed stiffness Ŝ, on the contact unknowns in the order of `contact_dofs`.
     pub stiffness: Dense,
-    /// The condensed load f̂ of the loads.
+    /// The load f̂ that the problem's loads condense to.
     load_of_loads: Vec<f64>,
-    /// The condensed load f̂ of the prescribed displacements.
+    /// The load f̂ that the prescribed displacements condense to.
     load_of_supports: Vec<f64>,
-    /// The normal and tangential displacement of every contact node, all contacts in a row; free ones are numbered from
-    /// 0 as in Ŝ. Where the node's axes are oblique: u_n and its other component. At a common end of two contacts that
-    /// belongs to one alone: the displacements along the axes of that one.
+    /// The normal and tangential displacement of every contact node, for all contacts one after another; free ones are
+    /// numbered from 0 as in Ŝ. Where the node's axes are oblique: u_n and the other component. At a common end of two
+    /// contacts that belongs to one contact alone: the displacements along the axes of this contact.
     pub contact_dofs: Vec<[Dof; 2]>,
-    /// Where the axes of a contact node are oblique: the coefficients of its two displacements in u_t.
+    /// Where the axes of a contact node are oblique: the coefficients of the node's two displacements in u_t.
     pub tangents: Vec<Option<[f64; 2]>>,
-    /// External forces at every node along x and y, without those of contact.
+    /// External forces at every node along x and y, without the forces of contact.
     pub nodal_loads: Vec<[f64; 2]>,
     /// Which displacements are unknown, with their numbers.
     pub map: DofMap,
-    /// L⁻¹ f of the unknowns away from contact: for the forces f of the loads, and for those of the prescribed
+    /// L⁻¹ f of the unknowns away from contact: for the forces f of the loads, and for the forces f of the prescribed
     /// displacements.
     reduced: [Vec<f64>; 2],
     factor: Factor,
@@ -48,8 +48,8 @@ pub struct ElasticBody {
     tables: ElementTables,
 }
 
-/// The part of a model that determines its body: models that are equal in this have the same body. Anything else that
-/// [`ElasticBody::new`] reads follows from it.
+/// The part of a model that determines its body: models with equal parts have the same body. Anything else that
+/// [`ElasticBody::new`] reads follows from this part.
 #[derive(PartialEq, Serialize)]
 pub struct Source<'a> {
     mesh: &'a Mesh,
@@ -64,7 +64,7 @@ pub struct Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    /// The part of this model that determines its body.
+    /// The part of `model` that determines its body.
     pub fn of(model: &'a Model) -> Self {
         let boundaries = model.contacts.iter().map(|contact| &contact.boundary);
         Source {
@@ -82,10 +82,10 @@ impl<'a> Source<'a> {
     }
 }
 
-/// The unknown of the midside node beside a contact's end on the axis is u_n − a u_n⁰, with u_n⁰ the displacement of
-/// that end, which has no area of its own: ∫ h₀ r dr = 0. With a = 1/8 the end's unknown moves h₀ + h₁/8, of which the
-/// area is that of h₁ over 8, and the pressure there, its reaction over that area, is exact for p = p₀ + β r²
-/// (formulation 3.5).
+/// The share a = 1/8 in the unknown u_n − a u_n⁰ of the midside node beside a contact's end on the axis, with u_n⁰ the
+/// displacement of this end. The end has no area of its own: ∫ h₀ r dr = 0. With a = 1/8 the end's unknown moves h₀ +
+/// h₁/8, whose area is 1/8 of the area of h₁, and the pressure at the end, the unknown's reaction over this area, is
+/// exact for p = p₀ + β r² (formulation 3.5).
 pub const AXIS_SHARE: f64 = 0.125;
 
 impl ElasticBody {
@@ -233,7 +233,7 @@ impl ElasticBody {
         self.factor.entries() + kept * (kept + 1) / 2
     }
 
-    /// How many threads may work on the fields of this body: the observer is asked for a second one if that is worth
+    /// How many threads may work on the fields of this body: the observer is asked for a second thread if one is worth
     /// it.
     pub fn threads(&self, observer: &mut dyn Observer) -> usize {
         if self.factor.has_large_fields() && observer.threads() > 1 {
@@ -243,12 +243,12 @@ impl ElasticBody {
         }
     }
 
-    /// Displacements along x and y of every node at a load level, from those of the contact unknowns.
+    /// Displacements along x and y of every node at a load level, from the displacements of the contact unknowns.
     pub fn displacements(&self, contact_displacement: &[f64], level: &Level) -> Vec<[f64; 2]> {
         self.displacements_on(1, contact_displacement, level)
     }
 
-    /// As [`ElasticBody::displacements`], on `threads` threads.
+    /// The result of [`ElasticBody::displacements`], computed on `threads` threads.
     pub fn displacements_on(
         &self,
         threads: usize,
@@ -264,8 +264,8 @@ impl ElasticBody {
         self.map.displacements(|i| u[i][0], level.supports)
     }
 
-    /// Displacements along x and y of every node under the given displacements of the contact unknowns alone, for at
-    /// most `FIELDS` such fields, on `threads` threads.
+    /// Displacements along x and y of every node if only the contact unknowns are displaced as given, for up to
+    /// `FIELDS` sets of such displacements at once, on `threads` threads.
     pub fn displacements_without_loads<const FIELDS: usize>(
         &self,
         contact_displacements: &[Vec<f64>],
@@ -287,8 +287,8 @@ fn all_finite(values: &[f64]) -> bool {
     values.iter().all(|value| value.is_finite())
 }
 
-/// The normal unknowns of contact nodes on the axis, each with that of the midside node beside it, if both are free;
-/// without the nodes that stay open.
+/// The normal unknowns of contact nodes on the axis, each with the normal unknown of the midside node beside it, if
+/// both are free; without the nodes that stay open.
 fn axis_ends(model: &Model, contact_dofs: &[[Dof; 2]]) -> Vec<[usize; 2]> {
     let (mut first, mut ends) = (0, Vec::new());
     for contact in &model.contacts {
@@ -305,8 +305,8 @@ fn axis_ends(model: &Model, contact_dofs: &[[Dof; 2]]) -> Vec<[usize; 2]> {
     ends
 }
 
-/// Numbers the unknowns in the order of their elimination, those of contact nodes last, turned to (n, t) and in the order
-/// of the contacts; and plans their elimination.
+/// Numbers the unknowns in the order of their elimination, and plans the elimination. The unknowns of contact nodes
+/// come last, turned to (n, t) and in the order of the contacts.
 fn number(model: &Model, elements: Elements<'_>) -> Result<(DofMap, Fronts), SolveError> {
     let count = model.mesh.nodes.len();
     let mut axes = vec![None; count];

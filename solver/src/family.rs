@@ -1,4 +1,4 @@
-//! Many problems on one body: it is factored and condensed once.
+//! Many problems on one body: the body is factored and condensed once.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use crate::solution::{
 use crate::steps::{self, Numbers, Shared};
 pub use crate::steps::{End, Start};
 
-/// Problems on one body, solved one after another; each starts from the end of another one where that helps.
+/// Problems on one body, solved one after another; each starts from the final state of another one where that helps.
 pub struct Family {
     model: VariableModel,
     body: Arc<ElasticBody>,
@@ -58,7 +58,7 @@ impl Family {
     /// Checks the first problem, factors and condenses its body.
     ///
     /// Errors of numbers are estimated, not verified, and meshes are not refined adaptively: a problem that asks for
-    /// that shares no body, and is solved by [`solve_on`](crate::solve_on).
+    /// verification or adaptive refinement shares no body, and is solved by [`solve_on`](crate::solve_on).
     ///
     /// # Errors
     ///
@@ -84,15 +84,15 @@ impl Family {
         }
     }
 
-    /// Solves a problem on this body (`problem.mesh` is not read: it is the family's), and also returns its end, from
-    /// which other problems may start.
+    /// Solves a problem on this body (`problem.mesh` is not read: it is the family's), and also returns its final
+    /// state, from which other problems may start.
     ///
     /// The numbers are those of the problem's own solution within its tolerance. Their last bits depend on `start`, and
     /// on nothing else that was solved before.
     ///
     /// Displacements away from the contacts are not computed: the balance of forces (`residuals.equilibrium`) is 0, and
-    /// warnings that need it, or strains, are missing. A body that only contact holds, and comparisons of solutions,
-    /// take the whole solution.
+    /// warnings that need the balance, or strains, are missing. If only contact holds the body, or the problem asks for
+    /// a comparison of solutions, it is solved completely.
     ///
     /// # Errors
     ///

@@ -13,7 +13,7 @@ pub fn is_finite<T: Serialize + ?Sized>(value: &T) -> bool {
     value.serialize(&mut walk).is_ok()
 }
 
-/// JSON Pointers to the numbers of a value that are not finite, at most `most` of them, and the number of those beyond.
+/// JSON Pointers to the numbers of a value that are not finite, at most `most` of them, and the number of further ones.
 pub fn not_finite<T: Serialize + ?Sized>(value: &T, most: usize) -> (Vec<String>, usize) {
     let mut walk = Walk::new(Limit::List(most));
     // nothing here fails: only the other limit ends a walk with an error
@@ -25,7 +25,7 @@ pub fn not_finite<T: Serialize + ?Sized>(value: &T, most: usize) -> (Vec<String>
 enum Limit {
     /// At the first number that is not finite, by an error.
     StopAtFirst,
-    /// After the whole value, listing this many numbers at most.
+    /// After the whole value; at most this many numbers are listed.
     List(usize),
 }
 
@@ -34,7 +34,7 @@ struct Walk {
     /// The path from the whole value to the current part.
     path: Vec<Step>,
     found: Vec<String>,
-    /// The number of non-finite numbers beyond those listed.
+    /// The number of non-finite numbers that are not listed.
     more: usize,
     limit: Limit,
     /// Whether the next string is the key of an entry.

@@ -3,8 +3,9 @@
 //! as "formulation 4.3".
 //!
 //! A library of pure functions: no clock, file or network; the same problem gives the same bits. A large body is
-//! factored on two threads if the observer lets it ([`observer::Observer::threads`]), with the same bits as on one. Reading and writing of any format is left to the crate `files`. The modules are listed from the ground up; each
-//! uses only those above it.
+//! factored on two threads if the observer lets it ([`observer::Observer::threads`]), with the same bits as on one.
+//! Reading and writing of any format is left to the crate `files`. The modules are listed from the ground up; each uses
+//! only the modules above it in the list.
 //!
 //! ```
 //! // a block that is pressed by a rigid punch, as JSON: `files::parse` reads it with all violations at once
@@ -129,16 +130,16 @@ use verify::Verification;
 
 /// Solves a problem.
 ///
-/// `observer` is told every phase and iteration, and asked again and again in long work whether to stop; then the result
-/// is the last state, as `Outcome::Canceled`. Pass `&mut ()` to observe nothing. A method that does not converge is an
-/// [`Outcome`](solution::Outcome) too, with its history.
+/// `observer` is told every phase and iteration, and asked again and again in long work whether to stop (`&mut ()`
+/// ignores all progress and never stops): the result is then the last state as `Outcome::Canceled`. A method that does
+/// not converge is an [`Outcome`](solution::Outcome) too, with its history.
 ///
 /// # Errors
 ///
 /// [`SolveError::Invalid`] with all violations, if the problem is wrong or names a mesh that only its caller can read
 /// (see [`solve_on`]). The other kinds of [`SolveError`] mean that no state could be computed: the body is not held,
-/// memory does not suffice, a number is not finite, or the observer stopped before there was a state, or while its
-/// stresses and profiles were much work.
+/// memory does not suffice, a number is not finite, or the observer stopped before there was a state, or while the
+/// state's stresses and profiles were computed, if these were much work.
 pub fn solve(problem: &Problem, observer: &mut dyn Observer) -> Result<Solution, SolveError> {
     solve_on(problem, None, observer)
 }
@@ -200,7 +201,7 @@ pub struct Checked {
     pub estimate: Estimate,
 }
 
-/// Checks a problem without solving it: its warnings and its cost.
+/// Checks a problem without solving it: returns its warnings and the cost of solving it.
 ///
 /// # Errors
 ///

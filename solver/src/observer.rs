@@ -1,4 +1,4 @@
-//! What the solver tells while it solves, and what it asks.
+//! What the solver tells an observer while it solves, and what it asks.
 
 use crate::error::SolveError;
 use crate::phase::Phase;
@@ -10,22 +10,23 @@ use crate::solution::{Iteration, Solution, Warning};
 /// takes [`Progress`], and `()`, which ignores it. An observer in front of another one ([`Observer::behind`]) passes on the
 /// questions that it does not answer itself.
 pub trait Observer {
-    /// Is told the progress.
+    /// Receives the progress of the solution.
     fn event(&mut self, progress: Progress<'_>);
 
-    /// Whether the solver should stop. It asks after each phase and iteration, and again and again in long work; once
-    /// the answer is yes, it should remain yes.
+    /// Whether the solver should stop. The solver asks after each phase and iteration, and again and again in long
+    /// work; after the first `true` the observer should always return `true`.
     fn stop(&mut self) -> bool {
         self.behind().is_some_and(|observer| observer.stop())
     }
 
-    /// Whether the solver may take this many bytes more at once. A solver that cannot go on without them tells
-    /// [`Progress::OutOfMemory`]; otherwise a refusal stops nothing: it works with less, or ends with the results so far.
+    /// Whether the solver may take `bytes` more bytes at once. If not, a solver that cannot go on without them reports
+    /// [`Progress::OutOfMemory`]; otherwise it does with less, or ends with the results so far.
     fn may_use(&mut self, bytes: u64) -> bool {
         self.behind().is_none_or(|observer| observer.may_use(bytes))
     }
 
-    /// How many threads may share the next work, at least 1: the solver uses one or two. No result depends on it.
+    /// How many threads may share the next work, at least 1: the solver uses one or two. No result depends on their
+    /// number.
     fn threads(&mut self) -> usize {
         self.behind().map_or(1, |observer| observer.threads())
     }
@@ -43,19 +44,19 @@ pub enum Progress<'a> {
     Phase(Phase),
     /// An iteration is done.
     Iteration(&'a Iteration),
-    /// Adaptive refinement begins to solve on a mesh, or returns to the one before, whose results are final.
+    /// Adaptive refinement begins to solve on a mesh, or returns to the mesh before, whose results are final.
     Refinement {
         /// The number of the mesh, from 1.
         number: u32,
-        /// The number of its elements.
+        /// The number of elements of the mesh.
         elements: u64,
         /// Largest relative error on the mesh before; absent for the first mesh, and where the error is unknown.
         error: Option<f64>,
     },
-    /// An iteration is done on a mesh that is the last only if its errors are within the tolerance; then all its
-    /// iterations are reported again. The iterations of the next mesh are counted from 1.
+    /// An iteration is done on a mesh of adaptive refinement that may not be the last. If it turns out to be the last,
+    /// all its iterations are reported again. The iterations of the next mesh are counted from 1.
     Tentative(&'a Iteration),
-    /// A warning, as soon as it is known; all are repeated in the summary.
+    /// A warning, as soon as it is known; all warnings are repeated in the summary.
     Warning(&'a Warning),
     /// A load step that is not the last has ended: the solution so far, without fields. Sent for problems with several
     /// steps only, and not on the meshes of adaptive refinement.
@@ -78,7 +79,7 @@ impl<F: FnMut(Progress<'_>)> Observer for F {
     }
 }
 
-/// Tells the progress; an error if the solution is to stop.
+/// Tells the observer the progress; an error if the solution is to stop.
 pub(crate) fn notify(
     observer: &mut dyn Observer,
     progress: Progress<'_>,
@@ -95,7 +96,7 @@ pub(crate) fn go_on(observer: &mut dyn Observer) -> Result<(), SolveError> {
     }
 }
 
-/// Takes memory that the solution cannot do without; an error if it is refused.
+/// Asks the observer for memory that the solution cannot do without; an error if the memory is refused.
 pub(crate) fn take(observer: &mut dyn Observer, bytes: u64) -> Result<(), SolveError> {
     if observer.may_use(bytes) {
         return Ok(());

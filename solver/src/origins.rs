@@ -4,15 +4,15 @@ use std::collections::BTreeSet;
 
 use crate::model::Model;
 
-/// A quantity with an error above this many times the tolerance counts as one with exactly this error.
+/// A quantity whose error is more than this many times the tolerance counts as if its error were this many times it.
 const MOST_EXCESS: f64 = 100.0;
 
 /// The contribution of every element to the errors above a tolerance.
 pub struct Origins {
     /// The largest relative error that needs no refinement.
     tolerance: f64,
-    /// The contribution of each element: for each quantity they add up to its relative error divided by the tolerance.
-    /// All 0 if no error is above the tolerance, or none is known.
+    /// The contribution of each element. The contributions to the error of one quantity add up to its relative error
+    /// divided by the tolerance. All are 0 if no error is above the tolerance, or none is known.
     pub elements: Vec<f64>,
     /// Elements where errors are unknown until there are more nodes.
     pub unresolved: BTreeSet<usize>,
@@ -41,7 +41,7 @@ impl Added {
 }
 
 impl Origins {
-    /// Starts without any contribution for a model.
+    /// Starts with no contribution, for the elements of a model.
     pub fn new(model: &Model, tolerance: f64) -> Self {
         let mut with_side = vec![0; model.mesh.nodes.len()];
         for (element, e) in model.mesh.elements.iter().zip(0..) {
@@ -69,7 +69,7 @@ impl Origins {
     }
 
     /// Adds a place of a contact where the obstacle between the nodes is not resolved: errors are unknown until there
-    /// are nodes.
+    /// are nodes at the place.
     pub fn add_place(&mut self, model: &Model, patch: usize, s: f64) {
         let boundary = &model.contacts[patch].boundary;
         let covers = |edge: &usize| boundary.edge_arc(*edge)[1] >= s;
@@ -78,7 +78,8 @@ impl Origins {
         self.unresolved.insert(self.at_edge[patch][edge] as usize);
     }
 
-    /// Adds the contributions to the error of a quantity of a contact that has this relative error.
+    /// Adds the contributions `added` to the error of a quantity of a contact. `relative`: the relative error of the
+    /// quantity.
     pub fn add(&mut self, patch: usize, relative: f64, added: &Added) {
         let edges = added.edges.iter().map(|(_, part)| part);
         let total: f64 = added.elements.iter().chain(edges).sum();

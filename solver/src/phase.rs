@@ -43,7 +43,7 @@ pub enum Phase {
 }
 
 impl Phase {
-    /// The name that the API has for it.
+    /// The name of the phase in the API.
     pub fn as_str(self) -> &'static str {
         self.into()
     }

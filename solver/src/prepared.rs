@@ -24,8 +24,8 @@ pub struct Prepared {
     pub body: Arc<ElasticBody>,
 }
 
-/// Checks a problem on its own mesh, and factors and condenses its body; `external` is the mesh that it only names or
-/// contains as text.
+/// Checks a problem on its own mesh, and factors and condenses its body; `external` is the mesh that the problem only
+/// names or contains as text.
 ///
 /// # Errors
 ///
@@ -55,8 +55,8 @@ pub fn checked(
     Ok(model)
 }
 
-/// Prepares a problem like [`prepare`], on another mesh of its body, which has all boundaries, groups and node sets
-/// itself.
+/// Prepares a problem like [`prepare`], on another mesh of its body; this mesh must have all boundaries, groups and
+/// node sets itself.
 ///
 /// # Errors
 ///
@@ -99,7 +99,7 @@ impl Prepared {
         steps::run(&self.model, &self.body, None, observer)
     }
 
-    /// Solves another problem on this body, or returns `None` if its body is not the same.
+    /// Solves another problem on this body; `None` if the body of `model` is not the same.
     ///
     /// # Errors
     ///

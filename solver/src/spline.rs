@@ -13,7 +13,7 @@ pub struct Spline {
     flat: f64,
 }
 
-/// Slopes up to this part of the steepest are rounding.
+/// Slopes up to this fraction of the steepest are rounding.
 const FLAT: f64 = 1e-12;
 
 impl Spline {
@@ -113,11 +113,11 @@ fn not_a_knot(steps: &[f64], chords: &[f64]) -> Vec<f64> {
     slope
 }
 
-/// Smoothed values near `y` at the same places: of all with Σ((y − f)/deviation)² ≤ number of points, those with the
-/// smallest ∫f‴² (Reinsch's criterion, with the third derivative and by differences). The pressure follows the
+/// The smoothed values f near `y` at the places `x`: of all f with Σ((y − f)/deviation)² ≤ number of points, the one
+/// with the smallest ∫f‴² (Reinsch's criterion, with the third derivative and by differences). The pressure follows the
 /// curvature of a profile: the usual penalty on the curvature itself would flatten it, most at the ends, while a
-/// parabola has no penalty here and is recovered exactly under noise. Where a parabola is within the deviation, it is
-/// the result.
+/// parabola has no penalty here and is recovered exactly under noise. If a parabola is within the deviation, it is the
+/// result.
 pub fn smoothed(x: &[f64], y: &[f64], deviation: f64) -> Vec<f64> {
     let count = x.len();
     let parabola = parabola(x, y);
@@ -148,11 +148,11 @@ pub fn smoothed(x: &[f64], y: &[f64], deviation: f64) -> Vec<f64> {
     parabola.iter().zip(f).map(|(p, f)| p + f).collect()
 }
 
-/// The bounds of log₂ √λ, in units of the mean spacing: far beyond the values at which 100,000 points are not smoothed
-/// at all, or to a parabola.
+/// The bound of |log₂ √λ| for the weight λ of the penalty, in units of the mean spacing: far beyond the values at which
+/// 100,000 points are not smoothed at all, or to a parabola.
 const SMOOTHEST: f64 = 120.0;
 
-/// The number of halvings of that interval, which give λ to 10⁻⁸.
+/// The number of halvings of the interval of log₂ √λ, which give λ to 10⁻⁸.
 const HALVINGS: u32 = 36;
 
 /// The values of the least-squares parabola, by polynomials that are orthogonal over the places.

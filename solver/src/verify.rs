@@ -35,14 +35,16 @@ impl Verification {
         })
     }
 
-    /// Limits the refined mesh for adaptive refinement that starts from this model: its last mesh may have any number
-    /// of elements, but the refined one only as many as the estimate of the memory assumes.
+    /// Limits the refined mesh for adaptive refinement that starts from the model `first`: the last mesh of the
+    /// refinement may have any number of elements, but the refined mesh only as many as the estimate of the memory
+    /// assumes.
     pub fn limited(mut self, first: &Model) -> Verification {
         self.most = Some(MostElements::of(first));
         self
     }
 
-    /// Verifies the errors that are stated for a solution on this mesh. If it is stopped, the estimates remain.
+    /// Verifies the errors that are stated for a solution on this mesh. If the verification is stopped, the estimates
+    /// remain.
     pub fn verify(
         self,
         problem: &Problem,
@@ -66,7 +68,7 @@ impl Verification {
         accuracy::limit_by(&summary.warnings, estimated);
     }
 
-    /// The errors by comparison, or the reason why there are none.
+    /// The errors by comparison of solutions, or the reason why there are no such errors.
     fn compared(
         self,
         problem: &Problem,
@@ -139,7 +141,7 @@ impl Verification {
     }
 }
 
-/// The quantities of a problem on another mesh; `Err` inside: the iterations did not converge.
+/// The quantities of a problem on another mesh; the inner `Err`: the iterations did not converge.
 fn solved(
     model: &Model,
     observer: &mut QuietObserver<'_>,
@@ -168,9 +170,9 @@ struct QuietObserver<'a> {
 
 /// Why the other solution was stopped.
 enum Stop {
-    /// It needed this many more bytes.
+    /// The other solution needed this many more bytes.
     Memory(u64),
-    /// The observer wants it.
+    /// The observer asked to stop.
     Asked,
 }
 

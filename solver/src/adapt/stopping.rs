@@ -14,6 +14,7 @@ const MOST_MESHES: usize = 30;
 /// The number of meshes by which the decrease of errors is judged. At a kink of the obstacle, for example, errors do
 /// not decrease.
 const PATIENCE: usize = 8;
+/// The number of meshes before refinement stops because errors decrease too slowly.
 const FEWEST_MESHES: usize = 12;
 
 /// The largest number of meshes in a row without a known error. Errors are unknown while the obstacle between the nodes

@@ -8,13 +8,14 @@ use crate::spline::Spline;
 pub(super) enum Curve<'a> {
     /// A polyline, with its segments in blocks.
     Segments(&'a [[f64; 2]], Vec<Block>),
-    /// A smooth line: the Bézier points of its cubic pieces, and these in blocks.
+    /// A smooth line: the Bézier points of its cubic pieces, and the pieces in blocks.
     Smooth(Vec<Bezier>, Vec<Block>),
     /// A straight line through two points, without ends.
     Line([f64; 2], [f64; 2]),
 }
 
-/// The four points of a cubic: its ends, and two between that its tangents there point at.
+/// The four Bézier points of a cubic: its two ends, and two points between them at which the tangents in the ends
+/// point.
 type Bezier = [[f64; 2]; 4];
 
 /// Consecutive pieces of a curve, and a disc that contains them.
@@ -37,20 +38,20 @@ pub(super) enum Side {
 /// The place of a curve that a normal of the body faces.
 pub(super) struct Hit {
     pub(super) profile: Profile,
-    /// The first and the last of the pieces that meet there.
+    /// The first and the last of the pieces that meet at the place.
     pub(super) pieces: [usize; 2],
 }
 
 /// A place where the straight line through a normal of the body crosses a curve.
 pub(super) struct Crossing {
-    /// The profile there; its distance is negative behind the surface.
+    /// The profile at the crossing; its distance is negative if the crossing is behind the surface.
     profile: Profile,
     piece: usize,
-    /// The side of the curve that is entered there in the direction of the normal.
+    /// The side of the curve that is entered at the crossing in the direction of the normal.
     entered: Side,
 }
 
-/// A normal of the body: its foot, n, and t.
+/// A normal of the body: its foot `place`, the outward unit normal n, and the tangent t.
 pub(super) struct Ray {
     pub(super) place: [f64; 2],
     pub(super) n: [f64; 2],
@@ -58,7 +59,7 @@ pub(super) struct Ray {
 }
 
 impl<'a> Curve<'a> {
-    /// The curve through points, no two consecutive ones of which are equal.
+    /// The curve through `points`, of which no two consecutive ones are equal.
     pub(super) fn through(points: &'a [[f64; 2]], interpolation: Interpolation) -> Self {
         match interpolation {
             Interpolation::Linear => {
@@ -112,7 +113,8 @@ impl<'a> Curve<'a> {
         found
     }
 
-    /// The place of the curve that a normal of the body faces, if the obstacle is rigid on the side `rigid` of it.
+    /// The place of the curve that a normal of the body faces, if the obstacle is rigid on the side `rigid` of the
+    /// curve.
     ///
     /// A place ahead of the surface is faced. A place behind it is faced only if the surface there lies inside the
     /// obstacle: the normal enters the rigid side at that place and does not leave it before the surface. Where the
@@ -154,7 +156,8 @@ impl<'a> Curve<'a> {
         })
     }
 
-    /// The profile at that crossing of a normal of the body with the curve whose distance is nearest to `distance`.
+    /// The profile at one of the crossings of a normal of the body with the curve: the crossing whose distance is
+    /// nearest to `distance`.
     pub(super) fn crossing_near(&self, ray: &Ray, rounding: f64, distance: f64) -> Option<Profile> {
         let crossings = self.crossings(ray, rounding).into_iter();
         let profiles = crossings.map(|crossing| crossing.profile);
@@ -162,8 +165,8 @@ impl<'a> Curve<'a> {
         profiles.min_by(|a, b| off(a).total_cmp(&off(b)))
     }
 
-    /// The side of the curve that is rigid, judged along one normal; none if that does not cross the curve. `reach`:
-    /// how far the body extends along −n (length).
+    /// The side of the curve that is rigid, judged along one normal; `None` if the normal does not cross the curve.
+    /// `reach`: how far the body extends along −n (length).
     pub(super) fn rigid_side(&self, ray: &Ray, reach: f64, rounding: f64) -> Option<Side> {
         let crossings = self.crossings(ray, rounding);
         match nearest(&crossings, rounding) {
@@ -249,8 +252,8 @@ fn nearest(crossings: &[Crossing], rounding: f64) -> [Option<&Crossing>; 2] {
     [least(true), least(false)]
 }
 
-/// The crossing of a normal with the straight line from `start` to `end`, if the parameter along it is in the given
-/// range.
+/// The crossing of a normal with the straight line from `start` to `end`, if the parameter along the line is in the
+/// given range.
 fn on_segment(
     ray: &Ray,
     start: [f64; 2],
@@ -315,7 +318,7 @@ fn spline(points: &[[f64; 2]]) -> Vec<Bezier> {
 /// Slopes of a curve up to this are rounding: a symmetric curve is flat in its middle.
 const FLAT: f64 = 1e-12;
 
-/// Divides pieces into blocks. `points`: the points that contain a piece between them.
+/// Divides pieces into blocks. `points`: for a piece, points that the piece lies between.
 fn blocks(count: usize, points: impl Fn(usize) -> Vec<[f64; 2]>) -> Vec<Block> {
     let block = |first: usize| {
         let pieces = first..count.min(first + BLOCK);

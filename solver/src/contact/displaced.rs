@@ -1,4 +1,4 @@
-//! An obstacle displaced as a rigid body, and the profile that the nodes of a contact face then.
+//! An obstacle displaced as a rigid body, and the profile that the nodes of a contact face after the displacement.
 
 use super::curve::Ray;
 use super::shape::Shape;
@@ -18,7 +18,7 @@ pub struct Displaced<'a> {
 }
 
 impl<'a> Displaced<'a> {
-    /// The obstacle at a contact boundary. `normals`: those of the body at its nodes.
+    /// The obstacle at a contact boundary. `normals`: the body's normals at the nodes of the boundary.
     pub fn new(
         obstacle: &'a Obstacle,
         boundary: &'a ContactBoundary,
@@ -33,8 +33,8 @@ impl<'a> Displaced<'a> {
         }
     }
 
-    /// The profile at a node after a displacement. If the node's normal meets the curve several times, the crossing
-    /// nearest to `expected` counts. None where the obstacle does not face the node any more.
+    /// The profile at a node after the displacement `by`. If the node's normal meets the curve several times, the
+    /// crossing nearest to `expected` counts. `None` where the obstacle no longer faces the node.
     pub fn profile(&self, node: usize, by: [f64; 2], expected: f64) -> Option<Profile> {
         let ([x, y], n) = (self.boundary.positions[node], self.normals[node]);
         let t = [n[1], -n[0]];
@@ -47,8 +47,8 @@ impl<'a> Displaced<'a> {
         }
     }
 
-    /// The profile at a node after a displacement, for an obstacle along the boundary: at the place that is moved
-    /// before the node.
+    /// The profile at a node after the displacement `by`, for an obstacle given along the boundary: the profile at the
+    /// point of the obstacle that the displacement moves in front of the node.
     fn before(&self, node: usize, by: [f64; 2]) -> Option<Profile> {
         let (place, n) = (self.boundary.positions[node], self.normals[node]);
         let t = [n[1], -n[0]];
@@ -95,8 +95,8 @@ impl<'a> Displaced<'a> {
         })
     }
 
-    /// A point of the obstacle before it is displaced, over the place q of the boundary (in edges from its start);
-    /// beyond the ends of the boundary it is continued along the tangents there.
+    /// A point of the obstacle before it is displaced, over the place q of the boundary (in edges from the boundary's
+    /// start); beyond its ends the boundary is continued along its tangents there.
     fn point(&self, q: f64) -> Option<[f64; 2]> {
         let boundary = self.boundary;
         let count = boundary.edge_count();

@@ -25,7 +25,7 @@ use crate::element::edge3;
 use crate::element::gauss::GAUSS_3;
 use crate::mesh::{Edge, Mesh};
 
-/// Positions count as equal within this part of a length, since they coincide with grid lines only up to rounding.
+/// Positions count as equal within this fraction of a length, since they coincide with grid lines only up to rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// The directions (unit vectors, with their errors as angles) along which supports hold nodes.
@@ -36,7 +36,7 @@ pub type HeldDirections = BTreeMap<u32, ([f64; 2], f64)>;
 pub struct Profile {
     /// Distance along the body's normal (length); the indentation is not yet subtracted.
     pub distance: f64,
-    /// The change of the distance per length along t; the mean of both sides at a kink.
+    /// The change of the distance per length along t; at a kink the mean of the changes on both sides.
     pub slope: f64,
 }
 
@@ -58,9 +58,9 @@ pub struct ContactBoundary {
     /// The unit outward normal; at a corner the mean of the normals of both edges, also at an end where the surface
     /// continues smoothly.
     pub normals: Vec<[f64; 2]>,
-    /// How far each normal may deviate from that of the surface (angle).
+    /// How far each normal may deviate from the normal of the surface (angle).
     pub normal_errors: Vec<f64>,
-    /// The area ∫ h_i with the depth of the section: divides a nodal force to give a pressure.
+    /// The area ∫ h_i with the depth of the section; a nodal force divided by it is a pressure.
     pub weights: Vec<f64>,
     /// The points where friction acts, three Gauss points on each edge.
     pub friction_points: Vec<FrictionPoint>,
@@ -71,7 +71,7 @@ pub struct ContactBoundary {
 pub struct FrictionPoint {
     /// The arc length.
     pub s: f64,
-    /// The three chain nodes of its edge.
+    /// The three chain nodes of the point's edge.
     pub nodes: [usize; 3],
     /// The shape functions of these nodes at the point.
     pub shape: [f64; 3],
@@ -82,7 +82,7 @@ pub struct FrictionPoint {
 impl ContactBoundary {
     /// The contact along consecutive edges, with the first node at arc length `start`; `depth` as in
     /// `elasticity::Section`. A normal that is parallel or perpendicular to a direction of `held`, within the errors of
-    /// both, is made exactly so: on a line of symmetry it lies in that line.
+    /// both, is made exactly parallel or perpendicular: on a line of symmetry it lies in that line.
     pub fn new(
         mesh: &Mesh,
         chain: &[Edge],

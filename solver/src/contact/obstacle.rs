@@ -1,4 +1,5 @@
-//! Rigid obstacles: the part of a boundary that faces one, its distance at the nodes, and its shape between them.
+//! Rigid obstacles: the part of a boundary that faces an obstacle, the obstacle's distance at the nodes, and its shape
+//! between the nodes.
 
 use std::ops::Range;
 
@@ -43,11 +44,12 @@ pub struct Place {
     pub edge: usize,
     /// The place on the edge, −1 … 1.
     pub xi: f64,
-    /// The body's normal there.
+    /// The body's normal at the place.
     pub normal: [f64; 2],
-    /// The obstacle's distance and slope there.
+    /// The obstacle's distance and slope at the place.
     pub profile: Profile,
-    /// The change of the obstacle's slope along t; positive at a kink that points at the body, 0 where it is smooth.
+    /// The change of the obstacle's slope along t; positive at a kink that points at the body, 0 where the obstacle is
+    /// smooth.
     pub kink: f64,
     /// How much nearer the obstacle is than the parabola through the profile at the edge's nodes (length); negative:
     /// farther.
@@ -103,9 +105,9 @@ fn along(mesh: &Mesh, chain: &[Edge], held: &HeldDirections) -> ContactBoundary 
     ContactBoundary::new(mesh, chain, 0.0, held, |_| 1.0)
 }
 
-/// Where an obstacle ends inside edges of `boundary` (edges that follow one another): those edges, with the place of
-/// the end on each, −1 … 1. `deepest`: the largest indentation; ends of a curve that an edge does not reach then are
-/// left out.
+/// The edges of `boundary` (edges that follow one another) inside which an obstacle ends, each with the place of the
+/// end on it, −1 … 1. `deepest`: the largest indentation; where an edge is farther from a curve than this, the curve's
+/// ends are left out.
 pub fn ends_inside_edges(
     mesh: &Mesh,
     boundary: &[Edge],
@@ -147,7 +149,7 @@ struct View<'a> {
     shape: Shape<'a>,
     along: Along,
     whole: ContactBoundary,
-    /// The rigid side of a curve.
+    /// The side of a curve that is rigid, for an obstacle that is a curve.
     rigid: Side,
     corners: Vec<Corner>,
     rounding: f64,
@@ -157,7 +159,7 @@ struct View<'a> {
 #[derive(Clone, Copy)]
 struct Seen {
     profile: Profile,
-    /// The first and the last piece of a curve that meet there.
+    /// The first and the last of a curve's pieces that meet at the point seen.
     pieces: [usize; 2],
 }
 
@@ -195,8 +197,8 @@ impl<'a> View<'a> {
         ]
     }
 
-    /// The runs of edges whose nodes all face the obstacle along the normals of a contact that consists of this run: at
-    /// an end the normal of the edge itself, else the mean of both edges. `within`: the edges between `from` and `to`.
+    /// The runs of edges whose nodes all face the obstacle along the normals that a contact of just this run has: at
+    /// its ends the normal of the edge alone, else the mean of both edges. `within`: the edges between `from` and `to`.
     fn runs(&self, boundary: &[Edge], within: &dyn Fn(usize) -> bool) -> Vec<Range<usize>> {
         let mut runs: Vec<Range<usize>> = Vec::new();
         for k in (0..boundary.len()).filter(|k| within(*k)) {
@@ -239,13 +241,14 @@ impl<'a> View<'a> {
         })
     }
 
-    /// Sets the normals at the ends of a run to those of a contact that ends there. `chain`: its edges.
+    /// Sets the normals along a run to the normals of a contact that ends where the run ends. `chain`: the edges of the
+    /// run.
     fn end_at(&mut self, run: Range<usize>, chain: &[Edge]) {
         let normals = along(self.mesh, chain, self.held).normals;
         self.whole.normals[2 * run.start..=2 * run.end].copy_from_slice(&normals);
     }
 
-    /// The obstacle along a run of edges; none if a node does not face it.
+    /// The obstacle along a run of edges; `None` if a node does not face it.
     fn run(&self, run: Range<usize>, chain: &[Edge]) -> Option<FacingRun> {
         let nodes = 2 * run.start..2 * run.end + 1;
         let seen: Option<Vec<Seen>> = nodes.clone().map(|i| self.seen_from_node(i)).collect();
@@ -291,9 +294,9 @@ impl<'a> View<'a> {
         bisected(|xi| length(xi) < c, -1.0, 1.0)
     }
 
-    /// The places where an edge faces an end of a curve along the edge's own normals. Where a curve turns away from the
-    /// edge before its end, there is none: its flank, steeper than 45°, is no place for a node. Nor does contact end at
-    /// a corner of the body: there the next side faces the part of the obstacle that overlaps the body.
+    /// The places where an edge faces an end of a curve along the edge's own normals. A curve that turns away from the
+    /// edge before its end has no such place: its flank, steeper than 45°, is no place for a node. Nor does contact end
+    /// at a corner of the body: there the next side faces the part of the obstacle that overlaps the body.
     fn ends_of_sight(&self, k: usize, edge: &Edge, deepest: f64) -> Vec<f64> {
         let Some(curve_ends) = self.shape.in_space().and_then(Curve::ends) else {
             return Vec::new();
@@ -436,8 +439,8 @@ impl<'a> View<'a> {
         ends && (middle || beside(start, -1.0 + BESIDE) || beside(end, 1.0 - BESIDE))
     }
 
-    /// The obstacle between the nodes of an edge, and at its corners there, in order of s. `nodes`: the obstacle as
-    /// seen from the edge's start, end and midside.
+    /// The obstacle between the nodes of an edge and at the obstacle's corners on the edge, in order of s. `nodes`: the
+    /// obstacle as seen from the edge's start, end and midside.
     fn places(&self, edge: usize, nodes: [Seen; 3]) -> Vec<Place> {
         let mut found: Vec<Place> = Vec::new();
         let at_nodes = nodes.map(|seen| seen.profile.distance);
@@ -491,7 +494,7 @@ impl<'a> View<'a> {
         found
     }
 
-    /// The corners of the obstacle on an edge. One at the edge's end belongs to the next edge, if there is one.
+    /// The corners of the obstacle on an edge. A corner at the edge's end belongs to the next edge, if there is one.
     fn corners_in(&self, edge: usize) -> Vec<(f64, Corner)> {
         let mut c = edge_nodes(edge).map(|node| self.coordinate(node));
         let falls = c[1] < c[0];
@@ -521,8 +524,8 @@ impl<'a> View<'a> {
         found
     }
 
-    /// The joints between pieces of a curve that an edge faces: the place on the edge, the point, and the change of
-    /// slope. `sight`: the obstacle seen from places of the edge, in their order.
+    /// The joints between pieces of a curve that an edge faces, each with its place on the edge, its point, and the
+    /// change of slope. `sight`: the obstacle seen from places of the edge, in the order of the places.
     fn joints_in(
         &self,
         curve: &Curve<'_>,
@@ -556,7 +559,7 @@ impl<'a> View<'a> {
         found.into_iter().map(with_change).collect()
     }
 
-    /// The place between two places of an edge whose normal meets a joint, if there is one.
+    /// The place of an edge in the given range whose normal meets a joint of the curve, if there is such a place.
     fn faces(
         &self,
         curve: &Curve<'_>,
@@ -591,7 +594,7 @@ impl<'a> View<'a> {
     }
 }
 
-/// The last place from `from` towards `to` for which `holds` is true, by bisection; none if that is `from` itself.
+/// The last place from `from` towards `to` for which `holds` is true, by bisection; `None` if it is `from` itself.
 fn bisected(holds: impl Fn(f64) -> bool, from: f64, to: f64) -> Option<f64> {
     let (mut inside, mut outside) = (from, to);
     // to rounding

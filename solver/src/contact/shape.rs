@@ -5,12 +5,12 @@ use super::curve::Curve;
 use crate::problem::{Interpolation, Obstacle};
 use crate::spline::{Spline, smoothed};
 
-/// A circle ends where its flank is almost vertical: at this part of its radius below its centre.
+/// The end of a circle, where its flank is almost vertical: below its centre by this fraction of its radius.
 const FLANK: f64 = 1e-3;
 
 /// What follows from the shape of an obstacle, wherever it is.
 impl Obstacle {
-    /// The exponent of a profile that is a power of the distance from its center.
+    /// The exponent of the profile, if it is a power of the distance from its center.
     pub(crate) fn power(&self) -> Option<f64> {
         match self {
             Obstacle::Circle { .. } | Obstacle::Parabola { .. } => Some(2.0),
@@ -25,17 +25,17 @@ impl Obstacle {
         }
     }
 
-    /// Whether sliding along itself leaves it as it is.
+    /// Whether sliding along itself leaves the obstacle unchanged.
     pub(crate) fn is_straight(&self) -> bool {
         matches!(self, Obstacle::Flat { .. } | Obstacle::Line { .. })
     }
 
-    /// Whether it is a curve in the plane, which has no coordinate c.
+    /// Whether the obstacle is a curve in the plane, which has no coordinate c.
     pub(crate) fn is_in_space(&self) -> bool {
         matches!(self, Obstacle::Line { .. } | Obstacle::Polyline { .. })
     }
 
-    /// Whether it is made of several straight pieces.
+    /// Whether the obstacle is made of several straight pieces.
     pub(crate) fn has_kinks(&self) -> bool {
         match self {
             Obstacle::Table {
@@ -50,7 +50,7 @@ impl Obstacle {
         }
     }
 
-    /// Whether it ends in flanks: a node at its end would face along the body what is beside it.
+    /// Whether the obstacle ends in flanks, at which no node is put as at other ends.
     pub(super) fn ends_in_flanks(&self) -> bool {
         matches!(self, Obstacle::RoundedFlat { .. })
     }
@@ -61,7 +61,7 @@ impl Obstacle {
 pub(super) struct Corner {
     /// The coordinate c of the place.
     pub(super) c: f64,
-    /// The change of the profile's slope there, along growing c; positive where the obstacle points at the body.
+    /// The change of the profile's slope at the place, along growing c; positive where the obstacle points at the body.
     pub(super) change: f64,
 }
 
@@ -128,7 +128,7 @@ impl<'a> Shape<'a> {
         }
     }
 
-    /// The places between which the profile is smooth, or has no extremum, in order of c.
+    /// The places where the profile is not smooth, or may be nearer to the body than on both sides, in order of c.
     pub(super) fn corners(&self) -> Vec<Corner> {
         let smooth = |c: f64| Corner { c, change: 0.0 };
         match *self {

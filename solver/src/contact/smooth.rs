@@ -40,14 +40,14 @@ pub fn edge_normal(positions: &Side, xi: f64) -> [f64; 2] {
     [-dy / length, dx / length]
 }
 
-/// How far the direction of a side at its ends may deviate from that of the surface (angle).
+/// How far the direction of a side at its ends may deviate from the direction of the surface (angle).
 pub fn direction_error(side: &Side) -> f64 {
     let shape = SideShape::of(side);
     (ERRORS * shape.error + PRINTED).min(CORNER)
 }
 
-/// The angle by which the surface turns from one side to the next: 0 where it is smooth, positive at a corner that points
-/// out of the body, and negative at one that points into it.
+/// The angle by which the surface turns from one side to the next: 0 where it is smooth, positive at a corner that
+/// points out of the body, and negative at a corner that points into the body.
 pub fn corner(before: &Side, after: &Side) -> f64 {
     let [[ax, ay], [bx, by]] = [end_direction(before, 1.0), end_direction(after, -1.0)];
     // the body lies on the right
@@ -98,7 +98,7 @@ pub fn normals_beyond(mesh: &Mesh, boundary: &[Edge]) -> BTreeMap<u32, [f64; 2]>
     found
 }
 
-/// The direction of a side at one of its ends, ξ = ∓1 (of any length).
+/// The direction of a side at one of its ends, ξ = ∓1, as a vector of any length.
 fn end_direction([start, end, middle]: &Side, xi: f64) -> [f64; 2] {
     [0, 1].map(|a| {
         let bow = middle[a] - 0.5 * (start[a] + end[a]);
@@ -108,11 +108,11 @@ fn end_direction([start, end, middle]: &Side, xi: f64) -> [f64; 2] {
 
 /// Length, curvature and error of a side as a part of a curve.
 struct SideShape {
-    /// The length of its chord.
+    /// The length of the side's chord.
     length: f64,
-    /// The angle of its turn per length of its chord, with sign.
+    /// The angle by which the side turns per length of its chord, with sign.
     curvature: f64,
-    /// The error of its directions at the ends, if it stands for a curve (angle).
+    /// The error of the side's directions at its ends, if it stands for a curve (angle).
     error: f64,
 }
 

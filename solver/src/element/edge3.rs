@@ -43,7 +43,8 @@ pub fn invert(v: &[f64; 3], value: f64) -> f64 {
     xi.clamp(-1.0, 1.0)
 }
 
-/// The places ξ in [−1, 1] with Σ h_i(ξ) v_i = 0, up to two, including the ends within rounding. None if all v are 0.
+/// The places ξ in [−1, 1] with Σ h_i(ξ) v_i = 0, up to two, including the ends within rounding; no place if all v are
+/// 0.
 pub fn zeros(v: &[f64; 3]) -> impl Iterator<Item = f64> {
     const ROUNDING: f64 = 1e-9;
     // a ξ² + b ξ + c = 0, without cancellation

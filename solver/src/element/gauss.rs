@@ -5,7 +5,7 @@
 pub struct GaussPoint {
     /// The master coordinates ξ and η.
     pub place: [f64; 2],
-    /// The weights of all points add up to the area of the master element.
+    /// The weight; the weights of all points of a rule add up to the area of the master element.
     pub weight: f64,
 }
 

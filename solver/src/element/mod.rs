@@ -27,7 +27,7 @@ pub enum Element {
 /// Values at the nodes of an element; the last two of a triangle are not used.
 pub type AtNodes<T> = [T; 8];
 
-/// The family of an element: all that does not depend on its nodes.
+/// The family of an element: what elements with the same number of nodes have in common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Family {
     /// Eight nodes, ξ and η from −1 to 1.
@@ -82,7 +82,7 @@ impl Element {
         values
     }
 
-    /// The same element with other node numbers.
+    /// A copy of the element with other node numbers.
     pub fn map_nodes(&self, number: impl Fn(u32) -> u32) -> Element {
         match self {
             Element::Quad(nodes) => Element::Quad(nodes.map(number)),
@@ -126,8 +126,8 @@ fn wrong_count(count: usize) -> String {
     format!("{count} nodes, where an element has 8 (quadrilateral) or 6 (triangle)")
 }
 
-/// Writes the element as a list of its nodes. Written by hand, like its reading: a list made for every element of a
-/// large mesh takes longer than its text.
+/// Writes the element as a list of its nodes. Written by hand, like the `Deserialize` of elements: a list made for
+/// every element of a large mesh takes longer than the text.
 impl Serialize for Element {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_seq(self.iter())

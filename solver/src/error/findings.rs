@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{Reason, Violation};
 
-/// Violations beyond this number are counted, not listed, so that the answer stays small.
+/// Violations beyond this number are counted, not listed, so that the list stays small.
 pub const MOST_LISTED: usize = 100;
 
 /// The largest number of violations of one kind in a mesh: the same fault may occur thousands of times and would hide
@@ -19,7 +19,7 @@ const LONGEST: usize = 2000;
 /// Whether a check failed is the result of the check itself, a [`Checked`], and is not read from this list.
 #[derive(Debug)]
 pub struct Findings {
-    /// The start of all JSON Pointers.
+    /// The start of the JSON Pointers of all violations.
     at: String,
     listed: Vec<Violation>,
     /// The number of violations of each kind, while there is a limit for each kind.
@@ -59,7 +59,7 @@ impl Findings {
         }
     }
 
-    /// Adds a violation that makes a check fail. `place`: the JSON Pointer relative to the start.
+    /// Adds a violation that makes a check fail. `place`: the JSON Pointer relative to the start of all JSON Pointers.
     pub fn report(
         &mut self,
         place: impl AsRef<str>,
@@ -72,7 +72,7 @@ impl Findings {
         Refused(())
     }
 
-    /// Adds a violation where the list itself is the result.
+    /// Adds a violation for a check whose result is the list of violations itself.
     pub fn add(&mut self, violation: Violation) {
         if !self.has_room(violation.reason) {
             return;
@@ -96,12 +96,12 @@ impl Findings {
         });
     }
 
-    /// Whether there are none.
+    /// Whether there are no violations.
     pub fn is_empty(&self) -> bool {
         self.listed.is_empty() && self.more == 0
     }
 
-    /// Whether further violations are only counted.
+    /// Whether the list is full, so that further violations are only counted.
     pub fn is_full(&self) -> bool {
         self.listed.len() >= MOST_LISTED
     }
@@ -119,7 +119,7 @@ impl Findings {
         })
     }
 
-    /// Counts one more violation; true if it should be listed.
+    /// Counts one more violation; returns whether it should be listed.
     fn has_room(&mut self, reason: Reason) -> bool {
         if self.is_full() {
             self.more += 1;
@@ -130,7 +130,7 @@ impl Findings {
         *count <= self.most_of_a_kind
     }
 
-    /// The list; the last hints give the numbers of violations that are not listed.
+    /// The listed violations; their last hints give the numbers of violations that are not listed.
     pub fn into_violations(mut self) -> Vec<Violation> {
         for (reason, count) in self.of_a_kind {
             let more = count.saturating_sub(self.most_of_a_kind);
@@ -169,7 +169,7 @@ impl Extend<Violation> for Findings {
     }
 }
 
-/// The result of several checks: all are made, and the whole fails if one of them does.
+/// The result of several checks: all are made, and the whole fails if one of the checks does.
 #[derive(Debug)]
 #[must_use]
 pub struct AllChecks(Checked);
@@ -181,7 +181,7 @@ impl Default for AllChecks {
 }
 
 impl AllChecks {
-    /// Adds a check; returns the checked value.
+    /// Adds the result of a check; returns the checked value.
     pub fn check<T>(&mut self, checked: Checked<T>) -> Option<T> {
         checked.map_err(|refused| self.0 = Err(refused)).ok()
     }
@@ -205,7 +205,7 @@ pub fn shortened(text: &str, most: usize) -> String {
     }
 }
 
-/// A number rounded to six digits, for messages; shown by `{:?}` in any units.
+/// A number rounded to six digits, for messages that show it by `{:?}`, whatever its units are.
 pub fn rounded(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
 }

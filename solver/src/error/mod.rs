@@ -23,11 +23,11 @@ pub struct Violation {
     pub pointer: String,
     /// The kind of violation, stable for programs.
     pub reason: Reason,
-    /// The value found there.
+    /// The value found at the place of `pointer`.
     pub got: String,
-    /// The requirement there.
+    /// The requirement on the value at the place of `pointer`.
     pub expected: String,
-    /// How to correct it.
+    /// How to correct the violation.
     pub hint: String,
 }
 
@@ -59,7 +59,8 @@ impl Violation {
         Some((line.parse().ok()?, got))
     }
 
-    /// The line of a deck or mesh file where the violation is, counted from 1; none if it is not about one line.
+    /// The line of a deck or mesh file where the violation is, counted from 1; `None` if the violation is not about one
+    /// line.
     pub fn line(&self) -> Option<u64> {
         self.on_line().map(|(line, _)| line)
     }
@@ -113,14 +114,14 @@ pub enum SolveError {
     SingularSystem {
         /// The node at which the factorisation stopped.
         node: u32,
-        /// The direction in which nothing holds it.
+        /// The direction in which nothing holds the node.
         direction: [f64; 2],
     },
     /// Neither the supports nor the contacts of the final state hold the body.
     Unheld {
-        /// The free motion.
+        /// The free motion, in words.
         motion: String,
-        /// A node that moves.
+        /// A node that moves in the free motion.
         node: u32,
     },
     /// There is not enough memory for a matrix.
@@ -130,10 +131,10 @@ pub enum SolveError {
     },
     /// A phase computed NaN or infinity.
     NonFinite {
-        /// The phase in which it occurred.
+        /// The phase that computed the number.
         phase: Phase,
     },
-    /// A problem cannot be solved on this body, because its own body differs.
+    /// The problem has another body than the one that it was to be solved on.
     OtherBody,
     /// The observer stopped the solution before there was a state to return.
     Stopped,

@@ -140,7 +140,7 @@ pub enum Reason {
 }
 
 impl Reason {
-    /// The name that the API has for it.
+    /// The name of the reason in the API.
     pub fn as_str(self) -> &'static str {
         self.into()
     }

@@ -32,7 +32,7 @@ pub enum BoundLaw<A = Averaging> {
 /// What the bound at one place is computed from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Source {
-    /// The pressures of some nodes, averaged by this row.
+    /// The pressures of some nodes, averaged by a row of weights.
     Average(Arc<Row>),
     /// A prescribed bound (stress).
     Given(f64),
@@ -47,7 +47,7 @@ impl Source {
         }
     }
 
-    /// The same source with nodes numbered from `first` on.
+    /// The same source for a system in which the contact's nodes are numbered from `first` on.
     pub fn shifted(mut self, first: usize) -> Self {
         // rows are shared with the operator: those of the first contact stay so
         if let Source::Average(row) = &mut self
@@ -60,7 +60,7 @@ impl Source {
 }
 
 impl BoundLaw<Average> {
-    /// The law with the operator of its average along a chain of contact edges.
+    /// The law along a chain of contact edges, with an averaging operator instead of the parameters of the average.
     pub fn along(&self, operator: impl FnOnce(&Average) -> Averaging) -> BoundLaw {
         match self {
             BoundLaw::Prescribed(bound) => BoundLaw::Prescribed(bound.clone()),
@@ -78,7 +78,7 @@ impl BoundLaw<Average> {
         }
     }
 
-    /// The radius ρ (length); `None` where the bound is prescribed.
+    /// The radius ρ of the average (length); `None` where the bound is prescribed.
     pub fn radius(&self) -> Option<f64> {
         match self {
             BoundLaw::Pressure { average, .. } => Some(average.radius),
@@ -125,7 +125,7 @@ impl<A> BoundLaw<A> {
 }
 
 impl BoundLaw {
-    /// The distance up to which the bound depends on pressures (length); `None` where it is prescribed.
+    /// The distance up to which the bound depends on pressures (length); `None` where the bound is prescribed.
     pub fn reach(&self) -> Option<f64> {
         match self {
             BoundLaw::Pressure { average, .. } => Some(average.radius()),
@@ -194,7 +194,7 @@ impl BoundLaw {
     }
 }
 
-/// The value that S must exceed to count as pressure.
+/// The value that the averaged pressure S must exceed to count as pressure.
 fn least_pressure(cohesion: f64, largest: f64) -> f64 {
     // without cohesion nothing jumps
     if cohesion > 0.0 {

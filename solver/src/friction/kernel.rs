@@ -21,24 +21,26 @@ const BUMP_INTEGRAL: f64 = 0.443_993_816_168_079;
 /// The reciprocal 1 / ∫ exp(1/(r² − 1)) dA over the unit disc.
 const BUMP_DISC: f64 = 2.143_565_775_8;
 
-/// The integration rule for one piece; on a piece much shorter than ρ the kernel is almost constant and fewer points
-/// are enough.
+/// The integration rule for one piece of the kernel.
 static FULL_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss::rule(40));
+/// The integration rule for a short piece of the kernel, on which the kernel is almost constant.
 static SHORT_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss::rule(12));
+/// A piece is short if its length is below this part of ρ.
 const SHORT: f64 = 0.1;
 
-/// With rings, where a kernel value takes longer to compute, fewer points are also used on a piece whose distance from
-/// the kernel's ends exceeds this many times half its length, and a few more on one that is not long: to 10⁻¹³, away
-/// from the axis.
+/// Over rings, where a kernel value takes longer to compute, [`SHORT_RULE`] is also used on a piece whose distance from
+/// the kernel's ends exceeds this many times half its length. Away from the axis the error is 10⁻¹³.
 const FAR: f64 = 3.0;
+/// The integration rule over rings for a piece that is longer than a short one, but not than [`MIDDLE`].
 static MIDDLE_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss::rule(24));
+/// The largest length of a piece with [`MIDDLE_RULE`], as a part of ρ.
 const MIDDLE: f64 = 0.25;
 
-/// The midside node of an edge counts as its middle within this part of its length, which is the rounding of arc
+/// The midside node of an edge counts as its middle within this fraction of the edge's length, the rounding of arc
 /// length.
 const STRAIGHT: f64 = 1e-12;
 
-/// A radius below this part of the chain's length counts as 0, since arc length itself is less accurate: the law is
+/// A radius below this fraction of the chain's length counts as 0, since arc length itself is less accurate: the law is
 /// Coulomb's.
 const LOCAL: f64 = 1e-9;
 
@@ -95,10 +97,10 @@ pub struct Averaging {
     conserving: bool,
 }
 
-/// The distance of a place from the axis as a function of its position, a r + b z + c.
+/// The coefficients a, b and c of a distance from the axis, a r + b z + c, as a function of the position (r, z).
 type Distance = [f64; 3];
 
-/// The distance from the axis of the position itself, which is its coordinate r.
+/// The distance of the position itself from the axis: its coordinate r.
 const OWN: Distance = [1.0, 0.0, 0.0];
 
 /// A mirror image of the chain that continues it evenly beyond an end.
@@ -129,7 +131,7 @@ impl Row {
     }
 }
 
-/// Computed rows of W, by the bits of their arc length.
+/// Computed rows of W, by the bits of the arc length that they are for.
 #[derive(Debug, Default)]
 struct KnownRows {
     rows: HashMap<u64, Arc<Row>>,
@@ -138,7 +140,7 @@ struct KnownRows {
 }
 
 impl KnownRows {
-    /// Stores a row, unless there are too many weights for each node of the chain already.
+    /// Stores a row, unless the stored rows have too many weights for each node of the chain already.
     fn add(&mut self, s: f64, row: &Arc<Row>, nodes: usize) {
         const MOST_FOR_A_NODE: usize = 256;
         // a row takes some space beside its weights
@@ -151,7 +153,7 @@ impl KnownRows {
 }
 
 impl Averaging {
-    /// The averaging operator with these parameters on a chain.
+    /// The averaging operator with the parameters `average` on a chain.
     pub fn new(average: &Average, chain: Chain) -> Self {
         let length = chain.s[chain.s.len() - 1] - chain.s[0];
         let radius = match average.radius {
@@ -202,8 +204,8 @@ impl Averaging {
         (half(before) + half(after)) / (2.0 * half(1.0))
     }
 
-    /// The factor by which averaging reduces the amplitude of a pressure wave of this length, relative to a uniform
-    /// pressure.
+    /// The factor by which averaging reduces the amplitude of a pressure wave of wavelength `length`, relative to a
+    /// uniform pressure.
     pub fn part_of_wave(&self, length: f64) -> f64 {
         if self.radius == 0.0 {
             return 1.0;
@@ -217,7 +219,7 @@ impl Averaging {
         wave / whole
     }
 
-    /// The radius ρ, or 0 where the law is local (length).
+    /// The radius ρ (length); 0 where the law is local.
     pub fn radius(&self) -> f64 {
         self.radius
     }
@@ -325,8 +327,9 @@ impl Averaging {
         around * most * ring
     }
 
-    /// Integrates the kernel at an image's centre, edge by edge, also outside the chain. If the distance of the
-    /// kernel's centre from the axis is given, it is integrated over the image's rings.
+    /// Integrates the kernel at an image's centre, edge by edge, also outside the chain. `ring`: the distance of the
+    /// kernel's centre from the axis, if the kernel is integrated over the image's rings. `add`: receives the weights
+    /// of an edge.
     fn integrate(&self, image: &Image, ring: Option<f64>, add: &mut impl FnMut(usize, [f64; 3])) {
         let centre = image.centre;
         let (low, high) = (centre - self.radius, centre + self.radius);
@@ -471,8 +474,8 @@ impl Averaging {
             .collect()
     }
 
-    /// A distance from the axis, of places that are first reflected in the line across the chain's start or end:
-    /// x → x − 2 t (x − e)·t with the tangent t at the end e. At the axis the line is the axis.
+    /// The function `distance` for places that are first reflected in the line across the chain's start or end: x → x −
+    /// 2 t (x − e)·t with the tangent t at the end e. At the axis this line is the axis.
     fn reflected(&self, distance: Distance, at_end: bool) -> Distance {
         let x = &self.chain.positions;
         let n = x.len();
@@ -503,7 +506,7 @@ impl Averaging {
         [s[2 * edge], s[2 * edge + 2], s[2 * edge + 1]]
     }
 
-    /// The edge at arc length s; beyond the ends the first or the last one.
+    /// The edge at arc length s; beyond the chain's ends its first or its last edge.
     fn edge_at(&self, s: f64) -> usize {
         let after = self.chain.s.partition_point(|&node| node <= s);
         (after.max(1) - 1).min(self.chain.s.len() - 2) / 2

@@ -42,7 +42,7 @@ pub struct FrictionLaw<A = Averaging> {
 }
 
 impl FrictionLaw<Average> {
-    /// The law with the operator of its average along a chain of contact edges.
+    /// The law along a chain of contact edges, with an averaging operator instead of the parameters of the average.
     pub fn along(&self, operator: impl FnOnce(&Average) -> Averaging) -> FrictionLaw {
         FrictionLaw {
             bound: self.bound.along(operator),

@@ -1,4 +1,4 @@
-//! The moments of a kernel up to a place, from which follows its integral over a part of a straight edge.
+//! The moments of a kernel up to a place, which give the kernel's integral over a part of a straight edge.
 
 use std::sync::LazyLock;
 
@@ -29,11 +29,13 @@ pub(super) fn moments_up_to(kernel: Kernel, x: f64) -> [f64; 3] {
     }
 }
 
-/// The number of cells of the table. A quarter of them would give an error of 3·10⁻¹²; it falls with the sixth power.
+/// The number of cells of the table. A quarter of the cells would give an error of 3·10⁻¹²; the error falls with the
+/// sixth power of their number.
 const CELLS: usize = 1024;
+/// The length of a cell.
 const CELL: f64 = 2.0 / CELLS as f64;
 
-/// The values at an end of a cell: the moments up to it, ω and ω′.
+/// The values at an end of a cell: the moments up to this place, ω and ω′.
 struct Known {
     moments: [f64; 3],
     omega: f64,

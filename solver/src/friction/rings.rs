@@ -22,11 +22,12 @@ const TERMS: usize = 20;
 /// The largest q for which the series is used: rings farther from the axis than about half of ρ.
 pub(super) const LARGEST: f64 = 0.25;
 
-/// A term below this part of the first is left out, with all after it.
+/// A term of the series below this fraction of the first is left out, with all terms after it.
 const ROUNDING: f64 = 1e-17;
 
 /// The number of cells of the table on 0 ≤ b ≤ 1; the error of its polynomials of degree five is 10⁻¹⁴.
 const CELLS: usize = 1024;
+/// The length of a cell.
 const CELL: f64 = 1.0 / CELLS as f64;
 
 /// The coefficients a_k of (1 − x)^(−1/2) = Σ a_k xᵏ.
@@ -96,7 +97,7 @@ pub(super) fn around(kernel: Kernel, b: f64, q: f64) -> f64 {
     4.0 * q.sqrt() * sum
 }
 
-/// The number of terms that matter.
+/// The number of terms of the series that matter for q.
 fn terms(q: f64) -> usize {
     let (mut count, mut power) = (1, q);
     while power > ROUNDING && count < TERMS {

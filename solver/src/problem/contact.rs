@@ -10,7 +10,7 @@ use strum::VariantArray;
 pub struct Contact {
     /// Name of the boundary.
     pub boundary: String,
-    /// The obstacle that faces it.
+    /// The obstacle that faces the boundary.
     pub obstacle: Obstacle,
     /// How far the obstacle is pushed against the body (length, either sign):
     /// gap = profile − indentation.
@@ -30,7 +30,7 @@ pub struct Contact {
     /// The contact condition.
     #[serde(default)]
     pub condition: Condition,
-    /// Absent: frictionless.
+    /// The friction law; absent: frictionless.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction: Option<Friction>,
 }

@@ -18,8 +18,8 @@ pub enum Load {
     Pressure(String, BoundaryValue),
     /// A stress along x and along y on a boundary.
     Traction(String, [BoundaryValue; 2]),
-    /// A stress along the outward normal of a boundary, positive pulls; and one along t, the outward normal
-    /// turned clockwise, if it is given.
+    /// A stress along the outward normal of a boundary, positive pulls; and, if given, a stress along t, the outward
+    /// normal turned clockwise.
     Normal(String, BoundaryValue, Option<BoundaryValue>),
     /// A stress along t on a boundary.
     Tangential(String, BoundaryValue),
@@ -46,7 +46,7 @@ impl Load {
     }
 }
 
-/// The allowed forms as JSON Schema: each requires its own fields and excludes those of the others.
+/// The allowed forms as JSON Schema: each requires its own fields and excludes the fields of the others.
 fn forms() -> [Schema; 6] {
     const FORMS: [(Option<&str>, &[&str]); 6] = [
         (Some("boundary"), &["pressure"]),
@@ -149,7 +149,7 @@ impl TryFrom<LoadFields> for Load {
                 Reason::WrongCount,
                 either(&given),
                 "exactly one of `pressure`, `traction`, `normal` and `tangential`, `nodal`, `force`, `body_force`",
-                "Give each its own load.",
+                "Give each of them a load of its own.",
             )),
         }
     }
@@ -193,8 +193,8 @@ fn nowhere(boundary: &Option<String>, nodes: &Option<String>) -> Result<(), Viol
         place,
         Reason::NotUsed,
         "a place for a body force",
-        "no place: it acts on the whole body",
-        "Remove it, or give a traction.",
+        "no place: a body force acts on the whole body",
+        "Remove the place, or give a traction.",
     ))
 }
 

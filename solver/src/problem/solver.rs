@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// One load step: factors on the values given elsewhere, reached in equal or growing increments
-/// from those of the previous step (from zero at first).
+/// One load step: factors on the values given elsewhere, reached in equal or growing increments from the factors of the
+/// previous step (in the first step from zero).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Step {
@@ -39,7 +39,7 @@ pub enum Spacing {
 }
 
 impl Step {
-    /// All given values at once.
+    /// The step that applies all given values at once.
     pub fn whole() -> Self {
         Step {
             name: None,
@@ -53,7 +53,7 @@ impl Step {
     }
 }
 
-/// All loads at once, with no tangential displacement.
+/// A step that applies all loads at once, with no tangential displacement.
 impl Default for Step {
     fn default() -> Self {
         Step {
@@ -97,7 +97,7 @@ pub enum Algorithm {
     FixedPoint,
     /// One semi-smooth Newton iteration for contact, friction and averaging together.
     Newton,
-    /// The thesis's own iteration (3.1), exactly as described there. At the thesis's parameters it does not solve the
+    /// The thesis's own iteration, exactly as described in thesis 3.1. At the thesis's parameters it does not solve the
     /// problem; the outcome is then `false_convergence`.
     Thesis,
 }
@@ -109,8 +109,8 @@ pub enum AccuracyMode {
     /// Estimated on the mesh of the solution, at little cost.
     #[default]
     Estimate,
-    /// By a second solution with every element split in two in each direction; with `refine` of 1 or more also by one
-    /// on the mesh before the last refinement, which gives orders of convergence.
+    /// By a second solution with every element split in two in each direction; with `refine` of 1 or more also by a
+    /// solution on the mesh before the last refinement, which gives orders of convergence.
     Verify,
 }
 
@@ -138,7 +138,7 @@ pub struct ThesisOptions {
     pub local_points: u32,
     /// Fraction of the new friction force that is applied (0 < relaxation ≤ 1).
     pub relaxation: f64,
-    /// Whether friction opposes the motion, as in (1.8), instead of acting along t everywhere.
+    /// Whether friction opposes the motion, as in thesis (1.8), instead of acting along t everywhere.
     pub signed: bool,
 }
 

@@ -22,7 +22,8 @@ pub struct Support {
     /// Name of the boundary.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub boundary: Option<String>,
-    /// Name of a set of nodes instead; a side is held where all its nodes are held, before the mesh is refined.
+    /// Name of a set of nodes, instead of a boundary; a side is held where all its nodes are held, before the mesh is
+    /// refined.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nodes: Option<String>,
     /// Displacement along x (length).

@@ -37,13 +37,14 @@ pub struct Accuracy {
 #[strum(serialize_all = "snake_case")]
 pub enum Verdict {
     /// Every force is accurate to 1 %, every extent and every peak that has a limit to 5 %. Stated errors are at most
-    /// three quarters of that, since one in twenty is too small.
+    /// three quarters of these limits, since one stated error in twenty is too small.
     Good,
     /// Forces are accurate to 5 %, extents and peaks to 20 %. Also the verdict where a contact has too many ends of
     /// stick to state their errors, or another number of ends on the refined mesh, or a warning says that the mesh is
     /// too coarse.
     Fair,
-    /// Some other number is less accurate than that or its error is unknown, or a second solution was found.
+    /// A number is less accurate than in a `fair` solution, or its error is unknown for another reason than there, or a
+    /// second solution was found.
     Poor,
 }
 
@@ -84,8 +85,8 @@ pub struct EstimatedQuantity {
     /// The value on the refined mesh; absent unless verified.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub finer: Option<f64>,
-    /// The difference between the two values (≥ 0); for a peak tangential stress, whose size may occur twice with both
-    /// signs, the difference of their sizes.
+    /// The difference between `value` and `finer` (≥ 0); for a peak tangential stress, whose size may occur twice with
+    /// both signs, the difference of the sizes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub difference: Option<f64>,
     /// The observed order of convergence: log₂ of the difference to the mesh one refinement coarser divided by
@@ -96,7 +97,7 @@ pub struct EstimatedQuantity {
     /// The error in the unit of the value: due to the mesh, under the incremental law also to the number of increments,
     /// and to a `direction` of the indentation. Absent where the quantity has no limit, or the error is unknown.
     pub error: Option<f64>,
-    /// The part of `error` due to the number of increments; absent where the result does not depend on them.
+    /// The part of `error` due to the number of increments; absent where the result does not depend on increments.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub increments: Option<f64>,
     /// The part of `error` due to an indentation along a `direction`, in which gaps are linear; absent where gaps are

@@ -70,7 +70,7 @@ impl Solution {
     }
 }
 
-/// The end of one load step.
+/// The results at the end of one load step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StepSolution {
     /// The step's name in the problem, or its number from 0.
@@ -169,8 +169,8 @@ pub struct Summary {
 /// A second solution of the same problem, compared with the first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Comparison {
-    /// True where the two agree: forces and friction bounds to 1e-6 (uniqueness only; for doubled increments to
-    /// `tolerance`), or within rounding.
+    /// True where the two solutions agree: forces and friction bounds to 1e-6 (uniqueness only; for doubled increments
+    /// to `tolerance`), or within rounding.
     pub agrees: bool,
     /// Whether the second solution converged; if not, `agrees` has no meaning.
     pub converged: bool,
@@ -180,7 +180,7 @@ pub struct Comparison {
     pub tangential_force: f64,
     /// Friction force ∫|σ_t| of the second solution.
     pub friction_force: f64,
-    /// Largest relative difference of these forces.
+    /// Largest relative difference between the forces of the two solutions.
     pub change: f64,
 }
 
@@ -203,8 +203,8 @@ pub struct Refinement {
     pub peak_normal_stress: f64,
     /// Largest relative change from the previous mesh; absent for the first.
     pub change: Option<f64>,
-    /// Largest relative error of the quantities that have a limit, as in `accuracy`; absent where one is unknown, and
-    /// in results of older versions.
+    /// Largest relative error of the quantities that have a limit, as in `accuracy`; absent where one of the errors is
+    /// unknown, and in results of older versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<f64>,
 }
@@ -270,7 +270,7 @@ impl Residuals {
 pub struct Warning {
     /// The kind of warning, stable for programs.
     pub code: WarningCode,
-    /// JSON Pointer to the part of the problem that it concerns.
+    /// JSON Pointer to the part of the problem that the warning is about.
     pub pointer: String,
     /// The warning with its numbers, and what to do.
     pub message: String,
@@ -378,7 +378,7 @@ pub enum WarningCode {
 }
 
 impl WarningCode {
-    /// The name that the API has for it.
+    /// The name of the warning in the API.
     pub fn as_str(self) -> &'static str {
         self.into()
     }
@@ -405,7 +405,7 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// The name that the API has for it.
+    /// The name of the stage in the API.
     pub fn as_str(self) -> &'static str {
         self.into()
     }
@@ -474,13 +474,13 @@ pub struct ForcePair {
 /// Columns along a contact boundary in order of arc length: one entry per node of Γ_C, or one per
 /// point where friction acts.
 ///
-/// Those points are three Gauss points per edge, also without friction; with `"points": "nodal"` the
-/// nodes, except one on the axis. There `normal_stress`, the gap and the displacements are those of
-/// the edge, quadratic between its nodes (which beside a steep peak may overshoot into a tension that
-/// no node has; profiles at all points and at equally spaced ones show 0 there); `nonlocal_pressure`, `friction_bound` and `friction_ratio`
-/// are those of the law at the point; `tangential_stress` is the one that acts in the solution, so that
-/// it adds up to the forces of the summary (at a node it is that of the law, which differs by
-/// `Residuals::friction` of the largest); and a point is open if one of the nodes beside it is.
+/// The points where friction acts are three Gauss points per edge, also without friction; with `"points": "nodal"` the
+/// nodes, except a node on the axis. At these points `normal_stress`, the gap and the displacements are the edge's,
+/// quadratic between its nodes (which beside a steep peak may overshoot into a tension that no node has; profiles at
+/// all points and at equally spaced ones show 0 there); `nonlocal_pressure`, `friction_bound` and `friction_ratio` are
+/// the values of the law at the point; `tangential_stress` is the stress that acts in the solution, so that it adds up
+/// to the forces of the summary (at a node it is the stress of the law, which differs by `Residuals::friction` of the
+/// largest); and a point is open if one of the nodes beside it is.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ContactProfile {
     /// Arc length from the start of the named boundary.
@@ -574,13 +574,13 @@ pub enum NodeState {
 }
 
 impl NodeState {
-    /// The name that the API has for it.
+    /// The name of the state in the API.
     pub fn as_str(self) -> &'static str {
         self.into()
     }
 }
 
-/// Values at all nodes of the mesh, in its order.
+/// Values at all nodes of the mesh, in the order of the nodes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Fields {
     /// Position x before deformation.

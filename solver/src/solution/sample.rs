@@ -3,7 +3,7 @@
 use super::ContactProfile;
 use crate::element::edge3;
 
-/// A place counts as a node within this part of the whole length, which is the rounding of `s`.
+/// A place counts as a node if they are closer than this fraction of the whole length, which is the rounding of `s`.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// The columns of a profile at `count` places, equally spaced in arc length from the first node of Γ_C to the last;
@@ -12,10 +12,10 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// `profile` has values at the nodes, `friction` at the friction points of the same Γ_C and the same step (it may be
 /// empty: results stored by older versions have none). Nothing is solved or averaged again.
 ///
-/// - positions, gap, displacements and normal stress are the quadratics through the three nodes of an
-///   edge: exact, since the solution is quadratic. (Contact uses the gap at nodes; between them the obstacle
-///   itself may be elsewhere.) But beside a steep peak the parabola may overshoot into a tension that no
-///   contact has: between three nodes without tension there is none.
+/// - positions, gap, displacements and normal stress are the quadratics through the three nodes of an edge: exact,
+///   since the solution is quadratic. (Contact uses the gap at nodes; between them the obstacle itself may be
+///   elsewhere.) But beside a steep peak the parabola may overshoot into a tension that no contact has: between three
+///   nodes without tension there is no tension.
 /// - tangential stress, nonlocal pressure, friction bound and ratio are those of the law at nodes and
 ///   friction points, five per edge with Gauss points, and curves between them: of the two parabolas in s through a
 ///   third neighbour the flatter one, and the straight line where they bend to opposite sides. So a
@@ -46,7 +46,7 @@ pub fn sample(profile: &ContactProfile, friction: &ContactProfile, count: usize)
 
 /// The columns of a profile at all points where the solution is known: the nodes, the points where friction acts, and
 /// the places of the peaks, for one contact, each in order of arc length. So the largest stresses of these columns are
-/// the peaks. Between three nodes without tension there is none, as in [`sample`].
+/// the peaks. Between three nodes without tension there is no tension, as in [`sample`].
 pub fn at_all_points(
     profile: &ContactProfile,
     friction: &ContactProfile,
@@ -102,7 +102,7 @@ impl<'a> Known<'a> {
         Known { nodes, values }
     }
 
-    /// All columns at one place.
+    /// The values of all columns at arc length `s`.
     fn at(&self, s: f64) -> ContactProfile {
         let (nodes, values) = (self.nodes, &self.values);
         let edges = edges(nodes);
