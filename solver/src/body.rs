@@ -233,7 +233,7 @@ impl ElasticBody {
         self.factor.entries() + kept * (kept + 1) / 2
     }
 
-    /// How many threads may work on the fields of this body: the observer is asked for a second thread if one is worth
+    /// How many threads may work on the fields of this body: the observer is asked for a second thread if that is worth
     /// it.
     pub fn threads(&self, observer: &mut dyn Observer) -> usize {
         if self.factor.has_large_fields() && observer.threads() > 1 {

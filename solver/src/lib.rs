@@ -144,7 +144,7 @@ pub fn solve(problem: &Problem, observer: &mut dyn Observer) -> Result<Solution,
     solve_on(problem, None, observer)
 }
 
-/// Solves a problem like [`solve`]; if the problem only names or quotes its mesh, `external` is that mesh
+/// Solves a problem like [`solve`]; if the problem only names its mesh or contains it as text, `external` is this mesh
 /// (`files::external_mesh` reads it).
 ///
 /// # Errors
@@ -197,7 +197,7 @@ pub fn solve_with_mesh(
 pub struct Checked {
     /// The warnings about the problem.
     pub warnings: Vec<Warning>,
-    /// The estimated cost of solving it.
+    /// The estimated cost of solving the problem.
     pub estimate: Estimate,
 }
 

@@ -4,11 +4,11 @@ use crate::error::SolveError;
 use crate::phase::Phase;
 use crate::solution::{Iteration, Solution, Warning};
 
-/// Follows a solution: is told its progress, and answers the solver's questions.
+/// Follows a solution: receives its progress, and answers the solver's questions.
 ///
-/// By default it lets the solver go on to the end on one thread, with all the memory it needs. So does a closure that
-/// takes [`Progress`], and `()`, which ignores it. An observer in front of another one ([`Observer::behind`]) passes on the
-/// questions that it does not answer itself.
+/// By default an observer lets the solver go on to the end on one thread, with all the memory it needs; so does `()`,
+/// which ignores all progress. A closure that takes [`Progress`] receives progress only. An observer in front of
+/// another observer passes on the questions that it does not answer itself.
 pub trait Observer {
     /// Receives the progress of the solution.
     fn event(&mut self, progress: Progress<'_>);
@@ -31,7 +31,8 @@ pub trait Observer {
         self.behind().map_or(1, |observer| observer.threads())
     }
 
-    /// The observer behind this one, if there is one.
+    /// The observer behind this one, if there is one: it answers the questions that this observer does not answer
+    /// itself.
     fn behind(&mut self) -> Option<&mut dyn Observer> {
         None
     }

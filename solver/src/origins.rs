@@ -23,14 +23,14 @@ pub struct Origins {
 /// The contribution of each element, and of each edge of a contact, to the error of a quantity, in one unit.
 #[derive(Default)]
 pub struct Added {
-    /// The contribution by element; empty if it is not known by element.
+    /// The contribution by element; empty if the contributions are known by edge only.
     pub elements: Vec<f64>,
     /// The contribution by edge of the contact.
     pub edges: Vec<(usize, f64)>,
 }
 
 impl Added {
-    /// Adds a `total` that comes from several edges in proportion to their `parts`.
+    /// Adds the contributions of several edges, `total` together, in proportion to their `parts`.
     pub fn spread(&mut self, total: f64, parts: &[(usize, f64)]) {
         let sum: f64 = parts.iter().map(|(_, part)| part).sum();
         if sum > 0.0 {

@@ -9,7 +9,7 @@ pub struct Spline {
     y: Vec<f64>,
     /// The slope at every point.
     slope: Vec<f64>,
-    /// Slopes up to this are rounding: a symmetric curve is flat in its middle.
+    /// Slopes up to this count as rounding: a symmetric curve is flat in its middle.
     flat: f64,
 }
 
@@ -183,7 +183,7 @@ fn parabola(x: &[f64], y: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// The third derivative over each four consecutive points, times the root of the length that it represents.
+/// The third derivative over each four consecutive points, times the root of the length that the derivative represents.
 fn third_differences(x: &[f64]) -> Vec<[f64; 4]> {
     let row = |x: &[f64]| {
         let root = ((x[3] - x[0]) / 3.0).sqrt();

@@ -23,8 +23,8 @@ use crate::solution::{
 /// An increment that does not converge is halved this often before the step ends there.
 const MOST_HALVINGS: u32 = 6;
 
-/// Solves all steps; the end of the last one is the solution. After a step that does not converge no other is solved.
-/// `origins`: receives where the errors of the results come from.
+/// Solves all steps; the end of the last step is the solution. After a step that does not converge no further step is
+/// solved. `origins`: receives where the errors of the results come from.
 pub fn run(
     model: &Model,
     body: &ElasticBody,
@@ -77,8 +77,8 @@ fn has_uncertain_ends(model: &Model) -> bool {
 
 /// Solves with common ends of contacts as the model assigns them, and again while the solution shows another
 /// assignment: each end is tried with one contact, then the other, and finally with both. Where the node on the axis is
-/// open and the midside node is pressed, it solves once more with that node left open; if the node touches then, or the
-/// iterations do not converge, the solution before is used.
+/// open and the midside node is pressed, the steps are solved once more with the node on the axis left open; if the
+/// node then touches, or the iterations do not converge, the solution before is used.
 fn with_corners<T>(
     (model, body): (&Model, &ElasticBody),
     converged: impl Fn(&T) -> bool,
@@ -399,8 +399,8 @@ fn tell_of_earlier_steps(solution: &mut Solution) {
     }
 }
 
-/// Solves all steps to the end without assessing it or comparing it with another: for a solution that is itself used in
-/// a comparison.
+/// Solves all steps to the end without assessing the solution or comparing it with another: for a solution that is
+/// itself used in a comparison.
 pub fn run_to_compare(
     model: &Model,
     body: &ElasticBody,
@@ -424,7 +424,7 @@ pub fn run_to_compare(
     )
 }
 
-/// The load steps; a problem without steps has one.
+/// The load steps of a model; a problem without steps has one step.
 fn steps_of(model: &Model) -> Cow<'_, [Step]> {
     match &model.steps[..] {
         [] => Cow::Owned(vec![Step::whole()]),
@@ -571,7 +571,7 @@ impl<'a> LoadHistory<'a> {
         last
     }
 
-    /// Solves one step; returns its end, and its rows of the history.
+    /// Solves one step; returns the end of the step, and the step's rows of the history.
     fn step(
         &mut self,
         number: u32,
@@ -698,7 +698,7 @@ impl<'a> LoadHistory<'a> {
 struct StepPath<'a> {
     from: Level,
     step: &'a Step,
-    /// The exponent of the first obstacle's profile, where it has one.
+    /// The exponent of the first obstacle's profile that is a power; `None` if no profile is a power.
     power: Option<f64>,
 }
 

@@ -162,7 +162,8 @@ fn solved(
         .collect()))
 }
 
-/// Asks the observer of the solution, but shows it nothing; records why the other solution was stopped.
+/// An observer of the other solution: passes questions on to the observer of the solution, but no progress; records why
+/// the other solution was stopped.
 struct QuietObserver<'a> {
     observer: &'a mut dyn Observer,
     stopped: Option<Stop>,

@@ -2,7 +2,7 @@
 
 use crate::solution::{ErrorMethod, EstimatedQuantity, QuantityName, Refinement, Solution};
 
-/// A force below this part of the largest one is not compared between meshes.
+/// A force below this fraction of the largest force is not compared between meshes.
 const SMALL_FORCE: f64 = 1e-3;
 
 /// The results that are compared from mesh to mesh.
@@ -95,8 +95,8 @@ pub(super) fn largest_error(solution: &Solution) -> f64 {
     quantities.map(relative_error).fold(0.0, f64::max)
 }
 
-/// The relative error of a quantity due to the mesh: 0 if it has no limit or is one of too many, infinite if it is
-/// unknown.
+/// The relative error of a quantity due to the mesh: 0 if the quantity has no limit or belongs to too many ends of
+/// stick, infinite if the error is unknown.
 pub(super) fn relative_error(quantity: &EstimatedQuantity) -> f64 {
     match (quantity.method, quantity.error, quantity.relative) {
         (ErrorMethod::NoLimit | ErrorMethod::TooMany, ..) | (_, Some(0.0), _) => 0.0,

@@ -20,16 +20,16 @@ use crate::solution::{Outcome, Refinement, Solution, Warning};
 use mesh_results::{MeshResults, largest_error};
 use stopping::{StopReason, given_up, unfinished};
 
-/// The elements to be divided hold this part of the errors above the tolerance.
+/// The elements to be divided hold this fraction of the errors above the tolerance.
 const BULK: f64 = 0.6;
 
-/// At least this part of all elements is divided: fewer would not be worth another mesh.
+/// At least this fraction of all elements is divided: fewer would not be worth another mesh.
 const LEAST_MARKED: f64 = 0.02;
 
-/// Edges under a peak of σ_t are divided until they are this part of ρ.
+/// Edges under a peak of σ_t are divided until their length is this fraction of ρ.
 const PART_OF_RADIUS: f64 = 0.25;
 
-/// Solves one model, and notes where the errors of its results come from.
+/// A function that solves one model, and notes where the errors of the results come from.
 pub type Solve<'a> =
     dyn Fn(Model, &mut Origins, &mut dyn Observer) -> Result<Solution, SolveError> + 'a;
 
@@ -178,7 +178,7 @@ struct OnMesh {
     short: Option<u64>,
 }
 
-/// Observes the solution on one mesh, which may not be the last.
+/// Observes the solution on one mesh of the sequence, which may not be the last.
 struct MeshObserver<'a> {
     observer: &'a mut dyn Observer,
     /// Whether this is not the first mesh: if it needs too much memory, the solution on the mesh before is kept, and
@@ -308,7 +308,7 @@ fn finer(
 
 /// The parts of contacts that are left out because the obstacle ends inside an edge.
 struct Truncation {
-    /// The largest such part, divided by the length of its contact.
+    /// The largest part left out, divided by the length of the contact that it belongs to.
     error: f64,
     /// The elements at edges of which the part left out is above the tolerance.
     elements: Vec<usize>,

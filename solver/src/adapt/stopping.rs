@@ -18,16 +18,16 @@ const PATIENCE: usize = 8;
 const FEWEST_MESHES: usize = 12;
 
 /// The largest number of meshes in a row without a known error. Errors are unknown while the obstacle between the nodes
-/// is not resolved, and each mesh halves the distance of the nodes there.
+/// is not resolved; each mesh halves the distance of the nodes where this is so.
 const MOST_UNKNOWN: usize = 8;
 
 /// Why refinement stopped.
 pub(super) enum StopReason {
     /// The tolerance is met.
     Nothing,
-    /// The next mesh would have more elements than allowed: their number.
+    /// The next mesh would have more elements than allowed: the number of its elements.
     Elements(usize),
-    /// The next mesh would have too many elements at one contact: their number, and the most that are allowed.
+    /// The next mesh would have too many elements at one contact: the number of these, and the largest number allowed.
     ContactElements(usize, usize),
     /// The largest number of meshes is reached.
     Meshes,
@@ -101,7 +101,8 @@ pub(super) fn given_up(sequence: &[Refinement], tolerance: f64) -> Option<StopRe
     (errors.len() >= FEWEST_MESHES && before.is_finite() && hopeless).then_some(StopReason::Stalled)
 }
 
-/// The warning that names what prevents the tolerance, or a quantity that has no limit; none if the tolerance is met.
+/// The warning that names what keeps the tolerance from being met, or a quantity that has no limit; `None` if there is
+/// nothing to warn of.
 pub(super) fn unfinished(
     problem: &Problem,
     goal: &AdaptiveRefine,

@@ -80,7 +80,7 @@ impl<'a> Curve<'a> {
         Curve::Line(point, [point[0] + cosine, point[1] + sine])
     }
 
-    /// The two ends of the curve; none for a straight line or a closed curve.
+    /// The two ends of the curve; `None` for a straight line or a closed curve.
     pub(super) fn ends(&self) -> Option<[[f64; 2]; 2]> {
         let [first, last] = match self {
             Curve::Segments(points, _) => [*points.first()?, *points.last()?],
@@ -194,8 +194,8 @@ impl<'a> Curve<'a> {
         }
     }
 
-    /// The point between pieces `k − 1` and `k` of a curve, and the change of the profile's slope there, seen along the
-    /// normal `n`.
+    /// The point between pieces `k − 1` and `k` of a curve, and the change of the profile's slope at this point, seen
+    /// along the normal `n`.
     pub(super) fn joint(&self, k: usize, n: [f64; 2], t: [f64; 2]) -> ([f64; 2], f64) {
         match self {
             Curve::Segments(points, _) => {
@@ -315,7 +315,7 @@ fn spline(points: &[[f64; 2]]) -> Vec<Bezier> {
     (0..splines[0].pieces()).map(cubic).collect()
 }
 
-/// Slopes of a curve up to this are rounding: a symmetric curve is flat in its middle.
+/// Slopes of a curve up to this count as rounding: a symmetric curve is flat in its middle.
 const FLAT: f64 = 1e-12;
 
 /// Divides pieces into blocks. `points`: for a piece, points that the piece lies between.
@@ -340,7 +340,7 @@ fn blocks(count: usize, points: impl Fn(usize) -> Vec<[f64; 2]>) -> Vec<Block> {
     (0..count).step_by(BLOCK).map(block).collect()
 }
 
-/// The pieces of those blocks that a normal of the body passes through.
+/// The pieces of the blocks that a normal of the body passes through.
 fn near(blocks: &[Block], ray: &Ray, rounding: f64) -> impl Iterator<Item = usize> {
     let Ray { place, t, .. } = *ray;
     let passes = move |block: &&Block| {

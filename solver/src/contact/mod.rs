@@ -210,7 +210,7 @@ pub fn edge_length(mesh: &Mesh, edge: &Edge) -> f64 {
     first + second
 }
 
-/// Arc length of an edge through these points: its start, end and midside.
+/// Arc length of an edge, given the positions of its start, end and midside.
 pub(crate) fn length_through(positions: &[[f64; 2]; 3]) -> f64 {
     let [first, second] = halves_through(positions);
     first + second

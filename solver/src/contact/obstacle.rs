@@ -33,7 +33,7 @@ pub struct FacingRun {
     pub start: f64,
     /// The coordinate c of each node.
     pub coordinate: Vec<f64>,
-    /// The obstacle between the nodes, and at its corners.
+    /// The obstacle between the nodes, and at the obstacle's corners.
     pub places: Vec<Place>,
 }
 
@@ -421,9 +421,9 @@ impl<'a> View<'a> {
         self.seen_from_place(place, n, c)
     }
 
-    /// Whether a curve ends inside an edge: some of the edge's nodes face it and others do not. Where the curve ends
-    /// exactly at a node, the edge beyond that node sees nothing of it. A straight line has no end: the body turns away
-    /// from it.
+    /// Whether a curve ends inside an edge: some of the edge's nodes face the curve and others do not. Where the curve
+    /// ends exactly at a node, no point of the edge beyond this node faces it. A straight line has no end: the body
+    /// turns away from it.
     fn ends_inside(&self, k: usize, edge: &Edge) -> bool {
         const BESIDE: f64 = 1.0 / 64.0;
         let normals = self.own_normals(edge);

@@ -8,7 +8,7 @@ use crate::spline::{Spline, smoothed};
 /// The end of a circle, where its flank is almost vertical: below its centre by this fraction of its radius.
 const FLANK: f64 = 1e-3;
 
-/// What follows from the shape of an obstacle, wherever it is.
+/// The properties that follow from the shape of an obstacle, wherever it is.
 impl Obstacle {
     /// The exponent of the profile, if it is a power of the distance from its center.
     pub(crate) fn power(&self) -> Option<f64> {
@@ -101,7 +101,7 @@ impl<'a> Shape<'a> {
         }
     }
 
-    /// The curve, if the shape is one.
+    /// The curve, if the shape is a curve.
     pub(super) fn in_space(&self) -> Option<&Curve<'a>> {
         match self {
             Shape::InSpace(curve) => Some(curve),
@@ -176,8 +176,8 @@ impl<'a> Shape<'a> {
         }
     }
 
-    /// The distance before the obstacle is pushed, and its derivative by c, at coordinate c. `None` where there is no
-    /// obstacle, and for curves.
+    /// The obstacle's distance before it is pushed, and the derivative of the distance by c, at coordinate c. `None`
+    /// where there is no obstacle, and for curves.
     pub(super) fn at(&self, c: f64, rounding: f64) -> Option<(f64, f64)> {
         match self {
             Shape::Of(obstacle) => formula(obstacle, c, rounding),
@@ -244,7 +244,7 @@ fn formula(obstacle: &Obstacle, c: f64, rounding: f64) -> Option<(f64, f64)> {
     }
 }
 
-/// The distance and its slope, linear between the points of a table; at a point the mean of both slopes.
+/// The value at `at`, linear between the points of a table, and its slope; at a point the mean of both slopes.
 fn tabulated(x: &[f64], y: &[f64], at: f64, rounding: f64) -> Option<(f64, f64)> {
     let last = x.len() - 1;
     if at < x[0] - rounding || at > x[last] + rounding {

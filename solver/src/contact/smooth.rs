@@ -12,8 +12,8 @@ use std::collections::BTreeMap;
 use crate::element::edge3;
 use crate::mesh::{Edge, Mesh};
 
-/// A curve is smooth where directions differ by at most this many errors of the sides (ellipses, waves and cubics of
-/// ten sides and more, also unequal ones; circles of four).
+/// A curve is smooth where directions differ by at most this many times the errors of the sides (as on ellipses, waves
+/// and cubics of ten or more sides, also of unequal length, and on circles of four).
 const ERRORS: f64 = 4.0;
 
 /// The factor on the error by different lengths and curvatures of two sides.
@@ -22,7 +22,7 @@ const DIFFERENCES: f64 = 2.0;
 /// The error of a side's direction if coordinates have six to eight digits (angle): 0.03°.
 const PRINTED: f64 = 5e-4;
 
-/// The surface has a corner where it turns by more than this, however coarse its sides are: 15°.
+/// The surface has a corner where it turns by more than this angle, however coarse its sides are: 15°.
 const CORNER: f64 = 0.26;
 
 /// Positions of a side's start, end and midside.
@@ -33,7 +33,7 @@ pub fn edge_normals(positions: &Side) -> [[f64; 2]; 3] {
     [-1.0, 1.0, 0.0].map(|xi| edge_normal(positions, xi))
 }
 
-/// Unit outward normal of an edge at a place of it, −1 … 1.
+/// Unit outward normal of an edge at the place `xi` on it, −1 … 1.
 pub fn edge_normal(positions: &Side, xi: f64) -> [f64; 2] {
     let [dx, dy] = edge3::map(positions, xi).1;
     let length = dx.hypot(dy);

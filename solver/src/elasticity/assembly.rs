@@ -13,12 +13,12 @@ use crate::element::{Element, Family, edge3};
 use crate::linear::ElementMatrix;
 use crate::mesh::{Edge, Mesh};
 
-/// One component of one node's displacement.
+/// One component of the displacement of a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Dof {
-    /// Unknown: its number in the system.
+    /// The component is unknown: its number in the system.
     Free(usize),
-    /// Prescribed: its value (length).
+    /// The component is prescribed: its value (length).
     Fixed(f64),
 }
 
@@ -152,7 +152,7 @@ fn stiffness(masters: &Masters, section: &Section, shape: &Shape) -> [[f64; 16];
     }
 }
 
-/// The stiffness of a body's elements on its unknowns.
+/// The stiffness of a body's elements on the unknowns of the body.
 pub struct ElementStiffness<'a> {
     elements: Elements<'a>,
     map: &'a DofMap,

@@ -151,8 +151,8 @@ impl Masters {
     }
 }
 
-/// The matrix with rows and columns ordered by node, then direction, made exactly symmetric: its two triangles may
-/// differ by rounding.
+/// The stiffness matrix with rows and columns ordered by node, then direction, made exactly symmetric: the triangles of
+/// `k` may differ by rounding.
 fn symmetric(k: &[[[[f64; 8]; 2]; 2]; 8]) -> [[f64; 16]; 16] {
     let mut whole = [[0.0; 16]; 16];
     for row in 0..16 {
@@ -196,7 +196,7 @@ fn add_stiffness(station: &Station, moduli: &Moduli, k: &mut [[[[f64; 8]; 2]; 2]
     }
 }
 
-/// What is computed once for all elements of the same shape.
+/// The tables that are computed once for all elements of the same shape.
 pub struct ElementTables {
     /// The number of Gauss points, as in `assemble_element`.
     pub quadrature: u32,

@@ -13,7 +13,7 @@ use crate::elasticity::Section;
 use crate::elasticity::material::{COMPONENTS, Split, stress};
 use crate::element::{AtNodes, Family, GaussPoint, Mapped};
 
-/// The displacement components of the largest element with its bubble, which comes after the nodes.
+/// The displacement components of the largest element with its bubble; the bubble comes after the nodes.
 const SIZE: usize = 18;
 
 /// The components of strain whose sum is the dilatation.
@@ -212,7 +212,7 @@ impl<'a> Mixed<'a> {
         forces
     }
 
-    /// The state inside the element by the displacements of its nodes and a force on the bubble.
+    /// The state inside the element, from the displacements of its nodes and a force on the bubble.
     pub fn inside(&self, u: &AtNodes<[f64; 2]>, force_on_bubble: &[f64; 2]) -> Inside<'a> {
         let nodal = |row: &[f64; SIZE]| -> f64 {
             let nodes = u.iter().take(self.nodes).enumerate();
@@ -258,7 +258,7 @@ impl Inside<'_> {
         (0..COMPONENTS).for_each(|c| strain[c] += dot2(&b[c], &self.bubble));
     }
 
-    /// The projected dilatation θ̄ at a position, and the stress there for the whole strain.
+    /// The projected dilatation θ̄ and the stress at a position, where `strain` is the whole strain.
     pub fn stress(
         &self,
         strain: &[f64; COMPONENTS],

@@ -194,7 +194,7 @@ impl Recovered {
     }
 }
 
-/// The mean of the elements' stresses at every node, over all elements or those of one `material`.
+/// The mean stress at every node over the elements of one `material`, or over all elements if it is `None`.
 fn average(
     mesh: &Mesh,
     section: &Section,

@@ -43,7 +43,7 @@ impl Shape {
         }
     }
 
-    /// The element's area divided by the longest distance between its corners: how thin it is.
+    /// The element's area divided by the longest distance between its corners, a measure of how thin the element is.
     fn thickness(&self) -> f64 {
         let corners = &self.nodes[..self.family.nodes() / 2];
         let (mut area, mut longest) = (0.0, 0.0f64);

@@ -248,7 +248,7 @@ impl Family {
         }
     }
 
-    /// The points with the most accurate stresses, which are extrapolated linearly from there to the nodes
+    /// The points with the most accurate stresses. From these points stresses are extrapolated linearly to the nodes
     /// (bilinearly in a quadrilateral).
     pub fn stress_points(self) -> &'static [GaussPoint] {
         self.rule(2)

@@ -7,8 +7,8 @@ use super::{Reason, Violation};
 /// Violations beyond this number are counted, not listed, so that the list stays small.
 pub const MOST_LISTED: usize = 100;
 
-/// The largest number of violations of one kind in a mesh: the same fault may occur thousands of times and would hide
-/// the others.
+/// The largest number of violations of one kind that are listed for a mesh: the same fault may occur thousands of times
+/// and would hide other faults.
 const MOST_OF_A_KIND: usize = 20;
 
 /// The largest number of characters of each text: a name from a request may be as long as the request.
@@ -22,7 +22,7 @@ pub struct Findings {
     /// The start of the JSON Pointers of all violations.
     at: String,
     listed: Vec<Violation>,
-    /// The number of violations of each kind, while there is a limit for each kind.
+    /// The number of violations of each kind, counted while there is a limit for each kind.
     of_a_kind: BTreeMap<Reason, usize>,
     most_of_a_kind: usize,
     /// The number of violations found after the list was full.

@@ -32,7 +32,7 @@ pub struct Violation {
 }
 
 impl Violation {
-    /// A violation from its parts, in their order.
+    /// A violation from its parts, in the order of the fields.
     pub fn new(
         pointer: impl Into<String>,
         reason: Reason,
@@ -51,8 +51,8 @@ impl Violation {
 }
 
 impl Violation {
-    /// The line of the file where the violation is, and the value found there: readers of files begin `got` by `line
-    /// 61: `.
+    /// The line of the file where the violation is, and the value found on this line: readers of files begin `got` by
+    /// `line 61: `.
     fn on_line(&self) -> Option<(u64, &str)> {
         let rest = self.got.strip_prefix("line ")?;
         let (line, got) = rest.split_once(": ").filter(|_| self.pointer.is_empty())?;
@@ -108,7 +108,7 @@ impl fmt::Display for Violation {
 /// Why no solution could be computed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SolveError {
-    /// The problem cannot be solved; all its violations.
+    /// The problem cannot be solved, because it has these violations.
     Invalid(Vec<Violation>),
     /// The stiffness matrix has no Cholesky factor although the supports looked sufficient.
     SingularSystem {

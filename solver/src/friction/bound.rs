@@ -5,9 +5,9 @@ use std::sync::Arc;
 use crate::friction::{Average, Averaging, Row};
 use crate::problem::PrescribedBound;
 
-/// With cohesion, an averaged pressure below this part of the largest nodal pressure counts as zero, so that rounding
-/// does not switch on the cohesion where nothing touches. Pressures are known to far more digits, and the kernel is
-/// negligible at its very end.
+/// With cohesion, an averaged pressure below this fraction of the largest nodal pressure counts as zero, so that
+/// rounding does not switch on the cohesion where nothing touches. Pressures are known to far more digits, and the
+/// kernel is negligible at its very end.
 const NO_PRESSURE: f64 = 1e-9;
 
 /// The source of the friction bound; `A` as in [`FrictionLaw`](crate::friction::FrictionLaw).
@@ -29,7 +29,7 @@ pub enum BoundLaw<A = Averaging> {
     Prescribed(PrescribedBound),
 }
 
-/// What the bound at one place is computed from.
+/// The source that the bound at one place is computed from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Source {
     /// The pressures of some nodes, averaged by a row of weights.

@@ -25,15 +25,16 @@ const BUMP_DISC: f64 = 2.143_565_775_8;
 static FULL_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss::rule(40));
 /// The integration rule for a short piece of the kernel, on which the kernel is almost constant.
 static SHORT_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss::rule(12));
-/// A piece is short if its length is below this part of ρ.
+/// A piece is short if its length is below this fraction of ρ.
 const SHORT: f64 = 0.1;
 
 /// Over rings, where a kernel value takes longer to compute, [`SHORT_RULE`] is also used on a piece whose distance from
 /// the kernel's ends exceeds this many times half its length. Away from the axis the error is 10⁻¹³.
 const FAR: f64 = 3.0;
-/// The integration rule over rings for a piece that is longer than a short one, but not than [`MIDDLE`].
+/// The integration rule over rings for a piece that is neither short, nor far from the kernel's ends, nor longer than
+/// [`MIDDLE`].
 static MIDDLE_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss::rule(24));
-/// The largest length of a piece with [`MIDDLE_RULE`], as a part of ρ.
+/// The largest length of a piece with [`MIDDLE_RULE`], as a fraction of ρ.
 const MIDDLE: f64 = 0.25;
 
 /// The midside node of an edge counts as its middle within this fraction of the edge's length, the rounding of arc
@@ -229,7 +230,7 @@ impl Averaging {
         self.scale * shape(self.kernel, distance / self.radius)
     }
 
-    /// The row of W at arc length s. For ρ = 0 it is interpolation: Coulomb's law.
+    /// The row of W at arc length s. For ρ = 0 the row interpolates between nodes: Coulomb's law.
     pub fn row(&self, s: f64) -> Arc<Row> {
         let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(row) = known().rows.get(&s.to_bits()) {

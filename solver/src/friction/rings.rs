@@ -16,7 +16,7 @@ use super::moments::hermite;
 use crate::element::gauss;
 use crate::problem::Kernel;
 
-/// The number of terms of the series: up to [`LARGEST`] the next one is below 10⁻¹⁵ of the first.
+/// The number of terms of the series: up to [`LARGEST`] the next term is below 10⁻¹⁵ of the first.
 const TERMS: usize = 20;
 
 /// The largest q for which the series is used: rings farther from the axis than about half of ρ.

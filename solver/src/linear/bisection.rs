@@ -26,16 +26,16 @@ pub(super) struct Bisection<'a, E> {
     around: Vec<u32>,
     /// By element: a number that identifies the part and the half that the element was last in.
     half: Vec<u32>,
-    /// By element: the stamp of the round in which it last moved.
+    /// By element: the stamp of the round in which the element last moved.
     went: Vec<u32>,
-    /// By element: the stamp of the round in which its gain was last computed.
+    /// By element: the stamp of the round in which the element's gain was last computed.
     known: Vec<u32>,
-    /// By element: the stamp of the last move after which its gain was computed anew.
+    /// By element: the stamp of the last move after which the element's gain was computed anew.
     seen: Vec<u32>,
     stamp: u32,
     /// By element: by how much the number of nodes in both halves decreases if the element moves.
     gains: Vec<i32>,
-    /// By node: the number of its elements in each half.
+    /// By node: the number of the node's elements in each half.
     counts: Vec<[u32; 2]>,
     waiting: BinaryHeap<(i32, Reverse<u32>)>,
     gone: Vec<u32>,

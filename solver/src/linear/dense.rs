@@ -244,7 +244,7 @@ impl General {
 /// The x with the smallest |Σ x_k a_k − b| for the `columns` a_k, by Gram–Schmidt. Columns that depend almost linearly
 /// on the others are left out. `None` without columns, or if the result is not finite.
 pub fn least_squares(columns: &[Vec<f64>], b: &[f64]) -> Option<Vec<f64>> {
-    /// A column whose remainder is below this part of the largest column is left out.
+    /// A column whose remainder is below this fraction of the largest column is left out.
     const SPANNED: f64 = 1e-8;
     let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let largest = columns.iter().map(|c| norm(c)).fold(0.0, f64::max);

@@ -162,8 +162,8 @@ impl FrontMatrix<'_> {
     }
 }
 
-/// Fronts that own at most this many columns are eliminated by a simple loop, which costs less than the call of a
-/// kernel.
+/// Fronts that own at most this many columns are eliminated by a simple loop, which costs less than the call of one of
+/// faer's kernels.
 const NARROW: usize = 24;
 
 /// The largest size of a diagonal block that is computed as a whole, although its lower triangle would be enough.

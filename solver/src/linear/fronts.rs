@@ -21,7 +21,7 @@ const LARGE: usize = 5_000_000;
 pub struct Fronts {
     /// The fronts in the order of their elimination.
     pub(super) fronts: Vec<Front>,
-    /// The fronts in groups, in the same order.
+    /// The fronts in groups, in the order of their elimination.
     pub(super) pieces: Vec<Piece>,
     /// The fronts that are computed, in the order of their columns in the factor.
     pub(super) order: Vec<u32>,
@@ -48,7 +48,7 @@ pub struct Fronts {
     in_slots: usize,
 }
 
-/// One front.
+/// One front of the factor: the dense matrix of a part of the dissection.
 pub(super) struct Front {
     pub(super) halves: Option<[usize; 2]>,
     pub(super) elements: [usize; 2],
@@ -98,7 +98,7 @@ impl Stage {
     }
 }
 
-/// Fronts that one thread computes one after another; the last one uses the Schur complements of the others.
+/// Fronts that one thread computes one after another; the last front uses the Schur complements of the others.
 pub(super) struct Task {
     /// The range of the task's fronts in [`Fronts::order`].
     pub(super) fronts: Range<usize>,
@@ -427,12 +427,12 @@ impl Fronts {
         self.fronts.iter().map(Front::height).max().unwrap_or(0)
     }
 
-    /// Whether a second thread is worth its start for a factor.
+    /// Whether the factor is so large that computing it is worth a second thread.
     pub fn is_large(&self) -> bool {
         self.len > LARGE
     }
 
-    /// Whether a second thread is worth its start for computing fields, which pass through all fronts.
+    /// Whether the fronts are so large that computing fields, which pass through all fronts, is worth a second thread.
     pub(super) fn has_large_fields(&self) -> bool {
         self.len_of_all > LARGE
     }
@@ -447,7 +447,7 @@ impl Fronts {
     }
 }
 
-/// The fronts that equal no earlier one.
+/// The numbers of the fronts that equal no earlier front.
 fn firsts(first_equal: &[usize]) -> impl Iterator<Item = usize> {
     let all = first_equal.iter().enumerate();
     all.filter(|(number, first)| number == *first)

@@ -135,7 +135,7 @@ impl Factor {
         Ok((Factor { fronts, values }, schur))
     }
 
-    /// Whether a second thread is worth its start for computing fields.
+    /// Whether the fronts are so large that computing fields is worth a second thread.
     pub fn has_large_fields(&self) -> bool {
         self.fronts.has_large_fields()
     }

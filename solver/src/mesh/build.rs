@@ -7,7 +7,7 @@ use crate::element::Element;
 use crate::error::{AllChecks, Checked, Findings, Reason, Refused, Violation};
 use crate::solution::{Warning, WarningCode};
 
-/// Placeholder for the midsides of an element that has none yet.
+/// Placeholder for the midsides of an element that has no midsides yet.
 pub const NO_NODE: u32 = u32::MAX;
 
 /// A mesh as read from a file. Labels are the numbers in the file, for messages.
@@ -17,7 +17,7 @@ pub struct RawMesh {
     pub nodes: Vec<[f64; 2]>,
     /// Label of every node.
     pub node_labels: Vec<u64>,
-    /// Nodes by their place in `nodes`; all midsides are [`NO_NODE`] if the file has only corners.
+    /// The elements, with nodes by their place in `nodes`; all midsides are [`NO_NODE`] if the file has only corners.
     pub elements: Vec<Element>,
     /// Label of every element.
     pub element_labels: Vec<u64>,
@@ -171,7 +171,7 @@ fn counter_clockwise(raw: &mut RawMesh) -> usize {
     reversed
 }
 
-/// Adds missing midsides, shared with the neighbours; returns the number of elements that had none.
+/// Adds missing midsides, shared with the neighbours; returns the number of elements that had no midsides.
 fn second_order(raw: &mut RawMesh) -> usize {
     let lacks = |element: &Element| element[element.len() - 1] == NO_NODE;
     let lacking = raw.elements.iter().filter(|e| lacks(e)).count();

@@ -2,16 +2,16 @@
 
 use super::Mesh;
 
-/// Nodes whose distance is below this part of the shortest side at them are at the same place: such a thin slit is
-/// never intended, and files have six digits.
+/// Nodes are at the same place if their distance is below this fraction of the shortest side that meets them: such a
+/// thin slit is never intended, and files have six digits.
 const SAME_PLACE: f64 = 3e-4;
 
 /// The largest number of nodes that each node is compared with: in any useful mesh far fewer are as close along
 /// `DIRECTION`.
 const MOST_COMPARED: usize = 200;
 
-/// A unit vector that hardly any line of nodes is perpendicular to, so that nodes next to each other in the order along
-/// it are mostly close to each other.
+/// A unit vector that hardly any line of nodes is perpendicular to, so that nodes that are neighbours in the order
+/// along this vector are mostly close to each other.
 const DIRECTION: [f64; 2] = [0.618_181_9, 0.786_035_2];
 
 /// Pairs of nodes on the surface of the body at the same place, within rounding, in the order of the second nodes. Each

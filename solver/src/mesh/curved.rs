@@ -5,7 +5,7 @@ use super::{Edge, Mesh, runs};
 use crate::problem::{Curve, CurveKind};
 use crate::spline::Spline;
 
-/// Corners of elements lie on a circle if their distance from it is at most this part of its radius.
+/// Corners of elements lie on a circle if their distance from it is at most this fraction of its radius.
 const OFF_CIRCLE: f64 = 1e-4;
 
 /// A smooth curve is laid through the corners of a boundary if the boundary turns by less than 45° at each (cosine).
@@ -27,7 +27,7 @@ pub enum OffCurve {
         /// The largest distance allowed.
         most: f64,
     },
-    /// The boundary has a corner at this node, where it turns by this angle.
+    /// The boundary has a corner at a node, where it turns by an angle: the node and the angle.
     Turns(u32, f64),
 }
 

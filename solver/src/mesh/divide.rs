@@ -125,8 +125,8 @@ impl Mesh {
         true
     }
 
-    /// Whether a set names the midside of a side without its ends: a force or a support there must not move with the
-    /// node.
+    /// Whether a set names the midside of a side without its ends: then a force or support of the set must not move
+    /// with the midside.
     fn has_midside_alone(&self, [a, b, mid]: &Edge) -> bool {
         let alone = |set: &Vec<u32>| set.contains(mid) && !(set.contains(a) && set.contains(b));
         self.node_sets.values().any(alone)

@@ -27,7 +27,7 @@ impl Mesh {
             .is_some_and(|first| (first..self.first_nodes()).contains(&side[2]))
     }
 
-    /// The nodes of the first mesh that a set contains, without midsides that its file did not have.
+    /// The nodes of the first mesh that a set contains, without midsides that the mesh's file did not have.
     pub fn given_nodes(&self, set: &[u32]) -> Vec<u32> {
         let first = self.first_nodes();
         let count = self.added_midsides.map_or(first, |added| added.min(first));
@@ -35,7 +35,7 @@ impl Mesh {
         given.collect()
     }
 
-    /// Whether forces and supports at nodes have to be applied to other nodes too: sides are split, or had no midsides.
+    /// Whether forces and supports given at nodes act on other nodes too, because sides are split or had no midsides.
     pub fn has_later_nodes(&self) -> bool {
         self.lineage.first_nodes.is_some() || self.added_midsides.is_some()
     }
@@ -65,7 +65,7 @@ impl Mesh {
 /// A side of the first mesh.
 #[derive(Clone, Debug, Default)]
 pub struct FirstSide {
-    /// The parts of the side in this mesh, all directed like it.
+    /// The parts of the side in this mesh, all directed like the side.
     pub parts: Vec<Part>,
     /// Whether the side lies between two elements.
     pub inside: bool,

@@ -110,7 +110,7 @@ impl GradedMesh {
         }
     }
 
-    /// Moves the nodes of a boundary onto its curve; if they are too far from it, they stay.
+    /// Moves the nodes of a boundary onto its curve; if the boundary is too far from it, the nodes stay.
     pub fn put_on_curve(&mut self, boundary: &str, curve: &Curve) {
         if let Some(edges) = self.boundaries.get(boundary) {
             let _ = put_on_curve(&mut self.finer.nodes, edges, curve);
@@ -118,7 +118,7 @@ impl GradedMesh {
     }
 
     /// The mesh without hanging nodes, and for each of its elements the number of the element of `self` that contains
-    /// it.
+    /// the element.
     pub fn closed(&self) -> (Mesh, Vec<u32>) {
         let mut finer = self.finer.clone();
         let (mut elements, mut parts) = (Vec::new(), Vec::new());
@@ -156,7 +156,7 @@ impl GradedMesh {
         (mesh, parts)
     }
 
-    /// Adds the four parts of a part, or the two halves of a long one.
+    /// Adds the four parts of an element, or the two halves of a long one.
     fn divide(&mut self, part: Part) {
         let Part {
             element,
@@ -267,7 +267,7 @@ fn turned(p: [u32; 8], by: usize) -> [u32; 8] {
     std::array::from_fn(|i| p[i / 4 * 4 + (i + by) % 4])
 }
 
-/// Two triangles in place of one whose side `k` is split.
+/// Two triangles in place of a triangle whose side `k` is split.
 fn bisected(finer: &mut Finer, p: [u32; 6], k: usize) -> Option<Vec<Element>> {
     let [a, b, c, ab, bc, ca] = std::array::from_fn(|i| p[i / 3 * 3 + (i + k) % 3]);
     let (first, second) = finer.halves(ab, a)?;
@@ -290,7 +290,7 @@ fn fan(finer: &mut Finer, p: [u32; 8]) -> Option<Vec<Element>> {
     ])
 }
 
-/// Two quadrilaterals in place of one whose first and third sides are split.
+/// Two quadrilaterals in place of a quadrilateral whose first and third sides are split.
 fn halves(finer: &mut Finer, p: [u32; 8]) -> Option<Vec<Element>> {
     let [a, b, c, d, ab, bc, cd, da] = p;
     let (south, north) = (finer.halves(ab, a)?, finer.halves(cd, c)?);
@@ -301,7 +301,7 @@ fn halves(finer: &mut Finer, p: [u32; 8]) -> Option<Vec<Element>> {
     ])
 }
 
-/// Three quadrilaterals in place of one whose first and second sides are split.
+/// Three quadrilaterals in place of a quadrilateral whose first and second sides are split.
 fn three(finer: &mut Finer, p: [u32; 8]) -> Option<Vec<Element>> {
     let [a, b, c, d, ab, bc, cd, da] = p;
     let (south, east) = (finer.halves(ab, a)?, finer.halves(bc, b)?);

@@ -92,7 +92,7 @@ pub fn grid_mesh(grid: &Grid) -> Mesh {
     }
 }
 
-/// The height of a polyline at x, linear between its points; y = 0 where there is none.
+/// The height of a polyline at x, linear between its points; 0 if there is no polyline.
 fn height(line: &Option<Vec<[f64; 2]>>, x: f64) -> f64 {
     let Some(points) = line else { return 0.0 };
     let after = points

@@ -19,7 +19,7 @@ const LONG: f64 = 3.0;
 /// The halvings of one element.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Halving {
-    /// The sides that a halving splits: 0 for the first and third, 1 for the others.
+    /// The sides that a halving splits: 0 for the first and third, 1 for the second and fourth.
     pub(super) sides: usize,
     /// The number of halvings; 0 for triangles.
     pub(super) times: u32,
@@ -102,7 +102,7 @@ pub(super) fn halvings(mesh: &Mesh) -> Vec<Halving> {
     halvings
 }
 
-/// For each side of each element, the neighbouring element and the number of the side there.
+/// For each side of each element, the neighbouring element and the number of the side in the neighbour.
 fn neighbours(mesh: &Mesh) -> Vec<Vec<Option<(usize, usize)>>> {
     let mut found: Vec<Vec<Option<(usize, usize)>>> = Vec::with_capacity(mesh.elements.len());
     let mut first: HashMap<u32, (usize, usize)> = HashMap::new();

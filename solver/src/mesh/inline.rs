@@ -6,11 +6,11 @@ use super::{Mesh, key};
 use crate::error::{AllChecks, Checked, Findings, Reason, Violation, escape};
 use crate::problem::InlineMesh;
 
-/// Builds the mesh that a problem has written out; `pointer` is its place in the problem.
+/// Builds the mesh that a problem has written out; `pointer` is the mesh's place in the problem.
 ///
 /// # Errors
 ///
-/// All violations of its numbering.
+/// All violations of the mesh's numbering.
 pub fn inline_mesh(input: InlineMesh, pointer: &str) -> Result<Mesh, Vec<Violation>> {
     let mut found = Findings::of_mesh(pointer);
     let mesh = check(input, &mut found);
@@ -144,7 +144,7 @@ fn numbers(input: &InlineMesh, found: &mut Findings) -> Checked<Vec<bool>> {
     all.finish(used)
 }
 
-/// Checks the edges of a boundary; returns them, each with the body on its right.
+/// Checks the edges of a boundary; returns the edges, each with the body on its right.
 fn directed(
     name: &str,
     edges: &[[u32; 3]],

@@ -23,12 +23,12 @@ pub struct Part {
     pub side: Edge,
     /// The part, as a side of the refined mesh.
     pub edge: Edge,
-    /// The range of the part on the side, −1 … 1 from the side's start to its end.
+    /// The range of the part on the first mesh's side, −1 … 1 from the side's start to its end.
     pub range: [f64; 2],
 }
 
 impl Part {
-    /// The part directed from the start of `edge` to its end, with the side in that direction.
+    /// The part directed from the start of `edge` to its end, with its side of the first mesh in the same direction.
     fn along(mut self, edge: &Edge) -> Part {
         if self.edge[0] != edge[0] {
             self.range.reverse();
@@ -60,7 +60,7 @@ impl Part {
 }
 
 impl Lineage {
-    /// Marks the mesh as no longer the first one.
+    /// Marks the mesh, which has `nodes` nodes, as no longer the first one.
     pub(super) fn leave_first(&mut self, nodes: usize) {
         self.first_nodes.get_or_insert(nodes as u32);
     }
@@ -86,12 +86,12 @@ impl Lineage {
             .or_else(|| first.then(whole))
     }
 
-    /// Records that a side is split at its middle; `halves`: the midsides of its two halves, from its start on.
+    /// Records that a side is split at its middle; `halves`: the midsides of the two halves, from the side's start on.
     pub(super) fn split(&mut self, edge: &Edge, halves: [u32; 2]) {
         self.split_at(edge, 0.0, halves);
     }
 
-    /// Records that a side is split at the place ξ, −1 … 1, where its midside node is moved to.
+    /// Records that a side is split at the place ξ, −1 … 1, to which its midside node is moved.
     pub(super) fn split_at(&mut self, edge: &Edge, xi: f64, halves: [u32; 2]) {
         let Some(part) = self.part(edge) else { return };
         let [start, end, _] = part.places();

@@ -61,15 +61,15 @@ pub struct Mesh {
     pub boundaries: BTreeMap<String, Vec<Edge>>,
     /// Elements by the name of their group.
     pub groups: BTreeMap<String, Vec<u32>>,
-    /// Nodes by the name of their set: those of the first mesh, and later ones on sides and in elements whose nodes are
-    /// all in the set.
+    /// Nodes by the name of their set: the set's nodes of the first mesh, and later nodes on sides and in elements all
+    /// of whose nodes are in the set.
     pub node_sets: BTreeMap<String, Vec<u32>>,
-    /// The first of the midside nodes that were added to elements with corners only, if there are any; they are the
-    /// last nodes of the first mesh. In a stored mesh this comes after the other fields.
+    /// The first of the midside nodes that were added to elements with corners only, if any were added; they are the
+    /// last nodes of the first mesh. In a stored mesh this field comes after the others.
     #[serde(skip)]
     pub added_midsides: Option<u32>,
-    /// How many nodes of a set were left out because they belong to no element. In a stored mesh this comes after the
-    /// other fields.
+    /// How many nodes of each set were left out because they belong to no element. In a stored mesh this field comes
+    /// after the others.
     #[serde(skip)]
     pub nodes_left_out: BTreeMap<String, u32>,
     /// The relation to the first mesh. It is not stored, since every stored mesh is a first one.
@@ -82,7 +82,7 @@ pub struct Mesh {
 pub struct ExternalMesh {
     /// The mesh, before it is refined.
     pub mesh: Mesh,
-    /// Warnings about changes made when it was read; pointers are those of the problem.
+    /// Warnings about changes made when the mesh was read; pointers are those of the problem.
     pub warnings: Vec<Warning>,
 }
 
@@ -126,8 +126,8 @@ impl Mesh {
         edge.map(|n| self.nodes[n as usize])
     }
 
-    /// Elements that are inverted somewhere: number, place and det J. They are checked at the Gauss points of the
-    /// larger rule and, with `at_nodes`, at the nodes: a midside node far from the middle inverts the element at a
+    /// Elements that are inverted somewhere: number, place and det J. Elements are checked at the Gauss points of the
+    /// larger rule and, with `at_nodes`, at the nodes: a midside node far from the middle inverts its element at a
     /// corner first.
     pub fn inverted_elements(&self, at_nodes: bool) -> Vec<(usize, String, f64)> {
         let inverted = |(e, element): (usize, &Element)| {
@@ -152,8 +152,9 @@ impl Mesh {
             .collect()
     }
 
-    /// The smallest ratio, over all elements, of the smallest to the largest det J within an element, and that element:
-    /// 1 for a parallelogram or a triangle with straight sides, near 0 for one that is almost inverted.
+    /// The smallest ratio, over all elements, of the smallest to the largest det J within an element, and the element
+    /// that has it: 1 for a parallelogram or a triangle with straight sides, near 0 for an element that is almost
+    /// inverted.
     pub fn worst_element(&self) -> (f64, usize) {
         let ratio = |element: &Element| {
             let (family, nodes) = (element.family(), self.element_nodes(element));
@@ -173,8 +174,8 @@ impl Mesh {
         )
     }
 
-    /// The parts that are connected by sides of elements, each as a list of its nodes. Parts that touch only in a
-    /// corner are separate although they share that node.
+    /// The parts of the mesh that are connected by sides of elements, each as a list of its nodes. Parts that touch
+    /// only in a corner are separate although they share the corner's node.
     pub fn connected_parts(&self) -> Vec<Vec<u32>> {
         // union–find over the elements; a side is known by its midside node
         let mut parent: Vec<u32> = (0..self.elements.len() as u32).collect();
@@ -227,8 +228,8 @@ fn find(parent: &mut [u32], node: u32) -> u32 {
     root
 }
 
-/// Edges sorted into runs, each from its start to its end, whatever their order. Where a boundary meets itself at a
-/// node, runs end; a closed loop has no start, and begins at its first edge.
+/// The edges sorted into runs, each from its start to its end, whatever the order of `edges` is. Where a boundary meets
+/// itself at a node, runs end; a closed loop has no start, and begins at its first edge.
 pub fn runs(edges: &[Edge]) -> Vec<Vec<Edge>> {
     // the edges that start at a node: how many, and one of them; and how many end there
     let mut at: HashMap<u32, (usize, usize, usize)> = HashMap::with_capacity(edges.len() + 1);

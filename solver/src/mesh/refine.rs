@@ -6,7 +6,7 @@ use std::ops::Range;
 use crate::element::{Element, edge3, quad8, tri6};
 use crate::mesh::{Edge, Lineage, Mesh};
 
-/// New nodes lie half-way between the old ones, in master coordinates.
+/// New nodes lie half-way between old nodes, in master coordinates.
 const STEP: f64 = 0.5;
 
 /// The distance of new nodes from the sides of a triangle, in master coordinates.
@@ -64,7 +64,7 @@ impl Finer {
         }
     }
 
-    /// The midsides of the halves of a side, from `start` on, if it is split.
+    /// The midsides of the two halves of a side, from `start` on; `None` if the side is not split.
     pub(super) fn halves(&self, mid: u32, start: u32) -> Option<(u32, u32)> {
         let (from, first, second) = (*self.halves.get(mid as usize)?)?;
         Some(if from == start {
@@ -74,7 +74,7 @@ impl Finer {
         })
     }
 
-    /// Splits a side; returns the midsides of its two halves, from its start on.
+    /// Splits a side; returns the midsides of the two halves, from the side's start on.
     pub(super) fn split(&mut self, [a, b, mid]: Edge) -> (u32, u32) {
         // midsides of new sides are not in the list yet
         if self.halves.len() < self.nodes.len() {
@@ -152,7 +152,7 @@ impl Finer {
     }
 }
 
-/// The node sets of each node: a new node is in those sets that contain all nodes of its side or element.
+/// The node sets of each node: a new node is in the sets that contain all nodes of its side or element.
 #[derive(Clone)]
 pub(super) struct Sets {
     of_node: HashMap<u32, Vec<usize>>,

@@ -10,7 +10,7 @@ const ROUNDING: f64 = 1e-12;
 /// The axis of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axis {
-    /// The largest radius that counts as 0; `None` in the plane.
+    /// The largest radius that counts as 0; `None` for a body in the plane.
     reach: Option<f64>,
 }
 

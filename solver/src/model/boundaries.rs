@@ -175,7 +175,7 @@ impl Checks {
         all.finish(())
     }
 
-    /// The mesh as given, before it is refined.
+    /// The mesh of the problem before it is refined.
     fn source(&mut self, source: &MeshSource, external: Option<External>) -> Checked<Mesh> {
         match source {
             MeshSource::Grid(grid) => {
@@ -371,7 +371,8 @@ impl Checks {
         ))
     }
 
-    /// Checks that a boundary has a start and an end, so that a value can be given from one to the other.
+    /// Checks that a boundary is one chain with a start and an end, so that values can be given from the start to the
+    /// end.
     pub(super) fn chain(&mut self, edges: &[Edge], pointer: String, hint: &str) -> Checked {
         let runs = mesh::runs(edges);
         let got = match &runs[..] {

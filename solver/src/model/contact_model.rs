@@ -31,7 +31,7 @@ pub struct ContactModel {
     pub boundary: ContactBoundary,
     /// The profile of the obstacle at each node, along the contact's normal (length).
     pub profile: Vec<f64>,
-    /// The obstacle between the nodes and at its corners, in order of s.
+    /// The obstacle between the nodes and at the obstacle's corners, in order of s.
     pub places: Vec<Place>,
     /// Whether the obstacle is a curve in space; otherwise it is given by its distance from the body's surface.
     pub in_space: bool,
@@ -66,7 +66,7 @@ pub struct ContactModel {
 }
 
 impl ContactModel {
-    /// The gap at a node (length) when the obstacle is pushed by `factor` times its indentation.
+    /// The gap at a node (length) when the obstacle is pushed by `factor` times the contact's indentation.
     pub fn gap(&self, node: usize, factor: f64) -> f64 {
         self.gap_behind(node, factor * self.indentation)
     }

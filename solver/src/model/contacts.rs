@@ -28,8 +28,8 @@ const SHARPEST_TURN: f64 = 0.35;
 /// The sharpest corner between two contact edges that is accepted: 45° (angle).
 const SHARPEST_CORNER: f64 = 0.795;
 
-/// Largest nonlocal radius, in lengths of the contact boundary. Beyond it the average hardly depends
-/// on the contact, and between two lines of symmetry its cost grows with the radius.
+/// Largest nonlocal radius, in lengths of the contact boundary. With a larger radius the average hardly depends on the
+/// contact, and between two lines of symmetry the cost of the average grows with the radius.
 const LARGEST_RADIUS: f64 = 10.0;
 
 /// An obstacle's slope above this is intended, not an effect of rounded coordinates in a file.
@@ -182,7 +182,7 @@ impl Checks {
     }
 
     /// Checks supports along neither normal nor tangent: the normal and the support's direction become the axes of the
-    /// node, if possible. At a common end of two contacts the axes are their normals, and a support must be along one
+    /// node, if possible. At a common end of two contacts the axes are the two normals, and a support must be along one
     /// of them.
     fn oblique_supports(
         &mut self,

@@ -81,7 +81,7 @@ struct Size {
 }
 
 /// The number of bytes of a mesh file for one element, underestimated rather than overestimated: in the larger files
-/// that Gmsh writes, an element of second order has about 150 with its nodes, one of first order 100.
+/// that Gmsh writes, an element of second order with its nodes takes about 150 bytes, one of first order 100.
 const BYTES_PER_ELEMENT: f64 = 80.0;
 
 /// The most elements that can be numbered, with up to eight nodes each.
@@ -263,8 +263,8 @@ impl Size {
         (500.0 * self.nodes + self.history()) as u64
     }
 
-    /// The cost for this size. The constants of memory are compared with measurements by
-    /// `server/service/src/queue/tests/estimates.rs`, those of time by `tests/bench/estimates.py`.
+    /// The cost for this size. The constants for memory are compared with measurements by
+    /// `server/service/src/queue/tests/estimates.rs`, the constants for time by `tests/bench/estimates.py`.
     fn estimate(&self, margin: f64) -> Estimate {
         let dofs = 2.0 * self.nodes;
         let contact = self.contact;
@@ -370,7 +370,7 @@ fn every_average(elements: f64) -> Along {
     }
 }
 
-/// The memory for a friction point apart from its average, in numbers.
+/// The memory for a friction point apart from its average, as a number of entries of an average.
 const POINT: f64 = 24.0;
 
 /// The number of nodes that an average reaches beyond those within the radius.

@@ -19,7 +19,7 @@ const MOST_LINE_POINTS: usize = 10_000;
 /// The smallest number of points for smoothing.
 const FEWEST_SMOOTHED: usize = 4;
 
-/// A standard deviation above this part of the range of all values can hardly be the error of one of them.
+/// A standard deviation above this fraction of the range of all values can hardly be the error of a single value.
 const LARGE_DEVIATION: f64 = 0.1;
 
 impl Checks {

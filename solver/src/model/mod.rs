@@ -87,9 +87,9 @@ pub struct Model {
     /// Contact boundaries with their obstacles.
     pub contacts: Vec<ContactModel>,
     /// Contact nodes whose displacement is measured along two directions that are not perpendicular: the normals of two
-    /// contacts that meet there, or the normal and the direction of a support.
+    /// contacts that meet at the node, or the normal and the direction of a support.
     pub oblique: BTreeMap<u32, [[f64; 2]; 2]>,
-    /// Common ends of two contacts that belong to one of them alone, since the other one does not touch there.
+    /// Common ends of two contacts that belong to one contact alone, since the other contact does not touch there.
     pub alone: Alone,
     /// Contact nodes on the axis that stay open under a hollow of the obstacle: the constraints at them and at the
     /// midside nodes beside them are those of ordinary nodes (formulation 3.5).
@@ -105,7 +105,8 @@ pub struct Model {
 }
 
 impl Model {
-    /// Checks and numbers a problem. `external`: its mesh, if the problem only names it or contains it as text.
+    /// Checks and numbers a problem. `external`: the problem's mesh, if the problem only names it or contains it as
+    /// text.
     ///
     /// # Errors
     ///
@@ -116,8 +117,8 @@ impl Model {
         checks.found.conclude(model)
     }
 
-    /// Checks and numbers a problem on a refined mesh, which has all names of the first one: adaptive refinement makes
-    /// a sequence of such meshes, and verification splits the last one in two.
+    /// Checks and numbers a problem on a refined mesh, which has all names of the first mesh: adaptive refinement makes
+    /// a sequence of such meshes, and verification splits the last of them in two.
     ///
     /// # Errors
     ///

@@ -109,7 +109,7 @@ impl<'a> FirstSides<'a> {
         forces.retain(|node, _| !spent.contains(node));
     }
 
-    /// The displacements at all nodes of sides where they are prescribed at every node of the first mesh.
+    /// The displacements at all nodes of sides that have prescribed displacements at all their nodes of the first mesh.
     pub(super) fn between(&self, prescribed: &BTreeMap<u32, f64>) -> Vec<(u32, f64)> {
         let mut found = Vec::new();
         for side in self.sides.values() {
@@ -137,9 +137,9 @@ impl<'a> FirstSides<'a> {
     }
 }
 
-/// The forces on the start, end and midside of a part of a side, in one direction. `ends`, `middle`: those on the nodes
-/// of the side; without a middle the side has linear displacements. `places`: the places of the part's nodes on the
-/// side.
+/// The forces on the start, end and midside of a part of a side, in one direction. The first two arguments are the
+/// forces on the ends and on the middle of the side; without a middle the side has linear displacements. `places`: the
+/// places of the part's nodes on the side.
 ///
 /// With the side's shape functions h_i(ξ), −1 ≤ ξ ≤ 1, and the forces F_i on its nodes, the traction per dξ is the
 /// combination q of the h_i with ∫ q h_i dξ = F_i. The forces on the nodes of a part of the side are ∫ q H_k dξ, with

@@ -68,7 +68,8 @@ impl Checks {
         all.finish(())
     }
 
-    /// Checks the lengths of lists: very long ones are a mistake, and each entry is checked edge by edge.
+    /// Checks the lengths of lists: a very long list is a mistake, and each of its entries would be checked edge by
+    /// edge.
     pub(super) fn counts(&mut self, problem: &Problem) -> Checked {
         let mut all = AllChecks::default();
         const MOST: usize = 1000;
@@ -184,7 +185,7 @@ impl Checks {
 
     pub(super) fn steps(&mut self, steps: &[Step]) -> Checked {
         let mut all = AllChecks::default();
-        /// The most increments of one step: far more than is useful, and still a bounded time.
+        /// The most increments of one step: far more than is useful, but few enough to bound the time.
         const MOST_INCREMENTS: u32 = 10_000;
         /// The most increments of all steps together: each adds rows to the history.
         const MOST_IN_ALL: u64 = 20_000;

@@ -75,13 +75,13 @@ impl Checks {
     }
 }
 
-/// A drag is radial if its radial component is more than this part of it.
+/// A drag is radial if its radial component is more than this fraction of the drag.
 const RADIAL: f64 = 1e-6;
 
 impl Checks {
     /// Warns of an obstacle of revolution that is dragged away from the axis or towards it: a rigid obstacle can only
-    /// move along its axis. Along a cone that motion is a drag together with an indentation, whose radial components
-    /// cancel.
+    /// move along its axis. Along a cone a motion along the axis is a drag together with an indentation, whose radial
+    /// components cancel.
     pub(super) fn warn_of_radial_drag(
         &mut self,
         contacts: &[ContactModel],

@@ -25,7 +25,7 @@ pub enum Held {
     Along {
         /// The direction (unit vector).
         direction: [f64; 2],
-        /// The displacement along it (length).
+        /// The displacement along the direction (length).
         value: f64,
         /// How far the direction may deviate from the direction of the surface (angle); 0 along x and y.
         #[serde(skip)]
@@ -36,7 +36,7 @@ pub enum Held {
 }
 
 impl Held {
-    /// The prescribed displacement along a direction (unit vector), if there is one.
+    /// The prescribed displacement along a direction (unit vector); `None` if it is not prescribed.
     pub fn along(&self, along: [f64; 2]) -> Option<f64> {
         match *self {
             Held::Both(u) => Some(u[0] * along[0] + u[1] * along[1]),

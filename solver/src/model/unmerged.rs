@@ -8,8 +8,8 @@ use crate::mesh::Mesh;
 use crate::solution::WarningCode;
 
 impl Checks {
-    /// Warns of nodes at the same place that are not connected. This is no fault, since a crack may be intended: if
-    /// both of its sides are contacts it is taken as such. (Parts that can move independently are refused.)
+    /// Warns of nodes at the same place that are not connected. This is no violation, since a crack may be intended: if
+    /// both sides of the crack are contacts, there is no warning. (Parts that can move independently are refused.)
     pub(super) fn warn_of_unmerged(&mut self, mesh: &Mesh, contacts: &[ContactModel]) {
         let meant: BTreeSet<u32> = contacts
             .iter()

@@ -16,7 +16,7 @@ pub struct VariableModel {
 }
 
 impl VariableModel {
-    /// Starts with a model and its problem.
+    /// Starts with a model, and the problem that it was made from.
     pub fn new(model: Model, problem: &Problem) -> Self {
         let mut lasting = model.warnings.clone();
         for warning in warnings(&model) {
@@ -34,8 +34,8 @@ impl VariableModel {
         &self.model
     }
 
-    /// Changes to the model of another problem, whose mesh is not read. `None` if more than the variable numbers
-    /// differ.
+    /// Changes to the model of another problem, whose mesh is not read. `None` if the problems differ in more than the
+    /// variable numbers.
     ///
     /// # Errors
     ///
@@ -81,7 +81,7 @@ impl VariableModel {
     }
 }
 
-/// The warnings about contacts and their drag.
+/// The warnings about contacts, and about drag along lines of symmetry.
 fn warnings(model: &Model) -> Vec<Warning> {
     let mut checks = Checks::default();
     checks.warn_about_contacts(&model.contacts);

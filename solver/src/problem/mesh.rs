@@ -49,7 +49,7 @@ pub enum MeshSource {
 }
 
 impl MeshInput {
-    /// A mesh from one source, without refinement or further names.
+    /// A mesh from `source`, without refinement or further names.
     pub fn new(source: MeshSource) -> Self {
         MeshInput {
             source,
@@ -60,7 +60,7 @@ impl MeshInput {
         }
     }
 
-    /// The grid, if the mesh is one.
+    /// The grid, if the source of the mesh is a grid.
     pub fn grid(&self) -> Option<&Grid> {
         match &self.source {
             MeshSource::Grid(grid) => Some(grid),
@@ -68,7 +68,7 @@ impl MeshInput {
         }
     }
 
-    /// The grid, if the mesh is one, for changes.
+    /// The grid, to be changed, if the source of the mesh is a grid.
     pub fn grid_mut(&mut self) -> Option<&mut Grid> {
         match &mut self.source {
             MeshSource::Grid(grid) => Some(grid),
@@ -76,7 +76,7 @@ impl MeshInput {
         }
     }
 
-    /// The hash of the stored mesh, if the mesh is one.
+    /// The hash of the stored mesh, if the source of the mesh is a stored mesh.
     pub fn stored(&self) -> Option<&str> {
         match &self.source {
             MeshSource::Stored(hash) => Some(hash),

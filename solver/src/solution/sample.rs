@@ -142,7 +142,7 @@ impl<'a> Known<'a> {
     }
 }
 
-/// The normal stress on an edge, without a tension if none of its three nodes has one.
+/// The normal stress on an edge; tension is left out if none of the edge's three nodes has tension.
 fn without_overshoot(nodes: &ContactProfile, edge: usize, stress: f64) -> f64 {
     let of_nodes = &nodes.normal_stress[2 * edge..=2 * edge + 2];
     if of_nodes.iter().all(|of_node| *of_node <= 0.0) {

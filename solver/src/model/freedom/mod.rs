@@ -19,7 +19,7 @@ use parts::{Free, MOST_HINGED, MOST_IN_MECHANISMS, Motion, Part, Parts, Unheld};
 
 impl Checks {
     /// Checks that every part of the body is held against rigid motions, by supports or by contacts (if they touch).
-    /// True if a contact is needed for that.
+    /// Returns whether a contact is needed for that.
     pub(super) fn freedom(
         &mut self,
         mesh: &Mesh,
@@ -144,7 +144,8 @@ fn in_words(parts: &Parts<'_>, free: &Free) -> (String, u32, bool) {
     (words, node.copied().unwrap_or_default(), turns)
 }
 
-/// Whether a motion moves all nodes of contacts away from their obstacles, or all towards them, and none along them.
+/// Whether a motion moves all nodes of contacts away from their obstacles, or all towards their obstacles, and none
+/// along.
 fn held_on_one_side(moves: &BTreeMap<u32, [f64; 2]>, contacts: &[ContactModel]) -> bool {
     let (mut away, mut towards, mut tangential) = (0.0f64, 0.0f64, 0.0f64);
     for contact in contacts {
@@ -289,7 +290,7 @@ fn directions(fixed: &BTreeMap<u32, Held>) -> Vec<Hold> {
     held
 }
 
-/// The motions of a contact's nodes that it prevents while it touches.
+/// The motions of a contact's nodes that the contact prevents while it touches.
 fn hindered(contact: &ContactModel) -> Vec<Hold> {
     let holds = |law: &FrictionLaw<Average>| law.bound.holds();
     let normal = contact.condition != Condition::None;

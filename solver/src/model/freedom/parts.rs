@@ -57,7 +57,7 @@ impl Hold {
 /// What is known about parts that nothing holds.
 pub(super) enum Unheld {
     Free(Free),
-    /// Too many hinged parts to be examined: their number, and one of their nodes.
+    /// Too many hinged parts to be examined: the number of parts, and one of their nodes.
     TooMany(usize, u32),
 }
 
