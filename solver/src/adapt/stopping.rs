@@ -62,7 +62,7 @@ impl StopReason {
             StopReason::Failed(unknowns, why) => {
                 format!("the next mesh, with {unknowns} unknowns, has no solution ({why})")
             }
-            StopReason::Meshes => "that is the largest number of meshes".to_owned(),
+            StopReason::Meshes => "more meshes are not allowed".to_owned(),
             StopReason::Stalled => {
                 format!("the last {PATIENCE} meshes hardly reduced the error, so refinement stopped")
             }

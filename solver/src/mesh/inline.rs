@@ -55,7 +55,7 @@ fn numbers(input: &InlineMesh, found: &mut Findings) -> Checked<Vec<bool>> {
             "/elements",
             Reason::TooFew,
             "no element",
-            "at least one",
+            "at least one element",
             "Give the elements as lists of eight or six nodes.",
         ));
     }
@@ -102,7 +102,7 @@ fn numbers(input: &InlineMesh, found: &mut Findings) -> Checked<Vec<bool>> {
                     Reason::RepeatedElement,
                     e,
                     "each element once",
-                    "Remove it.",
+                    "Remove the repeated number.",
                 ));
             }
         }

@@ -88,7 +88,7 @@ impl Checks {
                 Reason::NameTaken,
                 &contact.boundary,
                 "a boundary of its own for each contact",
-                "Name parts of it under /mesh/boundaries.",
+                "Name parts of the boundary under /mesh/boundaries.",
             ));
         }
         let edges = self.boundary(mesh, &contact.boundary, format!("{pointer}/boundary"))?;

@@ -20,7 +20,7 @@ impl Checks {
                 "/materials",
                 Reason::TooFew,
                 "no material",
-                "at least one",
+                "at least one material",
                 "Give youngs_modulus and poissons_ratio.",
             ));
         }

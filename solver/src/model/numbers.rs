@@ -61,7 +61,7 @@ impl Checks {
                 Reason::NotFinite,
                 "NaN or infinity",
                 "a finite number",
-                "Check the computation that produced it.",
+                "Check the computation that produced the number.",
             ));
         }
         self.found.count(more);

@@ -169,7 +169,7 @@ impl Checks {
                 pointer,
                 Reason::TooFew,
                 "neither `ux` nor `uy` nor `un` nor `ut`",
-                "at least one of them",
+                "at least one of `ux`, `uy`, `un` and `ut`",
                 "Prescribe a displacement, or remove the support.",
             ));
         }

@@ -103,8 +103,8 @@ fn not_used(name: &str) -> Violation {
         format!("/{name}"),
         Reason::NotUsed,
         "an isotropic constant together with `orthotropic`",
-        "one of the two forms",
-        "Remove it, or remove `orthotropic`.",
+        "either isotropic constants or `orthotropic`",
+        "Remove the isotropic constant, or remove `orthotropic`.",
     )
 }
 
