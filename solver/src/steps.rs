@@ -20,7 +20,7 @@ use crate::solution::{
     WarningCode,
 };
 
-/// An increment that does not converge is halved this often before the step ends there.
+/// An increment that does not converge is halved this many times before the step ends with it.
 const MOST_HALVINGS: u32 = 6;
 
 /// Solves all steps; the end of the last step is the solution. After a step that does not converge no further step is

@@ -24,7 +24,7 @@ impl Shape {
         Shape::new(element.family(), &nodes, section, section.material_of(e))
     }
 
-    /// The shape of an element with these nodes.
+    /// The shape of an element with the node positions `nodes`.
     pub(super) fn new(
         family: Family,
         nodes: &AtNodes<[f64; 2]>,

@@ -249,7 +249,7 @@ impl Pencil {
     }
 }
 
-/// The strains ε_xx, ε_yy and γ_xy of unit displacements along x and y, for shape functions with these derivatives.
+/// The strains ε_xx, ε_yy and γ_xy of unit displacements along x and y, for a shape function with given derivatives.
 fn strains(h: f64, [a, b]: [f64; 2], det: f64) -> [[f64; 3]; 2] {
     let (dx, dy) = (h * a / det, h * b / det);
     [[dx, 0.0, dy], [0.0, dy, dx]]

@@ -29,7 +29,7 @@ pub enum Reason {
     Malformed,
     /// A value of the wrong type.
     WrongType,
-    /// A name that is not known here.
+    /// A name that is not known where it stands.
     UnknownName,
     /// A value that is none of the allowed forms or words.
     UnknownAlternative,
@@ -55,7 +55,7 @@ pub enum Reason {
     OutOfRange,
     /// Numbers that do not increase.
     NotIncreasing,
-    /// A value that has no effect here, or excludes another one that is given.
+    /// A value that has no effect where it stands, or excludes another value that is given.
     NotUsed,
     /// Two values that contradict each other.
     Conflict,
@@ -77,7 +77,7 @@ pub enum Reason {
     Truncated,
     /// A kind of file, keyword or element that is not supported.
     Unsupported,
-    /// A part of a deck's analysis that is not supported here.
+    /// A part of a deck's analysis that the solver does not support.
     NotUnderstood,
 
     // Meshes.

@@ -19,7 +19,7 @@ impl Dense {
         Ok(values.map(|values| Dense { size, values }))
     }
 
-    /// The memory for a matrix of this size (bytes).
+    /// The memory for a matrix with `size` rows (bytes).
     pub fn bytes(size: usize) -> u64 {
         (size as u64).saturating_mul(size as u64).saturating_mul(8)
     }

@@ -171,7 +171,7 @@ const FULL: usize = 64;
 
 /// The number of rows of a product that make one portion of work. `of_one`: the multiplications for one row.
 fn portion(of_one: usize) -> usize {
-    /// With fewer rows at once the work would be far less efficient.
+    /// The fewest rows of a portion: with fewer, the work would be far less efficient.
     const FEWEST: usize = 16;
     let lines = (PORTION / of_one.max(1) as f64) as usize;
     lines.clamp(FEWEST, STRIP)

@@ -396,7 +396,7 @@ impl Fronts {
         &self.fronts[self.order[task.fronts.end - 1] as usize]
     }
 
-    /// Adds the Schur complement of a front to the sizes of the stacks; returns these.
+    /// Adds the Schur complement of a front to the sizes of the stacks; returns both sizes.
     fn put(&self, front: &Front, stacks: &mut [usize; 2]) -> [usize; 2] {
         if front.slot.is_none() {
             stacks[front.stack] += front.boundary().pow(2);

@@ -161,7 +161,7 @@ obstacles! {
     Table {
         /// Coordinates c, strictly increasing; at most 100,000.
         x: Vec<f64>,
-        /// Profile at these coordinates (length, any sign).
+        /// Profile at the coordinates `x` (length, any sign).
         gap: Vec<f64>,
         /// The shape between the points.
         #[serde(default, skip_serializing_if = "Interpolation::is_linear")]
@@ -287,7 +287,7 @@ pub enum PrescribedBound {
 pub struct BoundTable {
     /// Arc length from the start of the named boundary, strictly increasing.
     pub s: Vec<f64>,
-    /// Friction bound τ at these places, ≥ 0 (stress).
+    /// Friction bound τ at the places `s`, ≥ 0 (stress).
     pub bound: Vec<f64>,
 }
 

@@ -305,7 +305,7 @@ pub enum WarningCode {
     RaisedToSecondOrder,
     /// Elements of a rigid body of a deck.
     RigidElementsLeftOut,
-    /// A part of a deck that is solved differently here.
+    /// A part of a deck that the solver treats differently.
     DeckDiffers,
     /// Nodes at the same place that are not connected: a crack.
     CoincidentNodes,
@@ -434,7 +434,7 @@ pub struct Iteration {
     pub contact: ContactCount,
     /// Numbers of friction points that slip and stick.
     pub friction: FrictionCount,
-    /// Forces of this state.
+    /// Forces of the state after the iteration.
     pub force: ForcePair,
     /// Contraction q = |Δτ_k|/|Δτ_{k−1}|; absent in the first sweeps.
     pub contraction: Option<f64>,
