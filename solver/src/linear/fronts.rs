@@ -151,9 +151,9 @@ impl Front {
 }
 
 impl Fronts {
-    /// Plans the factor. `kinds`: a number for each element, equal for elements with the same matrix and the same unknown
-    /// nodes, or `None`. `unknowns_of`: the number of unknowns of a node. `kept`: the number of nodes that the dissection
-    /// does not eliminate.
+    /// Plans the factor. `kinds`: a number for each element, equal for elements with the same matrix and the same
+    /// unknown nodes, or `None`. `unknowns_of`: the number of unknowns of a node. `kept`: the number of nodes that the
+    /// dissection does not eliminate.
     pub fn new<E: Deref<Target = [u32]>>(
         mut dissection: Dissection,
         elements: &[E],

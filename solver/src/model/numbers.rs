@@ -223,7 +223,7 @@ impl Checks {
                 Reason::NotUsed,
                 format!("`thesis` with triangles (element {e} is one)"),
                 "a mesh of quadrilaterals",
-                "The rows of Gauss points that it uses exist in quadrilaterals only; choose another algorithm.",
+                "Only quadrilaterals have the rows of Gauss points that `thesis` uses; choose another algorithm.",
             ));
         }
         Ok(())
