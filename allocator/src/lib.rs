@@ -27,14 +27,20 @@ thread_local! {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Counting;
 
-/// Makes memory of 128 KiB and more go back to the system as soon as it is freed, from now on. Otherwise glibc raises
-/// this limit by itself, up to 32 MiB, when an allocation of that size is freed: the memory of a hundred responses or a
-/// large mesh then stays with the process, in pieces. It costs no measurable time in a solution.
+/// Sets, from now on, what glibc gives back to the system when it is freed: every allocation of 128 KiB and more at once,
+/// and of smaller ones what lies at the end of an arena, once that is 2 MiB.
+///
+/// Without the first, glibc raises that limit by itself, up to 32 MiB, when an allocation of that size is freed: the memory
+/// of a hundred responses or a large mesh then stays with the process, in pieces. It costs no measurable time in a
+/// solution. Without the second, whose limit is 128 KiB otherwise, memory goes back and forth with every few requests,
+/// which costs a service a fifth of the submissions that it takes in a second.
 pub fn give_back_large_memory() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
-    // SAFETY: it only sets a parameter of malloc, whatever the other threads do
+    // SAFETY: it only sets parameters of malloc, whatever the other threads do
     unsafe {
         libc::mallopt(libc::M_MMAP_THRESHOLD, 128 << 10);
+        libc::mallopt(libc::M_TRIM_THRESHOLD, 2 << 20);
+        libc::mallopt(libc::M_TOP_PAD, 512 << 10);
     }
 }
 
