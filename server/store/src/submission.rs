@@ -142,7 +142,7 @@ pub(super) enum Answer {
     Accepted(Box<Accepted>),
     /// The submission, not accepted: an earlier result may answer one of its jobs, and must be checked first, outside
     /// the transaction, since the check would occupy the single writer.
-    ToCheck(Submission),
+    ToCheck(Box<Submission>),
 }
 
 /// The inbox in which submissions wait for the next commit.

@@ -43,7 +43,7 @@ impl Store {
                 for job in jobs.filter(|job| job.cache == Cache::Use) {
                     self.check_earlier_result(&job.input_hash).await;
                 }
-                match self.send(submission, claim, true).await? {
+                match self.send(*submission, claim, true).await? {
                     Answer::Accepted(accepted) => Ok(*accepted),
                     Answer::ToCheck(_) => Err(StoreError::Unexpected("checked twice".into())),
                 }
@@ -101,7 +101,7 @@ fn accept_together(
     let mut answers = vec![];
     for (submission, claim, checked) in submissions {
         if !checked && coalescing::has_result_to_check(writer, &submission.jobs) {
-            answers.push(Ok(Answer::ToCheck(submission)));
+            answers.push(Ok(Answer::ToCheck(Box::new(submission))));
             continue;
         }
         let savepoint = change.savepoint()?;
