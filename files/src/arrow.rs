@@ -1,4 +1,4 @@
-//! A table as an Arrow IPC file, one record batch: which pandas, polars and DuckDB open without copying.
+//! A table as an Arrow IPC file with one record batch, which pandas, polars and DuckDB open without copying.
 
 use std::sync::Arc;
 
@@ -33,8 +33,8 @@ fn written(table: &Table) -> Result<Vec<u8>, ArrowError> {
     writer.into_inner()
 }
 
-/// One column as an Arrow array; whether it is nullable depends on the column, not on its values, so that the files of
-/// two jobs have the same schema.
+/// A column as an Arrow array: its type, the array, and whether it may have missing numbers. That depends on the kind
+/// of column and not on its values, so that the files of two jobs have the same schema.
 fn array(values: &Values) -> (DataType, ArrayRef, bool) {
     match values {
         Values::Real(values) => {

@@ -1,7 +1,8 @@
-//! Bodies of requests: JSON that is checked against the schema of a type, with all violations at once, and then read.
+//! Bodies of HTTP requests: JSON that is checked against the schema of a type, with all violations at once, and then
+//! read.
 //!
-//! A problem in a body is read by [`json::parse`], as one in a file is: it may have a large mesh. Its violations are
-//! listed with those around it.
+//! A problem in the body of a request is read by [`json::parse`], like a problem in a file: it may have a large mesh.
+//! Its violations are listed with those of the rest of the body.
 
 use std::{borrow::Cow, marker::PhantomData, sync::LazyLock};
 
@@ -14,7 +15,7 @@ use solver::{
 
 use crate::{json, schema};
 
-/// The place of a problem in a body, which is read apart from it.
+/// Stands for a problem in the body of a request; the problem itself is read apart from the rest of the body.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Embedded;
 
@@ -38,28 +39,28 @@ impl JsonSchema for Embedded {
     }
 }
 
-/// A kind of body. Its type says in its schema that other names are refused, and to serde nothing of them: what can be
-/// read is read although others are there.
+/// A kind of request body, which is read as the type `T`. The schema of `T` refuses unknown names, but its
+/// `Deserialize` ignores them, so that the rest of a body with unknown names can still be read.
 pub struct Body<T> {
     shape: LazyLock<schema::Shape>,
     read: PhantomData<fn() -> T>,
 }
 
-/// A body that was read.
+/// The content of a request body that was read.
 #[derive(Debug)]
 pub struct Content<'a, T> {
-    /// What it says beside its problems; none if that cannot be read.
+    /// The fields of the body apart from its problems; none if they cannot be read.
     pub fields: Option<T>,
-    /// Its problems as text, with their places, in their order.
+    /// The problems in the body: of each the JSON Pointer to it, and its text.
     pub problems: Vec<(String, &'a str)>,
-    /// What is wrong with it.
+    /// The violations found in the body so far.
     pub violations: Findings,
-    /// The place of the first problem that was not checked, since enough is wrong with those before it.
+    /// The JSON Pointer to the first problem that was not checked, because there were enough violations before it.
     unchecked: Option<String>,
 }
 
 impl<T: DeserializeOwned + JsonSchema> Body<T> {
-    /// Bodies of this type.
+    /// Request bodies of the type `T`.
     #[allow(clippy::new_without_default)]
     pub const fn new() -> Self {
         Body {
@@ -68,11 +69,11 @@ impl<T: DeserializeOwned + JsonSchema> Body<T> {
         }
     }
 
-    /// Reads a body.
+    /// Reads a request body.
     ///
     /// # Errors
     ///
-    /// A message if the text is not JSON. All else that is wrong is in the content.
+    /// A message if the text is not JSON. All other faults are listed in the content's `violations`.
     pub fn read<'a>(&'static self, text: &'a str) -> Result<Content<'a, T>, String> {
         if text.trim().is_empty() {
             return Err("the body is empty; expected an object".to_owned());
@@ -110,7 +111,7 @@ impl<T> std::fmt::Debug for Body<T> {
 }
 
 impl<'a, T> Content<'a, T> {
-    /// Reads the problems. Those that are invalid are left out, and reported.
+    /// Reads the problems. Invalid problems are left out; their violations are added to those of the body.
     pub fn parse_problems(&mut self) -> Vec<Problem> {
         let mut read = vec![];
         for (place, text) in &self.problems {
@@ -129,7 +130,7 @@ impl<'a, T> Content<'a, T> {
         read
     }
 
-    /// All that is wrong with the body.
+    /// All violations of the body.
     pub fn into_violations(self) -> Vec<Violation> {
         let mut found = self.violations.into_violations();
         if let (Some(place), Some(last)) = (self.unchecked, found.last_mut()) {
@@ -139,7 +140,7 @@ impl<'a, T> Content<'a, T> {
         found
     }
 
-    /// The content with something else read from it.
+    /// The same content with other fields.
     pub fn with<U>(self, fields: Option<U>) -> Content<'a, U> {
         Content {
             fields,

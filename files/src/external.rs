@@ -1,4 +1,4 @@
-//! The mesh that a problem only names or contains as text.
+//! The mesh of a problem that only names it by its hash, or contains it as text.
 
 use std::collections::BTreeSet;
 
@@ -8,8 +8,9 @@ use solver::solution::Warning;
 
 use crate::{abaqus, gmsh, source::ReadError};
 
-/// The mesh that a problem does not have in readable form: `stored`, if the caller has it, or read from the text in the
-/// problem. `None` if it needs none. Violations and warnings point to its place in the problem.
+/// The mesh of a problem that does not have it in readable form: read from the text in the problem, or `stored`, the
+/// mesh that the problem names by its hash. `None` if the problem needs none or `stored` is missing. Violations and
+/// warnings point to the place of the mesh in the problem.
 pub fn external_mesh(problem: &Problem, stored: Option<Mesh>) -> Option<External> {
     match &problem.mesh.source {
         MeshSource::Grid(_) | MeshSource::Inline(_) => None,

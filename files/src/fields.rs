@@ -1,5 +1,5 @@
-//! The fields as arrays, the same in VTU and NPZ: vectors and tensors by components in VTK's order,
-//! with the stress measures that are usually drawn. The NPZ has the integration points too.
+//! Fields as arrays, which are the same in VTU and NPZ: vectors and tensors by components in VTK's order, with the
+//! stress measures that are usually drawn. The NPZ also has values at the integration points.
 
 use crate::npz::Npz;
 use crate::stress::{Stress, principal, von_mises};
@@ -19,7 +19,7 @@ pub(crate) enum Data {
     Small(Vec<i8>),
 }
 
-/// The arrays at nodes, made one after another: together they are larger than the fields.
+/// The arrays at nodes, made one after another, since all of them together are larger than the fields.
 pub(crate) fn point_data(fields: &Fields) -> impl Iterator<Item = Array> {
     const ARRAYS: [fn(&Fields) -> Array; 5] = [
         |fields| {

@@ -5,8 +5,9 @@ use std::ops::Deref;
 use serde::Serialize;
 use solver::solution::Fields;
 
-/// The most numbers, and elements, that are written at once: their text is 256 KiB at most.
+/// The largest number of numbers that are written at once: their text is 256 KiB at most.
 const NUMBERS: usize = 8192;
+/// The largest number of elements that are written at once: their text is 256 KiB at most.
 const ELEMENTS: usize = 2048;
 
 /// The text that `serde_json` would write for fields, in pieces. `F` holds the fields: a reference, or a shared
@@ -40,10 +41,10 @@ const COLUMNS: [(&str, Column); 18] = [
     (r#"],"stress_zz":["#,                   |f, from| part(&f.gauss.stress_zz, from)),
 ];
 
-/// The values of a column, starting from an index.
+/// A function that gives the next values of a column, starting from an index.
 type Column = fn(&Fields, usize) -> Values<'_>;
 
-/// The text after the last value.
+/// The end of the JSON text, after the last value.
 const END: &str = "]}}";
 
 /// Some values of a column: their number, whether they are the column's last, and how they are written as a list.
@@ -64,7 +65,7 @@ fn part<T: Serialize>(column: &[T], from: usize) -> Values<'_> {
 }
 
 impl<F: Deref<Target = Fields>> FieldsJson<F> {
-    /// Starts at the beginning of the text.
+    /// Prepares writing fields, from the beginning of the text.
     pub fn new(fields: F) -> Self {
         FieldsJson {
             fields,
@@ -73,7 +74,7 @@ impl<F: Deref<Target = Fields>> FieldsJson<F> {
         }
     }
 
-    /// Returns the next piece, never empty, and `None` after the last.
+    /// Returns the next piece of the text, never empty, and `None` after the last piece.
     ///
     /// # Errors
     ///

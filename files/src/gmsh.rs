@@ -27,14 +27,14 @@ const KINDS: [(i64, usize, Kind); 8] = [
     (15, 1, Kind::Point),
 ];
 
-/// The largest number of bytes of a physical name; Gmsh itself cuts at 128 characters.
+/// The largest number of bytes of a physical name; Gmsh itself cuts names at 128 characters.
 const LONGEST_NAME: usize = 512;
 
 /// Marks an element that is in no physical group.
 const NO_GROUP: u32 = u32::MAX;
 
-/// The largest average number of physical groups of an element: the groups of a surface are written once for all of its
-/// elements, and may be many.
+/// The largest average number of physical groups of an element: a file names the groups of a surface once for all of
+/// its elements, and may name many.
 const MOST_GROUPS: usize = 16;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,7 +65,7 @@ pub fn read(reader: impl BufRead) -> Result<(Mesh, Vec<Warning>), ReadError> {
     }
 }
 
-/// Physical tags of an entity, by dimension and number. A tag may have a sign, which is its direction.
+/// The physical tags of each entity, by the entity's dimension and number. The sign of a tag is a direction.
 type Entities = BTreeMap<(u8, i64), Vec<u64>>;
 
 struct File<R> {
@@ -253,7 +253,7 @@ impl<R: BufRead> File<R> {
         self.end("$EndMeshFormat")
     }
 
-    /// Reads the end of a section; after a binary section a line end remains.
+    /// Reads the keyword that ends a section, and the line end that precedes it in a binary file.
     fn end(&mut self, end: &str) -> Result<(), ReadError> {
         let found = self.source.word(end)?;
         if found == end {
@@ -401,7 +401,7 @@ impl<R: BufRead> File<R> {
         Ok(())
     }
 
-    /// Reserves memory for the announced number of nodes, up to a limit: the number may be wrong.
+    /// Reserves memory for the announced number of nodes, up to a limit, since that number may be wrong.
     fn reserve(&mut self, count: u64) {
         const MOST: u64 = 1 << 20;
         let count = count.min(MOST) as usize;
@@ -409,8 +409,8 @@ impl<R: BufRead> File<R> {
         self.raw.node_labels.reserve_exact(count);
     }
 
-    /// Reads the nodes of version 2. `parametric`: each position is followed by its entity, and by its coordinates on
-    /// that.
+    /// Reads the nodes of version 2. `parametric`: each position is followed by an entity, and by the node's
+    /// coordinates on that entity.
     fn nodes_2(&mut self, parametric: bool) -> Result<(), ReadError> {
         let count: u64 = self.source.number("the number of nodes")?;
         self.reserve(count);
@@ -506,8 +506,8 @@ impl<R: BufRead> File<R> {
         Ok(())
     }
 
-    /// Merges the copies of elements that version 2 writes, one for each physical group. The same element twice in one
-    /// group, or in none, is a fault of the mesh.
+    /// Merges the copies of an element that version 2 writes, one for each of its physical groups. An element that
+    /// occurs twice in one group, or twice without a group, is a fault of the mesh.
     fn merge_repeated(&mut self) {
         let elements = &self.raw.elements;
         let mut order: Vec<u32> = (0..elements.len() as u32).collect();
@@ -595,7 +595,7 @@ impl<R: BufRead> File<R> {
         Ok(())
     }
 
-    /// The number of nodes and the kind of an element, by Gmsh's number.
+    /// The number of nodes and the kind of an element type, given by its number in Gmsh.
     fn kind(&self, number: i64) -> Result<(usize, Kind), ReadError> {
         let known = KINDS.iter().find(|kind| kind.0 == number);
         if let Some((_, size, kind)) = known {

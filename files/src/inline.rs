@@ -1,22 +1,22 @@
 //! Removes the nodes and elements of an inline mesh from a JSON text while it is read.
 //!
-//! They are most of a large problem. They go from the pieces of a reader directly into the columns of the mesh, and
-//! whoever reads the text from [`Extract`] finds an empty list in their place: a problem without its mesh is small. A
-//! list that is not as expected is passed on from the first unexpected character, after as many simple items as were
-//! removed, so that its faults are found at their places by the code that describes all others too.
+//! Nodes and elements are most of a large problem. They go from the pieces of a reader directly into the columns of the
+//! mesh, and whoever reads the text from [`Extract`] finds an empty list in their place: a problem without its mesh is
+//! small. A list with an unexpected character is passed on from that character, after as many simple items as were
+//! removed, so that its faults are found at their places by the code that describes all other faults.
 
 use std::io::{self, Read};
 
 use solver::element::Element;
 use solver::problem::InlineMesh;
 
-/// The number of bytes that are requested at once. A longer item is passed on.
+/// The number of bytes that are requested from the reader at once. A list with a longer item is passed on.
 const PIECE: usize = 1 << 16;
 
-/// The number of items that are written at once where a list is passed on.
+/// The number of items that are written at once in place of removed items.
 const AT_ONCE: usize = 1 << 10;
 
-/// The longest name that is compared with others.
+/// The largest number of bytes of a name that is compared with the names that lead to the mesh.
 const LONGEST_NAME: usize = 8;
 
 /// A reader of a JSON text that removes the nodes and elements of the inline mesh at one place in it; other texts pass
@@ -25,18 +25,18 @@ pub(crate) struct Extract<R> {
     input: Input<R>,
     /// The names that lead to the mesh, from the outermost object on.
     way: &'static [&'static str],
-    /// The number of these names that lead to the present place in the text.
+    /// The number of names of `way` that lead to the present place in the text.
     inside: usize,
     /// The number of open brackets.
     depth: usize,
     /// The last string, or the current one.
     name: Vec<u8>,
     string: Option<InString>,
-    /// The kind of list that a value after a colon is.
+    /// What the value after the next colon is: an object on the way to the mesh, or a list of the mesh.
     awaited: Option<Awaited>,
     /// The list that is being removed.
     list: Option<List>,
-    /// Items that must still be written in place of those that were removed.
+    /// Simple items that must still be written in place of removed items.
     stand_ins: Option<StandIns>,
     /// Text that is to be passed on.
     out: Vec<u8>,
@@ -55,11 +55,11 @@ pub(crate) struct Taken {
     pub(crate) places: Places,
 }
 
-/// Places in the original text for places in the text that was passed on.
+/// Pairs of places: in the text that was passed on, and the corresponding place in the original text.
 #[derive(Default)]
 pub(crate) struct Places(Vec<(Place, Place)>);
 
-/// A place by its line, from 1, and the bytes before it in that line.
+/// A place in a text: its line, from 1, and the number of bytes before it in that line.
 #[derive(Clone, Copy, PartialEq, PartialOrd)]
 struct Place {
     line: usize,
@@ -69,7 +69,7 @@ struct Place {
 #[derive(Clone, Copy)]
 enum InString {
     Plain,
-    /// After a backslash.
+    /// Inside a string, after a backslash.
     Escaped,
 }
 
@@ -91,7 +91,7 @@ struct StandIns {
     first: bool,
 }
 
-/// The items of a list that were removed: all, or those before the first that is not as expected.
+/// The removed items of a list: all items, or those before the first unexpected character.
 struct Column<T> {
     items: Vec<T>,
     state: State,
@@ -104,22 +104,22 @@ enum State {
     Whole,
 }
 
-/// The pieces that a reader gives.
+/// The pieces of text that a reader gives.
 struct Input<R> {
     reader: R,
     piece: Vec<u8>,
-    /// The start of the part of the piece that was not used yet.
+    /// The start of the unused part of the piece.
     start: usize,
     end: usize,
-    /// Whether the reader has no more.
+    /// Whether the reader is at its end.
     ended: bool,
     /// The place of `start` in the text.
     place: Place,
 }
 
 impl<R: Read> Extract<R> {
-    /// A text from a reader. `way`: the names that lead to the mesh, from the outermost object on; each at most
-    /// [`LONGEST_NAME`] long.
+    /// Prepares extraction from the text of a reader. `way`: the names that lead to the mesh, from the outermost object
+    /// on; each at most [`LONGEST_NAME`] bytes long.
     pub(crate) fn new(reader: R, way: &'static [&'static str]) -> Self {
         Extract {
             input: Input {
@@ -183,7 +183,7 @@ impl<R: Read> Extract<R> {
         }
     }
 
-    /// Passes the text on, up to its next list of nodes or elements.
+    /// Passes the text on, up to the next list of nodes or elements.
     fn pass(&mut self) {
         let piece = &self.input.piece[self.input.start..self.input.end];
         let mut used = 0;
@@ -233,7 +233,7 @@ impl<R: Read> Extract<R> {
         self.input.advance(used);
     }
 
-    /// The list that the last string names, before a colon.
+    /// What the value after a colon is, if the name before the colon leads to the mesh or names a list of it.
     fn named(&self) -> Option<Awaited> {
         let directly = self.depth == self.inside + 1;
         match self.way.get(self.inside).filter(|_| directly) {
@@ -308,7 +308,7 @@ impl<R> Extract<R> {
 }
 
 impl Taken {
-    /// Puts nodes and elements into the mesh that was read from the rest of the text.
+    /// Puts the removed nodes and elements into the mesh that was read from the rest of the text.
     pub(crate) fn put(self, mesh: &mut InlineMesh) {
         self.nodes.put(&mut mesh.nodes);
         self.elements.put(&mut mesh.elements);
@@ -316,7 +316,7 @@ impl Taken {
 }
 
 impl Places {
-    /// Line and column in the original text of those in the text that was passed on.
+    /// Converts line and column in the text that was passed on to those in the original text.
     pub(crate) fn original(&self, line: usize, column: usize) -> (usize, usize) {
         let place = Place { line, column };
         match self.0.iter().rev().find(|(passed, _)| *passed <= place) {
@@ -328,7 +328,7 @@ impl Places {
         }
     }
 
-    /// The message of an error of serde, with its place in the original text.
+    /// The message of an error of `serde_json`, with the place in the original text.
     pub(crate) fn message(&self, error: &serde_json::Error) -> String {
         let text = error.to_string();
         let (line, column) = (error.line(), error.column());
@@ -345,7 +345,7 @@ impl Places {
 impl Place {
     const START: Place = Place { line: 1, column: 0 };
 
-    /// The place after a text.
+    /// Moves the place to the end of a text that begins there.
     fn pass(&mut self, text: &[u8]) {
         // in bytes, many at once: checked additions of larger numbers take as long as reading the numbers of a mesh
         let ends = |part: &[u8]| {
@@ -369,7 +369,7 @@ impl<T> Column<T> {
         }
     }
 
-    /// Removes items until the list ends or is not as expected.
+    /// Removes items until the list ends or has an unexpected character.
     fn take<R: Read>(
         &mut self,
         input: &mut Input<R>,
@@ -424,7 +424,7 @@ impl<T> Column<T> {
 }
 
 impl<R: Read> Input<R> {
-    /// Reads more after the unused part; false if there is no more, or no room.
+    /// Reads more text after the unused part; false if the reader is at its end or the piece is full.
     fn fill(&mut self) -> io::Result<bool> {
         self.piece.copy_within(self.start..self.end, 0);
         (self.start, self.end) = (0, self.end - self.start);
@@ -449,16 +449,16 @@ impl<R: Read> Input<R> {
     }
 }
 
-/// Why no further item could be read from a text.
+/// The reason why no further item could be read from a text.
 enum Not {
     /// The text ends before the item does.
     Complete,
-    /// The text continues with something else.
+    /// The text continues with something else than an item.
     Expected,
 }
 
-/// Reads the next item of a list with the comma before it; none at the end of the list. `at`: the place where it
-/// begins, then that where it ends.
+/// Reads the next item of a list with the comma before it; `None` at the end of the list. `at`: the place in the text,
+/// which moves behind the item.
 fn next<T>(
     text: &[u8],
     at: &mut usize,

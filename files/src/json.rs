@@ -2,7 +2,7 @@
 //!
 //! The nodes and elements of an inline mesh, nearly all of a large problem, are removed while the text is read. The
 //! rest is first checked against our JSON Schema, which gives all faults with their places, in memory that does not
-//! depend on the content of the text; then serde reads it.
+//! depend on the content of the text; then serde reads that rest.
 
 use std::fmt;
 use std::io::Read;
@@ -18,16 +18,16 @@ use solver::problem::{MeshSource, Problem};
 /// The names that lead to an inline mesh.
 const INLINE: &[&str] = &["mesh", "inline"];
 
-/// The largest number of brackets that may be open at once. A problem has ten.
+/// The largest number of brackets that may be open at once. A problem opens at most ten.
 pub const MOST_NESTED: usize = 64;
 
 /// Reads a problem from JSON.
 ///
 /// # Errors
 ///
-/// All violations of its structure (at most a hundred), with pointers relative to the problem: unknown and missing
-/// fields, wrong types, no or several alternatives where exactly one is required. Combinations of fields are checked by
-/// the solver.
+/// All violations of the problem's structure (at most a hundred), with pointers relative to the problem: unknown and
+/// missing fields, wrong types, no or several alternatives where exactly one is required. Combinations of fields are
+/// checked by the solver.
 pub fn parse(text: &str) -> Result<Problem, Vec<Violation>> {
     let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text);
     if text.contains("\"inline\"") {
@@ -37,8 +37,8 @@ pub fn parse(text: &str) -> Result<Problem, Vec<Violation>> {
     }
 }
 
-/// Reads a problem from a reader, in pieces: the text of an inline mesh is never held as a whole, only its columns,
-/// unless it is faulty.
+/// Reads a problem from a reader, in pieces. Of an inline mesh only the columns are held in memory, and never the whole
+/// text, unless the mesh is faulty.
 ///
 /// # Errors
 ///
@@ -60,7 +60,7 @@ pub fn read(reader: impl Read) -> Result<Problem, ReadError> {
     Ok(problem)
 }
 
-/// Reads a text. `places` gives the places in the original text.
+/// Reads a problem from a text. `places` converts places in this text to places in the original text.
 pub(crate) fn check(text: &str, places: &Places) -> Result<Problem, Vec<Violation>> {
     if text.trim().is_empty() {
         return Err(vec![Violation::new(
@@ -104,7 +104,7 @@ pub(crate) fn check(text: &str, places: &Places) -> Result<Problem, Vec<Violatio
     })
 }
 
-/// The place of the first bracket that nests a text too deeply, in words.
+/// The place, in words, of the first bracket beyond [`MOST_NESTED`] open ones.
 pub fn too_deep(text: &str) -> Option<String> {
     deepest(text).map(|(line, column)| nested_too_deeply(line, column))
 }
@@ -113,7 +113,7 @@ fn nested_too_deeply(line: usize, column: usize) -> String {
     format!("more than {MOST_NESTED} open brackets at line {line} column {column}")
 }
 
-/// The line and column of the first bracket that nests a text too deeply.
+/// The line and column of the first bracket beyond [`MOST_NESTED`] open ones.
 fn deepest(text: &str) -> Option<(usize, usize)> {
     let bytes = text.as_bytes();
     let (mut depth, mut at, mut line, mut start) = (0, 0, 1, 0);
@@ -138,7 +138,7 @@ fn deepest(text: &str) -> Option<(usize, usize)> {
     None
 }
 
-/// The first error of the syntax, or of a number or string that has no value, with its line and column.
+/// The first error of a text's syntax, or of a number or string without a value, with line and column.
 pub(crate) fn syntax_error(text: &str) -> Option<serde_json::Error> {
     let mut reader = serde_json::Deserializer::from_str(text);
     let read = reader.deserialize_any(Anything);
@@ -200,7 +200,8 @@ impl<'de> serde::de::DeserializeSeed<'de> for Anything {
     }
 }
 
-/// A fault that the schema cannot express, such as a repeated name or a number outside its type.
+/// The violation for a fault that the schema cannot express, such as a repeated name or a number too large for its
+/// type. `first`: the message of serde for the fault.
 pub(crate) fn beyond_the_schema<T: DeserializeOwned>(
     text: &str,
     first: String,

@@ -10,12 +10,12 @@ use zip::{CompressionMethod, result::ZipResult};
 use crate::number::Number;
 use crate::table::{Table, Values};
 
-/// An archive being written. `numpy.load` reads it as arrays by name.
+/// An archive that is being written. `numpy.load` reads the archive as arrays by name.
 pub struct Npz {
     zip: ZipWriter<Cursor<Vec<u8>>>,
 }
 
-/// The number of values that are turned into bytes at a time.
+/// The number of values that are converted to bytes at a time.
 const CHUNK: usize = 1 << 16;
 
 impl Default for Npz {
@@ -32,8 +32,8 @@ impl Npz {
         }
     }
 
-    /// Adds `rows` × `width` numbers, row by row; a vector when `width` is 1. The number of rows follows from that of
-    /// the numbers.
+    /// Adds an array of `rows` × `width` numbers, row by row; a vector when `width` is 1. `rows` follows from the
+    /// number of values.
     ///
     /// # Errors
     ///
@@ -65,7 +65,7 @@ impl Npz {
         Ok(())
     }
 
-    /// Adds a vector of words, each as wide as the longest: NumPy's own `<U`, which needs no pickle.
+    /// Adds a vector of words, each as wide as the longest word, in NumPy's type `<U`, which needs no pickle.
     ///
     /// # Errors
     ///
@@ -93,7 +93,7 @@ impl Npz {
         self.zip.write_all(&bytes).map_err(failed)
     }
 
-    /// Adds the columns of a table, each under its name after `prefix`; a missing number is NaN.
+    /// Adds the columns of a table, each as an array named `prefix` and the column's name; a missing number is NaN.
     ///
     /// # Errors
     ///

@@ -11,8 +11,8 @@ const LONGEST_LINE: usize = 1 << 20;
 /// The byte order mark that some editors write before a text.
 pub const BYTE_ORDER_MARK: char = '\u{feff}';
 
-/// Decodes a text, also one written by a program for Windows or an old one: removes a byte order mark, and reads a line
-/// as Latin-1 if it is not UTF-8.
+/// Decodes a text, also from a program for Windows or an old program: removes a byte order mark, and decodes a line as
+/// Latin-1 if it is not UTF-8.
 pub fn text(bytes: Vec<u8>) -> String {
     let text = String::from_utf8(bytes).unwrap_or_else(|error| {
         let lines = error
@@ -37,12 +37,12 @@ fn decoded(bytes: Vec<u8>) -> String {
 pub enum ReadError {
     /// The bytes could not be read.
     Io(io::Error),
-    /// The violations; pointers are empty: only the caller knows the origin of the file.
+    /// The violations of the file. Their pointers are empty, since only the caller knows where the file comes from.
     Invalid(Vec<Violation>),
 }
 
 impl ReadError {
-    /// The violations of a text in memory, which can always be read.
+    /// The violations of a text in memory; reading from memory does not fail.
     pub(crate) fn into_violations(self) -> Vec<Violation> {
         match self {
             ReadError::Invalid(violations) => violations,
@@ -64,7 +64,7 @@ pub(crate) struct Source<R> {
     text: String,
     /// The start of the next word in the line.
     at: usize,
-    /// The number of the line, from 1; in a binary section that of the section's first line.
+    /// The number of the current line, from 1; in a binary section the number of the section's first line.
     pub(crate) line: u64,
     /// Whether the byte order differs from that of this machine.
     pub(crate) swapped: bool,
@@ -114,8 +114,8 @@ impl<R: BufRead> Source<R> {
         Ok(true)
     }
 
-    /// Reads the bytes of the next line, up to the longest allowed; returns whether its end was found: a line feed, a
-    /// carriage return, or both in this order.
+    /// Reads the bytes of the next line, up to the longest allowed; returns whether the line's end was found: a line
+    /// feed, a carriage return, or a carriage return and a line feed.
     fn line_of(&mut self, bytes: &mut Vec<u8>) -> io::Result<bool> {
         while bytes.len() < LONGEST_LINE {
             let piece = match self.reader.fill_buf() {
@@ -141,13 +141,13 @@ impl<R: BufRead> Source<R> {
         Ok(false)
     }
 
-    /// The rest of the current line, whose words then count as read.
+    /// The rest of the current line. Its words then count as read.
     pub(crate) fn text(&mut self) -> &str {
         self.at = self.text.len();
         &self.text
     }
 
-    /// The next word, on this line or a later one.
+    /// The next word, on the current line or a later one. `what`: its meaning, for the message if there is none.
     pub(crate) fn word(&mut self, what: &str) -> Result<&str, ReadError> {
         loop {
             let rest = &self.text[self.at..];
@@ -169,7 +169,7 @@ impl<R: BufRead> Source<R> {
         }
     }
 
-    /// The next word as a number.
+    /// The next word as a number. `what`: its meaning, for messages.
     pub(crate) fn number<T: FromStr>(&mut self, what: &str) -> Result<T, ReadError> {
         let word = self.word(what)?;
         match word.parse() {
@@ -181,7 +181,7 @@ impl<R: BufRead> Source<R> {
         }
     }
 
-    /// The next bytes of a binary section.
+    /// The next bytes of a binary section. `what`: their meaning, for messages.
     pub(crate) fn bytes<const N: usize>(&mut self, what: &str) -> Result<[u8; N], ReadError> {
         let mut bytes = [0; N];
         match self.reader.read_exact(&mut bytes) {
@@ -201,26 +201,26 @@ impl<R: BufRead> Source<R> {
         }
     }
 
-    /// An error at the current line.
+    /// The error that the current line has a fault.
     pub(crate) fn fault(&self, reason: Reason, got: &str, expected: &str, hint: &str) -> ReadError {
         let got = format!("line {}: {got}", self.line);
         ReadError::Invalid(vec![Violation::new("", reason, got, expected, hint)])
     }
 }
 
-/// Nodes or elements by their numbers in the file. These are mostly dense and kept in a list; numbers far beyond are kept in a
-/// map, so that one large number does not fill the memory.
+/// The places of nodes or elements by their numbers in the file. Mostly numbers are dense and kept in a list; numbers
+/// far beyond are kept in a map, so that one large number does not fill the memory.
 #[derive(Clone, Default)]
 pub(crate) struct Labels {
     dense: Vec<u32>,
     sparse: std::collections::BTreeMap<u64, u32>,
     count: u32,
-    /// The smallest and the largest number.
+    /// The smallest and the largest number so far.
     ends: Option<(u64, u64)>,
 }
 
 impl Labels {
-    /// Gives the next node this number; false, without effect, if another node has it.
+    /// Gives the next node or element this number; false, without effect, if another one has it.
     pub(crate) fn add(&mut self, label: u64) -> bool {
         if self.get(label).is_some() {
             return false;
@@ -243,14 +243,14 @@ impl Labels {
         true
     }
 
-    /// The smallest and the largest number.
+    /// The smallest and the largest number; none if there are no numbers.
     pub(crate) fn ends(&self) -> Option<(u64, u64)> {
         self.ends
     }
 
-    /// The places of all numbers first, first + step, … up to last, and how many numbers were looked at, at most one
-    /// more than `most`. A range may be very wide: only existing numbers are visited, and each wanted number at most
-    /// once.
+    /// The places of all existing numbers among first, first + step, … up to last, and how many numbers were examined,
+    /// at most one more than `most`. The range may be very wide: only existing numbers are examined, and each wanted
+    /// number at most once.
     pub(crate) fn range(&self, first: u64, last: u64, step: u64, most: u64) -> (Vec<u32>, u64) {
         let (mut found, mut visited) = (Vec::new(), 0);
         if first > last {
@@ -288,7 +288,7 @@ impl Labels {
         (found, visited)
     }
 
-    /// The place of a node in the file.
+    /// The place, in the order of the file, of the node or element with this number.
     pub(crate) fn get(&self, label: u64) -> Option<u32> {
         let dense = usize::try_from(label).ok().and_then(|l| self.dense.get(l));
         dense
@@ -298,7 +298,7 @@ impl Labels {
     }
 }
 
-/// Checks that all nodes lie in one plane, where z is constant.
+/// Checks that all nodes lie in one plane z = const.
 pub(crate) struct Plane {
     lowest: (f64, u64),
     highest: (f64, u64),
@@ -328,7 +328,7 @@ impl Plane {
 
     /// A violation if the nodes do not lie in one plane z = const.
     pub(crate) fn fault(&self) -> Option<Violation> {
-        /// The relative difference of z that is only rounding, in files with some nine digits.
+        /// The largest relative difference of z that counts as rounding, in files with some nine digits.
         const FLAT: f64 = 1e-9;
         let ((low, at_low), (high, at_high)) = (self.lowest, self.highest);
         (high - low > FLAT * self.extent.max(high.abs())).then(|| {

@@ -1,5 +1,5 @@
-//! Principal stresses and the von Mises stress. Out of the plane there is only σ_zz, so that one principal
-//! stress is σ_zz and the other two are those of Mohr's circle in the plane.
+//! Principal stresses and the von Mises stress. The only stress out of the plane is σ_zz, so that one principal stress
+//! is σ_zz and the other two are those of Mohr's circle in the plane.
 
 /// The stresses σ_xx, σ_yy, σ_xy, σ_zz at one point.
 pub type Stress = [f64; 4];

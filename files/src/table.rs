@@ -1,5 +1,5 @@
-//! Columns with names: a profile or a history, written as CSV or JSON Lines (`arrow` and `npz` write the binary
-//! formats). All formats use one table, and so have the same columns.
+//! Tables: columns with names, of a profile or a history. They are written here as CSV and JSON Lines, and by `arrow`
+//! and `npz` in binary formats; all formats have the same columns.
 
 use std::{borrow::Cow, fmt::Write};
 
@@ -12,10 +12,10 @@ pub struct Table {
     pub columns: Vec<Column>,
 }
 
-/// One quantity.
+/// A column of a table: one quantity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
-    /// The quantity's name in the API; for a nested field both names, as in `contact_active`.
+    /// The quantity's name in the API. A column from a nested field has both names, as in `contact_active`.
     pub name: Cow<'static, str>,
     /// The values, one for each row.
     pub values: Values,
@@ -74,7 +74,7 @@ impl Table {
         ] }
     }
 
-    /// A table with one row for each iteration; a nested field of the JSON has both names.
+    /// A table with one row for each iteration. A column from a nested field of the JSON has both names.
     #[rustfmt::skip]
     pub fn of_history<'a>(rows: impl IntoIterator<Item = &'a Iteration, IntoIter: Clone>) -> Table {
         let rows = rows.into_iter();
@@ -105,7 +105,7 @@ impl Table {
     ///
     /// # Errors
     ///
-    /// The reason in words, if a column has another number of entries.
+    /// The reason in words, if columns have different numbers of entries.
     pub fn rows(&self) -> Result<usize, String> {
         let rows = self.columns.first().map_or(0, |first| first.values.len());
         match self.columns.iter().find(|c| c.values.len() != rows) {
@@ -118,7 +118,7 @@ impl Table {
         }
     }
 
-    /// The number of bytes of all texts if each is as wide as the longest of its column, as in NumPy.
+    /// The number of bytes of all texts if each text is as wide as the longest of its column, as in NumPy.
     pub fn padded_bytes(&self) -> u64 {
         let of_column = |column: &Column| match &column.values {
             Values::Text(values) => {
@@ -130,8 +130,8 @@ impl Table {
         self.columns.iter().map(of_column).sum()
     }
 
-    /// Writes the table as RFC 4180: a line of names, then a line per row. A number is the shortest text that reads
-    /// back as the same; a missing one is empty.
+    /// Writes the table as CSV (RFC 4180): a line of names, then a line for each row. A number is written as the
+    /// shortest text that reads back as the same number; a missing number is empty.
     ///
     /// # Errors
     ///
@@ -163,7 +163,7 @@ impl Table {
         format!("{}\r\n", names.join(","))
     }
 
-    /// Writes the table as JSON Lines: an object per row; a missing number is null.
+    /// Writes the table as JSON Lines: an object for each row. A missing number is null.
     ///
     /// # Errors
     ///
@@ -192,8 +192,8 @@ fn column(name: &'static str, values: Values) -> Column {
     Column { name, values }
 }
 
-/// A text as a cell of CSV, in quotes if it would be read as something else. A text that a spreadsheet would take for a
-/// formula and run gets an apostrophe before it; numbers stay numbers.
+/// A text as a cell of CSV, in quotes if it has separators, quotes or line ends. A text that a spreadsheet would take
+/// for a formula and run gets an apostrophe before it; numbers stay numbers.
 fn cell(text: &str) -> Cow<'_, str> {
     let mut text = Cow::Borrowed(text);
     if text.starts_with(FORMULAS) && !text.parse::<f64>().is_ok_and(f64::is_finite) {
@@ -206,7 +206,7 @@ fn cell(text: &str) -> Cow<'_, str> {
     }
 }
 
-/// The first characters of a cell that spreadsheets take for a formula, some of them also after a tab or a new line,
+/// The first characters of cells that spreadsheets take for formulas, some programs also after a tab or a new line,
 /// including the wide characters of East Asian keyboards.
 const FORMULAS: [char; 10] = ['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－'];
 

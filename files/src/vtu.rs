@@ -1,7 +1,7 @@
-//! The fields as VTU, the XML unstructured grid that ParaView, VisIt and PyVista open.
+//! Fields as VTU, the XML unstructured grid that ParaView, VisIt and PyVista open.
 //!
-//! Written by hand: the crate for it, vtkio, has had only release candidates since 0.6.3, and it writes one block too
-//! many where an array fills its compressed blocks exactly. The needed part of the format is one page.
+//! Written by hand: the crate for the format, vtkio, has had only release candidates since 0.6.3, and it writes one
+//! block too many where an array fills its compressed blocks exactly. The needed part of the format is one page.
 
 use std::io::Write;
 
@@ -13,7 +13,7 @@ use crate::number::Number;
 use solver::element::Family;
 use solver::solution::Fields;
 
-/// VTK's number of the quadratic triangle. VTK orders its nodes as we do, also those of the quadrilateral.
+/// VTK's number of the quadratic triangle. VTK orders the nodes of triangles and quadrilaterals as we do.
 const QUADRATIC_TRIANGLE: u8 = 22;
 /// VTK's number of the quadratic quadrilateral.
 const QUADRATIC_QUAD: u8 = 23;
@@ -70,8 +70,9 @@ fn written(fields: &Fields) -> std::io::Result<Vec<u8>> {
     Ok(out)
 }
 
-/// Writes one array: a header of 64-bit numbers (the number of blocks, the bytes of a block, the bytes of the last one
-/// if it is not full, and the bytes of each when compressed), then the compressed blocks, each part in base64.
+/// Writes one array: a header of 64-bit numbers (the number of blocks, the bytes of a block, the bytes of the last
+/// block if it is not full, else 0, and the compressed bytes of each block), then the compressed blocks. Header and
+/// blocks are in base64.
 fn data_array<T: Number>(
     out: &mut Vec<u8>,
     name: &str,

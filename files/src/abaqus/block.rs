@@ -1,4 +1,4 @@
-//! Blocks of data lines: what each line adds to the deck.
+//! Reads the data lines of a deck: each line adds rows or values to the keyword before it.
 
 use super::contact_parts::ContactBlock;
 use super::deck::Deck;
@@ -51,19 +51,19 @@ pub(super) enum Block {
     /// Rows of `*BOUNDARY`, and the name of their amplitude.
     Boundary(Option<Name>),
     Load(Rows, Option<Name>),
-    /// The two lines of `*INSTANCE` that move and turn a part.
+    /// The data lines of `*INSTANCE` so far: the first moves a part, the second turns it.
     Instance(Vec<Vec<f64>>),
-    /// A keyword that allows no data lines here.
+    /// A keyword that must not have data lines, by its name for messages.
     NoData(&'static str),
 }
 
-/// The elements of one `*ELEMENT`.
+/// An `*ELEMENT` block whose data lines are being read.
 pub(super) struct Elements {
     pub(super) shape: Shape,
-    /// Whether they belong to a rigid surface.
+    /// Whether the elements belong to a rigid surface.
     pub(super) is_rigid: bool,
     pub(super) set: Option<Name>,
-    /// The numbers of an element that the next line continues.
+    /// The numbers of an element (its own and its nodes') whose data continue on the next line.
     pub(super) pending: Vec<u64>,
     /// Whether the last line of an element of unknown size ended in a comma.
     pub(super) continued: bool,
@@ -225,7 +225,7 @@ impl Deck {
         self.contact.note_increments(word(0), self.period);
     }
 
-    /// Ends a block, which must be complete.
+    /// Ends a block: stores what it defines, or reports that it is incomplete.
     pub(super) fn end(&mut self, block: Block, line: u64) {
         match block {
             Block::Elements(Elements {
@@ -269,7 +269,7 @@ impl Deck {
         }
     }
 
-    /// Stores the position of the instance: the nodes that it adds to those of its part are moved with them.
+    /// Stores the position of an instance from its data lines. Nodes that the instance adds to its part are moved too.
     fn place(&mut self, lines: Vec<Vec<f64>>, line: u64) {
         let at = |row: usize, k: usize| {
             lines
@@ -308,7 +308,7 @@ impl Deck {
         self.placement = Some((moved, turned));
     }
 
-    /// All numbers of a line; fields that are left out are 0.
+    /// The numbers of a line of text; a blank field is 0.
     fn numbers(&mut self, line: u64, text: &str) -> Vec<f64> {
         let mut values = Vec::new();
         for word in fields(text) {
@@ -331,7 +331,7 @@ impl Deck {
         values
     }
 
-    /// Records that a line of a block cannot be read, so that the names or numbers it would have added are unknown.
+    /// Records that a line of a block cannot be read, so that names or numbers which it defines are unknown.
     fn forget(&mut self, block: &Block) {
         match block {
             Block::Nodes(_) => self.here.incomplete.nodes = true,
@@ -388,7 +388,7 @@ impl Deck {
         }
     }
 
-    /// Reads a line of plane elements, which may continue on the next line.
+    /// Reads a data line with a plane element, whose numbers may continue on the next line.
     fn plane_elements(
         &mut self,
         family: Family,
@@ -423,7 +423,7 @@ impl Deck {
         }
     }
 
-    /// Adds an element of a plane mesh. `numbers`: its own, then those of its nodes.
+    /// Adds an element of a plane mesh. `numbers`: the number of the element, then the numbers of its nodes.
     fn element(&mut self, family: Family, set: &Option<Name>, line: u64, numbers: &[u64]) {
         let label = numbers[0];
         let mut nodes = [NO_NODE; 9];
@@ -472,7 +472,7 @@ impl Deck {
         self.here.element_labels.push(label);
     }
 
-    /// Gives an element its number; false if another element has it.
+    /// Gives an element its number; false if another element has that number.
     fn number(&mut self, label: u64, place: Numbered, set: &Option<Name>, line: u64) -> bool {
         if !self.here.element_places.add(label) {
             return false;
@@ -485,7 +485,8 @@ impl Deck {
         true
     }
 
-    /// Reads a line element; the mesh ignores one that cannot be read.
+    /// Reads a data line with a line element; an element that cannot be read is left out of the mesh without a
+    /// violation.
     fn line_element(&mut self, count: usize, elements: &Elements, line: u64, text: &str) {
         let words = fields(text);
         let Some(label) = words.first().and_then(|word| word.parse().ok()) else {
@@ -514,7 +515,7 @@ impl Deck {
         }
     }
 
-    /// Reads an element that a plane mesh ignores, but that sets may name.
+    /// Reads a data line with an element that a plane mesh leaves out, but that sets may name.
     fn other_element(
         &mut self,
         count: Option<usize>,
@@ -543,8 +544,8 @@ impl Deck {
         }
     }
 
-    /// Reads a line of a surface: an element or set, and the number of a side; without it, all sides on the body's
-    /// surface.
+    /// Reads a data line of a surface: an element or set, and the number of a side. Without a number all sides of the
+    /// elements on the body's surface are meant.
     fn side(&mut self, name: &Name, line: u64, text: &str) {
         let words = fields(text);
         let side = match words.get(1) {
@@ -569,7 +570,7 @@ impl Deck {
                 Reason::Malformed,
                 format!("`{text:.40}`"),
                 "an element or a set of elements, and a side S1 … S4",
-                "Write it like `TOP, S3`; without a side all sides of those elements on the surface of the body are meant. The element or set has no default.",
+                "Write it like `TOP, S3`; without the side, all sides of these elements that lie on the surface of the body are meant. The element or set must be given.",
             ),
         }
     }
@@ -666,7 +667,7 @@ impl Deck {
         }
     }
 
-    /// Reads a row of loads: its target, which load or component, and its size (0 if left out).
+    /// Reads a row of loads: the target, the kind of load or the component, and the value (0 if left out).
     fn load(&mut self, rows: Rows, amplitude: &Option<Name>, line: u64, text: &str) {
         let words = fields(text);
         let word = |k: usize| words.get(k).copied().unwrap_or_default();
@@ -724,7 +725,7 @@ impl Deck {
     }
 }
 
-/// Why a row of loads is invalid; `second`: the meaning of its second field.
+/// Says why a row of loads is invalid. `second`: the meaning of the row's second field, in words.
 fn unlike_load(words: &[&str], second: &str) -> String {
     match words {
         [] | ["", ..] => "the target of the load is blank".to_owned(),
@@ -743,7 +744,8 @@ fn unlike_load(words: &[&str], second: &str) -> String {
     }
 }
 
-/// The components that a name of `*BOUNDARY` holds: those in the plane, or ones that a plane body holds by itself.
+/// The first and the last component (1: x, 2: y, 3: z) that a name such as `XSYMM` in `*BOUNDARY` holds at 0; none for
+/// an unknown name. Components outside the plane are left out, unless the name holds no others (`ZSYMM`).
 pub(super) fn named_components(name: &str) -> Option<(u64, u64)> {
     match name {
         "PINNED" | "ENCASTRE" | "ZASYMM" => Some((1, 2)),

@@ -18,8 +18,8 @@ use crate::source::Plane;
 use solver::error::{Findings, Reason, Violation};
 use solver::mesh::{NO_NODE, RawMesh};
 
-/// The limit of how often all sets together may name each node or element on average, apart from what the deck writes
-/// out: sets that contain sets are short in the deck, and may be very long when written out.
+/// The number of members that all sets together may have per node and element, in addition to those that the deck
+/// writes out: sets that contain sets are short in the deck, but may be very long when written out.
 const MOST_TIMES: u64 = 16;
 
 /// A row of a deck, with the name that its target has in the mesh.
@@ -30,7 +30,7 @@ pub(super) struct Row<T> {
 
 /// A deck as a mesh, with the data that a problem needs in addition.
 pub(super) struct Built {
-    /// The materials and steps.
+    /// The deck, of which a problem uses materials, steps and contacts.
     pub(super) deck: Deck,
     pub(super) raw: RawMesh,
     /// The violations of the mesh.
@@ -46,7 +46,7 @@ pub(super) struct Built {
     /// Whether each node belongs to a plane element.
     pub(super) used: Vec<bool>,
     pub(super) tools: Tools,
-    /// For each contact pair the names of its surfaces in the mesh.
+    /// For each contact pair: the names of its two surfaces in the mesh.
     pub(super) pairs: Vec<[String; 2]>,
 }
 
@@ -136,7 +136,8 @@ struct Merged {
     doubts: Findings,
 }
 
-/// The sets of a deck: of nodes, and of elements (by their place among all that have a number).
+/// The sets of elements of a deck, each as places among all numbered elements; and the room for further members of
+/// sets.
 struct Sets {
     elements: BTreeMap<Key, Vec<u32>>,
     room: Room,
@@ -398,7 +399,8 @@ impl Merged {
         Sets { elements, room }
     }
 
-    /// Adds the sets of elements under their names in the mesh: as groups, and as boundaries where they contain lines.
+    /// Adds the sets of elements to the mesh under their names: as groups, and as boundaries where they contain line
+    /// elements.
     fn groups(&mut self, names: &Names<'_>, elements: BTreeMap<Key, Vec<u32>>) {
         for (name, set) in exported(names, elements, &mut self.faults) {
             let plane = |element: &u32| match self.numbered[*element as usize] {
@@ -433,8 +435,8 @@ impl Merged {
         all.copied().filter(|node| *node != NO_NODE)
     }
 
-    /// The ends of a line element: of three nodes the two that are farthest apart, since programs write the middle node
-    /// in different places.
+    /// The end nodes of a line element: of its three nodes the two that are farthest apart, since programs write the
+    /// middle node in different places.
     fn ends(&self, element: u32) -> Option<[u32; 2]> {
         let Numbered::Line(place) = self.numbered[element as usize] else {
             return None;
@@ -498,7 +500,8 @@ impl Merged {
         found
     }
 
-    /// Converts rows for nodes, in the order of the deck; a single node becomes a set of one.
+    /// Converts rows that name nodes to rows with the names of sets in the mesh, in the order of the deck; a single
+    /// node becomes a set of one.
     fn named_nodes<T>(
         &mut self,
         names: &Names<'_>,
@@ -666,12 +669,12 @@ impl Merged {
 struct Building<'a> {
     names: &'a Names<'a>,
     sets: &'a mut Sets,
-    /// The sides that two elements share, found when first needed.
+    /// The sides that two elements share, as corners; `None` until they are needed.
     twice: Option<Vec<(u32, u32)>>,
 }
 
 impl Building<'_> {
-    /// The corners of sides; none if some targets have no sides of plane elements.
+    /// The corners of the named sides of elements; none if a target has sides that plane elements lack.
     fn lines(
         &mut self,
         merged: &mut Merged,
@@ -745,7 +748,7 @@ impl Building<'_> {
     }
 }
 
-/// The corners of the sides that two elements share, in order.
+/// The sides that two elements share, each by its two corners, sorted.
 pub(super) fn sides_of_two(raw: &RawMesh) -> Vec<(u32, u32)> {
     let mut sides: Vec<(u32, u32)> = raw
         .elements
@@ -762,13 +765,13 @@ pub(super) fn sides_of_two(raw: &RawMesh) -> Vec<(u32, u32)> {
     sides
 }
 
-/// A side by its corners, whatever their order.
+/// Identifies a side by its two corners, whatever their order.
 pub(super) fn key([a, b]: [u32; 2]) -> (u32, u32) {
     (a.min(b), a.max(b))
 }
 
-/// Sets under their names in the mesh. A set of an instance has two names: one with that of the instance, and one
-/// without it if no other set has that name.
+/// Sets under their names in the mesh. A set of an instance has two names: `INSTANCE.SET`, and `SET` alone if no other
+/// instance or the assembly has that name.
 fn exported(
     names: &Names<'_>,
     sets: BTreeMap<Key, Vec<u32>>,
@@ -803,7 +806,7 @@ fn exported(
     exported
 }
 
-/// A target as it is written in the deck.
+/// A target as text, as the deck names it.
 fn word(target: &Target) -> String {
     match target {
         Target::Label(label) => label.to_string(),
@@ -812,7 +815,7 @@ fn word(target: &Target) -> String {
     }
 }
 
-/// Appends a list to another, without a copy if that is empty.
+/// Appends the list `more` to `all`, without a copy if `all` is empty.
 fn join<T>(all: &mut Vec<T>, mut more: Vec<T>) {
     if all.is_empty() {
         *all = more;

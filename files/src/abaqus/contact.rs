@@ -17,16 +17,16 @@ use solver::problem::{
 };
 use solver::solution::{Warning, WarningCode};
 
-/// The elastic slip, in lengths of a side: Abaqus's default.
+/// The default of Abaqus for the elastic slip, in lengths of an element's side.
 const SLIP_TOLERANCE: f64 = 0.005;
 
-/// The sine of the largest angle that counts as zero, since coordinates in files are rounded.
+/// The largest sine of the angle between two directions that count as parallel, since coordinates in files are rounded.
 const STRAIGHT: f64 = 1e-6;
 
-/// The largest gap that counts as closed, since coordinates in files are rounded: a part of the body's size.
+/// The largest gap that counts as closed, as a part of the body's size, since coordinates in files are rounded.
 const CLOSED: f64 = 1e-6;
 
-/// The largest number of nodes of a boundary that are examined.
+/// The largest number of sides of a boundary at which the rigid surface in front of it is examined.
 const MOST_LOOKS: usize = 1000;
 
 /// The contacts of a deck and its steps, with remarks.
@@ -50,12 +50,12 @@ pub(super) struct Source<'a> {
     pub(super) motions: &'a [Option<Motion>],
 }
 
-/// What is to be said about the contacts of a deck.
+/// Violations and warnings about the contacts of a deck.
 #[derive(Default)]
 pub(super) struct Remarks {
-    /// Parts of the deck that cannot be a contact here.
+    /// Parts of the deck that cannot be translated into a contact.
     pub(super) violations: Vec<Violation>,
-    /// Differences from the deck.
+    /// Differences between the translated contacts and the deck.
     pub(super) warnings: Vec<Warning>,
 }
 
@@ -65,7 +65,7 @@ impl Remarks {
         self.violations.push(violation);
     }
 
-    /// Adds a violation with which there is no contact.
+    /// Adds a violation and returns `None`: the contact cannot be translated.
     fn refuse<T>(
         &mut self,
         line: u64,
@@ -86,7 +86,7 @@ impl Remarks {
 struct Surfaces<'a> {
     boundary: &'a str,
     tool: &'a str,
-    /// The number of the rigid body.
+    /// The number of the rigid body that the rigid surface belongs to.
     body: usize,
     pieces: &'a [Piece],
 }
@@ -99,7 +99,7 @@ struct Made {
 }
 
 impl Source<'_> {
-    /// Translates all contacts. `others`: the factors of loads and supports at the end of each step.
+    /// Translates all contacts. `others`: the factors of loads and of supports at the end of each step.
     pub(super) fn contacts(&self, others: &[[f64; 2]]) -> Translated {
         let mut found = Translated::default();
         if self.report_shared_sides(&mut found.remarks) {
@@ -156,7 +156,7 @@ impl Source<'_> {
         found
     }
 
-    /// Reports pairs with sides of the body that an earlier pair has too; returns whether there are any.
+    /// Reports contact pairs whose boundary shares sides with that of an earlier pair; returns whether there are any.
     fn report_shared_sides(&self, remarks: &mut Remarks) -> bool {
         let mut owners: BTreeMap<Edge, (u64, &str)> = BTreeMap::new();
         let before = remarks.violations.len();
@@ -237,7 +237,7 @@ impl Source<'_> {
         })
     }
 
-    /// Which surface of a pair is the body's, and which is rigid.
+    /// Tells the boundary of the elastic body and the rigid surface of a contact pair apart.
     fn surfaces<'s>(
         &'s self,
         line: u64,
@@ -273,7 +273,7 @@ impl Source<'_> {
         })
     }
 
-    /// The rigid surface of a contact in front of the body, with its motion.
+    /// Finds the rigid surface of a contact pair, its motion, and the boundary of the body in front of which it lies.
     fn placed<'s>(
         &'s self,
         pair: &Pair,
@@ -360,7 +360,7 @@ impl Source<'_> {
         found
     }
 
-    /// Coulomb's law, which depends on the load path; `None`: without friction.
+    /// Translates friction into Coulomb's law, which depends on the load path; `None` if the contact is frictionless.
     fn friction(
         &self,
         said: &DeckFriction,
@@ -408,8 +408,8 @@ impl Source<'_> {
         })
     }
 
-    /// Checks the contact stiffness: contact is hard here. Warns of how far a softer contact differs from that, or
-    /// refuses it.
+    /// Checks the contact stiffness of the deck, since translated contacts are hard: warns by how much a stiff contact
+    /// of the deck differs from a hard one, and refuses a soft one.
     fn behavior(
         &self,
         behavior: &Behavior,
@@ -472,8 +472,8 @@ impl Source<'_> {
     }
 }
 
-/// The smallest number of increments of a step with friction, which depends on the load path; if the deck starts with
-/// more, that number is used.
+/// The smallest number of increments of a step with friction, which depends on the load path. A larger number in the
+/// deck is used.
 const FEWEST_INCREMENTS: f64 = 10.0;
 /// The largest number of increments of a step with friction.
 const MOST_INCREMENTS: f64 = 1000.0;
@@ -483,7 +483,8 @@ fn increments(written: Option<f64>) -> u32 {
     written.clamp(FEWEST_INCREMENTS, MOST_INCREMENTS) as u32
 }
 
-/// The largest motion of each kind, with its sign; the last of equal ones.
+/// The largest indentation and the largest tangential displacement of all steps, by size but with their signs; the last
+/// one of equal size.
 fn largest(moved: &[[f64; 2]]) -> [f64; 2] {
     [0, 1].map(|kind| {
         let all = moved.iter().map(|m| m[kind]);
@@ -512,7 +513,7 @@ struct Placed<'a> {
     size: f64,
 }
 
-/// A rigid surface and its motion, translated to an obstacle.
+/// An obstacle and its motion, translated from a rigid surface.
 struct Shape {
     obstacle: Obstacle,
     direction: Option<Point>,
@@ -521,11 +522,11 @@ struct Shape {
     message: Option<String>,
 }
 
-/// Why a rigid surface cannot be an obstacle: the value found, and the expected one.
+/// The reason why a rigid surface cannot be an obstacle: what the deck has, and what is expected.
 type Unlike = (String, &'static str);
 
 impl Placed<'_> {
-    /// Corner nodes of the boundary with the normal of a side at each, up to a limit.
+    /// Nodes of the boundary, each with the outward normal of a side there; of a long boundary only some.
     fn looks(&self) -> impl Iterator<Item = (Point, Point)> + '_ {
         let stride = self.edges.len().div_ceil(MOST_LOOKS).max(1);
         self.edges.iter().step_by(stride).flat_map(|edge| {
@@ -539,8 +540,8 @@ impl Placed<'_> {
         met(&self.outline.points, place, n, 0.1 * self.size)
     }
 
-    /// Whether the outer side of the rigid surface faces the body where they are nearest. A surface that faces no node
-    /// is reported by the checks of the obstacle instead.
+    /// Whether the outer side of the rigid surface faces the body at the place where both are nearest. True if the
+    /// surface faces no node at all, which the checks of the obstacle report.
     fn faces(&self) -> bool {
         let hits = self.looks().filter_map(|look| {
             let (distance, m) = self.met(look)?;
@@ -550,7 +551,7 @@ impl Placed<'_> {
         nearest.is_none_or(|(_, along)| along < 0.0)
     }
 
-    /// Whether `ADJUST` would move nodes of the body.
+    /// Whether the parameter `ADJUST` of the deck would move nodes of the body.
     fn is_moved_by(&self, adjust: Adjust) -> bool {
         let closed = CLOSED * self.size;
         self.looks().any(|look| {
@@ -564,7 +565,7 @@ impl Placed<'_> {
         })
     }
 
-    /// The normal of a straight boundary; none if it is curved.
+    /// The normal of the boundary if it is straight; none if it is curved.
     fn straight(&self) -> Option<Point> {
         let mut normals = self
             .edges
@@ -575,7 +576,7 @@ impl Placed<'_> {
         same.then_some(n)
     }
 
-    /// The normal of a straight rigid surface, towards the body; none if it is curved.
+    /// The normal of the rigid surface, towards the body, if the surface is straight; none if it is curved.
     fn flat(&self) -> Option<Point> {
         if self.outline.joined != Joined::Lines {
             return None;
@@ -607,8 +608,10 @@ impl Placed<'_> {
         }
     }
 
-    /// Translates a rigid surface at a straight boundary: its motion along n is the indentation, and its motion along t
-    /// the tangential displacement, by which its position is shifted too.
+    /// Translates a rigid surface in front of a straight boundary with the outward normal `n`. Its motion against n is
+    /// the indentation, and that along the tangent t the tangential displacement; a surface not parallel to the
+    /// boundary is placed where it is along t at the end of the last step. `ends`: its displacement at the end of each
+    /// step.
     fn before_a_straight_side(&self, n: Point, ends: &[Point], others: &[[f64; 2]]) -> Shape {
         let t = [n[1], -n[0]];
         let mut moved: Vec<[f64; 2]> = ends.iter().map(|u| [-dot(*u, n), dot(*u, t)]).collect();
@@ -672,7 +675,7 @@ impl Placed<'_> {
         }
     }
 
-    /// A circle by its profile along the boundary; it ends where the arc of the deck ends.
+    /// A circular obstacle, as a profile along the boundary. It ends where the arc of the deck ends.
     fn circle(&self, center: Point, radius: f64, t: Point, points: &[Point]) -> Obstacle {
         let run = runs(self.edges);
         let start = run
@@ -702,8 +705,9 @@ impl Placed<'_> {
         }
     }
 
-    /// Translates a straight rigid surface at a curved boundary, by the rigid surface's own normal, which is the same
-    /// everywhere: `q`, towards the body.
+    /// Translates a straight rigid surface in front of a curved boundary. The normal of contact is the normal `q` of
+    /// the rigid surface, towards the body, which is the same at all points. `ends`: its displacement at the end of
+    /// each step.
     fn straight_before_a_curve(&self, q: Point, ends: &[Point]) -> Shape {
         // of the contact: n = −q
         let t = [-q[1], q[0]];
@@ -723,7 +727,8 @@ impl Placed<'_> {
         }
     }
 
-    /// Translates a curved rigid surface at a curved boundary, which moves in one direction.
+    /// Translates a curved rigid surface in front of a curved boundary; the surface must move in one direction. `ends`:
+    /// its displacement at the end of each step.
     fn curve_before_a_curve(&self, ends: &[Point]) -> Result<Shape, Unlike> {
         let most =
             ends.iter().copied().fold(
@@ -775,7 +780,7 @@ fn span(values: impl Iterator<Item = f64>) -> [f64; 2] {
     })
 }
 
-/// A straight line without ends, through the first and the last of some points.
+/// A straight obstacle without ends, through the first and the last of some points.
 fn line(points: &[Point]) -> Obstacle {
     let step = minus(points[points.len() - 1], points[0]);
     Obstacle::Line {
@@ -787,7 +792,8 @@ fn line(points: &[Point]) -> Obstacle {
     }
 }
 
-/// Points as an obstacle, with the distance from the curves that they were taken from, in words.
+/// An obstacle through points, and a message that tells its distance from the curves of the deck; no message if that is
+/// 0.
 fn polyline(points: Vec<Point>, joined: Joined) -> (Obstacle, Option<String>) {
     let (interpolation, off) = match joined {
         Joined::Lines => (Interpolation::Linear, 0.0),

@@ -5,22 +5,23 @@ use std::collections::BTreeMap;
 use super::tool::{Piece, Point};
 use super::written::{Name, Target};
 
-/// The advice for a contact that a deck cannot state here.
+/// Advice where a contact of a deck cannot be translated: to write it in a problem as JSON.
 pub(super) const WRITTEN_INSTEAD: &str = "Write the contact in a problem as JSON (`contacts`: obstacle, indentation, friction) with this deck as its mesh: \"mesh\": {\"abaqus\": \"…\"}, or upload the deck and name it by its hash.";
 
-/// All data of a deck about contact, apart from that in its parts.
+/// The data of a deck about contact, apart from surfaces and rigid bodies, which its parts hold.
 #[derive(Clone, Default)]
 pub(super) struct DeckContact {
     pub(super) pairs: Vec<Pair>,
     pub(super) interactions: BTreeMap<Name, Interaction>,
     /// The interaction that `*FRICTION` and `*SURFACE BEHAVIOR` belong to.
     pub(super) current: Option<Name>,
-    /// The lines of `*STEP`, and the increments that `*STATIC` begins with.
+    /// By step: the line of `*STEP`, and the number of increments that `*STATIC` begins with.
     pub(super) steps: Vec<(u64, Option<f64>)>,
 }
 
 impl DeckContact {
-    /// Records how many increments `*STATIC` starts with.
+    /// Records the number of increments that the current step begins with, from the first time increment of `*STATIC`
+    /// and the length of the step's time.
     pub(super) fn note_increments(&mut self, initial: Option<f64>, period: Option<f64>) {
         let initial = initial.filter(|initial| *initial > 0.0);
         if let (Some(step), Some(initial)) = (self.steps.last_mut(), initial) {
@@ -28,7 +29,7 @@ impl DeckContact {
         }
     }
 
-    /// The step, from 0, that a line belongs to; lines before the first step belong to that.
+    /// The step, from 0, that a line of the deck belongs to; a line before the first step belongs to the first step.
     pub(super) fn step_of(&self, line: u64) -> usize {
         let begun = self.steps.partition_point(|step| step.0 < line);
         begun.saturating_sub(1)
@@ -43,7 +44,7 @@ pub(super) struct Analytical {
 }
 
 impl Analytical {
-    /// Moves all points of the surface.
+    /// Moves all points of the surface by the map `to`.
     pub(super) fn place(&mut self, to: impl Fn(Point) -> Point) {
         for piece in &mut self.pieces {
             *piece = piece.placed(&to);
@@ -87,7 +88,7 @@ pub(super) struct DeckFriction {
     /// The slip tolerance, in lengths of a side.
     pub(super) slip_tolerance: Option<f64>,
     pub(super) most_stress: Option<f64>,
-    /// Whether friction is by Lagrange multipliers, without elastic slip.
+    /// Whether the deck computes friction by Lagrange multipliers, without elastic slip.
     pub(super) lagrange: bool,
 }
 
@@ -102,7 +103,7 @@ pub(super) enum Behavior {
     Exponential { line: u64, clearance: Option<f64> },
 }
 
-/// A row of `*BOUNDARY`: components that are held at a value; 6 is the rotation.
+/// A row of `*BOUNDARY`: the components that it holds at a value (1: x, 2: y, 6: the rotation).
 #[derive(Clone, Debug)]
 pub(super) struct Held {
     pub(super) line: u64,
@@ -128,13 +129,13 @@ pub(super) enum ContactBlock {
 pub(super) struct RigidBody {
     pub(super) line: u64,
     pub(super) made_of: MadeOf,
-    /// The node that moves it.
+    /// The reference node, which moves the rigid body.
     pub(super) reference: Target,
     /// CalculiX's node whose displacements are the rotations of the body.
     pub(super) rotation: Option<Target>,
 }
 
-/// The elements, nodes or surface of a rigid body.
+/// What a rigid body consists of: elements, nodes or a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum MadeOf {
     /// An analytical surface.

@@ -1,4 +1,4 @@
-//! The content of a deck: the supported parts, and the violations of the others.
+//! The content of a deck: the supported parts, and violations where it has others.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -23,13 +23,13 @@ pub(super) enum Inside {
 /// The position of an instance: a translation, then a rotation (centre and angle in radians).
 pub(super) type Placement = ([f64; 3], Option<([f64; 2], f64)>);
 
-/// The supported parts of a deck, and the violations.
+/// The supported parts of a deck, and violations where it has others.
 #[derive(Default)]
 pub(super) struct Deck {
     /// The part, instance or assembly that the present lines belong to.
     pub(super) here: Part,
     pub(super) inside: Inside,
-    /// The assembly, while lines belong to a part or instance.
+    /// The assembly, set aside while lines of a part or an instance are read.
     pub(super) assembly: Part,
     pub(super) assembly_name: Option<Name>,
     pub(super) parts: BTreeMap<Name, Part>,
@@ -50,9 +50,9 @@ pub(super) struct Deck {
     pub(super) steps: usize,
     /// The position of the present instance.
     pub(super) placement: Option<Placement>,
-    /// The length of the step's time.
+    /// The length of time of the current step; `None`: 1.
     pub(super) period: Option<f64>,
-    /// Whether the step has had a `*BOUNDARY`.
+    /// Whether a `*BOUNDARY` was read in the current step.
     pub(super) supported_in_step: bool,
     /// Keywords with `OP=NEW` in steps after the first.
     pub(super) replacements: Vec<Replacement>,
@@ -81,7 +81,7 @@ impl Deck {
             .add(|| on_line(line, reason, got.into(), expected, hint));
     }
 
-    /// The name in the spelling in which it first occurred.
+    /// A name in the spelling of its first occurrence in the deck.
     pub(super) fn spelled(&mut self, name: &str) -> Name {
         let capitals = name.to_uppercase();
         match self.spelling.get(&capitals) {
@@ -98,12 +98,12 @@ impl Deck {
         self.materials.get_mut(name)
     }
 
-    /// The name in the spelling in which it first occurred, if the deck has it.
+    /// A name in the spelling of its first occurrence in the deck; none if the deck has no such name.
     pub(super) fn known(&self, name: &str) -> Option<&Name> {
         self.spelling.get(&name.to_uppercase())
     }
 
-    /// The members of a set of nodes, which begins on this line if it is new.
+    /// The members of the set of nodes with this name. A new set begins on this line.
     pub(super) fn node_set(
         &mut self,
         name: &Name,
@@ -114,7 +114,7 @@ impl Deck {
         members(set, of)
     }
 
-    /// The members of a set of elements, which begins on this line if it is new.
+    /// The members of the set of elements with this name. A new set begins on this line.
     pub(super) fn element_set(
         &mut self,
         name: &Name,
@@ -131,13 +131,13 @@ impl Deck {
         set.of_elements.push((of.clone(), elements));
     }
 
-    /// The nodes of a surface of nodes, whose name is separate from those of sets.
+    /// The members of a surface of nodes. Such surfaces and sets may have equal names.
     pub(super) fn node_surface(&mut self, name: &Name, line: u64) -> &mut Vec<Target> {
         let surfaces = &mut self.here.node_surfaces;
         &mut new_or_known(surfaces, &mut self.names, name, line).members
     }
 
-    /// A surface, which begins on this line if it is new.
+    /// The sides of the surface with this name. A new surface begins on this line.
     pub(super) fn surface(&mut self, name: &Name, line: u64) -> &mut Vec<(Target, Sides)> {
         let names = &mut self.names;
         let new = || {
@@ -151,7 +151,7 @@ impl Deck {
         &mut known.or_insert_with(new).sides
     }
 
-    /// Whether a name or number of a line is too long, which is reported.
+    /// Reports a name or number of a line that is too long; returns whether there is one.
     pub(super) fn has_long_name(&mut self, line: u64, text: &str) -> bool {
         let long = |word: &str| word.trim().len() > LONGEST_NAME;
         let Some(word) = text.split([',', '=']).find(|word| long(word)) else {
@@ -163,7 +163,7 @@ impl Deck {
         true
     }
 
-    /// The factor of an amplitude at the end of the step, or the reason why it has none.
+    /// The factor of an amplitude at the end of the current step, or the reason why it has none.
     pub(super) fn factor(&self, name: &Name) -> Result<f64, String> {
         let Some(amplitude) = self.amplitudes.get(name) else {
             return Err(format!("the unknown amplitude `{name:.60}`"));
@@ -219,7 +219,7 @@ fn new_or_known<'a>(
     sets.entry(name.clone()).or_insert_with(new)
 }
 
-/// The members of a set, with numbers and names of its own part or of an instance.
+/// The members that a set has in its own part, or in the named instance.
 fn members<'a>(set: &'a mut Set, instance: &Option<Name>) -> &'a mut Vec<Target> {
     let Some(instance) = instance else {
         return &mut set.members;

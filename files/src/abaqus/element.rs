@@ -1,4 +1,4 @@
-//! Types of elements: those that make up a plane body, and the meaning of others for its mesh and for a problem.
+//! Types of elements: which make up a plane body, and what the others mean for a mesh and for a problem.
 
 use solver::element::Family;
 
@@ -10,7 +10,7 @@ pub(super) enum Theory {
     Axisymmetric,
 }
 
-/// The mechanics of a type, if a problem can have it.
+/// The mechanics of a type of element that a problem can have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Mechanics {
     pub(super) theory: Theory,
@@ -19,12 +19,13 @@ pub(super) struct Mechanics {
     pub(super) reduced: bool,
 }
 
-/// The first elements with mechanics in a deck.
+/// The first elements of a deck with the given mechanics.
 #[derive(Clone, Debug)]
 pub(super) struct Typed {
     pub(super) mechanics: Mechanics,
-    /// The line of their keyword, and the type that it names.
+    /// The line of the keyword that defines the elements.
     pub(super) line: u64,
+    /// The type that the keyword names.
     pub(super) name: String,
 }
 
@@ -49,20 +50,20 @@ pub(super) enum Shape {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct ElementType {
     pub(super) shape: Shape,
-    /// Present for solids of plane strain, plane stress and revolution.
+    /// The mechanics; present for solids of plane strain, plane stress and revolution.
     pub(super) mechanics: Option<Mechanics>,
     /// Whether the type has no effect on a linear static step.
     pub(super) idle: bool,
 }
 
-/// Types of the plane, with the beginning of their names: solids; variants with a generalised third direction, for heat
-/// and for sound; shells, membranes and surfaces, which programs write for plane meshes too.
+/// The beginnings of the names of plane types: solids; variants with a generalised third direction, for heat and for
+/// sound; shells, membranes and surfaces, which programs write for plane meshes too.
 const PLANE: [&str; 14] = [
     "CPEG", "CGAX", "DC2D", "DCAX", "AC2D", "ACAX", "SFM3D", "STRI", "M3D", "CPE", "CPS", "CAX",
     "DS", "S",
 ];
 
-/// Trusses, beams, pipes, rigid and other lines, with their numbers of nodes.
+/// The names of line types (trusses, beams, pipes, rigid and other lines), with their numbers of nodes.
 const LINES: [(&str, usize); 32] = [
     ("T2D2", 2),
     ("T2D3", 3),
@@ -99,7 +100,7 @@ const LINES: [(&str, usize); 32] = [
 ];
 
 impl ElementType {
-    /// The type of a name in capitals.
+    /// The type of element with this name, in capitals.
     pub(super) fn new(name: &str) -> Self {
         let line = LINES.iter().find(|(start, _)| {
             let rest = name.strip_prefix(start);
@@ -118,7 +119,7 @@ impl ElementType {
     }
 }
 
-/// Family, number of nodes and mechanics of a type of the plane.
+/// Family, number of nodes and mechanics of a plane type; none for other types.
 fn plane(name: &str) -> Option<(Family, usize, Option<Mechanics>)> {
     let start = PLANE.iter().find(|start| {
         let rest = name.strip_prefix(**start);
@@ -151,7 +152,7 @@ fn plane(name: &str) -> Option<(Family, usize, Option<Mechanics>)> {
     Some((family, nodes, mechanics))
 }
 
-/// The nodes of a solid in space, which may be written on several lines.
+/// The number of nodes of a three-dimensional solid, which may be written on several lines.
 fn solid_nodes(name: &str) -> Option<usize> {
     let rest = ["C3D", "DC3D", "AC3D"]
         .iter()

@@ -10,11 +10,11 @@ use super::keyword::Keyword;
 use super::tool::Piece;
 use super::written::{Name, Target, fields, number};
 
-/// The largest number of pairs, of rigid bodies, and of pieces of an analytical surface.
+/// The largest number of contact pairs, of rigid bodies, and of pieces of an analytical surface.
 const MOST: usize = 1000;
 
 impl Deck {
-    /// The block of a keyword about contact; `None` for other keywords.
+    /// Begins the block of a keyword about contact; `None` for other keywords.
     pub(super) fn begin_contact(&mut self, keyword: &Keyword, line: u64) -> Option<Block> {
         let value = |name: &str| keyword.get(name).map(str::to_owned);
         let block = match &keyword.name[..] {
@@ -168,7 +168,8 @@ impl Deck {
     }
 
     fn contact_pairs(&mut self, keyword: &Keyword, line: u64) -> Block {
-        /// Parameters without effect for small sliding against a rigid surface, which is smooth and needs no stiffness.
+        /// Parameters that change nothing in small sliding against a rigid surface, which is smooth and needs no
+        /// stiffness.
         const HARMLESS: [&str; 16] = [
             "TYPE",
             "SMALL SLIDING",
@@ -439,7 +440,7 @@ impl Deck {
         }
     }
 
-    /// Records a row of `*BOUNDARY`, which reference nodes need.
+    /// Records a row of `*BOUNDARY` with all its components, for reference nodes.
     pub(super) fn note_row(&mut self, amplitude: &Option<Name>, line: u64, text: &str) {
         let words = fields(text);
         let word = |k: usize| words.get(k).copied().unwrap_or_default();

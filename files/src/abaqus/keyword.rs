@@ -1,4 +1,4 @@
-//! Keyword lines: `*NAME, PARAMETER=value, …`, and the block of data that each begins.
+//! Keyword lines, `*NAME, PARAMETER=value, …`, and the block of data lines that each begins.
 
 use super::block::{Block, Elements, Rows};
 use super::deck::{Deck, Inside};
@@ -11,26 +11,26 @@ use super::written::{
 };
 use solver::error::Reason;
 
-/// The largest number of parts, and of instances.
+/// The largest number of parts, and the largest number of instances.
 const MOST_PARTS: usize = 1 << 8;
 
 /// How many times instances may repeat the content of all parts.
 const MOST_TIMES: u64 = 8;
 
-/// A keyword line, divided into its name and parameters.
+/// A keyword line, divided into the keyword's name and its parameters.
 pub(super) struct Keyword {
     pub(super) name: String,
     pub(super) parameters: Vec<(String, Option<String>)>,
 }
 
-/// The name of a keyword with its blanks, which CalculiX allows to leave out.
+/// The name of a keyword with blanks, from a name without them, which CalculiX allows.
 fn spaced(name: String) -> String {
     let mut known = READ.iter().chain(IDLE);
     let known = known.find(|known| known.replace(' ', "") == name);
     known.map_or(name, |known| (*known).to_owned())
 }
 
-/// Whether a parameter has a name, with or without blanks.
+/// Whether a parameter has this name, apart from blanks.
 fn same(parameter: &str, name: &str) -> bool {
     let letters = |text: &str| text.chars().filter(|c| *c != ' ').collect::<String>();
     parameter == name || letters(parameter) == letters(name)
@@ -78,8 +78,9 @@ impl Keyword {
     }
 }
 
-/// The elements that a problem can have, for messages, and advice about others.
+/// The types of elements that a problem can have, in words.
 const SOLIDS: &str = "CPE, CPS or CAX with 3, 4, 6 or 8 nodes (and R, I, H, M or T)";
+/// Advice for elements that a problem cannot have.
 pub(super) const REMOVE_ELEMENTS: &str = "Remove them from the problem, or use the deck as a mesh: there they are left out or name boundaries.";
 
 /// Whether a type is a rigid line, in the plane or of a body of revolution.
@@ -154,7 +155,7 @@ impl Deck {
         }
     }
 
-    /// Reports once that the deck has too many names.
+    /// Reports that the deck has too many names of sets and surfaces.
     fn too_many_names(&mut self, line: u64) {
         if !std::mem::replace(&mut self.here.incomplete.names, true) {
             self.fault(
@@ -167,7 +168,7 @@ impl Deck {
         }
     }
 
-    /// Records a keyword that is unknown or at a wrong place; each is reported once at the end.
+    /// Records a keyword that is unknown or at a wrong place. At the end each such keyword is reported once.
     fn unknown_keyword(&mut self, name: &str, line: u64) -> Block {
         let known = &mut self.here.unknown_keywords;
         match known.iter().position(|known| known.name == name) {
@@ -182,7 +183,7 @@ impl Deck {
         Block::Skip
     }
 
-    /// Records a keyword that replaces prescriptions of earlier steps.
+    /// Records a keyword with `OP=NEW` in a step after the first, which ends supports or loads of earlier steps.
     fn note_replacement(&mut self, keyword: &Keyword, what: Replaces, line: u64) {
         if self.steps > 1 && keyword.is("OP", "NEW") {
             self.replacements.push(Replacement {
@@ -209,8 +210,8 @@ impl Deck {
         Block::Skip
     }
 
-    /// The amplitude that a keyword of loads or supports names; reports parameters other than that and OP, which would
-    /// change its meaning.
+    /// The amplitude that a keyword of loads or supports names. Other parameters than the amplitude and `OP` are
+    /// reported, since they would change the keyword's meaning.
     fn amplitude(&mut self, keyword: &Keyword, line: u64) -> Option<Name> {
         for (name, value) in &keyword.parameters {
             let known = match &name[..] {

@@ -2,8 +2,8 @@
 //!
 //! A part, each instance of it and the assembly have numbers and names of their own. In the assembly and in steps,
 //! `INSTANCE.SET` and `INSTANCE.7` refer to an instance; a name alone refers to the assembly, or else to the only
-//! instance that has it. The mesh has the same names: `SET` of the assembly, `INSTANCE.SET`, and `SET` where only one
-//! instance has it and the assembly has nothing of that name.
+//! instance that has it. In the mesh a set of the assembly is called `SET`, and a set of an instance `INSTANCE.SET`;
+//! the latter also `SET` where no other instance and nothing in the assembly has that name.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -68,7 +68,8 @@ impl Names<'_> {
         }
     }
 
-    /// The scope of a name, and the name in it. `has`: whether a scope has a name.
+    /// Resolves a name that is used in a scope: the scope that it refers to, and the name there. `has`: whether a scope
+    /// has something of a name.
     pub(super) fn named(
         &self,
         scope: usize,
@@ -99,7 +100,8 @@ impl Names<'_> {
         Some((found, word.clone()))
     }
 
-    /// This scope if it has the name; in the assembly otherwise the only instance that has it.
+    /// The scope `scope` if `has` is true for it; else, if `scope` is the assembly, the only instance for which it is
+    /// true.
     fn in_scopes(&self, scope: usize, has: impl Fn(usize) -> bool) -> Option<usize> {
         if has(scope) {
             return Some(scope);
@@ -116,7 +118,7 @@ impl Names<'_> {
         }
     }
 
-    /// The instance of `INSTANCE.NAME` in the assembly, and the name in it.
+    /// Divides `INSTANCE.NAME` in the assembly into the scope of the instance and the name there.
     fn dotted<'w>(&self, scope: usize, word: &'w str) -> Option<(usize, &'w str)> {
         if scope != 0 {
             return None;
@@ -129,14 +131,14 @@ impl Names<'_> {
             .find_map(|(start, rest)| Some((self.instance(start)?, rest)))
     }
 
-    /// The rest of a word after the name of the assembly.
+    /// The rest of `ASSEMBLY.NAME` after the name of the assembly and the dot; none if a word begins differently.
     fn in_assembly<'w>(&self, word: &'w str) -> Option<&'w str> {
         let assembly = self.deck.assembly_name.as_deref()?;
         let (start, rest) = word.split_once('.')?;
         start.eq_ignore_ascii_case(assembly).then_some(rest)
     }
 
-    /// The scope of an instance.
+    /// The scope of the instance with this name.
     pub(super) fn instance(&self, name: &str) -> Option<usize> {
         let name = self.deck.known(name)?;
         let named = |scope: &Scope| scope.name.as_ref() == Some(name);
@@ -159,7 +161,7 @@ impl Names<'_> {
         }
     }
 
-    /// The names that a target might have meant; none for a number.
+    /// The existing names, for advice about a target that does not exist; empty if the target is a number.
     pub(super) fn known(&self, kind: Kind, target: &Target) -> Vec<String> {
         match target {
             Target::Label(_) => Vec::new(),
@@ -180,7 +182,8 @@ impl Names<'_> {
         names.take(MOST_LISTED).collect()
     }
 
-    /// All sets of a kind as places in the mesh. `elements`: the sets of elements, and the nodes of each element.
+    /// All sets of a kind as places in the mesh. `nodes_of`: adds the nodes of a set of elements to a list; false if
+    /// there is no such set.
     pub(super) fn resolve(
         &self,
         kind: Kind,
@@ -224,10 +227,10 @@ struct Members<'a> {
     name: String,
     line: u64,
     found: Vec<u32>,
-    /// The lists that are being visited, with their scopes and nesting depths.
+    /// The sets that are being visited: of each the scope, the members left, and the nesting depth.
     open: Vec<(usize, std::slice::Iter<'a, Target>, usize)>,
     seen: BTreeSet<Key>,
-    /// The sets of elements whose nodes were added.
+    /// The sets of elements whose nodes were added to the set.
     seen_elements: BTreeSet<Key>,
 }
 
@@ -374,7 +377,7 @@ impl<'a> Members<'a> {
     }
 }
 
-/// The number of members of sets that may still be visited.
+/// How many members of sets may still be visited: sets that contain sets would otherwise take too long.
 pub(super) struct Room {
     most: u64,
     left: u64,
@@ -385,7 +388,7 @@ impl Room {
         Room { most, left: most }
     }
 
-    /// Uses some of it; reports once if there is not enough.
+    /// Takes `count` members from the room; false if there is not enough, which is reported once.
     pub(super) fn take(
         &mut self,
         count: u64,
@@ -421,7 +424,7 @@ impl Room {
 /// The largest number of names that a hint lists.
 const MOST_LISTED: usize = 20;
 
-/// Reports an unknown name or number. `known`: the existing names; `remedy`: advice.
+/// Reports an unknown name or number. `known`: the existing names; `remedy`: advice that follows them.
 pub(super) fn unknown(
     faults: &mut Findings,
     line: u64,

@@ -11,12 +11,12 @@ use crate::source::Labels;
 use solver::element::Element;
 use solver::error::{Findings, Violation};
 
-/// The kind of an element, with its place among those of its part.
+/// The kind of a numbered element, with its place in the list of that kind in its part.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Numbered {
-    /// A plane element, by its place among these.
+    /// A plane element, by its place among the plane elements.
     Plane(u32),
-    /// A line, by its place among these.
+    /// A line element, by its place among the line elements.
     Line(u32),
     /// An element that a plane mesh ignores.
     Other,
@@ -25,14 +25,15 @@ pub(super) enum Numbered {
 /// A block of rigid lines, which a problem can have only as the surface of a rigid body.
 #[derive(Clone)]
 pub(super) struct RigidLines {
-    /// The line of the block's keyword, and the words for messages.
+    /// The line of the block's keyword.
     pub(super) line: u64,
+    /// A description of the elements for messages.
     pub(super) what: String,
-    /// The places of its elements among all elements of its part.
+    /// The places of the lines among all numbered elements of their part.
     pub(super) places: Range<u32>,
 }
 
-/// The content of a part, of an instance of it, or of the assembly; in a deck without parts all of it.
+/// The content of a part, of an instance of one, or of the assembly; a deck without parts is an assembly only.
 #[derive(Clone, Default)]
 pub(super) struct Part {
     pub(super) nodes: Vec<[f64; 2]>,
@@ -42,7 +43,7 @@ pub(super) struct Part {
     pub(super) node_places: Labels,
     pub(super) elements: Vec<Element>,
     pub(super) element_labels: Vec<u64>,
-    /// The nodes of line elements; the last may be missing.
+    /// The nodes of line elements, the middle node last; it may be missing.
     pub(super) lines: Vec<[u32; 3]>,
     /// All elements with a number.
     pub(super) numbered: Vec<Numbered>,
@@ -67,17 +68,17 @@ pub(super) struct Part {
     pub(super) analytical: BTreeMap<Name, Analytical>,
     /// Every row of `*BOUNDARY`, with all its components.
     pub(super) held: Vec<Held>,
-    /// Which of its data are incomplete because a line could not be read.
+    /// Which data of the part are incomplete because a line could not be read.
     pub(super) incomplete: Incomplete,
     /// The unknown keywords of the part.
     pub(super) unknown_keywords: Vec<UnknownKeyword>,
-    /// The violations of its mesh.
+    /// Violations in the part's mesh.
     pub(super) faults: Found,
-    /// The parts of it that a problem cannot have.
+    /// Violations for what the part has and a problem cannot have.
     pub(super) doubts: Found,
 }
 
-/// Violations in a part; they are reported only if the part is used.
+/// Violations in a part; they are reported only if an instance or the assembly uses the part.
 #[derive(Clone, Default)]
 pub(super) struct Found {
     listed: Vec<Violation>,

@@ -19,7 +19,7 @@ use solver::problem::{
 };
 use solver::solution::Warning;
 
-/// Whether a deck has a step: one without is a mesh only.
+/// Whether a deck has a step. A deck without a step is only a mesh.
 pub fn has_step(text: &str) -> bool {
     let keyword = |line: &str| {
         let name = line.trim_start().split(',').next().unwrap_or_default();
@@ -130,8 +130,8 @@ pub fn problem_with_warnings(text: &str) -> Result<(Problem, Vec<Warning>), Vec<
     Ok((problem, warnings))
 }
 
-/// The violation that a deck has no step and is only a mesh; parts that only a problem could not have are not reported
-/// then.
+/// The violations of a deck without a step, which is only a mesh: that it has none, and those of the mesh. Parts that a
+/// problem cannot have are not reported.
 fn without_step(mut faults: Findings) -> Vec<Violation> {
     faults.add(Violation::new(
         "",
@@ -150,7 +150,7 @@ impl Built {
             .add(on_line(line, reason, got.into(), expected, hint));
     }
 
-    /// Why a set of nodes cannot be loaded: the value found, the expected one, and the advice.
+    /// Why a set of nodes cannot be loaded or displaced: what the set is, what is expected, and advice.
     fn not_meshed(&self, set: &str) -> (String, &'static str, &'static str) {
         const MESHED: &str = "nodes of plane elements";
         let nodes = self.raw.node_sets.get(set).map_or(&[][..], |nodes| nodes);
@@ -187,7 +187,7 @@ impl Built {
         )
     }
 
-    /// The factors of loads and supports at the end of each step, for steps that are understood.
+    /// The factors of loads and of supports at the end of each step; a deck with several steps must have contacts.
     fn factors_of_steps(&mut self) -> Vec<[f64; 2]> {
         let steps = self.deck.steps;
         if steps == 1 || steps > 1 && !self.pairs.is_empty() {
@@ -254,8 +254,9 @@ fn analysis(built: &mut Built) -> Analysis {
     }
 }
 
-/// The number of Gauss points for the quadrilaterals, or else for the triangles, which Abaqus and CalculiX integrate
-/// with three points. In a mixed mesh triangles get the larger rule, which is at least as accurate but not the same.
+/// The number of Gauss points in each direction for quadrilaterals; in a mesh of triangles 2, which gives the three
+/// points that Abaqus and CalculiX use. In a mixed mesh triangles get the rule of the quadrilaterals, which is at least
+/// as accurate.
 fn quadrature(built: &mut Built) -> u32 {
     let is_quad = |kind: &&Typed| !kind.mechanics.is_triangle();
     let quads: Vec<Typed> = built.types.iter().filter(is_quad).cloned().collect();
@@ -368,7 +369,7 @@ fn materials(built: &mut Built) -> Vec<Material> {
     materials
 }
 
-/// The angle of a material's first direction (degrees); it matters only for materials whose directions differ.
+/// The angle of the first direction of a section's material (degrees), which matters only for orthotropic materials.
 fn angle(built: &mut Built, section: &Section) -> f64 {
     let Some(name) = &section.orientation else {
         return 0.0;
@@ -393,7 +394,7 @@ fn angle(built: &mut Built, section: &Section) -> f64 {
 }
 
 impl Orientation {
-    /// The angle from x to the first direction (degrees), if both directions lie in the plane.
+    /// The angle from x to the first direction of the material (degrees); none if the orientation is not in the plane.
     fn angle(&self) -> Option<f64> {
         let points = self.lines.first().filter(|_| !self.curved)?;
         let at = |k: usize| points.get(k).copied().unwrap_or(0.0);
@@ -444,7 +445,7 @@ fn elasticity(elastic: &Elastic) -> Option<Elasticity> {
     }
 }
 
-/// The value found and the expected one for constants that are not understood.
+/// What the deck has, and what is expected, for elastic constants that are not understood.
 fn constants(elastic: &Elastic) -> (String, &'static str) {
     let known = ["ISO", "ISOTROPIC", "ENGINEERING CONSTANTS"].contains(&&elastic.kind[..]);
     if !known {
@@ -461,7 +462,8 @@ fn constants(elastic: &Elastic) -> (String, &'static str) {
     )
 }
 
-/// The numbers of the elements on both sides of those sides that lie inside the body, in words.
+/// The numbers, in words, of the elements at those of `sides` that lie inside the body, where two elements share a
+/// side. `inner`: all such sides of the mesh, sorted.
 fn elements_at(raw: &RawMesh, sides: &[[u32; 2]], inner: &[(u32, u32)]) -> String {
     let inside = sides.iter().map(|ends| key(*ends));
     let inside: BTreeSet<(u32, u32)> = inside
@@ -475,8 +477,8 @@ fn elements_at(raw: &RawMesh, sides: &[[u32; 2]], inner: &[(u32, u32)]) -> Strin
     numbered("element", places.map(|place| raw.element_labels[place]))
 }
 
-/// Translates the loads. `thickness`: that of a body in plane strain, whose forces are per unit of thickness here. On a
-/// body of revolution a force acts on the whole ring, both in Abaqus or CalculiX and here.
+/// Translates the loads. Forces are divided by `thickness`, the thickness of a body in plane strain: in a problem they
+/// are per unit of thickness. On a body of revolution a force acts on the whole ring, as in Abaqus and CalculiX.
 fn loads(built: &mut Built, thickness: f64) -> Vec<Load> {
     let mut loads = Vec::new();
     let pressures = std::mem::take(&mut built.pressures);

@@ -10,7 +10,7 @@ use super::keyword::Keyword;
 use super::written::Incomplete;
 use crate::source::{ReadError, Source};
 
-/// Reads a whole deck; violations are recorded in it.
+/// Reads a whole deck. Violations are recorded in the deck.
 pub(super) fn read(reader: impl BufRead) -> Result<Deck, ReadError> {
     let mut source = Source::new(reader);
     let mut deck = Deck::default();
@@ -71,7 +71,7 @@ pub(super) fn read(reader: impl BufRead) -> Result<Deck, ReadError> {
     Ok(deck)
 }
 
-/// Whether a line is empty or a comment.
+/// Whether a line has no content: it is empty or a comment.
 fn is_left_out(text: &str) -> bool {
     text.is_empty() || text.starts_with("**")
 }

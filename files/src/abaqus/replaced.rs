@@ -1,6 +1,6 @@
 //! Checks `OP=NEW` in steps after the first: it ends all supports, forces or pressures of earlier steps that its own
-//! step does not repeat. If the step repeats all of them it has no effect; otherwise those that end are refused by
-//! name.
+//! step does not repeat. If the step repeats all of them, `OP=NEW` has no effect; otherwise it is refused with the
+//! names of what it ends.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,20 +8,20 @@ use super::build::Built;
 use super::contact_parts::WRITTEN_INSTEAD;
 use super::written::{Replacement, Replaces};
 
-/// The component of a prescribed displacement or force, and its target.
+/// Identifies a support or load: the component of the displacement or force (0: a pressure), and the target's name.
 pub(super) type Key = (u64, String);
 
-/// A row of a step: step, key, line and value.
+/// A row of a deck: its step, what it prescribes, its line, and its value.
 type Stated = (usize, Key, u64, f64);
 
-/// The rows that are valid at a time, with their lines and values.
+/// The supports or loads that act in a step, with the lines of their rows and their values.
 type InForce = BTreeMap<Key, (u64, f64)>;
 
 /// The largest number of names that a violation lists.
 const MOST_NAMED: usize = 5;
 
 impl Built {
-    /// Reports keywords whose steps end earlier prescriptions, each once.
+    /// Reports keywords with `OP=NEW` that end supports or loads of earlier steps: the first one of each kind.
     pub(super) fn check_replaced(&mut self) {
         for what in [Replaces::Supports, Replaces::Forces, Replaces::Pressures] {
             let replacements = self.deck.replacements.iter();
@@ -39,13 +39,13 @@ impl Built {
                     line,
                     got,
                     "a step that repeats everything that OP=NEW replaces, or one without OP=NEW",
-                    &format!("Repeat those in this step: prescriptions that end between steps are not supported here. {WRITTEN_INSTEAD}"),
+                    &format!("Repeat in this step the supports or loads that it would end: those that end between steps cannot be translated. {WRITTEN_INSTEAD}"),
                 );
             }
         }
     }
 
-    /// The rows of one kind, in the order of the deck.
+    /// All rows of the deck that state supports, forces or pressures, as `what` says, in the order of the deck.
     fn stated(&self, what: Replaces) -> Vec<Stated> {
         let step = |line: u64| self.deck.contact.step_of(line);
         match what {
@@ -101,7 +101,7 @@ impl Built {
         }
     }
 
-    /// The first keyword that ends a prescription: its line, and the keys that end.
+    /// The first keyword that ends a support or load: its line, and a text that names the keyword and what it ends.
     fn first_end(
         &self,
         rows: &[Stated],
@@ -139,8 +139,8 @@ impl Built {
         None
     }
 
-    /// The prescriptions that are valid before a step and not in it. A force of 0 does not count; a node may be held by
-    /// a row for another set.
+    /// The supports or loads in `before` that `now` does not repeat, with their lines. A force or pressure of 0 is left
+    /// out, and so is a support of nodes that rows for other sets hold.
     fn ended<'a>(&self, before: &'a InForce, now: &InForce, what: Replaces) -> Vec<(&'a Key, u64)> {
         let supports = what == Replaces::Supports;
         let mut ended: Vec<(&Key, u64)> = before
@@ -156,7 +156,7 @@ impl Built {
         ended
     }
 
-    /// The nodes that rows hold, each with the component.
+    /// The nodes that the given supports hold, each with the component.
     fn nodes_held<'a>(&self, keys: impl Iterator<Item = &'a Key>) -> BTreeSet<(u64, u32)> {
         keys.flat_map(|(component, name)| {
             let nodes = self.raw.node_sets.get(name).into_iter().flatten();
@@ -165,7 +165,7 @@ impl Built {
         .collect()
     }
 
-    /// Whether all nodes of a set are held.
+    /// Whether the displacement `component` of all nodes of a set is held. `held`: components and nodes.
     fn is_held(&self, component: u64, set: &str, held: &BTreeSet<(u64, u32)>) -> bool {
         let nodes = self.raw.node_sets.get(set);
         nodes.is_some_and(|nodes| nodes.iter().all(|node| held.contains(&(component, *node))))

@@ -15,12 +15,12 @@ use solver::solution::{Warning, WarningCode};
 #[derive(Default)]
 pub(super) struct Tools {
     pub(super) bodies: Vec<Body>,
-    /// By the name of the surface in the mesh: the number of the rigid body, and the pieces of the surface, with the
-    /// elastic body on their left.
+    /// By name of a rigid surface in the mesh: the number of its rigid body, and its pieces, with the elastic body on
+    /// their left.
     pub(super) by_surface: BTreeMap<String, (usize, Vec<Piece>)>,
     /// The places of plane elements of rigid bodies, which are not part of the elastic body.
     pub(super) elements: BTreeSet<u32>,
-    /// The numbers of these elements, in the words of a warning.
+    /// The numbers of the plane elements of rigid bodies, in words, for a warning.
     pub(super) left_out: String,
     /// The places of all elements of rigid bodies among all elements.
     pub(super) members: BTreeSet<u32>,
@@ -42,9 +42,10 @@ pub(super) struct Body {
 /// A row of `*BOUNDARY` for reference nodes.
 pub(super) struct Moving {
     pub(super) row: Held,
-    /// The numbers of the bodies, and whether the node is that of their rotation.
+    /// For each reference or rotation node in the row: the number of its rigid body, and whether it is the rotation
+    /// node.
     pub(super) on: Vec<(usize, bool)>,
-    /// Whether the row holds no other nodes.
+    /// Whether the row holds no other nodes than reference nodes.
     pub(super) alone: bool,
 }
 
@@ -52,7 +53,7 @@ pub(super) struct Moving {
 pub(super) const MOST_POINTS: usize = 10_000;
 
 impl Tools {
-    /// The warning that names the elements left out.
+    /// The warning that names the elements of rigid bodies, which are left out of the mesh.
     pub(super) fn warning(&self) -> Option<Warning> {
         let count = self.elements.len();
         (count > 0).then(|| Warning {
@@ -66,7 +67,7 @@ impl Tools {
     }
 }
 
-/// The data in which rigid bodies are searched.
+/// The parts of a mesh in which rigid bodies are searched.
 pub(super) struct Search<'a> {
     pub(super) names: &'a Names<'a>,
     pub(super) raw: &'a RawMesh,
@@ -77,7 +78,8 @@ pub(super) struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The rigid bodies, each with the place of its scope, and all their surfaces.
+    /// Finds the rigid bodies and their surfaces. `bodies`, `analytical`, `held`: definitions of rigid bodies,
+    /// analytical surfaces and rows of `*BOUNDARY`, each with the place of its scope.
     pub(super) fn tools(
         &self,
         bodies: &[(usize, RigidBody)],
@@ -202,7 +204,8 @@ impl Search<'_> {
         (0..self.numbered.len() as u32).filter_map(body).collect()
     }
 
-    /// The rigid bodies that share nodes with plane elements that do not belong to them.
+    /// The numbers of the rigid bodies that share nodes with the elastic body, that is with plane elements of no rigid
+    /// body.
     fn attached(
         &self,
         owner: &BTreeMap<u32, usize>,
@@ -223,7 +226,7 @@ impl Search<'_> {
         all.chain(by_nodes.map(|(_, number)| *number)).collect()
     }
 
-    /// The sides of a surface, if all belong to one rigid body.
+    /// The rigid body that all sides of a surface belong to, and the sides; none if they do not belong to one body.
     fn rigid_sides(
         &self,
         scope: usize,
@@ -245,7 +248,7 @@ impl Search<'_> {
         body.map(|body| (body, pieces))
     }
 
-    /// A side of an element, with the element on its right, or a rigid line.
+    /// A side of an element, in the direction that has the element on the right; or a rigid line.
     fn side_of(&self, place: u32, side: Sides) -> Option<Piece> {
         let at = |node: u32| self.raw.nodes.get(node as usize).copied();
         let (element, side) = match (self.numbered[place as usize], side) {

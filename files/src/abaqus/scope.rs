@@ -1,11 +1,11 @@
-//! The assembly or an instance of a part, with its own numbers and names.
+//! A scope of names: the assembly or an instance of a part, with its own numbers and names.
 
 use std::collections::BTreeMap;
 
 use super::written::{Incomplete, Name, Set, Surface};
 use crate::source::Labels;
 
-/// The kinds of numbered things that sets contain.
+/// The kinds of sets: of nodes, of elements, and surfaces of nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Kind {
     Nodes,
@@ -39,7 +39,7 @@ impl Kind {
         }
     }
 
-    /// The kind of sets that a set of this kind may name: surfaces of nodes name sets of nodes.
+    /// The kind of sets that may be members of a set of this kind: a surface of nodes may contain sets of nodes.
     pub(super) fn named(self) -> Kind {
         match self {
             Kind::Elements => Kind::Elements,
@@ -57,7 +57,7 @@ impl Kind {
 
 /// The assembly or an instance: its names, and the places of its nodes and elements in the mesh.
 pub(super) struct Scope {
-    /// The instance's name; none for the assembly.
+    /// The name of the instance; none for the assembly.
     pub(super) name: Option<Name>,
     pub(super) incomplete: Incomplete,
     pub(super) node_places: Labels,
@@ -94,13 +94,13 @@ impl Scope {
         }
     }
 
-    /// The place of a number in the mesh.
+    /// The place in the mesh of the node or element with this number.
     pub(super) fn place(&self, kind: Kind, label: u64) -> Option<u32> {
         let (labels, from) = self.labels(kind);
         Some(labels.get(label)? + from)
     }
 
-    /// The places of a range of numbers, and how many numbers were examined.
+    /// The places in the mesh of a range of numbers, and how many numbers were examined.
     pub(super) fn range(
         &self,
         kind: Kind,
@@ -113,7 +113,7 @@ impl Scope {
         (places, visited)
     }
 
-    /// The advice for an unknown number: says which numbers exist.
+    /// The advice for an unknown number, which says which numbers exist.
     pub(super) fn hint_of_numbers(&self, kind: Kind) -> String {
         let (labels, _) = self.labels(kind);
         let (what, keyword) = match kind {

@@ -1,4 +1,4 @@
-//! The motion of a deck's rigid bodies in its steps, and the factors of all other prescriptions.
+//! The motion of a deck's rigid bodies in its steps, and the factors of its loads and supports.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,12 +16,12 @@ pub(super) struct Motion {
     pub(super) ends: Vec<Point>,
 }
 
-/// Values that differ relatively by less are equal, since numbers in files are rounded.
+/// The largest relative difference of values that count as equal, since numbers in files are rounded.
 const SAME: f64 = 1e-9;
 
 impl Built {
-    /// Removes the rows of reference nodes from the prescribed displacements; returns the motion of each rigid body,
-    /// `None` if it is refused.
+    /// Removes the rows of reference nodes from the prescribed displacements; returns the motion of each rigid body, or
+    /// `None` for a motion that is refused.
     pub(super) fn take_motions(&mut self, axisymmetric: bool) -> Vec<Option<Motion>> {
         let count = self.deck.contact.steps.len().max(1);
         let bodies = std::mem::take(&mut self.tools.bodies);
@@ -104,8 +104,9 @@ impl Built {
         })
     }
 
-    /// The factors of loads and of prescribed displacements at the end of each step; those of the last step are 1.
-    /// Values prescribed at the end of a step replace those before, and must be in proportion to them.
+    /// The factors of loads and of prescribed displacements at the end of each step; in the last step both are 1 (0 if
+    /// all values are 0). The values of each step must be in proportion to those of the last step, and are reported if
+    /// they are not.
     pub(super) fn factors(&mut self) -> Vec<[f64; 2]> {
         let steps = &self.deck.contact;
         let count = steps.steps.len().max(1);
@@ -171,7 +172,7 @@ impl Built {
             .collect()
     }
 
-    /// Keeps for each load only the row of the last step that has one.
+    /// Keeps for each load only the rows of the last step that states it.
     pub(super) fn keep_last_loads(&mut self) {
         let steps = &self.deck.contact;
         let mut last: BTreeMap<String, usize> = BTreeMap::new();
@@ -190,10 +191,10 @@ impl Built {
     }
 }
 
-/// Values with their steps, in the order of the deck.
+/// The values of each load with their steps, in the order of the deck.
 type ByName = BTreeMap<Key, Vec<(usize, f64)>>;
 
-/// Adds a load; loads of one step on the same set are added up.
+/// Adds the value of a load in a step; values of the same step are summed.
 fn add(rows: &mut Vec<(usize, f64)>, step: usize, value: f64) {
     match rows.last_mut() {
         Some((last, sum)) if *last == step => *sum += value,
@@ -201,8 +202,8 @@ fn add(rows: &mut Vec<(usize, f64)>, step: usize, value: f64) {
     }
 }
 
-/// The common factor of all values at the end of each step; 0 where there are none. The error is the first step whose
-/// values are not in proportion to the last ones.
+/// The common factor of all values at the end of each step, in proportion to the last step; 0 if there are none. The
+/// error is the first step whose values are not in proportion to those of the last step.
 fn proportion<K>(rows: &BTreeMap<K, Vec<(usize, f64)>>, count: usize) -> Result<Vec<f64>, usize> {
     let at = |rows: &[(usize, f64)], step: usize| {
         let mut latest = rows.iter().rev();
@@ -230,7 +231,8 @@ fn proportion<K>(rows: &BTreeMap<K, Vec<(usize, f64)>>, count: usize) -> Result<
     (0..count).map(factor).collect()
 }
 
-/// The factors that the indentations and tangential displacements of all contacts share at the end of each step.
+/// The factors of indentations and of tangential displacements at the end of each step; `None` if the contacts do not
+/// share them. `moved`: both displacements of each contact by step.
 pub(super) fn common_factors(moved: &[&[[f64; 2]]]) -> Option<Vec<[f64; 2]>> {
     let count = moved.first()?.len();
     let mut found = vec![[0.0; 2]; count];

@@ -1,9 +1,9 @@
-//! The supported keywords of a deck, and messages about others.
+//! The supported keywords of decks, and messages about others.
 
 use super::written::on_line;
 use solver::error::{Findings, Reason};
 
-/// Keywords that are read: the message about an unknown one lists them.
+/// Keywords that are read. The message about an unknown keyword lists them.
 pub(super) const READ: &[&str] = &[
     "HEADING",
     "NODE",
@@ -43,8 +43,8 @@ pub(super) const NOT_WRITTEN_OUT: &[&str] = &[
     "INCLUDE", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM",
 ];
 
-/// Keywords without effect on a linear static step: requests for output, options of its solution, and options of other
-/// kinds of steps.
+/// Keywords without effect on a linear static step: requests for output, options of the step's solution, and options of
+/// other kinds of steps.
 pub(super) const IDLE: &[&str] = &[
     "END STEP",
     "DENSITY",
@@ -97,7 +97,7 @@ pub(super) const IDLE: &[&str] = &[
     "POST OUTPUT",
 ];
 
-/// Properties that a linear elastic material does not have. A material that no element has may have them.
+/// Keywords for properties that a linear elastic material does not have. A material that no element uses may have them.
 pub(super) const NOT_ELASTIC: &[&str] = &[
     "PLASTIC",
     "CYCLIC HARDENING",
@@ -136,11 +136,11 @@ pub(super) struct UnknownKeyword {
     pub(super) name: String,
     /// The line where it first occurs.
     pub(super) line: u64,
-    /// The number of later occurrences.
+    /// The number of occurrences after the first.
     pub(super) more: usize,
 }
 
-/// Reports each unknown keyword once; the first with a list of the supported ones.
+/// Reports each unknown keyword once; the first report lists the supported keywords.
 pub(super) fn report_unknown(mut unknown: Vec<UnknownKeyword>, doubts: &mut Findings) {
     unknown.sort_by(|a, b| (&a.name, a.line).cmp(&(&b.name, b.line)));
     unknown.dedup_by(|later, first| {

@@ -7,7 +7,7 @@ use super::build::{Built, Row};
 use super::written::Prescribed;
 use solver::problem::{BoundaryValue, Support};
 
-/// A value of one displacement at a set of nodes.
+/// The prescribed value of one displacement component at a set of nodes.
 struct Entry<'a> {
     line: u64,
     set: &'a str,
@@ -19,12 +19,13 @@ struct Entry<'a> {
 /// The supports of a deck.
 pub(super) struct Supports {
     pub(super) list: Vec<Support>,
-    /// Sets of nodes that the deck does not have: the rest of a set where a later row applies to some of its nodes.
+    /// Sets of nodes that the deck does not have: what is left of a set of the deck where later rows apply to its other
+    /// nodes.
     pub(super) sets: BTreeMap<String, Vec<u32>>,
-    /// The sets whose use shows that these supports are used, each with a sentence for the warning.
+    /// For each overlap of supports: a set, and a message for the case that a problem uses this set.
     pub(super) overlaps: Vec<(String, String)>,
-    /// The lines that prescribe displacements of no node, or nonzero ones of nodes without an element, with their
-    /// targets.
+    /// The lines and targets of rows that prescribe displacements of no node, or nonzero displacements of nodes without
+    /// an element.
     pub(super) of_no_element: Vec<(u64, String)>,
 }
 
@@ -109,7 +110,7 @@ pub(super) fn supports(built: &Built) -> Supports {
     found
 }
 
-/// The values in the order in which they apply; of several values for the same set only the last one.
+/// The prescribed values in the order of the deck; of several values for one component of a set only the last.
 fn entries(rows: &[Row<Prescribed>]) -> Vec<Entry<'_>> {
     let mut entries: Vec<Option<Entry<'_>>> = Vec::new();
     let mut places: HashMap<(&str, usize), usize> = HashMap::new();

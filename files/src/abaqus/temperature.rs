@@ -1,12 +1,12 @@
-//! Temperatures of a deck. Only their changes cause thermal strains: `*INITIAL CONDITIONS` causes none, nor does a
-//! `*TEMPERATURE` that equals them.
+//! Temperatures of a deck. Only changes of temperature cause thermal strains: `*INITIAL CONDITIONS` causes none, nor
+//! does a `*TEMPERATURE` equal to them.
 
 use super::block::Block;
 use super::deck::Deck;
 use super::keyword::Keyword;
 use super::written::{fields, number};
 
-/// The largest number of rows of `*INITIAL CONDITIONS` that are kept for comparison with those of `*TEMPERATURE`.
+/// The largest number of rows of `*INITIAL CONDITIONS` that are kept, to compare the rows of `*TEMPERATURE` with them.
 const MOST_ROWS: usize = 1 << 16;
 
 impl Deck {

@@ -17,22 +17,22 @@ pub(super) enum Piece {
     Parabola([Point; 3]),
 }
 
-/// Angles up to this (radians) between two pieces are no corner, since coordinates in files are rounded.
+/// The largest angle (radians) between two pieces that is no corner, since coordinates in files are rounded.
 const SMOOTH: f64 = 2e-3;
 
-/// An arc is divided into parts of at most this angle (radians).
+/// The largest angle (radians) of the parts that an arc is divided into.
 const PART: f64 = 4e-3;
 
-/// The number of parts of a parabola.
+/// The number of parts that a parabola is divided into.
 const PARTS: usize = 32;
 
-/// Relative differences up to this are rounding in files.
+/// The largest relative difference that counts as rounding in files.
 const DIGITS: f64 = 1e-4;
 
 /// A rigid surface in the form of an obstacle.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Outline {
-    /// The points of the outline, in its direction.
+    /// The points of the outline, from its start to its end.
     pub(super) points: Vec<Point>,
     /// How the points are joined.
     pub(super) joined: Joined,
@@ -43,7 +43,7 @@ pub(super) struct Outline {
 pub(super) enum Joined {
     /// By straight lines, exactly.
     Lines,
-    /// By one circle, exactly. Convex: the body is outside of it.
+    /// By one circle, exactly. `convex`: the body is outside the circle.
     Circle {
         center: Point,
         radius: f64,
@@ -51,7 +51,7 @@ pub(super) enum Joined {
     },
     /// By a spline, which differs from the smooth curves by at most this length.
     Spline(f64),
-    /// By straight lines in place of curves with corners, which differ by at most this length.
+    /// By straight lines in place of curves with corners; the lines differ from the curves by at most this length.
     Polygon(f64),
 }
 
@@ -68,7 +68,7 @@ impl Piece {
         }
     }
 
-    /// The piece with all its points moved.
+    /// The piece with all its points moved by the map `to`.
     pub(super) fn placed(self, to: impl Fn(Point) -> Point) -> Self {
         match self {
             Piece::Line(points) => Piece::Line(points.map(to)),
@@ -95,7 +95,7 @@ impl Piece {
         }
     }
 
-    /// The side of an element of second order: a line if its midside lies in the middle.
+    /// The side of an element of second order: a straight line if the midside node lies in the middle, else a parabola.
     pub(super) fn side([a, m, b]: [Point; 3]) -> Self {
         let off = length(minus(m, [0, 1].map(|i| 0.5 * (a[i] + b[i]))));
         if off <= 1e-9 * length(minus(b, a)) {
@@ -105,7 +105,7 @@ impl Piece {
         }
     }
 
-    /// An arc whose ends are equally far from its centre, and which is less than half a circle.
+    /// An arc between `ends`; none unless both are equally far from `center` and the arc is less than half a circle.
     pub(super) fn arc(ends: [Point; 2], center: Point) -> Option<Self> {
         let [from, to] = ends.map(|end| minus(end, center));
         let (r, s) = (length(from), length(to));
@@ -142,9 +142,9 @@ impl Piece {
         })
     }
 
-    /// Points from the start of the piece to before its end, and the largest distance of straight lines between them
-    /// from it (length). `graded`: points on a straight line are closer together towards its ends, where `finest` is
-    /// their distance.
+    /// Points along the piece, without its end, and the largest distance (length) between the piece and straight lines
+    /// through the points. `finest`: the distance of points at the ends of a straight line, which grows towards its
+    /// middle; `None`: only its start.
     fn points(&self, finest: Option<f64>) -> (Vec<Point>, f64) {
         match *self {
             Piece::Line([a, b]) => {
@@ -193,7 +193,8 @@ impl Piece {
     }
 }
 
-/// Sorts pieces so that each begins where the one before ends. `None` if they do not form one chain, or there are none.
+/// Sorts pieces so that each begins where the previous one ends. `None` if they do not form one chain, or there are
+/// none.
 pub(super) fn chain(pieces: &[Piece]) -> Option<Vec<Piece>> {
     let key = |[x, y]: Point| [(x + 0.0).to_bits(), (y + 0.0).to_bits()];
     let mut starts = std::collections::BTreeMap::new();
@@ -262,8 +263,8 @@ pub(super) fn outline(pieces: &[Piece]) -> Outline {
     Outline { points, joined }
 }
 
-/// The circle that all pieces are arcs of, in the same direction: centre, radius, and whether the body, on the left, is
-/// outside of it.
+/// The circle that all pieces are arcs of, in one direction: its centre, its radius, and whether the body, on the left
+/// of the pieces, is outside the circle. `None` if there is none.
 fn circle(pieces: &[Piece]) -> Option<(Point, f64, bool)> {
     /// The relative difference of radii up to which arcs belong to one circle.
     const SAME: f64 = 1e-6;
@@ -286,9 +287,9 @@ fn circle(pieces: &[Piece]) -> Option<(Point, f64, bool)> {
     pieces.iter().all(same).then_some((center, radius, !turns))
 }
 
-/// The first intersection of the normal at a place of the body with a rigid surface, ahead of the place or at most
-/// `behind` behind it: the distance along n and the surface's own normal there, which points to the left of its
-/// direction.
+/// The intersection, nearest to `place`, of the normal `n` at a place of the body with a rigid surface through
+/// `points`, at most the distance `behind` behind the place. Returns the distance along n, and the surface's own unit
+/// normal there, which points to the left of the surface's direction.
 pub(super) fn met(points: &[Point], place: Point, n: Point, behind: f64) -> Option<(f64, Point)> {
     let t = [n[1], -n[0]];
     let hit = |pair: &[Point]| {

@@ -1,4 +1,5 @@
-//! The data of a deck as written: rows, sets, sections and materials, with their lines; and how a line is read.
+//! The data of a deck as written: rows, sets, sections and materials, with their lines. Also reads the values of a
+//! line.
 
 use std::rc::Rc;
 
@@ -7,24 +8,24 @@ use solver::error::{Reason, Violation};
 /// A name of a set, surface or material, stored once however often the deck uses it.
 pub(super) type Name = Rc<str>;
 
-/// The largest number of characters of a name; Abaqus and CalculiX allow 80. A line may be a million times as long, and
+/// The largest number of characters of a name; Abaqus and CalculiX allow 80. A line may have a million characters, and
 /// every entry of a set is compared with names.
 pub(super) const LONGEST_NAME: usize = 256;
 
-/// The largest number of names of sets and surfaces: each takes hundreds of bytes, and is compared with the whole
-/// surface of the mesh.
+/// The largest number of names of sets and surfaces: each name takes hundreds of bytes, and each set is compared with
+/// the whole surface of the mesh.
 pub(super) const MOST_NAMES: usize = 1 << 16;
 
 /// The largest number of constants of a material.
 pub(super) const MOST_CONSTANTS: usize = 10;
 
-/// The target of a set or a load.
+/// A node or element, a range of them, or a set: a member of a set, or what a load acts on.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Target {
     Label(u64),
-    /// A range: first, last, step; boxed, since labels are many and ranges few.
+    /// A range of numbers: first, last, step; boxed, since single numbers are many and ranges few.
     Range(Box<[u64; 3]>),
-    /// A set, or `INSTANCE.SET`, or `INSTANCE.7`.
+    /// The name of a set, `INSTANCE.SET`, or `INSTANCE.7`.
     Set(Name),
 }
 
@@ -43,7 +44,7 @@ pub(super) struct Elastic {
 #[derive(Clone, Debug, Default)]
 pub(super) struct MaterialDefinition {
     pub(super) elastic: Option<Elastic>,
-    /// Lines and keywords of properties that a linear elastic material does not have.
+    /// Properties that a linear elastic material does not have: their lines, and their keywords in words.
     pub(super) other: Vec<(u64, String)>,
     /// The first line of `*EXPANSION`.
     pub(super) expansion: Option<u64>,
@@ -59,8 +60,7 @@ pub(super) struct Section {
     pub(super) orientation: Option<Name>,
 }
 
-/// An orientation, `*ORIENTATION`: the angle of the first direction of the material (degrees), or the reason why it has
-/// none.
+/// An orientation, `*ORIENTATION`, which gives the angle of the material's first direction: its data lines as numbers.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Orientation {
     /// Whether the system has curved axes.
@@ -77,7 +77,7 @@ pub(super) struct Amplitude {
     pub(super) values: Vec<f64>,
 }
 
-/// A row of `*BOUNDARY`: components first … last (1: x, 2: y) have a value.
+/// A row of `*BOUNDARY` that prescribes a value of the components first … last (1: x, 2: y).
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Prescribed {
     pub(super) line: u64,
@@ -115,12 +115,12 @@ pub(super) struct Temperatures {
     pub(super) initial: Vec<(Target, f64)>,
     /// Whether some of the initial temperatures are unknown.
     pub(super) others: bool,
-    /// The first line that changes a temperature, in words.
+    /// The first line that changes a temperature, and what it changes, in words.
     pub(super) changed: Option<(u64, String)>,
 }
 
 impl Temperatures {
-    /// Whether a row leaves a temperature as it is; if that is uncertain it counts as changed.
+    /// Whether the temperature `value` of a target equals the initial one; false if that is uncertain.
     pub(super) fn is_initial(&self, target: &Target, value: f64) -> bool {
         let mut all = self.initial.iter();
         let same = all.clone().all(|(_, initial)| *initial == value);
@@ -134,8 +134,8 @@ impl Temperatures {
     }
 }
 
-/// The prescriptions that `OP=NEW` replaces. `*DLOAD` and `*DSLOAD` replace each other's pressures in CalculiX, and
-/// only their own in Abaqus: here both must be repeated.
+/// The kind of supports or loads that `OP=NEW` replaces. `*DLOAD` and `*DSLOAD` replace each other's pressures in
+/// CalculiX, and only their own in Abaqus: both must be repeated in a deck that is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Replaces {
     Supports,
@@ -154,24 +154,24 @@ pub(super) struct Replacement {
 /// A set as written.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Set {
-    /// The line that begins it.
+    /// The line of the keyword that begins the set.
     pub(super) line: u64,
     pub(super) members: Vec<Target>,
     /// Members that belong to an instance.
     pub(super) of_instances: Vec<(Name, Vec<Target>)>,
-    /// Sets of elements whose nodes belong to this set, with their instances.
+    /// Sets of elements whose nodes belong to this set, each with the name of its instance, if any.
     pub(super) of_elements: Vec<(Option<Name>, Name)>,
 }
 
 impl Set {
-    /// The number of members as written.
+    /// The number of members, where a set or range counts as one member.
     pub(super) fn written(&self) -> usize {
         let inner = self.of_instances.iter().map(|(_, members)| members.len());
         self.members.len() + inner.sum::<usize>() + self.of_elements.len()
     }
 }
 
-/// The sides of an element that belong to a surface.
+/// Which sides of an element belong to a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Sides {
     /// One side, by its number from 1.
@@ -184,10 +184,10 @@ pub(super) enum Sides {
     OfLine { left: bool },
 }
 
-/// A surface as written: sides by element or set and number.
+/// A surface as written: by element or set, which of its sides belong to the surface.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Surface {
-    /// The line that begins it.
+    /// The line of the keyword that begins the surface.
     pub(super) line: u64,
     pub(super) sides: Vec<(Target, Sides)>,
 }
@@ -225,7 +225,7 @@ pub(super) fn on_line(
     Violation::new("", reason, format!("line {line}: {got}"), expected, hint)
 }
 
-/// A list in words such as `element 3`, or `elements 3, 7, 12, 14, 20 and 31 others`.
+/// Numbers as a list in words, such as `element 3`, or `elements 3, 7, 12, 14, 20 and 31 others`.
 pub(super) fn numbered(what: &str, numbers: impl Iterator<Item = u64>) -> String {
     const MOST: usize = 5;
     let mut numbers = numbers.fuse();
@@ -255,7 +255,7 @@ pub(super) fn fields(text: &str) -> Vec<&str> {
     fields
 }
 
-/// A number, also with Fortran's exponent D.
+/// The value of a number as text, also with Fortran's exponent D; none if the text is no number.
 pub(super) fn number(word: &str) -> Option<f64> {
     let parsed = word
         .parse()

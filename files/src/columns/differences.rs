@@ -1,7 +1,8 @@
-//! Columns of numbers as differences from predictions, byte plane by byte plane.
+//! Columns of numbers as differences from predictions. The bytes of the differences are stored plane by plane.
 //!
-//! The first plane has the lowest byte of every difference, and so on. Planes that look random are stored unchanged.
-//! The others are deflated together in one stream, because small results have many short columns.
+//! The first plane has the lowest byte of every difference, the second plane the second byte, and so on. Planes that
+//! look random are stored unchanged. The others are deflated together in one stream, because small results have many
+//! short columns.
 
 use std::io::{Read, Write};
 
@@ -12,20 +13,23 @@ use super::{
     order::NodeOrder,
 };
 
-/// The kinds of content of a plane.
+/// The mark of a plane that has zeros only and is not stored.
 const ZEROS: u8 = 0;
+/// The mark of a plane whose bytes look random and are stored unchanged.
 const RANDOM: u8 = 1;
+/// The mark of a plane whose bytes are deflated.
 const DEFLATED: u8 = 2;
 
-/// The kinds of prediction of a column.
+/// The mark of a column whose values are predicted by the given predictions.
 const AS_PREDICTED: u8 = 0;
+/// The mark of a column whose values are each predicted by the value before.
 const AS_BEFORE: u8 = 1;
 
 /// A plane whose bytes have at least this many bits of information is stored unchanged: deflating it gains less than a
 /// tenth.
 const RANDOM_BITS: f64 = 7.2;
 
-/// The size above which compression speed counts more than the last per cent.
+/// The size of a stream (bytes) above which it is deflated fast rather than to the smallest size.
 const LARGE: usize = 1 << 20;
 
 /// Writes columns as bytes.
@@ -53,7 +57,7 @@ impl Writer {
         self.stream.extend(number.to_le_bytes());
     }
 
-    /// Writes whole numbers, each predicted by the one before.
+    /// Writes whole numbers, each predicted by the number before it.
     pub(super) fn whole(&mut self, values: impl Iterator<Item = i64> + Clone) {
         let before = std::iter::once(0).chain(values.clone());
         let differences: Vec<u64> = values
@@ -63,13 +67,13 @@ impl Writer {
         self.planes(&differences);
     }
 
-    /// Writes numbers, each predicted by the one before.
+    /// Writes numbers, each predicted by the number before it.
     pub(super) fn sequence(&mut self, values: &[f64]) {
         let differences = differences_in_sequence(values);
         self.planes(&differences);
     }
 
-    /// Writes numbers at nodes.
+    /// Writes numbers at nodes, predicted from numbers at other nodes.
     pub(super) fn nodal(&mut self, values: &[f64], order: &NodeOrder) {
         let difference =
             |place| difference(values[order.node(place)], order.predict(place, values));
@@ -77,7 +81,7 @@ impl Writer {
         self.planes(&differences);
     }
 
-    /// Writes numbers with their predictions, or each predicted by the one before if that is closer.
+    /// Writes numbers with the given predictions, or each predicted by the number before it if that is closer.
     pub(super) fn predicted(&mut self, values: &[f64], predicted: &[f64]) {
         let pairs = values.iter().zip(predicted);
         let own: Vec<u64> = pairs.map(|(v, p)| difference(*v, *p)).collect();
@@ -118,7 +122,8 @@ impl Writer {
         }
     }
 
-    /// The bytes, with the head of fields that have these numbers of nodes, elements and integration points.
+    /// Returns the written bytes, after the head of fields with these numbers of nodes, elements and integration
+    /// points.
     pub(super) fn finish(self, [nodes, elements, points]: [usize; 3]) -> Vec<u8> {
         let head = Head {
             nodes,
@@ -151,7 +156,7 @@ pub(super) struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// Reads the bytes after a head that was checked.
+    /// Reads the bytes that follow a checked head.
     pub(super) fn new<'a>(head: &Head, bytes: &'a [u8]) -> Result<Reader<'a>, String> {
         let (random, deflated) = bytes
             .split_at_checked(head.random)
@@ -278,22 +283,22 @@ fn differences_in_sequence(values: &[f64]) -> Vec<u64> {
         .collect()
 }
 
-/// The signed number of floating-point numbers between two.
+/// How many floating-point numbers a value lies above or below a prediction, as a number without sign.
 fn difference(value: f64, predicted: f64) -> u64 {
     folded(rank(value).wrapping_sub(rank(finite(predicted))))
 }
 
-/// The floating-point number at this difference from a prediction.
+/// The floating-point number with this [`difference`] from a prediction.
 fn moved(predicted: f64, difference: u64) -> f64 {
     ranked(rank(finite(predicted)).wrapping_add(unfolded(difference)))
 }
 
-/// The prediction, with NaN replaced, since the bits of a computed NaN differ between machines.
+/// The prediction, or 0 in place of NaN, since the bits of a computed NaN differ between machines.
 fn finite(predicted: f64) -> f64 {
     if predicted.is_nan() { 0.0 } else { predicted }
 }
 
-/// The place of a number among all floating-point numbers, in their order.
+/// The place of a number in the order of all floating-point numbers.
 fn rank(value: f64) -> i64 {
     let bits = value.to_bits() as i64;
     bits ^ (((bits >> 63) as u64) >> 1) as i64
@@ -312,7 +317,7 @@ fn unfolded(value: u64) -> i64 {
     (value >> 1) as i64 ^ -((value & 1) as i64)
 }
 
-/// The mean information (bits) in one of `total` bytes.
+/// The mean information (bits) of a byte, where `counts` says how often each byte occurs among `total` bytes.
 fn bits_of_information(counts: &[u32; 256], total: usize) -> f64 {
     let total = total as f64;
     let bits = |count: &u32| match f64::from(*count) / total {
@@ -322,7 +327,7 @@ fn bits_of_information(counts: &[u32; 256], total: usize) -> f64 {
     counts.iter().map(bits).sum()
 }
 
-/// Approximately the information (bits) that this number of random bytes has.
+/// Approximately the mean information (bits) of a byte among `count` random bytes, if they are few.
 fn most_bits(count: usize) -> f64 {
     0.9 * (count as f64).log2()
 }

@@ -1,4 +1,4 @@
-//! The head of stored fields: all sizes, and the memory that decoding takes, which are checked before any is allocated.
+//! The head of stored fields: their sizes, which are checked before memory for decoding is allocated.
 
 use solver::element::Element;
 
@@ -8,29 +8,32 @@ const VERSION: u8 = 1;
 /// Numbers for each node, element and integration point, in this order.
 type ForEach = [usize; 3];
 
-/// The smallest number of characters of JSON for each. No number is shorter than `0.0`, and each has a comma or a
-/// bracket: eight columns and a contact state for a node; a list of six nodes and an error for an element; six columns
-/// for an integration point.
+/// The smallest number of characters of JSON for each node, element and integration point. No number is shorter than
+/// `0.0`, and each has a comma or a bracket: eight columns and a contact state for a node; a list of six nodes and an
+/// error for an element; six columns for an integration point.
 const LEAST_JSON: ForEach = [8 * 4 + 2, 14 + 4, 6 * 4];
 
-/// The largest number of bytes of the planes, eight for each number. An element has the number of its nodes, eight
-/// nodes, error and material.
+/// The largest number of bytes of planes for each node, element and integration point, eight for each number. An
+/// element has the number of its nodes, up to eight nodes, error and material.
 const MOST_CONTENT: ForEach = [9 * 8, 11 * 8, 6 * 8];
 
-/// The largest number of other bytes: the law, and marks of planes.
+/// The largest number of stored bytes apart from the numbers of nodes, elements and integration points: the law, and
+/// marks of planes.
 const MOST_BESIDE: usize = 64 << 10;
 
-/// The number of bytes of the fields themselves.
+/// The number of bytes of decoded fields for each node, element and integration point.
 const FIELDS: ForEach = [8 * 8 + 1, size_of::<Element>() + 8, 6 * 8];
 
-/// The number of bytes that decoding needs in addition to fields and planes: the order of nodes and the number of
-/// elements at each, the elements by columns, differences of a column and their values.
+/// The number of bytes that decoding needs for each node, element and integration point in addition to fields and
+/// planes: the order of nodes and the number of elements at each, the elements by columns, differences of a column and
+/// their values.
 const WORKING: ForEach = [12 + 4 + 16, 48, 16];
 
-/// The number of bytes that decoding needs for any size: windows of the inflater, and tables of the master elements.
+/// The number of bytes that decoding needs whatever the sizes: windows of the inflater, and tables of the master
+/// elements.
 const WORKING_ALWAYS: usize = 256 << 10;
 
-/// The data before the planes.
+/// The sizes that precede the planes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Head {
     pub(super) nodes: usize,
@@ -39,7 +42,7 @@ pub(super) struct Head {
     pub(super) points: usize,
     /// The number of bytes that are stored unchanged.
     pub(super) random: usize,
-    /// The number of bytes that were deflated.
+    /// The number of bytes that are deflated, before deflation.
     pub(super) stream: usize,
 }
 
@@ -76,8 +79,8 @@ impl Head {
         Ok((head, rest))
     }
 
-    /// Fails if fields of these sizes cannot have so many bytes of JSON. Planes of zeros take no bytes here, so that
-    /// nothing else limits their memory: after this check it is at most six times the JSON.
+    /// Fails if fields of these sizes need more than `json_bytes` bytes of JSON. Planes of zeros take no stored bytes,
+    /// so that only this check limits the memory for decoding: after it, to at most six times `json_bytes`.
     pub(super) fn check(&self, json_bytes: usize) -> Result<(), String> {
         let content = self.random.saturating_add(self.stream);
         let most = self.sum(MOST_CONTENT).saturating_add(MOST_BESIDE);
@@ -129,7 +132,7 @@ pub(super) fn take_size(from: &mut &[u8]) -> Result<usize, String> {
     Err(damaged("a size"))
 }
 
-/// The error for bytes that are not encoded fields.
+/// The error for bytes that are not valid stored fields. `what`: what is wrong, in words.
 pub(super) fn damaged(what: &str) -> String {
     format!("stored fields are damaged: {what}")
 }

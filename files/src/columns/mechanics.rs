@@ -1,9 +1,9 @@
 //! Stresses from displacements by Hooke's law, as a prediction: thesis 2.2, and formulation 3.
 //!
-//! It repeats what the solver does for ordinary elements, in the same order of operations, with formulas of the master
-//! elements of its own (`version_1`): a change of one rounding there, or here, would make all stored fields unreadable; the test
-//! in `stored.rs` with the files of `version_1` detects that. For nearly incompressible elements the prediction is poor, which
-//! only costs space.
+//! The prediction repeats what the solver does for ordinary elements, in the same order of operations, with its own
+//! copy of the formulas of the master elements (`version_1`). A change of one rounding there, or here, would make all
+//! stored fields unreadable; the test in `stored.rs` with the files of `version_1` detects that. For nearly
+//! incompressible elements the prediction is poor, which only costs space.
 
 use solver::{
     elasticity::{COMPONENTS, Moduli, isotropic, orthotropic},
@@ -17,7 +17,7 @@ use super::version_1::{self, Place};
 /// The largest number of materials for predicting stresses; a solved problem has few.
 pub(super) const MOST_MATERIALS: usize = u8::MAX as usize;
 
-/// The data for predicting stresses.
+/// The data of a problem by which its stresses are predicted.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Law {
     /// Whether there is a hoop strain u_r / r.
@@ -81,9 +81,9 @@ pub(super) fn at_points(gauss: &GaussFields) -> [&Vec<f64>; 4] {
     ]
 }
 
-/// The predicted values.
+/// The predicted places of integration points, and the predicted stresses.
 pub(super) struct Stresses {
-    /// The integration points along x and y.
+    /// The places of the integration points, x and y.
     pub(super) points: [Vec<f64>; 2],
     /// The stresses at the integration points.
     pub(super) at_points: [Vec<f64>; COMPONENTS],
@@ -91,11 +91,11 @@ pub(super) struct Stresses {
     pub(super) at_nodes: [Vec<f64>; COMPONENTS],
 }
 
-/// Elements have the same strains if their nodes have the same places relative to the first one, within this part of
-/// their distances.
+/// Two elements have the same strains if the places of their nodes relative to the first node differ by at most this
+/// part of the element's size.
 const SAME_SHAPE: f64 = 1e-11;
 
-/// The strains at one place of an element, as linear functions of its displacements.
+/// The strains at one place of an element, as linear functions of the displacements of its nodes.
 struct Strains {
     dx: AtNodes<f64>,
     dy: AtNodes<f64>,
@@ -128,7 +128,8 @@ impl Strains {
     }
 }
 
-/// The places of a family of elements.
+/// The master element of a family: its integration points, and the points from which stresses are extrapolated to
+/// nodes.
 struct Master {
     rule: Vec<Place>,
     shapes: Vec<AtNodes<f64>>,
@@ -157,7 +158,7 @@ impl Master {
     }
 }
 
-/// The strains of the last element, which are reused for the following ones of the same shape.
+/// The strains of the last element, which are used again for following elements of the same shape.
 struct Shape {
     family: Family,
     nodes: AtNodes<[f64; 2]>,
@@ -241,7 +242,7 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// The material of each element with which its stresses are predicted best, found from the stresses themselves.
+/// The material of each element that predicts the element's stresses best, found from these stresses.
 pub(super) fn materials_by_element(fields: &Fields, law: &Law) -> Vec<u8> {
     if law.moduli.len() < 2 {
         return vec![0; fields.elements.len()];

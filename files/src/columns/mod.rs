@@ -85,11 +85,12 @@ pub fn memory_to_decode(bytes: &[u8]) -> Result<usize, String> {
     Ok(Head::read(bytes)?.0.memory())
 }
 
-/// Decodes fields, bit for bit as they were encoded. `json_bytes`, the size of their JSON, limits the memory.
+/// Decodes fields, bit for bit as they were encoded. `json_bytes`, the size of the same fields as JSON, limits the
+/// memory.
 ///
 /// # Errors
 ///
-/// The reason in words, if the bytes are not those of such fields.
+/// The reason in words, if the bytes are not encoded fields of that size.
 pub fn decode(bytes: &[u8], json_bytes: usize) -> Result<Fields, String> {
     let (head, rest) = Head::read(bytes)?;
     head.check(json_bytes)?;

@@ -2,17 +2,17 @@
 
 use solver::element::Element;
 
-/// Stands for the corners of a node that is not a midside: it is predicted from the node before it.
+/// Stands for the corners of a node that is not a midside node. Such a node is predicted from the node before it.
 const NONE: u32 = u32::MAX;
 
 /// The order of the nodes of a mesh.
 pub(super) struct NodeOrder {
-    /// Each node; a midside node with the two corners of its side.
+    /// Each node, with the two corners of its side if it is a midside node, else [`NONE`].
     nodes: Vec<(u32, [u32; 2])>,
 }
 
 impl NodeOrder {
-    /// The order for a mesh with this many nodes, which include all nodes of the elements.
+    /// The order of the nodes of a mesh. `nodes`: their number; all nodes of the elements are among them.
     pub(super) fn new(elements: &[Element], nodes: usize) -> NodeOrder {
         let mut between = vec![[NONE; 2]; nodes];
         for [a, b, middle] in elements.iter().flat_map(Element::sides) {

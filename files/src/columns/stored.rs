@@ -7,7 +7,7 @@ use solver::{elasticity::isotropic, problem::Analysis};
 use super::*;
 use mechanics::Known;
 
-/// A file in the folder of its version, with the checksum of the JSON of its fields.
+/// A stored file: its name, its bytes, and the checksum of its fields as JSON.
 type Stored = (&'static str, &'static [u8], u32);
 
 macro_rules! stored {
@@ -43,15 +43,15 @@ fn fields_stored_by_version_1_are_read_bit_for_bit() {
     }
 }
 
-/// A checksum of the exact numbers: their shortest digits differ where their bits do, also for the sign of zero.
+/// A checksum of fields as JSON: numbers with different bits, also 0 and −0, have different digits.
 fn checksum(fields: &Fields) -> u32 {
     let mut sum = Crc::new();
     sum.update(&serde_json::to_vec(fields).unwrap());
     sum.sum()
 }
 
-/// Fields of every kind are restored. With a folder in SIGNORINI_STORED_FOLDER the test also writes such files there,
-/// for a new version, and prints their checksums.
+/// Fields of every kind are decoded as they were encoded. If SIGNORINI_STORED_FOLDER names a folder, the test also
+/// writes the encoded fields there, for a new version, and prints their checksums.
 #[test]
 fn fields_of_every_kind_come_back() {
     let folder = std::env::var("SIGNORINI_STORED_FOLDER").ok();

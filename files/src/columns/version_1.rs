@@ -1,11 +1,12 @@
-//! The formulas of the master elements by which version 1 of the format predicts, bit by bit as they were when it was made.
+//! The formulas of the master elements by which version 1 of the format predicts, bit by bit as they were when that
+//! version was made.
 //!
-//! They are those of `solver::element`, copied: fields are stored as differences from these predictions, so that a change of
-//! one rounding here would make all that is stored unreadable, while the solver may change its own.
+//! The formulas are copied from `solver::element`: fields are stored as differences from these predictions, so that a
+//! change of one rounding here would make all stored fields unreadable, while the solver may change its own formulas.
 
 use solver::element::{AtNodes, Family};
 
-/// The places of integration.
+/// The integration points in master coordinates.
 pub(super) fn rule(family: Family, order: u32) -> &'static [[f64; 2]] {
     match (family, order) {
         (Family::Quad, 2) => &QUAD_2,
@@ -15,7 +16,7 @@ pub(super) fn rule(family: Family, order: u32) -> &'static [[f64; 2]] {
     }
 }
 
-/// The places from which stresses are extrapolated to the nodes.
+/// The points, in master coordinates, from which stresses are extrapolated to the nodes.
 pub(super) fn stress_points(family: Family) -> &'static [[f64; 2]] {
     rule(family, 2)
 }
@@ -25,7 +26,7 @@ const GAUSS_2: [f64; 2] = [-0.577_350_269_189_625_7, 0.577_350_269_189_625_7];
 const QUAD_3: [[f64; 2]; 9] = product(&GAUSS_3);
 const QUAD_2: [[f64; 2]; 4] = product(&GAUSS_2);
 
-/// ξ runs fastest.
+/// The points of a rule in two dimensions; ξ runs fastest.
 const fn product<const N: usize, const M: usize>(rule: &[f64; N]) -> [[f64; 2]; M] {
     let mut places = [[0.0; 2]; M];
     let mut k = 0;
@@ -57,7 +58,7 @@ const TRIANGLE_3: [[f64; 2]; 7] = {
     ]
 };
 
-/// Master coordinates of the nodes.
+/// The master coordinates of the nodes.
 pub(super) fn places(family: Family) -> &'static [[f64; 2]] {
     match family {
         Family::Quad => &QUAD,
@@ -77,7 +78,7 @@ const TRIANGLE: [[f64; 2]; 6] = [
     [0.5, 0.0], [0.5, 0.5], [0.0, 0.5],
 ];
 
-/// Weights of the stress points in the linear map to a place.
+/// The weights of the stress points in the linear map of stresses to a place (ξ, η).
 pub(super) fn from_stress_points(family: Family, [xi, eta]: [f64; 2]) -> [f64; 4] {
     match family {
         Family::Quad => {
@@ -97,7 +98,7 @@ pub(super) fn from_stress_points(family: Family, [xi, eta]: [f64; 2]) -> [f64; 4
     }
 }
 
-/// h_i(ξ, η).
+/// The shape functions h_i(ξ, η).
 #[rustfmt::skip]
 pub(super) fn shape(family: Family, [xi, eta]: [f64; 2]) -> AtNodes<f64> {
     let zeta = 1.0 - xi - eta;
@@ -119,7 +120,7 @@ pub(super) fn shape(family: Family, [xi, eta]: [f64; 2]) -> AtNodes<f64> {
     }
 }
 
-/// dh_i/dξ and dh_i/dη.
+/// The derivatives dh_i/dξ and dh_i/dη of the shape functions.
 #[rustfmt::skip]
 fn derivative(family: Family, [xi, eta]: [f64; 2]) -> AtNodes<[f64; 2]> {
     let zeta = 1.0 - xi - eta;
@@ -145,19 +146,19 @@ fn derivative(family: Family, [xi, eta]: [f64; 2]) -> AtNodes<[f64; 2]> {
     }
 }
 
-/// A place of the master element.
+/// A place of the master element, with the shape functions there.
 pub(super) struct Place {
     nodes: usize,
     shape: AtNodes<f64>,
     derivative: AtNodes<[f64; 2]>,
 }
 
-/// A place in an element.
+/// A place in an element, with the shape functions there.
 pub(super) struct Mapped {
     pub(super) shape: AtNodes<f64>,
-    /// dh_i/dx and dh_i/dy.
+    /// The derivatives dh_i/dx and dh_i/dy of the shape functions.
     pub(super) gradient: AtNodes<[f64; 2]>,
-    /// First coordinate: x, or the radius.
+    /// The first coordinate of the place: x, or the radius.
     pub(super) x: f64,
 }
 

@@ -1,16 +1,16 @@
-//! The range of an axis, the parts of curves within it, and its numbers.
+//! The range of an axis, the parts of curves within that range, and the axis's numbers.
 
 use std::ops::Range;
 
 /// The largest number of decades of a logarithmic axis, from the largest value down.
 const DECADES: f64 = 18.0;
-/// A stress is drawn up to this many times the value that half of the contact stays below; a higher peak is cut off and
-/// marked.
+/// The largest stress on an axis, as a multiple of the stress that half of the contact stays below; a higher peak is
+/// cut off and marked.
 pub(super) const CUT: f64 = 6.0;
 
 /// The range of an axis for stresses: from the smallest to the largest, including zero, but at most `cut` times the
-/// value that half of the length stays below. This is judged by length, not by points: a mesh has most of its points at
-/// the peak.
+/// stress that half of the length under stress stays below. Shares are measured by length and not by points, since a
+/// mesh has most of its points at the peak.
 pub(super) fn limits(curves: &[&[(f64, f64)]], cut: f64) -> Range<f64> {
     let mut parts: Vec<(f64, f64)> = Vec::new(); // value, length
     for points in curves {
@@ -49,7 +49,7 @@ pub(super) fn limits(curves: &[&[(f64, f64)]], cut: f64) -> Range<f64> {
     }
 }
 
-/// The value that a share of the length stays below.
+/// The value below which a share (0 … 1) of the total length lies. `parts`: values with their lengths.
 fn quantile(mut parts: Vec<(f64, f64)>, share: f64) -> Option<f64> {
     parts.sort_by(|a, b| a.0.total_cmp(&b.0));
     let whole: f64 = parts.iter().map(|p| p.1).sum();
@@ -61,7 +61,7 @@ fn quantile(mut parts: Vec<(f64, f64)>, share: f64) -> Option<f64> {
     reached.or(parts.last()).map(|part| part.0)
 }
 
-/// The parts of a curve within the range of an axis, each ending where the curve leaves it.
+/// The parts of a curve within the range `up` of the vertical axis; each ends where the curve leaves the range.
 pub fn within(points: &[(f64, f64)], up: &Range<f64>) -> Vec<Vec<(f64, f64)>> {
     let inside = |y: f64| up.start <= y && y <= up.end;
     let mut parts: Vec<Vec<(f64, f64)>> = Vec::new();
@@ -94,8 +94,8 @@ pub fn within(points: &[(f64, f64)], up: &Range<f64>) -> Vec<Vec<(f64, f64)>> {
     parts
 }
 
-/// The farthest points of a curve beyond the axis, one for each time that it leaves: x, the value, and whether it
-/// leaves at the top.
+/// The farthest point of a curve beyond the range `up` of the vertical axis each time that the curve leaves it: x, the
+/// value, and whether the curve leaves at the top.
 pub(super) fn peaks(points: &[(f64, f64)], up: &Range<f64>) -> Vec<(f64, f64, bool)> {
     let mut found: Vec<(f64, f64, bool)> = Vec::new();
     let mut before = None;
@@ -117,8 +117,8 @@ pub(super) fn peaks(points: &[(f64, f64)], up: &Range<f64>) -> Vec<(f64, f64, bo
     found
 }
 
-/// The peak that a figure names: x, the value, and whether it is at the top. Of peaks beyond the axis it is the
-/// largest; if there are none, the largest of the curves, provided that there is a remark about it.
+/// The peak that a figure names: x, the value, and whether the peak is at the top. It is the largest peak beyond the
+/// axis; if there is none, the largest point of the curves, provided that there is a remark (`of_peak`) about it.
 pub(super) fn named_peak(
     curves: &[&[(f64, f64)]],
     up: &Range<f64>,
@@ -140,7 +140,7 @@ pub(super) fn named_peak(
     Some((peak.0, peak.1, peak.1 > 0.0))
 }
 
-/// The value at a place, linear between points whose first coordinate rises.
+/// The value of a curve at `at`, linear between its points, whose first coordinate rises.
 pub(super) fn interpolated(
     points: impl Iterator<Item = (f64, f64)> + Clone,
     at: f64,
@@ -152,7 +152,7 @@ pub(super) fn interpolated(
     })
 }
 
-/// The place on the first axis where the second has a value.
+/// The place on the first axis where the second axis has a value. `places`: pairs of values on both axes.
 pub(super) fn place_of(places: &[(f64, f64)], value: f64) -> Option<f64> {
     let turned = places.iter().map(|&(s, c)| (c, s));
     if places.first()?.1 <= places.last()?.1 {
@@ -162,7 +162,7 @@ pub(super) fn place_of(places: &[(f64, f64)], value: f64) -> Option<f64> {
     }
 }
 
-/// The number of ticks: as many as there are whole numbers, and no more than fit.
+/// The number of ticks of an axis over whole numbers: one for each whole number, but no more than fit.
 pub(super) fn ticks(range: &Range<f64>) -> usize {
     ((range.end - range.start) as usize + 1).clamp(2, 12)
 }

@@ -11,12 +11,13 @@ use super::style::Style;
 use super::theme::{ColourMap, hex};
 use solver::element::{Element, Family};
 
-/// The largest number of bands; there are at least about half as many.
+/// The largest number of bands; round limits make at least about half as many.
 const BANDS: f64 = 14.0;
-/// The side of the cells that an element is divided into (pixels), and the most cells along a side.
+/// The side of the cells that an element is divided into (pixels).
 const CELL: f64 = 6.0;
+/// The largest number of cells along a side of an element.
 const MOST_CELLS: usize = 16;
-/// An element smaller than this is drawn in one colour (pixels).
+/// The size of an element (pixels) below which it is drawn in one colour.
 const SPECK: f64 = 1.5;
 
 /// The height of the colour bar with its numbers and name (pixels).
@@ -25,7 +26,7 @@ pub(super) const BAR: i32 = 76;
 /// Bands of values between round numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Bands {
-    /// The limits, one more than bands.
+    /// The limits between bands, from the lowest to the highest: one more than bands.
     edges: Vec<f64>,
     /// The extremes of the field, if they are beyond the first and the last limit.
     beyond: [Option<f64>; 2],
@@ -33,10 +34,10 @@ pub(super) struct Bands {
 }
 
 impl Bands {
-    /// The bands for values at nodes. `near`: value and area of the nodes in the last window. At a sharp edge a few
-    /// nodes may exceed all others, and their values do not converge: then the bands end half their width beyond the
-    /// values of 97 % of that area, and the bar shows the extremes of the field. A field of both signs has colours that
-    /// differ by the sign.
+    /// The bands for values at nodes. `near`: value and area of each node in the last window. At a sharp edge a few
+    /// nodes may exceed all others, and their values do not converge: the bands then extend beyond the 3rd and the 97th
+    /// percentile of values (by area) by half of their difference, and the bar shows the extremes. A field with values
+    /// of both signs has colours that differ by sign.
     pub(super) fn of(values: &[f64], mut near: Vec<(f64, f64)>) -> Bands {
         let extreme = |pick: fn(f64, f64) -> f64| values.iter().copied().reduce(pick);
         let least = extreme(f64::min).unwrap_or(0.0);
@@ -95,7 +96,7 @@ impl Bands {
         self.edges.len() - 1
     }
 
-    /// The band of a value; values beyond all limits belong to the first or the last band.
+    /// The number of the band of a value; a value beyond all limits belongs to the first or the last band.
     fn band(&self, value: f64) -> usize {
         let above = self.edges.partition_point(|edge| *edge <= value);
         above.saturating_sub(1).min(self.count() - 1)
@@ -188,7 +189,7 @@ impl Bands {
         }
     }
 
-    /// Adds a convex cell to the paths, divided at the limits of its bands.
+    /// Adds a convex cell to the paths of the bands, divided at their limits.
     fn fill_cell(&self, paths: &mut [Path], cell: &[Corner]) {
         let bands = cell.iter().map(|corner| self.band(corner.value));
         let (low, high) = bands.fold((usize::MAX, 0), |(l, h), b| (l.min(b), h.max(b)));
@@ -269,7 +270,7 @@ impl Bands {
     }
 }
 
-/// A corner of a cell.
+/// A corner of a cell: its place in the figure, and the value there.
 #[derive(Clone, Copy, Debug)]
 struct Corner {
     place: [f64; 2],

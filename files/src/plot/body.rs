@@ -1,5 +1,5 @@
-//! Draws bodies between axes of equal scale. The content is written as paths: they are clipped, have the parabolas of
-//! the sides of elements, and one path may contain thousands of shapes.
+//! Draws bodies between axes of equal scale. The content is written as SVG paths: these are clipped, have the parabolas
+//! of the sides of elements, and one path may contain thousands of shapes.
 
 use std::fmt::Write;
 
@@ -13,16 +13,21 @@ use super::theme::hex;
 use solver::element::Element;
 use solver::mesh::runs;
 
-/// The space around the axes (pixels): numbers and names left and below, a caption above.
+/// The space left of the names of vertical axes (pixels).
 const EDGE: i32 = 4;
+/// The space left of the axes, for names and numbers (pixels).
 const LEFT: i32 = 84;
+/// The space right of the axes (pixels).
 const RIGHT: i32 = 16;
+/// The space below the axes, for numbers and names (pixels).
 const BELOW: i32 = 46;
+/// The space below a body with its numbers and names (pixels).
 const GAP: i32 = 12;
+/// The height of the caption above the axes (pixels).
 const CAPTION: i32 = 26;
-/// A page narrower than this has no room for two windows beside one another (pixels).
+/// The width (pixels) below which a page has no room for two windows side by side.
 const NARROW: i32 = 640;
-/// The largest height of the axes (pixels): one above the other, and side by side.
+/// The largest height of the axes (pixels): if windows are one above the other, and if they are side by side.
 const HIGHEST: [f64; 2] = [430.0, 420.0];
 
 /// A rectangle of the plane of the body.
@@ -54,7 +59,7 @@ impl Window {
         self.size()[0].max(self.size()[1])
     }
 
-    /// The smallest window around two windows.
+    /// The smallest window around this window and another.
     pub(super) fn with(&self, other: &Window) -> Window {
         Window {
             low: [0, 1].map(|a| self.low[a].min(other.low[a])),
@@ -66,7 +71,7 @@ impl Window {
         (0..2).all(|a| self.low[a] <= point[a] && point[a] <= self.high[a])
     }
 
-    /// The window enlarged by a margin, as a part of its larger side.
+    /// The window enlarged on all sides by `part` times its larger side.
     pub(super) fn grown(&self, part: f64) -> Window {
         let by = part * self.largest();
         Window {
@@ -76,7 +81,7 @@ impl Window {
     }
 }
 
-/// A square window of that side around a small one, as far as possible between the corners of `within`.
+/// A square window with sides of length `side` around the middle of a small window, as far as possible inside `within`.
 pub(super) fn square(around: &Window, side: f64, within: &Window) -> Window {
     let low = [0, 1].map(|a| {
         let middle = 0.5 * (around.low[a] + around.high[a]);
@@ -95,13 +100,15 @@ pub(super) fn square(around: &Window, side: f64, within: &Window) -> Window {
 #[derive(Clone, Debug)]
 pub(super) struct Frame {
     pub(super) window: Window,
-    /// The upper left corner below the title, and the size, in the units of the drawing.
+    /// The upper left corner, measured from below the title, in the units of the drawing.
     corner: [i32; 2],
+    /// The width and the height, in the units of the drawing.
     size: [i32; 2],
 }
 
 impl Frame {
-    /// A place of the body as a distance from the corner of the axes, in the units of the drawing.
+    /// Converts a place of the body to a place in the frame, measured from its upper left corner in the units of the
+    /// drawing.
     pub(super) fn at(&self, point: [f64; 2]) -> [f64; 2] {
         let part = |a: usize| (point[a] - self.window.low[a]) / self.window.size()[a];
         [
@@ -110,14 +117,15 @@ impl Frame {
         ]
     }
 
-    /// Whether something between two corners (given as by `at`) is visible.
+    /// Whether some of the rectangle between two corners is visible; the corners are places as [`at`](Self::at) gives
+    /// them.
     pub(super) fn shows(&self, low: [f64; 2], high: [f64; 2]) -> bool {
         (0..2).all(|a| high[a] >= 0.0 && low[a] <= f64::from(self.size[a]))
     }
 }
 
-/// The frames for one window or two, and their height (pixels). Two are side by side, but one below the other where the
-/// first is wide or the page narrow.
+/// The frames for one or two windows, and their total height (pixels). Two frames are side by side, but one below the
+/// other if the first window is wide or the page narrow.
 pub(super) fn layout(style: Style, windows: &[Window]) -> (Vec<Frame>, i32) {
     let wide = |w: &Window| w.size()[0] > 1.7 * w.size()[1];
     let beside = windows.len() > 1 && !wide(&windows[0]) && style.width() >= NARROW;
@@ -197,7 +205,7 @@ pub(super) fn axes(
     draw_text(area, style, caption, corner)
 }
 
-/// The SVG of the content of the axes, clipped, in a border, to be put on top of the page.
+/// The SVG of `content` inside a frame, clipped and with a border, to be put on top of the page.
 pub(super) fn inside(style: Style, frame: &Frame, content: &str) -> String {
     let ([x, y], [w, h]) = (frame.corner, frame.size);
     let (place, border) = (
@@ -217,7 +225,7 @@ pub(super) fn inside(style: Style, frame: &Frame, content: &str) -> String {
 pub(super) struct Path(pub(super) String);
 
 impl Path {
-    /// Adds a closed polygon; nothing if it is only a point.
+    /// Adds a closed polygon, unless it is only a point in the drawing.
     pub(super) fn polygon(&mut self, points: &[[f64; 2]]) {
         let points: Vec<[i64; 2]> = points.iter().map(|p| p.map(round)).collect();
         let Some((first, rest)) = points.split_first() else {
@@ -270,7 +278,7 @@ impl Path {
         }
     }
 
-    /// The SVG element of the path with these attributes; empty if the path is empty.
+    /// The SVG element of the path, with these attributes; empty if the path is empty.
     pub(super) fn drawn(&self, attributes: &str) -> String {
         if self.0.is_empty() {
             String::new()
@@ -280,12 +288,12 @@ impl Path {
     }
 }
 
-/// Limits coordinates far outside of the page: some viewers fail on large numbers.
+/// Rounds a coordinate, and limits it if it is far outside the page: some viewers fail on large numbers.
 fn round(x: f64) -> i64 {
     x.clamp(-1e6, 1e6).round() as i64
 }
 
-/// Every side of the mesh once, and those on the surface.
+/// The sides of the elements of a mesh, each once, and the sides on the surface.
 pub(super) struct Sides {
     pub(super) all: Vec<[u32; 3]>,
     pub(super) surface: Vec<[u32; 3]>,

@@ -1,4 +1,4 @@
-//! The texts above and below a figure: title, parameters that distinguish the figures of a study, verdict, warnings.
+//! The texts above and below a figure: title, parameters, verdict and warnings.
 
 use std::collections::BTreeSet;
 
@@ -41,7 +41,7 @@ impl Mark {
 }
 
 impl Caption {
-    /// The caption for a problem: its title, or else `default`, and its laws of friction.
+    /// The caption for a problem: its title, or `default` if it has none, and the parameters of its laws of friction.
     pub fn of_problem(problem: &Problem, default: &str) -> Caption {
         let title = problem.title.as_deref().unwrap_or(default);
         let several = problem.contacts.len() > 1;

@@ -7,7 +7,7 @@ use solver::error::shortened;
 use solver::problem::Problem;
 use solver::solution::Iteration;
 
-/// Draws every residual on a logarithmic axis with the tolerance above, the contact set below, against the number of
+/// Draws all residuals and the tolerance on a logarithmic axis, and below them the contact set, against the number of
 /// the iteration; vertical lines mark the start of load steps.
 ///
 /// # Errors
@@ -92,7 +92,7 @@ pub fn convergence_svg(
     )
 }
 
-/// The places where load steps begin, each between two iterations, with the step's name.
+/// The places on the axis of iterations where load steps begin, with the steps' names.
 fn steps(problem: &Problem, history: &[Iteration], named: bool) -> Vec<(f64, String)> {
     let mut marks = Vec::new();
     if problem.steps.len() < 2 {

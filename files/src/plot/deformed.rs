@@ -16,12 +16,13 @@ use crate::stress::von_mises;
 use solver::problem::{Analysis, Condition, Problem};
 use solver::solution::{ContactProfile, Fields, NodeState};
 
-/// The largest displacement is drawn as this part of the size of the body, or of the window at the contact.
+/// The largest displacement in the figure, as a part of the size of the body, or of the window at the contact.
 const VISIBLE: f64 = 0.1;
-/// A contact below this part of the body gets a window of its own, twice its size.
+/// The size of a contact, as a part of the body's size, below which it gets a window of its own, twice as large.
 const SMALL: f64 = 0.2;
-/// The height of the legend and the width of the line along the contact (pixels).
+/// The height of the legend (pixels).
 const LEGEND: i32 = 24;
+/// The width of the line along the contact (pixels).
 const LINE: i32 = 4;
 
 impl Stress {
@@ -54,9 +55,9 @@ impl Stress {
     }
 }
 
-/// Draws the deformed body with contours of a stress and its undeformed outline, the obstacle on it, and the contact in
-/// the colours of stick and slip; a second panel shows the contact where it is small. Displacements are scaled so that
-/// they are visible, and each panel shows the factor.
+/// Draws the deformed body with contours of a stress, its undeformed outline, the obstacle, and the contact in the
+/// colours of stick and slip; a small contact has a second panel. Displacements are scaled so that they are visible,
+/// and each panel shows the factor.
 ///
 /// # Errors
 ///
@@ -138,14 +139,14 @@ pub fn deformed_svg(
     })
 }
 
-/// A contact boundary, by the nodes of its profile that the body has.
+/// A contact boundary, by the nodes of its profile that are found in the body.
 struct Surface<'a> {
     profile: &'a ContactProfile,
-    /// The rows of the profile with their nodes.
+    /// The row of each node in the profile, and the node.
     nodes: Vec<(usize, u32)>,
     /// Whether there is an obstacle, rather than only prescribed friction.
     faces: bool,
-    /// Whether its states are stick and slip.
+    /// Whether the contact has friction, so that its states are stick and slip.
     rough: bool,
 }
 
@@ -165,7 +166,7 @@ impl Surface<'_> {
         Face::after(&surface)
     }
 
-    /// The surface in contact, drawn in the colours of its states.
+    /// The SVG of the part of the boundary that is in contact, in the colours of stick and slip.
     fn states(&self, body: &Body<'_>, style: Style, frame: &Frame, factor: f64) -> String {
         let nodes: Vec<([f64; 2], NodeState)> = self
             .nodes
@@ -199,7 +200,7 @@ impl Surface<'_> {
     }
 }
 
-/// The states that have a colour of their own; without friction there is only one for contact.
+/// The states of nodes that are drawn in a colour, with their colours; without friction one colour for contact.
 fn looks(style: Style, rough: bool) -> Vec<(&'static [NodeState], RGBColor)> {
     let palette = style.palette();
     if rough {
@@ -261,8 +262,8 @@ fn draw_legend(
     Ok(())
 }
 
-/// The factor on displacements (1, 2 or 5 times a power of ten) that makes the largest one about `wanted`; 1 if that is
-/// close enough.
+/// The factor on displacements (1, 2 or 5 times a power of ten) with which the largest displacement is about `wanted`;
+/// 1 if that is close enough.
 fn visible(wanted: f64, largest: f64) -> f64 {
     let factor = wanted / largest;
     if !factor.is_normal() || (0.25..2.0).contains(&factor) {
@@ -278,7 +279,7 @@ struct Body<'a> {
 }
 
 impl Body<'_> {
-    /// Checks the lengths of columns: fields may come from a file or a store.
+    /// Checks the lengths of the columns of fields, which may come from a file or a store.
     fn check(&self) -> Result<(), String> {
         let f = self.fields;
         let nodes = f.x.len();
@@ -302,7 +303,7 @@ impl Body<'_> {
         self.fields.ux[node as usize].hypot(self.fields.uy[node as usize])
     }
 
-    /// The part of the body's area that belongs to each node: equal parts of its elements.
+    /// The part of the body's area that belongs to each node: every element is shared equally by its nodes.
     fn areas(&self) -> Vec<f64> {
         let mut areas = vec![0.0; self.fields.x.len()];
         for element in &self.fields.elements {
@@ -320,7 +321,7 @@ impl Body<'_> {
         areas
     }
 
-    /// The contact boundaries. The nodes of profiles are recognised by their positions.
+    /// The contact boundaries. Nodes of their profiles are recognised by position.
     fn surfaces<'b>(
         &self,
         problem: &Problem,
@@ -347,7 +348,7 @@ impl Body<'_> {
         profiles.iter().map(surface).collect()
     }
 
-    /// The nodes in contact, with a neighbour on each side, so that one node has an extent too.
+    /// The nodes in contact, and their neighbours on the boundary, so that a contact of one node has an extent too.
     fn contact(&self, surfaces: &[Surface<'_>]) -> Vec<u32> {
         let mut found = BTreeSet::new();
         for surface in surfaces {
@@ -368,7 +369,8 @@ impl Body<'_> {
         found.into_iter().collect()
     }
 
-    /// A square window around the contact, twice its size, as far as possible inside the body.
+    /// A square window around the contact, about twice its size, and the factor on displacements in it. The window is
+    /// as far as possible inside the body.
     fn near(&self, contact: &[u32], touching: &Window, whole: &Window) -> (Window, f64) {
         let side = (2.0 * touching.largest()).max(0.002 * whole.largest());
         let largest = contact.iter().map(|&n| self.moved(n)).fold(0.0, f64::max);

@@ -21,21 +21,25 @@ use super::theme::Palette;
 const PANEL: i32 = 198;
 /// The height of one line of the legend above a panel (pixels).
 const LEGEND: i32 = 22;
-/// The space above and below the axes (pixels): a margin; numbers, and the name of the axis.
+/// The space below a panel, and between its legend and its axes (pixels).
 const MARGIN: i32 = 8;
+/// The height of the numbers below the axes (pixels).
 const NUMBERS: i32 = 26;
+/// The height of the name of a horizontal axis (pixels).
 const NAME: i32 = 24;
-/// The space left of the names of axes, and of the axes (pixels).
+/// The space left of the names of vertical axes (pixels).
 const EDGE: i32 = 4;
+/// The space left of the axes, for names and numbers (pixels).
 const LEFT: i32 = 92;
+/// The space right of the axes (pixels).
 const RIGHT: i32 = 20;
 
-/// The style of a curve.
+/// The style in which a curve is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LineStyle {
-    /// A line in one of six colours, counted from 0.
+    /// A line in one of six colours, given by its number from 0.
     Line(usize),
-    /// A line with a mark at every value: a circle or a square, alternating with the colour.
+    /// A line in one of six colours with a mark at every value: a circle or a square, alternating with the colour.
     Marked(usize),
     /// A thin grey line, for a reference.
     Reference,
@@ -50,9 +54,9 @@ pub enum LineStyle {
 /// One curve.
 #[derive(Clone, Debug)]
 pub struct Curve {
-    /// The name in the legend; empty: no entry.
+    /// The name in the legend; if it is empty, the legend has no entry for the curve.
     pub label: String,
-    /// The style of its line.
+    /// The style of the curve.
     pub style: LineStyle,
     /// The points in order of x.
     pub points: Vec<(f64, f64)>,
@@ -61,7 +65,7 @@ pub struct Curve {
 /// The scale of the vertical axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scale {
-    /// Linear; a peak far beyond all else is cut off and marked, since nothing else would be visible.
+    /// Linear; a peak far beyond the other values, which would make them invisible, is cut off and marked.
     #[default]
     Peaked,
     /// Linear.
@@ -73,7 +77,7 @@ pub enum Scale {
 }
 
 impl Scale {
-    /// Whether the axes are over whole numbers.
+    /// Whether the axis is over whole numbers.
     fn is_whole(self) -> bool {
         matches!(self, Scale::Count | Scale::Log)
     }
@@ -84,7 +88,7 @@ impl Scale {
 pub struct Shade {
     /// The meaning of the colour.
     pub kind: ShadeKind,
-    /// The start and end of the part.
+    /// The start and end of the part, on the x axis.
     pub extent: [f64; 2],
 }
 
@@ -93,7 +97,7 @@ pub struct Shade {
 pub enum ShadeKind {
     /// Contact that sticks.
     Stick,
-    /// Contact that slips; hatched, so that the two differ also in grey.
+    /// Contact that slips; hatched, so that stick and slip differ also in grey.
     Slip,
 }
 
@@ -118,14 +122,14 @@ impl ShadeKind {
 pub struct Above {
     /// The name of the axis.
     pub name: String,
-    /// Pairs of values on the axis below and on this one, both monotone.
+    /// Pairs of values on the panel's x axis and on this axis, both monotone.
     pub places: Vec<(f64, f64)>,
 }
 
-/// One pair of axes.
+/// A pair of axes with curves.
 #[derive(Clone, Debug, Default)]
 pub struct Panel {
-    /// The name of the x axis; empty: numbers only, since the panel below has the same axis.
+    /// The name of the x axis; empty if the panel below has the same axis, so that numbers are enough.
     pub x: String,
     /// Name of the y axis.
     pub y: String,
@@ -137,9 +141,9 @@ pub struct Panel {
     pub marks: Vec<(f64, String)>,
     /// Shaded parts behind the curves; the legend names them if no curve has a name.
     pub shades: Vec<Shade>,
-    /// A second axis for another coordinate along x.
+    /// A second horizontal axis, above the panel, for another coordinate along x.
     pub above: Option<Above>,
-    /// A remark about the largest peak, after its value; empty: only a peak that is cut off is named.
+    /// A remark about the largest peak, written after its value. If it is empty, only a peak that is cut off is named.
     pub of_peak: String,
 }
 
@@ -224,7 +228,7 @@ fn draw_panel(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
     legend(&head, style, panel)
 }
 
-/// The points of a curve that its axis can show, on that axis.
+/// The points of a curve that a vertical axis can show, as places on that axis.
 fn shown(scale: Scale, curve: &Curve) -> Vec<(f64, f64)> {
     let points = curve.points.iter().copied();
     match scale {
@@ -236,7 +240,7 @@ fn shown(scale: Scale, curve: &Curve) -> Vec<(f64, f64)> {
     }
 }
 
-/// The axes of a panel, and what is drawn on them. Places are in the units of the drawing.
+/// The axes of a panel, which also draw its content. Places are in the units of the drawing.
 struct Axes<'a, 'b> {
     area: &'a Area<'b>,
     style: Style,
@@ -347,7 +351,7 @@ impl<'a, 'b> Axes<'a, 'b> {
         Ok(())
     }
 
-    /// Draws vertical lines, each with its word where there is room.
+    /// Draws vertical lines, with the word of each where there is room.
     fn draw_marks(&mut self, marks: &[(f64, String)]) -> Fallible<()> {
         let Range { start, end: top } = self.up;
         let thin = self.palette.faint.stroke_width(px(1) as u32);
@@ -403,8 +407,8 @@ impl<'a, 'b> Axes<'a, 'b> {
         Ok(())
     }
 
-    /// Draws two strokes through the axis wherever a curve leaves the panel, and the value of the largest peak; a peak
-    /// that is not cut off is also named if there is a remark about it.
+    /// Draws two strokes through the axis wherever a curve leaves the panel, and the value of the largest peak. A peak
+    /// that is not cut off is named only if the panel has a remark about it.
     fn draw_cuts(&self, panel: &Panel) -> Fallible<()> {
         let (area, up, palette) = (self.area, &self.up, &self.palette);
         let edge = |over: bool| if over { self.top } else { self.bottom };
@@ -445,7 +449,7 @@ impl<'a, 'b> Axes<'a, 'b> {
         Ok(())
     }
 
-    /// Draws the second axis.
+    /// Draws the second horizontal axis, above the panel.
     fn draw_above(&self, above: &Above, fit: usize) -> Fallible<()> {
         let (area, top) = (self.area, self.top);
         let axis = self.palette.axis.stroke_width(px(1) as u32);
@@ -478,7 +482,7 @@ impl<'a, 'b> Axes<'a, 'b> {
     }
 }
 
-/// Fills a rectangle as the shaded parts of the axis.
+/// Fills a rectangle like a shaded part of the axis.
 fn fill(
     area: &Area<'_>,
     place: [(i32, i32); 2],
@@ -527,7 +531,7 @@ fn deciding(panel: &Panel) -> Vec<&[(f64, f64)]> {
     curves.map(|curve| &curve.points[..]).collect()
 }
 
-/// The range of the vertical axis; for a logarithmic one in exponents.
+/// The range of the vertical axis of a panel; for a logarithmic axis in exponents of ten.
 fn up(panel: &Panel) -> Range<f64> {
     let values = || {
         panel
@@ -568,7 +572,7 @@ fn stroke(palette: &Palette, style: LineStyle) -> ShapeStyle {
     }
 }
 
-/// The mark of a value: a circle or a square.
+/// The mark of a value: a circle or a square, by the number `k` of the colour.
 fn dot((x, y): (i32, i32), k: usize, line: ShapeStyle) -> Polygon<(i32, i32)> {
     let size = 2.7 * f64::from(px(1));
     let corners: Vec<(i32, i32)> = match k % 2 {
@@ -622,13 +626,13 @@ fn places(style: Style, entries: &[Entry<'_>]) -> Vec<LegendPlace> {
     page::legend_places(style, LEFT, 14, entries.iter().map(Entry::words))
 }
 
-/// The number of lines of the legend.
+/// The number of lines of the legend of a panel.
 fn rows(style: Style, panel: &Panel) -> i32 {
     let places = places(style, &entries(panel));
     places.last().map_or(0, |place| place.row + 1)
 }
 
-/// Draws samples of the curves, above the panel so that they cover no curve.
+/// Draws the legend: samples of the curves with their names, above the panel so that the legend covers no curve.
 fn legend(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
     let palette = style.palette();
     let entries = entries(panel);

@@ -21,27 +21,30 @@ use crate::external::external_mesh;
 
 /// The height of one line of the legend (pixels).
 const LEGEND: i32 = 22;
+/// The space left of the legend (pixels).
 const LEFT: i32 = 84;
-/// The distance at which boundaries are marked outside the body, with an additional step for each further one on the
-/// same side, and their width (pixels): the elements at a graded edge stay visible.
+/// The distance of a boundary's line from the body, and between the lines of boundaries with a common side (pixels): the
+/// elements at a graded edge stay visible.
 const OUTSIDE: f64 = 3.5;
+/// The width of a boundary's line (pixels).
 const WIDE: f64 = 2.0;
-/// The largest number of boundaries side by side; further ones are drawn over the last.
+/// The largest number of boundaries that are drawn side by side; further boundaries are drawn over the last.
 const BESIDE: usize = 3;
-/// With more elements than this only the outline is drawn: the lines would cover the body, and viewers refuse files of
-/// some ten megabytes.
+/// The number of elements above which only the outline is drawn: the lines would cover the body, and viewers refuse
+/// files of some ten megabytes.
 const DRAWN: usize = 30_000;
-/// The largest number of boundaries that are named.
+/// The largest number of boundaries that are drawn and named in the legend.
 const MOST: usize = 12;
-/// The distance up to which the obstacle is in the picture, as a part of the body's size.
+/// The distance from the body up to which obstacles are in the picture, as a part of the body's size.
 const NEAR: f64 = 0.12;
-/// A contact below this part of the body has a window of its own, of at least this size.
+/// A contact whose size is below this part of the body's size is drawn in a window of its own, too.
 const SMALL: f64 = 0.2;
+/// The smallest size of a window for a small contact, as a part of the body's size.
 const CLOSE: f64 = 0.1;
 
 /// Draws the elements between equal axes, each named boundary in a colour of its own, and the obstacles before they are
-/// pushed; a small contact has a panel of its own. The elements are those of `fields`, which adaptive refinement makes,
-/// or without them those of the problem.
+/// pushed; a small contact has a panel of its own. The elements are those of `fields`, where adaptive refinement has
+/// changed them; if `fields` has none, those of the problem.
 ///
 /// # Errors
 ///
@@ -120,7 +123,7 @@ pub fn mesh_svg(
     })
 }
 
-/// The windows of the figure: the whole body with the obstacles near it, and a small contact.
+/// The windows of the figure: the whole body with the obstacles near it, and a window at the contact if that is small.
 fn windows(model: &Model, nodes: &[[f64; 2]], faces: &[Face]) -> Option<Vec<Window>> {
     let body = Window::around(nodes.iter().copied())?;
     let reach = body.grown(NEAR);
@@ -138,7 +141,7 @@ struct Drawing<'a> {
     elements: &'a [Element],
     nodes: &'a [[f64; 2]],
     sides: Sides,
-    /// Whether there are too many elements to draw each.
+    /// Whether only the outline is drawn, since there are too many elements.
     is_outline: bool,
 }
 
@@ -152,7 +155,7 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    /// What of it is in a window, as SVG.
+    /// The SVG of the elements, or of the outline, that a frame shows.
     fn content(&self, style: Style, frame: &Frame) -> String {
         let on_page = |side: &[u32; 3]| side.map(|n| frame.at(self.nodes[n as usize]));
         let visible = |side: &[[f64; 2]; 3]| {
@@ -189,7 +192,7 @@ impl<'a> Drawing<'a> {
     }
 }
 
-/// The sample before the label of an entry.
+/// The sample before the label of an entry of the legend.
 enum Sample {
     /// The line of a boundary, by its number.
     Boundary(usize),
@@ -239,8 +242,8 @@ fn entries(problem: &Problem, names: &[String], has_obstacle: bool) -> Vec<(Stri
     entries
 }
 
-/// The window around the nodes that the obstacles are pushed to, or that are nearest to them, if those are a small part
-/// of the body; and the side of a window for them.
+/// A window around the nodes that the obstacles are pushed to, or that are nearest to the obstacles, and the side of a
+/// window for them; none unless these nodes are a small part of the body.
 fn at_contact(model: &Model, body: &Window) -> Option<(Window, f64)> {
     let mut reached = Vec::new();
     for contact in &model.contacts {
@@ -255,7 +258,7 @@ fn at_contact(model: &Model, body: &Window) -> Option<(Window, f64)> {
     small.then(|| (around, (2.0 * around.largest()).max(CLOSE * body.largest())))
 }
 
-/// Draws the boundaries, outside the body.
+/// The SVG of lines along the named boundaries, outside the body.
 fn marks(style: Style, frame: &Frame, mesh: &Mesh, own: &Sides, names: &[String]) -> String {
     let palette = style.palette();
     // each side of the surface as its element goes round, by its midside node
@@ -300,7 +303,7 @@ fn marks(style: Style, frame: &Frame, mesh: &Mesh, own: &Sides, names: &[String]
     drawn
 }
 
-/// First the boundaries that the mesh has by itself, then those that name parts of them.
+/// Sorts the names of boundaries: first those of the mesh itself, then those that the problem defines.
 fn in_order(problem: &Problem, mut names: Vec<String>) -> Vec<String> {
     names.sort_by_key(|name| problem.mesh.boundaries.contains_key(name));
     names

@@ -64,13 +64,13 @@ impl Plot {
     /// All kinds of figures.
     pub const ALL: &[Plot] = Plot::VARIANTS;
 
-    /// The figure's name in paths and file names.
+    /// The name of the figure in paths and file names.
     pub fn as_str(self) -> &'static str {
         self.into()
     }
 }
 
-/// The parts of a solution that figures are drawn from. Parts that a figure does not need may be empty.
+/// The parts of a solution from which figures are drawn. Parts that a figure does not need may be empty.
 #[derive(Clone, Copy, Debug)]
 pub struct Parts<'a> {
     /// The iterations, for `convergence`.
@@ -79,13 +79,13 @@ pub struct Parts<'a> {
     pub summary: Option<&'a Summary>,
     /// Whether the job has not finished.
     pub partial: bool,
-    /// The load step at whose end the result is, if it is not the last.
+    /// The load step at the end of which the result is; `None` for the last.
     pub step: Option<&'a str>,
-    /// The profiles at all points, so that the peaks are visible, for `profile`; also for `deformed`.
+    /// The profiles at all points, so that peaks are visible: for `profile`, and for `deformed`.
     pub profiles: &'a BTreeMap<String, ContactProfile>,
     /// The fields, for `deformed`; without them `mesh` draws the problem's own mesh.
     pub fields: &'a Fields,
-    /// The mesh that the problem names by its hash, if it does, for `mesh`.
+    /// The mesh that the problem names by its hash, if it names one: for `mesh`.
     pub stored: Option<&'a Mesh>,
 }
 

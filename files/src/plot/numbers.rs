@@ -1,17 +1,17 @@
 //! The format of numbers in figures.
 
-/// A number for an axis: at most six digits, without trailing zeros, with a true minus.
+/// A number for an axis: at most six digits, without trailing zeros, with the minus sign −.
 pub(super) fn number(value: f64) -> String {
     digits(value).replace('-', "−")
 }
 
-/// A number with three digits: more would suggest an accuracy that does not exist.
+/// A number with three digits: more digits would suggest an accuracy that does not exist.
 pub(super) fn rounded(value: f64) -> String {
     let unit = 10f64.powf(value.abs().max(f64::MIN_POSITIVE).log10().floor() - 2.0);
     number((value / unit).round() * unit)
 }
 
-/// The number of a tick on an axis of some length: a rounding error near zero is shown as zero.
+/// The number at a tick of an axis. `length`: that of the axis; a rounding error near zero is shown as zero.
 pub(super) fn tick(value: f64, length: f64) -> String {
     let small = value.abs() < 1e-9 * length.abs();
     number(if small { 0.0 } else { value })
@@ -37,7 +37,7 @@ fn digits(value: f64) -> String {
     }
 }
 
-/// The smallest of these steps, times a power of ten, that is not below a positive number.
+/// The smallest product of one of `steps` and a power of ten that is not below a positive number.
 pub(super) fn round_up(value: f64, steps: &[f64]) -> f64 {
     let power = 10f64.powf(value.log10().floor());
     let mut rounds = steps.iter().map(|step| step * power);

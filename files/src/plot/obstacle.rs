@@ -1,4 +1,4 @@
-//! The obstacle next to a body: its face, and a band behind it.
+//! Draws the obstacle next to a body: its face, and a band behind the face.
 
 use solver::model::ContactModel;
 use solver::problem::Condition;
@@ -8,10 +8,10 @@ use super::page::{px, tinted};
 use super::style::Style;
 use super::theme::hex;
 
-/// The depth of the band (pixels).
+/// The depth of the band behind the face (pixels).
 pub(super) const DEPTH: i32 = 13;
 
-/// The face of an obstacle, with the direction out of the body at each point.
+/// The face of an obstacle as points, with the direction out of the body at each.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Face {
     pub(super) points: Vec<[f64; 2]>,
@@ -19,7 +19,7 @@ pub(super) struct Face {
 }
 
 impl Face {
-    /// The face before the obstacle is pushed; empty without an obstacle.
+    /// The face of the obstacle before it is pushed; empty for a contact without an obstacle.
     pub(super) fn before(contact: &ContactModel) -> Face {
         let mut face = Face::default();
         if contact.condition == Condition::None {
@@ -56,8 +56,8 @@ impl Face {
         face
     }
 
-    /// The face at the end: on the surface of the body where they touch, elsewhere at the distance of their gap along
-    /// the body's normal. `surface`: in order of arc length, the place of each node before deformation, its place in
+    /// The face of the obstacle in the final state: on the surface of the body where both touch, elsewhere beyond the
+    /// surface by the gap. `surface`: in order of arc length, the place of each node before deformation, its place in
     /// the figure, and the distance of the obstacle from it.
     pub(super) fn after(surface: &[([f64; 2], [f64; 2], f64)]) -> Face {
         let mut face = Face::default();
@@ -82,7 +82,7 @@ impl Face {
         }
     }
 
-    /// The SVG of the face inside a frame.
+    /// The SVG of the face and its band inside a frame.
     pub(super) fn drawn(&self, style: Style, frame: &Frame) -> String {
         if self.points.len() < 2 {
             return String::new();

@@ -11,15 +11,18 @@ use solver::error::shortened;
 use solver::problem::Units;
 use solver::solution::Verdict;
 
-/// The height of the title, and of a line below it (pixels).
+/// The height of the title (pixels).
 const TITLE: i32 = 34;
+/// The height of a line of text below the title (pixels).
 const LINE: i32 = 22;
-/// The height of a line of warnings and of its letters (pixels).
+/// The height of a line of warnings (pixels).
 const FOOT: i32 = 17;
+/// The height of the letters of warnings (pixels).
 const SMALL: i32 = 12;
 /// The space left of title and warnings, and right of the verdict (pixels).
 const MARGIN: i32 = 8;
-/// The units of the drawing per pixel: plotters draws in whole units, and a tenth of a pixel keeps curves smooth.
+/// The number of units of the drawing per pixel: plotters draws in whole units, and a tenth of a pixel keeps curves
+/// smooth.
 pub(super) const FINE: i32 = 10;
 const FONT: &str = "sans-serif";
 /// The height of numbers, legends and names (pixels): 7 pt in a column of 88 mm.
@@ -27,7 +30,7 @@ pub(super) const LETTERS: i32 = 15;
 /// The height of the letters of a title (pixels); a long title has smaller letters.
 const LARGE: i32 = 19;
 const LONGEST: usize = 84;
-/// The largest number of lines of warnings, and of parameters.
+/// The largest number of lines of warnings, and the largest number of lines of parameters.
 const LINES: usize = 6;
 
 pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -38,8 +41,8 @@ pub(super) const fn px(pixels: i32) -> i32 {
     pixels * FINE
 }
 
-/// A page with a figure `height` pixels high between the texts of its caption. `draw` gets the area of the figure, and
-/// returns further SVG that is put on top of it, in the units of the drawing, from the area's left upper corner.
+/// Draws a page: a figure `height` pixels high between the texts of its caption. `draw` draws the figure in the given
+/// area and returns SVG to be put on top, in the units of the drawing, from the area's upper left corner.
 pub(super) fn page(
     style: Style,
     caption: &Caption,
@@ -131,8 +134,8 @@ struct Line {
     right: Option<Mark>,
 }
 
-/// The lines below the title: the parameters, as many contacts in a line as fit, and the mark at the right of the first one
-/// that has room for it.
+/// The lines below the title: the parameters, with as many contacts in a line as fit, and the mark at the right of the
+/// first line that has room for it.
 fn above(style: Style, caption: &Caption) -> Vec<Line> {
     let room = style.width() - 2 * MARGIN;
     let parameters = wrapped(&caption.parameters, ";  ", room, width);
@@ -170,7 +173,7 @@ fn foot(style: Style, caption: &Caption) -> Vec<String> {
     wrapped(&words, " ", style.width() - 2 * MARGIN, small)
 }
 
-/// Joins texts to as many lines as they need, and at most `LINES`.
+/// Joins texts to lines of at most the width `room`; lines after the first [`LINES`] are replaced by `…`.
 fn wrapped(texts: &[String], between: &str, room: i32, width: impl Fn(&str) -> i32) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for text in texts {
@@ -191,19 +194,19 @@ fn wrapped(texts: &[String], between: &str, room: i32, width: impl Fn(&str) -> i
     lines
 }
 
-/// The style of a text with this height in pixels.
+/// The style of a text of this height (pixels).
 pub(super) fn text(style: Style, pixels: i32) -> TextStyle<'static> {
     (FONT, plotters_size(pixels))
         .into_font()
         .color(&style.palette().text)
 }
 
-/// The size that plotters needs for a height: it writes a font of size s as s/1.24.
+/// The font size with which plotters draws letters of a height (pixels): it writes a font of size s as s/1.24.
 fn plotters_size(pixels: i32) -> f64 {
     1.24 * f64::from(px(pixels))
 }
 
-/// Draws a line of text with its left end and its middle at a place (pixels).
+/// Draws a line of text whose left end, at half height, is at a place (pixels).
 pub(super) fn draw_text(
     area: &Area<'_>,
     style: Style,
@@ -215,8 +218,8 @@ pub(super) fn draw_text(
     Ok(())
 }
 
-/// The approximate width of a text of that height (pixels), without reading a font: fonts differ, and this is a wide
-/// one.
+/// The approximate width (pixels) of a text of the height [`LETTERS`], without reading a font: fonts differ, and a wide
+/// font is assumed.
 pub(super) fn width(words: &str) -> i32 {
     43 * words.chars().count() as i32 / 5
 }
@@ -227,8 +230,8 @@ pub(super) struct LegendPlace {
     pub(super) x: i32,
 }
 
-/// Places the entries of a legend in rows that begin at `left`, each a sample of a line and words, with `gap` behind
-/// them (pixels).
+/// Places the entries of a legend in rows that begin at `left`. An entry is a sample of a line and words, followed by
+/// the space `gap` (pixels).
 pub(super) fn legend_places<'a>(
     style: Style,
     left: i32,
@@ -248,13 +251,13 @@ pub(super) fn legend_places<'a>(
     placed.collect()
 }
 
-/// How many large bold letters fit on a line.
+/// The number of large bold letters that fit on a line of this width (pixels).
 fn bold_letters(width: i32) -> usize {
     ((width - 2 * MARGIN) / 13).max(1) as usize
 }
 
-/// The SVG with subscripts: `σ_xx` becomes σ with lowered letters. Sizes are numbers: not every program reads relative
-/// ones.
+/// Adds subscripts to SVG: `σ_xx` becomes σ with lowered letters. Their sizes are numbers, since not every program
+/// reads relative sizes.
 fn with_subscripts(svg: &str) -> String {
     let mut out = String::with_capacity(svg.len());
     let mut rest = svg;
@@ -291,7 +294,7 @@ fn with_subscripts(svg: &str) -> String {
     out
 }
 
-/// The font size of the last text that begins in this SVG.
+/// The font size of the last text element that begins in this part of an SVG.
 fn font_size(svg: &str) -> Option<f64> {
     const NAME: &str = "font-size=\"";
     let text = &svg[svg.rfind("<text")?..];
@@ -299,7 +302,7 @@ fn font_size(svg: &str) -> Option<f64> {
     value.split('"').next()?.parse().ok()
 }
 
-/// A quantity with its unit, where there is one.
+/// The name of a quantity with its unit, if it has one.
 pub(super) fn with_unit(name: &str, unit: Option<&str>) -> String {
     match unit {
         Some(unit) if !unit.is_empty() => format!("{name} ({unit})"),

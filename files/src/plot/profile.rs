@@ -14,8 +14,8 @@ use solver::error::shortened;
 use solver::problem::{Contact, Problem};
 use solver::solution::{ContactProfile, ErrorMethod, NodeState, QuantityName, Summary};
 
-/// Draws for each contact boundary σ_n above, and where there is friction σ_t with its bound ±τ below, against arc
-/// length and position, with stick and slip behind them. Stresses are negative in compression.
+/// Draws for each contact boundary σ_n, and below it, if there is friction, σ_t with its bound ±τ, against arc length
+/// and position, with the parts in stick and slip shaded. Stresses are negative in compression.
 ///
 /// # Errors
 ///
@@ -99,7 +99,7 @@ fn panels(
     vec![normal, tangential]
 }
 
-/// The remark about the peak of σ_n, after its value.
+/// The remark about the peak of σ_n, to be written after its value; empty if there is nothing to say.
 fn of_peak(name: &str, summary: Option<&Summary>) -> &'static str {
     let accuracy = summary.and_then(|summary| summary.accuracy.as_ref());
     let no_limit = accuracy.is_some_and(|accuracy| {
@@ -116,20 +116,20 @@ fn of_peak(name: &str, summary: Option<&Summary>) -> &'static str {
     }
 }
 
-/// What figures show of the stresses along a contact boundary, for programs that draw both of them over one axis
+/// What figures show of the stresses along a contact boundary, for programs that draw σ_n and σ_t over one axis
 /// themselves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProfileView {
-    /// The points under stress, with a margin on each side.
+    /// The range of points under stress, with a margin on each side.
     pub points: Range<usize>,
     /// The range of the axis of stresses.
     pub stresses: Range<f64>,
-    /// A sentence about the peak of σ_n where it is cut off, or where it grows on finer meshes.
+    /// A sentence about the peak of σ_n, if it is cut off or grows on finer meshes.
     pub peak: Option<String>,
 }
 
 impl ProfileView {
-    /// The view of this contact boundary. The summary tells whether the peak has a limit.
+    /// The view of the contact boundary `name`. The summary tells whether the peak has a limit as the mesh is refined.
     pub fn of(name: &str, profile: &ContactProfile, summary: Option<&Summary>) -> ProfileView {
         let points = stressed(profile);
         let curve = |values: &[f64]| -> Vec<(f64, f64)> {
@@ -161,7 +161,7 @@ impl ProfileView {
     }
 }
 
-/// The shaded parts of stick and slip: each extends half-way to a neighbour in another state.
+/// The parts of the boundary in stick and in slip; each ends half-way to a neighbour in another state.
 fn shades(profile: &ContactProfile, shown: Range<usize>) -> Vec<Shade> {
     let kind = |i: usize| match profile.state.get(i)? {
         NodeState::Open => None,
@@ -194,8 +194,8 @@ fn shades(profile: &ContactProfile, shown: Range<usize>) -> Vec<Shade> {
     shades
 }
 
-/// The position along the boundary: x, or y where x does not increase along it. `None` where neither does, and where it
-/// equals s.
+/// A second axis for the position along the boundary: x, or y if x is not monotone along it. `None` if neither is, or
+/// if the position equals s.
 fn position(
     profile: &ContactProfile,
     [x, y]: [&str; 2],
@@ -228,8 +228,8 @@ fn position(
         .flatten()
 }
 
-/// The nodes under stress and a margin of a fifth on each side: a contact is often a small part of
-/// the boundary that faces the obstacle. All nodes where nothing is under stress.
+/// The range of nodes under stress, with a margin of a fifth on each side: a contact is often a small part of the
+/// boundary that faces the obstacle. All nodes if none is under stress.
 fn stressed(profile: &ContactProfile) -> Range<usize> {
     let nodes = profile.s.len();
     let loaded = |&i: &usize| profile.normal_stress[i] != 0.0 || profile.friction_bound[i] != 0.0;

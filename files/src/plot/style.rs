@@ -31,12 +31,12 @@ impl FromStr for Size {
 }
 
 impl Size {
-    /// The size's name in queries.
+    /// The name of the size in queries.
     pub fn as_str(self) -> &'static str {
         self.into()
     }
 
-    /// The width on paper.
+    /// The width of a figure on paper, in millimetres.
     pub(super) fn millimetres(self) -> f64 {
         match self {
             Size::Column => 88.0,
@@ -45,7 +45,7 @@ impl Size {
         }
     }
 
-    /// Width on paper, in inches.
+    /// The width of a figure on paper, in inches.
     pub(super) fn inches(self) -> f64 {
         self.millimetres() / 25.4
     }
@@ -67,7 +67,7 @@ impl Style {
         self.theme.palette()
     }
 
-    /// The width in pixels, for letters of 15 pixels.
+    /// The width of a figure in pixels, where letters are 15 pixels high.
     pub(super) fn width(self) -> i32 {
         match self.size {
             Size::Column => 520,

@@ -1,5 +1,5 @@
-//! Colours for light and for dark pages: those of Okabe and Ito, which people with any common kind of colour blindness
-//! can distinguish. The Python client uses the same colours.
+//! Colours for light and for dark pages: the colours of Okabe and Ito, which people with any common kind of colour
+//! blindness can distinguish. The Python client uses the same colours.
 
 use std::str::FromStr;
 
@@ -42,9 +42,11 @@ pub(super) struct Palette {
     pub(super) obstacle: RGBColor,
     pub(super) stick: RGBColor,
     pub(super) slip: RGBColor,
-    /// The colours of the verdicts good, fair and poor.
+    /// The colour of the verdict good.
     pub(super) good: RGBColor,
+    /// The colour of the verdict fair.
     pub(super) fair: RGBColor,
+    /// The colour of the verdict poor.
     pub(super) poor: RGBColor,
     /// The colours of curves and boundaries; the first is for normal stress, the second for tangential stress.
     pub(super) curves: [RGBColor; 6],
@@ -114,7 +116,7 @@ pub(super) enum ColourMap {
 }
 
 impl ColourMap {
-    /// The colour at t from 0 to 1.
+    /// The colour of the map at t, from 0 to 1.
     pub(super) fn at(self, t: f64) -> RGBColor {
         const RISING: [[u8; 3]; 9] = [
             [0, 34, 78],

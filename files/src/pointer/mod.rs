@@ -1,4 +1,4 @@
-//! Finds the place that a JSON Pointer names in a text.
+//! Finds the place in a JSON text that a JSON Pointer names.
 
 mod parts;
 
@@ -12,10 +12,10 @@ use serde_json::value::RawValue;
 
 pub(crate) use parts::members;
 
-/// The place that a pointer names in a text.
+/// The place in a text that a JSON Pointer names.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Place {
-    /// The range of this value.
+    /// An existing value, by its range in the text.
     Value(Range<usize>),
     /// A member that the object lacks.
     Absent {
@@ -28,21 +28,21 @@ pub(crate) enum Place {
     },
 }
 
-/// Why a pointer names no place in a text.
+/// The reason why a JSON Pointer names no place in a text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Nowhere {
     /// The pointer to the last existing value on the way.
     pub(crate) parent: String,
-    /// The name or number that was missing there.
+    /// The name or number that is missing in the last existing value.
     pub(crate) token: String,
-    /// A description of that value: `an object`, `a list of 2`, `a value`.
+    /// A description of the last existing value: `an object`, `a list of 2`, `a value`.
     pub(crate) found: String,
-    /// The names in that value, if it is an object.
+    /// The names in the last existing value, if it is an object.
     pub(crate) names: Vec<String>,
 }
 
-/// The line, from 1, of the value that a pointer names, or of the last existing value on the way to it; none if the
-/// text is not JSON.
+/// The line, from 1, of the value that a JSON Pointer names, or of the last existing value on the way there; none if
+/// the text is not JSON.
 pub fn line_of(text: &str, pointer: &str) -> Option<usize> {
     serde_json::from_str::<&RawValue>(text).ok()?;
     let unescaped = |token: &str| token.replace("~1", "/").replace("~0", "~");
@@ -59,7 +59,7 @@ pub fn line_of(text: &str, pointer: &str) -> Option<usize> {
     Some(1 + text[..start].matches('\n').count())
 }
 
-/// The place that a pointer (RFC 6901) names. The text must be well formed.
+/// Finds the place that the tokens of a JSON Pointer (RFC 6901) name. The text must be well-formed JSON.
 pub(crate) fn locate(text: &str, tokens: &[String]) -> Result<Place, Nowhere> {
     let mut value = text;
     let mut parent = String::new();
@@ -113,10 +113,10 @@ pub(crate) fn locate(text: &str, tokens: &[String]) -> Result<Place, Nowhere> {
 }
 
 /// The largest number of members of an object that are searched: no object of a problem with fixed names has more, and
-/// one with free names is not read further.
+/// an object with free names is not read further.
 const MOST_NAMES: usize = 1 << 14;
 
-/// Finds an item of a list, which the text must be.
+/// Finds an item of a list. The text must be a list.
 fn item(text: &str, place: usize) -> Found<'_> {
     let mut reader = serde_json::Deserializer::from_str(text.trim_end());
     let read = serde::de::DeserializeSeed::deserialize(Item(place), &mut reader);

@@ -8,10 +8,10 @@ use serde::{
 };
 use serde_json::value::RawValue;
 
-/// Members of an object by their names, in their order.
+/// Members of an object with their names, in the order of the text.
 pub(super) type Named<'a> = Vec<(Cow<'a, str>, &'a RawValue)>;
 
-/// The first members of an object; none if the text is no object.
+/// The first members of an object, at most `most`; none if the text is no object.
 pub(crate) fn members(text: &str, most: usize) -> Option<Named<'_>> {
     #[derive(Deserialize)]
     struct Name<'a>(#[serde(borrow)] Cow<'a, str>);

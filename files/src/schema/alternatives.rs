@@ -10,7 +10,7 @@ use super::shape::{Shape, Type};
 use super::words;
 use solver::error::{Reason, Violation, either};
 
-/// A violation whose place is not known yet.
+/// A function that makes a violation from the pointer to its place, which is not known yet.
 pub(super) type Displaced = Box<dyn FnOnce(String) -> Violation>;
 
 /// The features of a value that distinguish alternatives.
@@ -18,9 +18,9 @@ pub(super) struct Outline<'de> {
     pub(super) found: Type,
     /// The text of the value.
     text: &'de str,
-    /// The text of `kind`.
+    /// The JSON text of the member `kind`.
     kind: Option<&'de str>,
-    /// The members that are not null, among those that distinguish the forms.
+    /// The names of members that are not null, as far as they distinguish the alternatives.
     given: Vec<&'static str>,
 }
 
@@ -56,7 +56,7 @@ impl<'de> Outline<'de> {
         Ok(outline)
     }
 
-    /// Whether the value has the type and the `kind` of an alternative; the rest is checked later.
+    /// Whether the value has the type and the `kind` of an alternative; its other content is not checked.
     pub(super) fn resembles(&self, shape: &Shape) -> bool {
         let same =
             |only: &str| serde_json::from_str::<Cow<str>>(self.text).is_ok_and(|t| t == only);
@@ -72,14 +72,15 @@ impl<'de> Outline<'de> {
                 || branches.iter().any(|branch| self.resembles_nested(branch)))
     }
 
-    /// As [`resembles`](Self::resembles), but by type alone, where the `kind` was not read.
+    /// Like [`resembles`](Self::resembles), but by type alone, for an alternative whose `kind` was not read.
     fn resembles_nested(&self, shape: &Shape) -> bool {
         let branches = shape.branches();
         shape.allows(self.found)
             && (branches.is_empty() || branches.iter().any(|branch| self.resembles_nested(branch)))
     }
 
-    /// The form that is meant: the one of whose own required names the value has some. There must be exactly one.
+    /// The number of the form that is meant: the only one of which the value has a name that no other form requires.
+    /// The error is a violation that there is none, or several.
     pub(super) fn form(&self, forms: &'static [Vec<String>]) -> Result<usize, Displaced> {
         let given = |name: &String| self.given.contains(&name.as_str());
         let mut meant = (0..).zip(forms).filter(|(_, form)| form.iter().any(given));
@@ -99,7 +100,7 @@ impl<'de> Outline<'de> {
         }))
     }
 
-    /// The violation of a value that is none of the alternatives, with the member that it concerns.
+    /// The violation of a value that resembles no alternative, and the member that the violation concerns, if any.
     pub(super) fn no_alternative(
         &self,
         branches: &'static [Shape],

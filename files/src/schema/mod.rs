@@ -1,9 +1,9 @@
-//! The faults of the structure of problems and bodies of requests, found with our JSON Schema and described in words.
+//! The faults of the structure of problems and of request bodies, found with our JSON Schema and described in words.
 //!
-//! It supports those keywords of draft 2020-12 that the schema of our types has. Written here rather than left to a
-//! library: the existing ones bring regular expressions, URIs and references over the network (a tenth of the build),
-//! need a tree of the whole text, and answer in terms of the schema ("not valid under any of the schemas") instead of
-//! naming the intended alternative and its faults.
+//! The keywords of draft 2020-12 that the schema of our types has are supported. The check is written here rather than
+//! left to a library: the existing libraries bring regular expressions, URIs and references over the network (a tenth
+//! of the build), need a tree of the whole text, and answer in terms of the schema ("not valid under any of the
+//! schemas") instead of naming the intended alternative and its faults.
 
 mod alternatives;
 mod numbers;
@@ -19,27 +19,27 @@ pub(crate) use shape::Shape;
 pub use shape::schema;
 pub use words::{meant, quoted};
 
-/// The shape of the body of a request.
+/// The shape of a request body of type `T`.
 pub(crate) fn of_body<T: JsonSchema>() -> Shape {
     // the schema is ours; a test reads it. A shape that allows anything leaves the decision to serde.
     shape::of_body::<T>().unwrap_or_default()
 }
 
-/// A text that was checked.
+/// What the check of a text has found.
 pub(crate) struct Checked<'a> {
-    /// At most a hundred.
+    /// The violations, at most a hundred.
     pub(crate) violations: Vec<Violation>,
-    /// The problems in a body, which are not checked yet, with their places.
+    /// The problems in a request body, which are not checked yet: of each the JSON Pointer to it, and its text.
     pub(crate) problems: Vec<(String, &'a str)>,
 }
 
-/// The violations of a problem's text, at most a hundred; or the error of a text that is not JSON, whose line and
-/// column may be relative to a part of it.
+/// The violations of a problem's text, at most a hundred. The error is that of a text that is not JSON; its line and
+/// column may be relative to a part of the text.
 pub(crate) fn violations(text: &str) -> serde_json::Result<Vec<Violation>> {
     check(&shape::PROBLEM, text).map(|checked| checked.violations)
 }
 
-/// A text and the shape that it should have, as [`violations`].
+/// Checks a text against a shape. The error is that of [`violations`].
 pub(crate) fn check<'a>(shape: &'static Shape, text: &'a str) -> serde_json::Result<Checked<'a>> {
     let mut found = Findings::default();
     let mut walk = walk::Walk::new(Some(&mut found));

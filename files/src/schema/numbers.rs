@@ -1,10 +1,10 @@
-//! Checks lists of numbers, which are most of a large problem, by their characters: serde converts them afterwards, and
-//! doing that twice takes longer than everything else together.
+//! Checks lists of numbers, which are most of a large problem, by their characters: serde converts the numbers
+//! afterwards, and converting them twice takes longer than everything else together.
 
 use super::shape::{Shape, Type};
 
-/// The number of items of a JSON text if it fits the shape, a list of numbers or of lists of them; none if it does not,
-/// or if that cannot be decided without reading it.
+/// The number of items of a JSON text if it fits the shape, which is a list of numbers or of lists of numbers; `None`
+/// if it does not fit, or if that cannot be decided from its characters.
 pub(super) fn count(shape: &Shape, text: &str) -> Option<usize> {
     list(shape, text.as_bytes(), &mut 0)
 }

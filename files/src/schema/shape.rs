@@ -1,4 +1,4 @@
-//! A JSON Schema in the form that values are checked with: references resolved, once per process.
+//! A JSON Schema in the form that values are checked with. References are resolved once per process.
 
 use std::{borrow::Cow, collections::BTreeMap, sync::LazyLock};
 
@@ -20,8 +20,9 @@ pub(super) static PROBLEM: LazyLock<Shape> = LazyLock::new(|| {
     shape(&schema, &schema).unwrap_or_default()
 });
 
-/// The shape of the body of a request. How long its parts and how large its numbers may be is left to the operation,
-/// which checks the same for requests over gRPC; only the lengths of lists are bounded here, before they are read.
+/// The shape of a request body. The lengths of texts and the sizes of numbers are left to the code that serves the
+/// request, which checks them for requests over gRPC too; only the lengths of lists are bounded here, before the lists
+/// are read.
 pub(super) fn of_body<T: JsonSchema>() -> serde_json::Result<Shape> {
     let schema = schemars::schema_for!(T).to_value();
     let mut shape: Shape = serde_json::from_value(Plain::OfBody.schema(&schema, &schema))?;
@@ -29,7 +30,7 @@ pub(super) fn of_body<T: JsonSchema>() -> serde_json::Result<Shape> {
     Ok(shape)
 }
 
-/// The shape that a schema describes; `whole` has the definitions.
+/// The shape that a schema describes. `whole`: the schema with the definitions that references name.
 pub(super) fn shape(schema: &Value, whole: &Value) -> serde_json::Result<Shape> {
     let mut shape: Shape = serde_json::from_value(Plain::OfProblem.schema(schema, whole))?;
     shape.find_forms();
@@ -50,7 +51,7 @@ pub(super) enum Type {
 }
 
 impl Type {
-    /// A value of the type in words.
+    /// A value of the type, in words, such as `a number`.
     pub(super) fn words(self) -> &'static str {
         match self {
             Type::Null => "null",
@@ -69,11 +70,11 @@ impl Type {
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "camelCase")]
 pub(crate) struct Shape {
-    /// `false` instead of a schema: the value must be absent.
+    /// Whether the value must be absent: the schema is `false`.
     pub(super) never: bool,
-    /// A problem in the body of a request: it is checked by itself.
+    /// Whether the value is a problem in a request body, which is checked by itself.
     pub(super) problem: bool,
-    /// Most entries of a list in the body of a request.
+    /// The largest number of entries of a list in a request body.
     pub(super) at_most: Option<usize>,
     #[serde(rename = "type")]
     types: Types,
@@ -85,7 +86,7 @@ pub(crate) struct Shape {
     pub(super) items: Option<Box<Shape>>,
     min_items: usize,
     max_items: Option<usize>,
-    /// Whether a shape is excluded: a length between the smallest and the largest.
+    /// The shape that the value must not have: the schema of our types excludes a list length in this way.
     not: Option<Box<Shape>>,
     pub(super) minimum: Option<f64>,
     any_of: Vec<Shape>,
@@ -95,7 +96,7 @@ pub(crate) struct Shape {
     pub(super) then: Option<Box<Shape>>,
     #[serde(rename = "else")]
     pub(super) otherwise: Option<Box<Shape>>,
-    /// For each alternative, the names that only it requires, if these distinguish all of them.
+    /// For each alternative, the names that only this alternative requires, if these distinguish all alternatives.
     #[serde(skip)]
     pub(super) forms: Option<Vec<Vec<String>>>,
 }
@@ -114,7 +115,7 @@ impl Default for Types {
 }
 
 impl Shape {
-    /// The types by name; empty if all are allowed.
+    /// The allowed types; empty if all types are allowed.
     pub(super) fn types(&self) -> &[Type] {
         match &self.types {
             Types::One(only) => std::slice::from_ref(only),
@@ -129,7 +130,7 @@ impl Shape {
         types.is_empty() || types.iter().any(same)
     }
 
-    /// Whether it says nothing of the value.
+    /// Whether the shape allows any value.
     pub(super) fn is_anything(&self) -> bool {
         !self.never
             && self.only.is_none()
@@ -140,7 +141,8 @@ impl Shape {
             && self.only_alternatives()
     }
 
-    /// Whether an object that lacks the member `name` is what that member should be, judged by its unknown names.
+    /// Whether an object was probably written in place of its member `name`: one of its unknown names is required
+    /// there.
     pub(super) fn lacks_only(&self, name: &str, unknown: &[Cow<'_, str>]) -> bool {
         let member = self.properties.get(name);
         member.is_some_and(|member| {
@@ -149,7 +151,7 @@ impl Shape {
         })
     }
 
-    /// Whether it is a list of any length of numbers, or of short lists of them.
+    /// Whether the shape is a list, of any length, of numbers or of short lists of numbers.
     pub(super) fn is_long_list_of_numbers(&self) -> bool {
         let number = |shape: &Shape| matches!(shape.types(), [Type::Number | Type::Integer]);
         // the lengths of inner lists are not compared with the limits of a walk
@@ -174,23 +176,25 @@ impl Shape {
         !self.branches().is_empty() || self.condition.is_some()
     }
 
-    /// Whether the schema consists of alternatives and nothing else.
+    /// Whether the shape says nothing of the value itself: neither types nor names of members. It may have
+    /// alternatives.
     pub(super) fn only_alternatives(&self) -> bool {
         self.types().is_empty() && self.properties.is_empty() && self.required.is_empty()
     }
 
-    /// Whether serde keeps the whole value in memory until it knows the alternative. It does not for a value or null.
+    /// Whether serde keeps the whole value in memory until it knows the alternative. It does not where the only
+    /// alternative to a value is null.
     pub(super) fn is_kept(&self) -> bool {
         let by_kind = self.one_of.iter().any(|branch| branch.kind().is_some());
         by_kind || !self.any_of.is_empty() && !self.any_of.iter().any(Shape::is_null)
     }
 
-    /// Whether it is null and nothing else.
+    /// Whether the shape allows null only.
     pub(super) fn is_null(&self) -> bool {
         self.types() == [Type::Null]
     }
 
-    /// The value of `kind` that an object of this shape must have.
+    /// The value that the member `kind` of an object of this shape must have.
     pub(super) fn kind(&self) -> Option<&str> {
         self.properties.get("kind")?.only.as_deref()
     }
@@ -203,12 +207,12 @@ impl Shape {
             && !self.not.as_deref().is_some_and(excluded)
     }
 
-    /// The largest number of items of a list.
+    /// The largest number of items of a list of this shape.
     pub(super) fn most_items(&self) -> Option<usize> {
         self.max_items
     }
 
-    /// The allowed lengths in words.
+    /// The allowed lengths of a list, in words.
     pub(super) fn lengths(&self) -> String {
         let Some(most) = self.max_items else {
             return format!("at least {}", self.min_items);
@@ -234,7 +238,7 @@ impl Shape {
     }
 }
 
-/// For each form of an object, the names that only it requires, if these distinguish the forms.
+/// For each form of an object, the names that only this form requires, if these distinguish the forms.
 fn forms(branches: &[Shape]) -> Option<Vec<Vec<String>>> {
     if branches.is_empty() || branches.iter().any(|branch| !branch.types().is_empty()) {
         return None;
@@ -249,15 +253,15 @@ fn forms(branches: &[Shape]) -> Option<Vec<Vec<String>>> {
     forms.iter().all(|form| !form.is_empty()).then_some(forms)
 }
 
-/// The names that a form requires: all of them, or one of several.
+/// The names that a form requires, including those of its own alternatives.
 fn all_required(form: &Shape) -> Vec<&str> {
     let further = form.branches().iter().flat_map(all_required);
     let own = form.required.iter().map(String::as_str);
     own.chain(further).collect()
 }
 
-/// How a schema is made plain: its references are replaced by what they name, and what is only for readers is left
-/// out. Our types do not contain themselves.
+/// How a schema is simplified: its references are replaced by the definitions that they name, and what only informs
+/// readers is left out. Our types do not contain themselves.
 #[derive(Clone, Copy)]
 enum Plain {
     OfProblem,
@@ -314,7 +318,7 @@ impl Plain {
     }
 }
 
-/// Keywords of bodies that are not checked here.
+/// Keywords that are not checked in request bodies: the code that serves the request checks them.
 const LEFT_TO_OPERATIONS: &[&str] = &[
     "maxLength",
     "maxProperties",

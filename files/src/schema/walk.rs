@@ -1,8 +1,8 @@
-//! A walk through a JSON text and the shape that it should have at once.
+//! Checks a JSON text against the shape that it should have, walking through both at once.
 //!
 //! The text is checked while it is read, without a tree of its values: a tree takes 32 bytes and more for a value of
-//! two. Only where alternatives must be distinguished, the text of one value is read again. The check ends at the
-//! hundredth violation, so that its cost does not grow with their number.
+//! two bytes. Only where alternatives must be distinguished, the text of one value is read again. The check ends at the
+//! hundredth violation, so that its cost does not grow with the number of violations.
 
 use std::{borrow::Cow, collections::BTreeSet, fmt};
 
@@ -17,25 +17,28 @@ use super::words;
 use solver::error::{Findings, MOST_LISTED, Reason, Violation, escape};
 
 /// The largest number of entries of a list of objects, and of names of an object whose names are free: an entry of
-/// three bytes takes a hundred and more in memory. No problem that can be solved comes close.
+/// three bytes in the text takes a hundred bytes and more in memory. No problem that can be solved comes close.
 const MOST_OBJECTS: usize = 1 << 14;
 
-/// The largest number of values in a list of numbers: lines of a grid, members of a group. They take less memory than
-/// their text, but a mesh of a million elements takes more than the largest body.
+/// The largest number of values in a list of numbers, such as the lines of a grid or the members of a group. Values
+/// take less memory than their text, but a mesh of a million elements takes more than the largest request body.
 const MOST_NUMBERS: usize = 1 << 20;
 
-/// The largest number of values in a list, and of lists in a list, inside an object with a `kind`: serde keeps such an
-/// object in memory until it knows its kind, with 32 bytes for a number and 200 for a list.
+/// The largest number of values in a list inside an object with a `kind`: serde keeps such an object in memory until it
+/// knows the kind, with 32 bytes for a number.
 const MOST_KEPT_NUMBERS: usize = 1 << 17;
+
+/// The largest number of lists in a list inside an object with a `kind`: serde keeps such an object in memory until it
+/// knows the kind, with 200 bytes for a list.
 const MOST_KEPT_LISTS: usize = 1 << 16;
 
-/// The violations of a walk, and where it is.
+/// The state of a walk: the violations so far, and the present place in the text.
 pub(super) struct Walk<'f, 'de> {
-    /// The list of violations; `None` if the question is only whether there is one.
+    /// The list of violations; `None` if it only matters whether there are any.
     found: Option<&'f mut Findings>,
-    /// The problems in the text, which are checked apart from it, with their places.
+    /// The problems in the text, which are checked by themselves: of each the JSON Pointer to it, and its text.
     pub(super) problems: Vec<(String, &'de str)>,
-    /// Names and numbers from the outermost value to the current one.
+    /// The names and numbers that lead from the outermost value to the current one.
     place: Vec<Token>,
     /// The number of values around the current one that serde keeps in memory.
     kept: usize,
@@ -61,7 +64,7 @@ impl<'f, 'de> Walk<'f, 'de> {
         }
     }
 
-    /// Checks a text. An error is one of its syntax, unless the walk has stopped.
+    /// Checks a text. The error is one of the text's syntax, unless the walk has `stopped`.
     pub(super) fn check(
         &mut self,
         shape: &'static Shape,
@@ -95,7 +98,7 @@ impl<'f, 'de> Walk<'f, 'de> {
         Value { shape, walk: self }
     }
 
-    /// Adds a violation at the current value. The error stops the reader.
+    /// Adds a violation at the current value. An error means that there are enough violations; it ends the reading.
     pub(super) fn report<E: Error>(
         &mut self,
         violation: impl FnOnce(String) -> Violation,
@@ -117,7 +120,8 @@ impl<'f, 'de> Walk<'f, 'de> {
         }
     }
 
-    /// Adds a violation at a member or an item of the current value. The error stops the reader.
+    /// Adds a violation at a member or an item of the current value. An error ends the reading, as in
+    /// [`report`](Self::report).
     pub(super) fn report_inside<E: Error>(
         &mut self,
         name: impl Into<Cow<'static, str>>,
@@ -129,7 +133,8 @@ impl<'f, 'de> Walk<'f, 'de> {
         reported
     }
 
-    /// Checks a value that has several alternatives: which of them is meant, and whether it fits.
+    /// Checks a value that has several alternatives: finds the alternative that is meant, and whether the value fits
+    /// it.
     fn check_alternatives(
         &mut self,
         shape: &'static Shape,
@@ -183,7 +188,7 @@ impl<'f, 'de> Walk<'f, 'de> {
         }
     }
 
-    /// The largest number of items of a list that are read.
+    /// The largest number of items that a list may have. `items`: the shape of an item.
     fn most_items(&self, items: &Shape) -> usize {
         let list = items.items.is_some();
         let number = !list && items.allows(Type::Number) && !items.has_alternatives();
@@ -212,7 +217,7 @@ fn pointer(place: &[Token]) -> String {
     place.iter().map(token).collect()
 }
 
-/// One value of the text, which is checked as it is read.
+/// One value of the text with its shape; the value is checked as it is read.
 struct Value<'w, 'f, 'de> {
     shape: &'static Shape,
     walk: &'w mut Walk<'f, 'de>,
@@ -244,7 +249,7 @@ impl Value<'_, '_, '_> {
         Ok(())
     }
 
-    /// `integral`: written as an integer. Serde takes no 1.0 for one.
+    /// Checks a number. `integral`: it is written as an integer, since serde does not read 1.0 as one.
     fn number<E: Error>(
         self,
         number: f64,
@@ -275,7 +280,8 @@ impl<'de> DeserializeSeed<'de> for Value<'_, '_, 'de> {
     fn deserialize<D: Deserializer<'de>>(self, reader: D) -> Result<(), D::Error> {
         if self.shape.never {
             let value = <&RawValue>::deserialize(reader)?;
-            let expected = "no such field: it cannot be combined with the others";
+            let expected =
+                "this field to be absent, since it cannot be combined with the other fields";
             let hint = "Remove it, or choose another form.";
             let got = || words::value(value.get());
             let not_used = |at| Violation::new(at, Reason::NotUsed, got(), expected, hint);

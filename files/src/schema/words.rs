@@ -1,4 +1,4 @@
-//! Quotes values and names of a text in violations: short, however long they are.
+//! Quotes values and names of a text in violations, shortened to a limit.
 
 use std::borrow::Cow;
 
@@ -7,7 +7,7 @@ use solver::error::{Reason, Violation};
 /// The largest number of characters of a name or text that are quoted.
 const QUOTED: usize = 80;
 
-/// The beginning of a long text, and its length in characters.
+/// A text, or of a long text its beginning and its length in characters.
 pub fn quoted(text: &str) -> String {
     match beginning(text) {
         Cow::Borrowed(whole) => whole.to_owned(),
@@ -15,7 +15,7 @@ pub fn quoted(text: &str) -> String {
     }
 }
 
-/// The beginning of a long text.
+/// A text, or of a long text its beginning.
 pub(super) fn beginning(text: &str) -> Cow<'_, str> {
     match text.char_indices().nth(QUOTED) {
         Some((end, _)) => Cow::Owned(format!("{}…", &text[..end])),
@@ -23,7 +23,7 @@ pub(super) fn beginning(text: &str) -> Cow<'_, str> {
     }
 }
 
-/// A string, in quotes.
+/// A string in quotes, shortened to a limit.
 pub(super) fn text(text: &str) -> String {
     match beginning(text) {
         Cow::Borrowed(whole) => serde_json::Value::from(whole).to_string(),
@@ -34,7 +34,7 @@ pub(super) fn text(text: &str) -> String {
     }
 }
 
-/// A value in quotes, as it is written.
+/// The JSON text of a value, shortened to a limit.
 pub(super) fn value(json: &str) -> String {
     quoted(json)
 }
@@ -46,7 +46,7 @@ pub(super) fn counted(count: usize, what: &str, of: &str) -> String {
     format!("{article} {what} {count} {of}{plural}")
 }
 
-/// Names in backquotes.
+/// Names in backquotes, with the text `between` between them.
 pub(super) fn listed<S: AsRef<str>>(names: &[S], between: &str) -> String {
     let names: Vec<_> = names
         .iter()
@@ -72,7 +72,7 @@ pub(super) fn unknown_name<'a>(
     Violation::new(at, Reason::UnknownName, got, expected, hint)
 }
 
-/// The violation for an object that is the member `name` itself instead of having it.
+/// The violation for an object that was written in place of its member `name`.
 pub(super) fn bare(at: String, name: &str) -> Violation {
     Violation::new(
         at,
@@ -83,10 +83,11 @@ pub(super) fn bare(at: String, name: &str) -> Violation {
     )
 }
 
-/// “Did you mean …”: the known name that differs from `name` by the fewest letters, if by few.
+/// Advice “Did you mean …” with the known name that differs from `name` by the fewest letters; none if it differs by
+/// many.
 pub fn meant<S: AsRef<str>>(name: &str, known: impl IntoIterator<Item = S>) -> Option<String> {
-    /// The longest name that is compared: a longer one is not just misspelt, and the comparison takes the square of its
-    /// length.
+    /// The largest number of characters of a name that is compared: a longer name is not just misspelt, and the time of
+    /// the comparison grows with the square of the length.
     const LONGEST: usize = 40;
     if name.len() > LONGEST {
         return None;

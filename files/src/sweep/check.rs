@@ -1,4 +1,4 @@
-//! Checks all members of a sweep before any is solved, and groups those that share a body.
+//! Checks all members of a sweep before the first is solved, and groups members that share a body.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,11 +13,11 @@ use super::read::Sweep;
 /// The largest number of violations of members that are reported.
 pub const MOST_TOLD: usize = 50;
 
-/// The numbers of members on one body, in order.
+/// The numbers of the members that share a body, in order.
 pub type Group = Vec<usize>;
 
-/// Puts the members of a sweep into groups that share a body. Structure and numbers of each member are checked; faults
-/// that only the mesh can show do not refuse a member here.
+/// Divides the members of a sweep into groups that share a body. Structure and numbers of each member are checked;
+/// faults that only the mesh can show are not found here.
 ///
 /// # Errors
 ///
@@ -86,7 +86,7 @@ fn with_rest(mut violations: Vec<Violation>, left: usize) -> Vec<Violation> {
     violations
 }
 
-/// The violations in the numbers of a problem, whatever its mesh is.
+/// The violations of a problem that do not depend on its mesh.
 fn violations(problem: &Problem) -> Vec<Violation> {
     let mut meshless = problem.clone();
     meshless.mesh.source = MeshSource::Gmsh(String::new());
@@ -111,7 +111,8 @@ fn is_alone(problem: &Problem, sweep: &Sweep) -> bool {
     has_own_meshes(problem, refine)
 }
 
-/// The data that members on one body have in common, as text. Finally the solver decides whether they share it.
+/// A text that is the same for members on one body: the data that determine the body. Whether two members share a body
+/// is finally decided by the solver.
 fn body(problem: &Problem, sweep: &Sweep, number: usize) -> String {
     let Problem {
         analysis,

@@ -5,29 +5,31 @@
 use super::check::Group;
 use super::plan::{Plan, Values};
 
-/// The number of consecutive members of a line that start from each other; the next one starts from the first of them
-/// again. Solving one member again requires those before it.
+/// The number of consecutive members of a line of the grid that each start from the member before; the next member
+/// starts from the first member of the line again. To solve one member alone, all members that it depends on are solved
+/// before.
 const CHAIN: usize = 64;
 
-/// The member that another one starts from.
+/// The member of a sweep from whose solution another member starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Neighbour {
-    /// The number of that member.
+    /// The number of this member.
     pub number: usize,
-    /// The number of the line that both are on, along an axis of the grid: once its last member is known, those before
-    /// it on the line are not needed again.
+    /// The number of the line of the grid that both members are on, along one of its axes. Once the last member of a
+    /// line is solved, the solutions of the members before it are not needed again for this line.
     pub line: usize,
     /// Whether the neighbour is the previous member in the group.
     pub adjacent: bool,
 }
 
 impl Plan {
-    /// The number of lines that members of a group are on.
+    /// How many values `Neighbour::line` can have: 0, one for each path of the sweep, and one for members that start
+    /// from the first member of their group for want of another.
     pub fn lines(&self) -> usize {
         self.paths.len() + 2
     }
 
-    /// The member that the one at a place of its group starts from; none for the first, which is alone on line 0.
+    /// The member that the member at `place` of its group starts from; none for the first member of the group.
     pub fn neighbour(&self, group: &Group, place: usize) -> Option<Neighbour> {
         let (first, number) = (*group.first()?, *group.get(place)?);
         if place == 0 {

@@ -1,12 +1,13 @@
-//! Reads the problems of members, one after another. Where members differ only in numbers of a friction law or of the
-//! motion of an obstacle, the text is read once, and the numbers are changed in the last problem.
+//! Reads the problems of the members of a sweep, one after another. Where a member differs from the previous one only
+//! in numbers of a friction law or of the motion of an obstacle, its text is not read: the numbers are changed in the
+//! last problem.
 
 use solver::error::Violation;
 use solver::problem::Problem;
 
 use super::plan::Plan;
 
-/// The problems of members of a sweep.
+/// Reads the problems of the members of a sweep one after another.
 pub struct Problems<'a> {
     plan: &'a Plan,
     last: Option<Last<'a>>,
@@ -14,7 +15,7 @@ pub struct Problems<'a> {
 
 /// The problem that was read last.
 struct Last<'a> {
-    /// For each path: the text of the member's value, or the fact that it is a number that can be changed.
+    /// For each path of the sweep: that the member's value is a number that can be changed, else the value's text.
     values: Vec<Known<'a>>,
     problem: Problem,
 }
@@ -25,7 +26,7 @@ enum Known<'a> {
     Number,
 }
 
-/// The problem of a member.
+/// The problem of a member, as [`Problems::read`] returns it.
 pub struct Read<'a> {
     /// The problem, as [`Plan::problem`] gives it.
     pub problem: &'a Problem,
@@ -74,13 +75,13 @@ impl<'a> Problems<'a> {
     }
 }
 
-/// The number in a value, if it can be changed in a problem that was read.
+/// The number that a value is, if it can be changed in a problem that was read already.
 fn exchanged(path: &str, text: Option<&str>) -> Option<f64> {
     field(path)?;
     serde_json::from_str(text?).ok()
 }
 
-/// The contact and the name of the number that a pointer names, if it can be changed.
+/// The contact and the field that a pointer names, if the field is a number that can be changed.
 fn field(path: &str) -> Option<(usize, &str)> {
     let (contact, name) = path.strip_prefix("/contacts/")?.split_once('/')?;
     let number: usize = contact.parse().ok()?;
@@ -88,7 +89,7 @@ fn field(path: &str) -> Option<(usize, &str)> {
     (number.to_string() == contact && NAMES.contains(&name)).then_some((number, name))
 }
 
-/// The numbers that affect neither the body nor the structure of a problem.
+/// The fields of a contact whose numbers affect neither the body nor the structure of a problem.
 const NAMES: [&str; 7] = [
     "indentation",
     "tangential_displacement",
@@ -99,7 +100,7 @@ const NAMES: [&str; 7] = [
     "friction/shear_cap",
 ];
 
-/// Changes a number in a problem; false if the problem has no such place.
+/// Changes the number at `path` in a problem; false if the problem has no such number.
 fn set(problem: &mut Problem, path: &str, number: f64) -> bool {
     let Some((contact, name)) = field(path) else {
         return false;

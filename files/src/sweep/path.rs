@@ -1,22 +1,22 @@
-//! JSON Pointers of a sweep.
+//! The JSON Pointers of a sweep to the values in which its members differ.
 
 use solver::error::{Findings, Reason, Violation};
 
 use crate::schema::quoted;
 
-/// A pointer into the problem, and its place in the definition.
+/// A JSON Pointer into the problem, and the place of the pointer itself in the definition of the sweep.
 pub(super) struct Path {
     pub(super) at: String,
     pub(super) text: String,
     pub(super) tokens: Vec<String>,
 }
 
-/// The largest number of bytes of a pointer: names in a problem are short.
+/// The largest number of bytes of a JSON Pointer in a sweep: names in a problem are short.
 pub const MOST_POINTER_BYTES: usize = 1 << 10;
-/// The largest number of names and numbers in a pointer: JSON is read to this depth.
+/// The largest number of names and numbers in a JSON Pointer of a sweep: JSON is read to this depth.
 pub const MOST_POINTER_TOKENS: usize = 64;
 
-/// A pointer to a part of a problem; `at` is its place in the definition.
+/// Checks and divides a JSON Pointer to a part of a problem. `at`: its place in the definition of the sweep.
 pub(super) fn path(at: String, text: &str, found: &mut Findings) -> Option<Path> {
     // before it is divided: each of its parts takes many times the two bytes that it has in the text
     if text.len() > MOST_POINTER_BYTES || text.matches('/').count() > MOST_POINTER_TOKENS {

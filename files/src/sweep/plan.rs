@@ -1,4 +1,4 @@
-//! All members of a sweep: the places where they differ, and their values.
+//! All members of a sweep: the paths of the values in which they differ, and these values.
 
 use std::collections::BTreeMap;
 
@@ -13,13 +13,13 @@ use crate::json::parse;
 
 /// The largest number of members of a sweep.
 pub const MOST_MEMBERS: usize = 10_000;
-/// The largest number of values in which members may differ.
+/// The largest number of paths, that is of values in which members may differ.
 pub const MOST_PATHS: usize = 16;
-/// The largest number of bytes of the problems of all members together, as text: checking them reads all of it.
+/// The largest number of bytes of the problems of all members together, as text: checking the members reads all of it.
 pub const MOST_BYTES: u64 = 64 << 20;
 
-/// The largest number of bytes of the values of all members together, as text: a table of all members contains all of
-/// them.
+/// The largest number of bytes of the values of all members together, as text: a table of all members contains all
+/// values.
 pub const MOST_VALUE_BYTES: u64 = 8 << 20;
 
 /// How the values of several axes are combined.
@@ -33,9 +33,9 @@ pub enum Mode {
     /// Every value of each axis with every value of the others; the last axis changes fastest.
     #[default]
     Grid,
-    /// The first values of all axes, then the second ones, and so on.
+    /// The first values of all axes for the first member, the second values for the second member, and so on.
     Zip,
-    /// As listed in `points`.
+    /// The points that are listed in `points`.
     List,
 }
 
@@ -55,7 +55,7 @@ pub struct Plan {
 pub(super) enum Values {
     Grid(Vec<Vec<String>>),
     Zip(Vec<Vec<String>>),
-    /// By member and path; none where a point keeps the value of the base.
+    /// The values by member and path; `None` where a member keeps the value of the base problem.
     List(Vec<Vec<Option<String>>>),
 }
 
@@ -81,7 +81,7 @@ impl Plan {
         self.with_mesh
     }
 
-    /// The values of a member as JSON, in the order of the paths; none where it keeps the value of the base.
+    /// The values of a member as JSON, in the order of the paths; `None` where it keeps the value of the base problem.
     pub fn values(&self, number: usize) -> Vec<Option<&str>> {
         match &self.values {
             Values::Grid(axes) => {
@@ -109,8 +109,8 @@ impl Plan {
         }
     }
 
-    /// The values of a member by path, without those of the base: as JSON without spaces, since many are held at a
-    /// time, and a tree of values takes twenty times as much memory.
+    /// The values of a member by path, without those of the base problem. They are JSON texts without spaces, since the
+    /// values of many members are held at a time, and a tree of values takes twenty times as much memory.
     pub fn parameters(&self, number: usize) -> BTreeMap<String, Box<RawValue>> {
         let values = self.paths.iter().zip(self.values(number));
         let read = |(path, value): (&String, Option<&str>)| {
@@ -129,7 +129,7 @@ impl Plan {
             .sum()
     }
 
-    /// Returns the problem of a member. Unless the sweep changes the mesh, it has an empty one in place of the base's.
+    /// Returns the problem of a member. Its mesh is empty unless the sweep changes the mesh.
     ///
     /// # Errors
     ///
@@ -138,7 +138,7 @@ impl Plan {
         parse(&self.template.filled(&self.values(number)))
     }
 
-    /// Returns the problem of a member on its mesh, which is the base's unless the sweep changes it.
+    /// Returns the problem of a member with its mesh: that of the base problem, unless the sweep changes the mesh.
     ///
     /// # Errors
     ///
@@ -155,7 +155,7 @@ impl Plan {
         Ok(problem)
     }
 
-    /// The place in the definition of the sweep that a violation of a member comes from.
+    /// The JSON Pointer to the place in the definition of the sweep that causes a violation of a member.
     pub(super) fn place(&self, number: usize, violation: &Violation) -> String {
         let pointer = violation.pointer.as_str();
         let inside = |path: &String| {
@@ -185,7 +185,7 @@ impl Plan {
         }
     }
 
-    /// The place in the definition of the sweep that determines a member: its point, or the axes.
+    /// The JSON Pointer to the place in the definition of the sweep that determines a member: its point, or the axes.
     pub fn origin(&self, number: usize) -> String {
         match &self.values {
             Values::List(_) => format!("/points/{number}"),

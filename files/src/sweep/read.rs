@@ -18,7 +18,7 @@ use crate::{
     schema::{meant, quoted},
 };
 
-/// A sweep as read.
+/// A sweep whose definition was read.
 #[derive(Clone, Debug)]
 pub struct Sweep {
     /// The base problem, from which members differ, with its mesh.
@@ -27,11 +27,11 @@ pub struct Sweep {
     pub plan: Plan,
 }
 
-/// A placeholder for the mesh that all members share: a file that is not read.
+/// A placeholder, never read, for the mesh that all members share.
 const NO_MESH: &str = r#"{"gmsh":""}"#;
 
-/// Reads a sweep from the text of its base and what its members differ in. Its members are not checked yet, see
-/// [`groups`](super::groups).
+/// Reads a sweep from the text of its base problem and from what its members differ in. The members are checked by
+/// [`groups`](super::groups) and not here.
 ///
 /// # Errors
 ///
@@ -116,11 +116,11 @@ pub fn read(text: &str, variation: Variation) -> Result<Sweep, Vec<Violation>> {
     found.into_result(Sweep { base, plan })
 }
 
-/// Reads a sweep from a body with its base as the only problem.
+/// Reads a sweep from a request body whose only problem is the base problem.
 ///
 /// # Errors
 ///
-/// All violations of the body: of its structure, or else of what it means.
+/// All violations of the body: of its structure, or if there are none, of its meaning.
 pub fn of_body(mut content: Content<'_, Variation>) -> Result<Sweep, Vec<Violation>> {
     let sound = content.violations.is_empty();
     match (content.fields.take(), &content.problems[..]) {
@@ -142,7 +142,7 @@ fn base(text: &str, found: &mut Findings) -> Option<Problem> {
         .ok()
 }
 
-/// The violation of a pointer that leads nowhere in the problem.
+/// The violation that a pointer names no value of the base problem.
 fn leads_nowhere(path: &Path, nowhere: &Nowhere) -> Violation {
     let Nowhere {
         parent,

@@ -10,25 +10,25 @@ use crate::pointer::Place;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Template {
     text: String,
-    /// The gaps in the order of the paths.
+    /// The gaps in the order of the sweep's paths.
     gaps: Vec<Gap>,
-    /// The numbers of the gaps in the order of their places.
+    /// The indices of the gaps in the order of their places in the text.
     order: Vec<usize>,
 }
 
-/// A gap for a value.
+/// A gap in a text, for a value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Gap {
-    /// The range of the text that the value replaces: empty for a member that the object there lacks.
+    /// The range of the text that the value replaces; empty for a new member of an object.
     place: Range<usize>,
-    /// The text before the value: the name of such a member.
+    /// The text to write before the value: the name of a new member, else empty.
     before: String,
-    /// The text after the value.
+    /// The text to write after the value: a comma after a new member, where one is needed.
     after: String,
 }
 
 impl Template {
-    /// A text with a gap at each of these places; none may be inside another.
+    /// A text with a gap at each of `places`, none of which may be inside another.
     pub(super) fn new(text: &str, places: Vec<Place>) -> Template {
         let mut gaps: Vec<Gap> = Vec::with_capacity(places.len());
         for place in places {
@@ -68,7 +68,7 @@ impl Template {
         }
     }
 
-    /// The text with these values; where there is none, the text is not changed.
+    /// The text with a value in each gap. Where the value is `None`, the text remains as it is.
     pub(super) fn filled(&self, values: &[Option<&str>]) -> String {
         let mut filled = String::with_capacity(self.text.len() + 64);
         let mut at = 0;

@@ -13,25 +13,26 @@ use super::{
 };
 use crate::{pointer::members, schema::quoted};
 
-/// What the members of a sweep differ in.
+/// The definition of what the members of a sweep differ in.
 #[derive(Clone, Debug, Default)]
 pub struct Variation {
     /// How the values of several axes are combined; absent: grid.
     pub mode: Option<Mode>,
-    /// With the modes grid and zip.
+    /// The axes, with the modes grid and zip.
     pub axes: Option<Vec<Axis>>,
-    /// With the mode list: objects from JSON Pointer to value, as they are written.
+    /// The points, with the mode list: objects from JSON Pointer to value.
     pub points: Option<Vec<Box<RawValue>>>,
 }
 
-/// A value of the problem that members differ in, and its values in one form.
+/// A place of the problem at which members differ, and the values there, in one of the forms `values`, `linspace` and
+/// `logspace`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub struct Axis {
-    /// JSON Pointer (RFC 6901) into the problem, such as /contacts/0/friction/coefficient. The object around it must be in
-    /// the base.
+    /// JSON Pointer (RFC 6901) into the problem, such as /contacts/0/friction/coefficient. The object that contains the
+    /// value must exist in the base.
     pub path: String,
-    /// Any values of the schema of a problem there: numbers, or a whole obstacle or list of steps.
+    /// A list of values that the schema of a problem allows there: numbers, or whole obstacles or lists of steps.
     #[serde(default)]
     #[schemars(with = "Option<Vec<Value>>", length(min = 1, max = MOST_MEMBERS))]
     pub values: Option<Vec<Box<RawValue>>>,
@@ -43,23 +44,23 @@ pub struct Axis {
     pub logspace: Option<Spaced>,
 }
 
-/// Numbers from start to stop, both among them.
+/// Numbers from `start` to `stop`, including both.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub struct Spaced {
-    /// The first.
+    /// The first number.
     pub start: f64,
-    /// The last.
+    /// The last number.
     pub stop: f64,
-    /// How many.
+    /// The number of numbers, including the first and the last.
     #[schemars(range(min = 1, max = MOST_MEMBERS))]
     pub count: u64,
 }
 
-/// The points of a sweep, for schemas: objects from JSON Pointer to value.
+/// The type of the points of a sweep in schemas: objects from JSON Pointer to value.
 pub type Points = Vec<BTreeMap<String, Value>>;
 
-/// A field that a mode does not use.
+/// Reports the field `name` if it is given, since the mode of the sweep does not use it.
 fn not_used(name: &str, given: bool, mode: Mode, hint: &str, found: &mut Findings) {
     if given {
         let mode: &str = mode.into();
@@ -73,13 +74,13 @@ fn not_used(name: &str, given: bool, mode: Mode, hint: &str, found: &mut Finding
     }
 }
 
-/// Most members of a point that are looked at: more than it may have.
+/// The largest number of members of a point that are read, more than a point may have.
 const MOST_NAMES: usize = 64;
 
 const AXES_HINT: &str = "Change several values together by the mode zip or list.";
 const VALUES_HINT: &str = "An axis has at least one value, and a sweep at most that many members.";
 
-/// Whether a list has 1 … `most` of `what`.
+/// Whether a list has 1 … `most` of `what`; reports it if not.
 fn are_few(
     at: &str,
     count: usize,
@@ -103,7 +104,7 @@ fn are_few(
     false
 }
 
-/// The axes of a grid or zip.
+/// The paths and values of the axes of a grid or zip.
 pub(super) fn axes(given: Variation, found: &mut Findings) -> Option<(Vec<Path>, Values)> {
     let mode = given.mode.unwrap_or_default();
     let hint = "Set `mode` to \"list\" for points, or leave them out.";
@@ -200,7 +201,7 @@ fn axis(at: &str, axis: Axis, found: &mut Findings) -> Option<Vec<String>> {
     }
 }
 
-/// A list of any values.
+/// The values of an axis that are given as a list.
 fn values(at: &str, given: &[Box<RawValue>], found: &mut Findings) -> Option<Vec<String>> {
     if !are_few(at, given.len(), MOST_MEMBERS, "values", VALUES_HINT, found) {
         return None;
@@ -212,8 +213,8 @@ fn values(at: &str, given: &[Box<RawValue>], found: &mut Findings) -> Option<Vec
     sound.then(|| given.iter().map(|raw| raw.get().to_owned()).collect())
 }
 
-/// Checks that a value is not too large a number. Numbers inside lists and objects are checked when the problem is
-/// read.
+/// Checks that a value is not a number too large for double precision. Numbers inside lists and objects are checked
+/// when the problem is read.
 fn is_finite(at: &str, raw: &RawValue, found: &mut Findings) -> bool {
     let number = raw
         .get()
@@ -275,7 +276,7 @@ fn rounded(value: f64) -> f64 {
     format!("{value:.14e}").parse().unwrap_or(value)
 }
 
-/// A finite number as JSON: a whole one without a fraction, so that it may be a count.
+/// A finite number as JSON. A whole number has no fraction, so that it may be a count.
 fn number(value: f64) -> String {
     const EXACT: f64 = 9_007_199_254_740_992.0;
     if value.fract() == 0.0 && value.abs() < EXACT {
@@ -285,7 +286,7 @@ fn number(value: f64) -> String {
     }
 }
 
-/// The points of a list: each an object from pointer to value.
+/// The paths and values of the points of a list, each an object from pointer to value.
 pub(super) fn points(given: &Variation, found: &mut Findings) -> Option<(Vec<Path>, Values)> {
     let hint = "Choose the mode grid or zip for axes, or leave them out.";
     not_used("axes", given.axes.is_some(), Mode::List, hint, found);

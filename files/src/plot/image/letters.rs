@@ -1,5 +1,5 @@
-//! The letters of figures: those of DejaVu Sans, regular and bold, one after another from the left, with kerning. There
-//! are no ligatures; scripts that run from the right or join their letters are not set correctly.
+//! Places the letters of a text in a figure: those of DejaVu Sans, regular and bold, one after another from the left,
+//! with kerning. There are no ligatures; scripts that run from the right or join their letters are not set correctly.
 
 use tiny_skia::{Path, PathBuilder};
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
@@ -8,10 +8,10 @@ use ttf_parser::{Face, GlyphId, OutlineBuilder};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Letter {
     pub(super) char: char,
-    /// The font's place in `Fonts`.
+    /// The number of the font in [`Fonts`].
     pub(super) font: usize,
     pub(super) glyph: GlyphId,
-    /// The start of the letter, from the start of the line.
+    /// The distance of the letter from the start of the line.
     pub(super) place: f32,
     pub(super) width: f32,
 }
@@ -34,7 +34,7 @@ impl Font {
         f32::from(units) / f32::from(self.face.units_per_em())
     }
 
-    /// The kerning: the change of the distance between two letters.
+    /// The kerning of two letters: a change of the distance between them (em).
     fn kerning(&self, left: GlyphId, right: GlyphId) -> f32 {
         let tables = self.face.tables().kern.iter();
         let mut parts = tables
@@ -56,7 +56,7 @@ impl Fonts {
         ]))
     }
 
-    /// The letters of a text, and its width.
+    /// The letters of a text with their places, and the width of the text (em).
     pub(super) fn line(&self, text: &str, bold: bool) -> (Vec<Letter>, f32) {
         let wanted = usize::from(bold);
         let mut letters: Vec<Letter> = Vec::new();
@@ -84,7 +84,8 @@ impl Fonts {
         (letters, end)
     }
 
-    /// The outlines of letters of a size, on a line that begins at `start` in the direction `along`; y points down.
+    /// The outlines of letters of height `size`, on a line that begins at `start` in the direction `along`; y points
+    /// down.
     pub(super) fn outlines(
         &self,
         letters: &[Letter],

@@ -28,7 +28,7 @@ pub enum Image {
 /// The largest SVG that is converted (bytes); drawing it takes several times this memory.
 const LARGEST: usize = 4 << 20;
 
-/// Writes a drawn figure as a file of the given kind.
+/// Writes a figure that was drawn as SVG as a file of the format `image`.
 ///
 /// # Errors
 ///

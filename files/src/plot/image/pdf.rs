@@ -21,18 +21,18 @@ use crate::plot::Size;
 const POINTS_PER_INCH: f64 = 72.0;
 /// The largest height of a page that PDF readers show (points).
 const HIGHEST: f32 = 14_400.0;
-/// The units of lengths in a PDF font, per height of the font.
+/// The height of a font in the units of a PDF font.
 const PER_EM: f32 = 1000.0;
 /// The names of the fonts on the page.
 const FONTS: [Name<'static>; 2] = [Name(b"F0"), Name(b"F1")];
-/// The numbering of glyphs, which is that of the embedded part.
+/// The numbering of glyphs in the PDF: by their numbers in the embedded part of the font.
 const NUMBERING: SystemInfo<'static> = SystemInfo {
     registry: Str(b"Adobe"),
     ordering: Str(b"Identity"),
     supplement: 0,
 };
 
-/// Writes the figure as PDF with its size on paper.
+/// Writes a figure as a PDF page with the figure's size on paper.
 pub(super) fn pdf(figure: &Document<'_>, fonts: &Fonts, size: Size) -> Result<Vec<u8>, String> {
     let [wide, high] = svg::size(figure)?;
     let width = (size.inches() * POINTS_PER_INCH) as f32;
@@ -103,7 +103,7 @@ pub(super) fn pdf(figure: &Document<'_>, fonts: &Fonts, size: Size) -> Result<Ve
     Ok(pdf.finish())
 }
 
-/// The name of the graphics state for an opacity.
+/// The name of the PDF graphics state for an opacity (thousandths) of fills (`F`) or of lines (`S`).
 fn opacity_name((what, thousandths): (char, u16)) -> String {
     format!("{what}{thousandths}")
 }
@@ -114,16 +114,16 @@ fn compressed(bytes: &[u8]) -> Result<Vec<u8>, String> {
     written.map_err(|error| error.to_string())
 }
 
-/// The part of a font that a figure needs.
+/// The part of a font that the PDF embeds: the letters that the figure needs.
 #[derive(Default)]
 struct Part {
     glyphs: GlyphRemapper,
-    /// By the glyph's number in the part: the first letter that it stands for, and its width.
+    /// By the number of a glyph in this part of the font: the first letter that the glyph stands for, and its width.
     letters: BTreeMap<u16, (char, f32)>,
 }
 
 impl Part {
-    /// Writes the part as objects with these numbers.
+    /// Writes the part of the font as PDF objects with these numbers.
     fn embed(&self, font: &Font, numbers: [Ref; 5], pdf: &mut Pdf) -> Result<(), String> {
         let [id, descendant, descriptor, file, unicode] = numbers;
         let bytes = subsetter::subset(font.bytes, 0, &self.glyphs);
@@ -177,8 +177,8 @@ impl Part {
         Ok(())
     }
 
-    /// Six letters that identify the part: different parts of the same font have different ones, so that programs that
-    /// join documents keep both.
+    /// Six letters that identify the part of the font. Different parts of one font have different letters, so that
+    /// programs that join documents keep both parts.
     fn tag(&self) -> String {
         let mut hasher = DefaultHasher::new();
         for glyph in self.glyphs.remapped_gids() {
@@ -197,7 +197,7 @@ impl Part {
 struct Page {
     content: Content,
     parts: [Part; 2],
-    /// The opacities in use (thousandths), for fills and for lines.
+    /// The opacities in use (thousandths), each for fills (`F`) or for lines (`S`).
     opacities: BTreeSet<(char, u16)>,
     clipped: bool,
 }

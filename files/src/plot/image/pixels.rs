@@ -11,11 +11,11 @@ use crate::plot::Size;
 
 const DOTS_PER_INCH: f64 = 300.0;
 const LEAST_DOTS_PER_INCH: f64 = 100.0;
-/// The largest number of pixels: a figure of many panels has fewer per inch, until it could not be read. Each takes
-/// eight bytes while it is drawn.
+/// The largest number of pixels; a figure of many panels has fewer pixels per inch. While a figure is drawn, each pixel
+/// takes eight bytes.
 pub(super) const MOST_PIXELS: f64 = 8e6;
 
-/// Writes the figure as PNG with its size on paper.
+/// Writes a figure as PNG with the figure's size on paper.
 pub(super) fn png(figure: &Document<'_>, fonts: &Fonts, size: Size) -> Result<Vec<u8>, String> {
     let [width, height] = svg::size(figure)?.map(f64::from);
     let wanted = size.inches() * DOTS_PER_INCH / width;
@@ -62,7 +62,7 @@ pub(super) fn png(figure: &Document<'_>, fonts: &Fonts, size: Size) -> Result<Ve
 
 struct Pixels<'a> {
     pixels: Pixmap,
-    /// The picture before clipping, and the rectangle that is drawn on now (units of the drawing).
+    /// The picture before clipping, and the rectangle that is clipped to (units of the drawing).
     clip: Option<(Pixmap, [f32; 4])>,
     /// The transformation from the units of the drawing to pixels.
     scale: Transform,
@@ -130,8 +130,8 @@ impl Canvas for Pixels<'_> {
 }
 
 impl Pixels<'_> {
-    /// Restores the pixels outside a rectangle (left, top, right, bottom) to the picture before: a mask while drawing
-    /// would shift the colours where shapes touch.
+    /// Restores the pixels outside a rectangle (left, top, right, bottom) to the picture before: clipping by a mask
+    /// while drawing would shift the colours where shapes touch.
     fn restore(&mut self, before: &Pixmap, inside: [f32; 4]) {
         let width = self.pixels.width() as usize;
         let scales = [self.scale.sx, self.scale.sy, self.scale.sx, self.scale.sy];

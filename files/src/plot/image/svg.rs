@@ -1,5 +1,5 @@
-//! Reads the SVG of a figure, shape by shape: only the elements that plotters and `body` write. Anything else is an
-//! error rather than left out.
+//! Reads the SVG of a figure, shape by shape: only the elements that plotters and `body` write. Any other element is an
+//! error, and is not left out.
 
 use roxmltree::{Document, Node};
 use tiny_skia::{FillRule, Path, PathBuilder, Rect};
@@ -8,7 +8,7 @@ use super::letters::{Fonts, Letter};
 
 /// A surface that a figure is drawn on. Places and lengths are in units of the drawing, y points down.
 pub(super) trait Canvas {
-    /// Fills a path and draws a line along it.
+    /// Fills a path (`inside`) and draws a line along it.
     fn shape(
         &mut self,
         path: &Path,
@@ -17,7 +17,7 @@ pub(super) trait Canvas {
     );
     /// Draws letters on a line.
     fn letters(&mut self, line: &Line<'_>, paint: Paint);
-    /// Clips everything that follows to a rectangle; `None` ends that.
+    /// Clips everything that is drawn next to a rectangle; `None` ends the clipping.
     fn clip(&mut self, to: Option<Rect>);
 }
 
@@ -28,7 +28,7 @@ pub(super) struct Paint {
     pub(super) opacity: f32,
 }
 
-/// The style of a line: with square ends and mitred joins where they are not round.
+/// The style of a line. Its ends are square and its joins mitred unless they are round.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Stroke {
     pub(super) width: f32,
@@ -44,7 +44,7 @@ pub(super) struct Line<'a> {
     pub(super) letters: &'a [Letter],
     pub(super) size: f32,
     pub(super) start: [f32; 2],
-    /// The direction of the line, of length 1.
+    /// The direction of the line, as a vector of length 1.
     pub(super) along: [f32; 2],
 }
 
@@ -65,7 +65,7 @@ pub(super) fn draw(
     content(figure.root_element(), [0.0; 2], fonts, canvas)
 }
 
-/// Draws the content of an element, moved by `from`.
+/// Draws the content of an element, shifted by `from`.
 fn content(
     parent: Node<'_, '_>,
     from: [f32; 2],
@@ -117,7 +117,7 @@ fn shape(node: Node<'_, '_>, from: [f32; 2], canvas: &mut impl Canvas) -> Result
     Ok(())
 }
 
-/// The path of a shape.
+/// The path of a shape, shifted by `from`; none if the path is empty.
 fn outline(node: Node<'_, '_>, from: [f32; 2]) -> Result<Option<Path>, String> {
     let value = |name| number(required(node, name)?);
     let mut path = PathBuilder::new();
@@ -155,7 +155,7 @@ fn outline(node: Node<'_, '_>, from: [f32; 2]) -> Result<Option<Path>, String> {
     Ok(path.finish())
 }
 
-/// Adds the commands of a path: `M` and `L` with places; `l` and `q` with steps from the last place; `z`.
+/// Adds the commands of an SVG path: `M` and `L` with places; `l` and `q` with steps from the last place; `z`.
 fn commands(path: &str, from: [f32; 2], to: &mut PathBuilder) -> Result<(), String> {
     let mut here = from;
     let mut commands = path
@@ -195,7 +195,7 @@ fn commands(path: &str, from: [f32; 2], to: &mut PathBuilder) -> Result<(), Stri
     Ok(())
 }
 
-/// Draws a text of several sizes on a line with subscripts.
+/// Draws a text, with letters of several sizes and with subscripts.
 fn text(
     node: Node<'_, '_>,
     from: [f32; 2],
@@ -245,8 +245,8 @@ fn text(
     Ok(())
 }
 
-/// The words of a text with the elements that they are in. Line ends count as blanks; only the first of several blanks
-/// is kept, and none at the ends of the text.
+/// The words of a text, each with the element that it is in. Line ends count as blanks; only the first of several
+/// blanks is kept, and none at the ends of the text.
 fn words<'a, 'input>(text: Node<'a, 'input>) -> Vec<(Node<'a, 'input>, String)> {
     let mut words: Vec<(Node<'a, 'input>, String)> = Vec::new();
     let mut blank = true;
@@ -267,7 +267,7 @@ fn words<'a, 'input>(text: Node<'a, 'input>) -> Vec<(Node<'a, 'input>, String)> 
     words
 }
 
-/// A length, which may be given in heights of letters.
+/// A length as text, which may be given in heights of letters. `size`: that height.
 fn length(text: &str, size: f32) -> Result<f32, String> {
     if let Some(heights) = text.strip_suffix("em") {
         Ok(number(heights)? * size)
@@ -279,7 +279,7 @@ fn length(text: &str, size: f32) -> Result<f32, String> {
     }
 }
 
-/// The colour of a fill or line; `None` if it is not drawn.
+/// The colour of an element's fill or line, as `what` says; `None` if it is not drawn.
 fn paint(node: Node<'_, '_>, what: &str) -> Result<Option<Paint>, String> {
     let Some(colour) = inherited(node, what).filter(|colour| *colour != "none") else {
         return Ok(None);
@@ -303,7 +303,7 @@ fn rectangle(node: Node<'_, '_>, from: [f32; 2]) -> Result<[f32; 4], String> {
     Ok([from[0] + x, from[1] + y, value("width")?, value("height")?])
 }
 
-/// The attribute of an element, or of the nearest element around it that has it.
+/// An attribute of an element, or of the nearest element around it that has the attribute.
 fn inherited<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
     node.ancestors().find_map(|node| node.attribute(name))
 }
@@ -313,7 +313,7 @@ fn required<'a>(node: Node<'a, '_>, name: &str) -> Result<&'a str, String> {
     value.ok_or_else(|| format!("a {} has no {name}", node.tag_name().name()))
 }
 
-/// The numbers in `name(…)`.
+/// The numbers between the brackets of `name(…)`.
 fn arguments<const N: usize>(text: &str, name: &str) -> Result<[f32; N], String> {
     let inside = text.strip_prefix(name).and_then(|rest| {
         let rest = rest.strip_prefix('(')?;
