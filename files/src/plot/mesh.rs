@@ -23,8 +23,8 @@ use crate::external::external_mesh;
 const LEGEND: i32 = 22;
 /// The space left of the legend (pixels).
 const LEFT: i32 = 84;
-/// The distance of a boundary's line from the body, and between the lines of boundaries with a common side (pixels): the
-/// elements at a graded edge stay visible.
+/// The distance of a boundary's line from the body, and between the lines of boundaries with a common side (pixels):
+/// the elements at a graded edge stay visible.
 const OUTSIDE: f64 = 3.5;
 /// The width of a boundary's line (pixels).
 const WIDE: f64 = 2.0;

@@ -1,14 +1,14 @@
 //! Errors of quantities by comparison with a refined mesh, on which every element is split in two.
 //!
-//! With q_h on the mesh of the solution and q_h/2 on the refined one, a quantity that converges with order p has the
+//! With q_h on the mesh of the solution and q_h/2 on the refined mesh, a quantity q that converges with order p has the
 //! error
 //!
 //!   |q_h − q| = |q_h − q_h/2| / (1 − 2⁻ᵖ)
 //!
-//! p is taken as 1 for forces, 0.74 for peaks and 0.58 for ends of stick; smoother quantities are covered by this.
-//! Where q_2h is known and shows a lower order, that order is taken, but at least ½. Two values may agree by chance, so
-//! the bound is never below a part of the estimate from one mesh. The factors are calibrated on random problems by
-//! `tests/verification/calibration.rs`.
+//! p is taken as 1 for forces, 0.74 for peaks and 0.58 for ends of stick, which covers smoother quantities. If q_2h, on
+//! the mesh that was split into that of the solution, is known and shows a lower order, that order is taken, but at
+//! least ½. Two values may agree by chance, so the bound is never below a part of the estimate from one mesh. The
+//! factors are calibrated on random problems by `tests/verification/calibration.rs`.
 
 use super::verdict::{Doubt, Unpaired, conclude, relative, scale};
 use crate::algorithm::{Estimable, Quantity};
@@ -17,10 +17,11 @@ use crate::solution::{Accuracy, ErrorMethod, EstimatedQuantity, Outcome, Quantit
 /// The lowest order of convergence that is assumed, for example of a peak at an edge of its neighbourhood.
 const LEAST_ORDER: f64 = 0.5;
 
-/// A difference below this part of the reference size of its quantity is an error of the iterations and shows no order.
+/// The largest difference, as a part of a quantity's reference size, that is an error of the iterations and shows no
+/// order.
 const ROUNDING: f64 = 1e-9;
 
-/// Calibrated factors: on the difference of two meshes, and on the estimate (as a lower limit of the error).
+/// Calibrated factors of an error: on the difference between two meshes, and on the estimate, which is a lower limit.
 fn factors(name: QuantityName) -> [f64; 2] {
     use QuantityName::*;
     match name {
@@ -40,12 +41,12 @@ pub struct OnOtherMesh {
     contact: String,
     value: f64,
     estimable: Estimable,
-    /// [`Quantity::images`].
+    /// The number of equal parts of the contact, [`Quantity::images`].
     images: f64,
 }
 
 impl OnOtherMesh {
-    /// Keeps name, contact and value of a quantity for a comparison.
+    /// Keeps what the comparison of a quantity on two meshes needs.
     pub fn new(quantity: &Quantity, contact: &str) -> Self {
         OnOtherMesh {
             name: quantity.name,
@@ -57,8 +58,8 @@ impl OnOtherMesh {
     }
 }
 
-/// Errors by comparison with the refined mesh and, if there is one, with the coarser mesh that this mesh was split
-/// from. `estimated`: the estimates for a converged solution.
+/// Bounds the errors of quantities by comparison with the refined mesh (`finer`) and, if there is one, with the mesh
+/// that was split into this one (`coarser`). `estimated`: the estimates from this mesh for a converged solution.
 pub fn verified(
     estimated: &Accuracy,
     finer: &[OnOtherMesh],
@@ -128,7 +129,7 @@ pub fn verified(
     }
 }
 
-/// The estimates, with a reason that says why they could not be verified.
+/// Adds to the estimates the reason `why` they could not be verified.
 pub fn unverified(mut estimated: Accuracy, why: &str) -> Accuracy {
     let why = why.trim_end_matches('.');
     let reason = format!("The errors are estimates, and not verified: {why}.");
@@ -202,13 +203,13 @@ fn compare(
     None
 }
 
-/// Removes the error of a quantity, which becomes unknown.
+/// Makes the error of a quantity unknown.
 fn forget_error(quantity: &mut EstimatedQuantity) {
     (quantity.error, quantity.relative) = (None, None);
     (quantity.increments, quantity.direction) = (None, None);
 }
 
-/// The bound of an error from the difference to the refined mesh and from the estimate on this one.
+/// Bounds an error by the difference to the refined mesh and by the estimate from the mesh of the solution.
 fn bound(name: QuantityName, difference: f64, order: Option<f64>, estimate: f64) -> f64 {
     let [factor, least] = factors(name);
     if matches!(name, QuantityName::ContactStart | QuantityName::ContactEnd) {

@@ -4,9 +4,9 @@
 //!
 //!   J(u) − J(u_h) ≈ ∫ (σ* − σ_h) : C⁻¹ (σ_z* − σ_z,h)
 //!
-//! with σ* recovered from σ_h, and σ_z the stresses of the dual solution of J: those of the body under the contact
-//! displacements z of [`influences`]. What happens between the nodes and points of the contact is added (`Parts`),
-//! each with a factor that makes the sum a bound: they are calibrated on random problems by
+//! with σ* recovered from σ_h, and σ_z the stresses of the dual solution of J, which has the contact displacements z of
+//! [`influences`]. The errors due to what happens between the nodes and points of the contact are added (`Parts`). Each
+//! part has a factor, so that the sum is a bound: the factors are calibrated on random problems by
 //! `tests/verification/calibration.rs`, which also says how often the bound holds.
 
 mod halved;
@@ -35,32 +35,32 @@ use verdict::{Doubt, conclude, length, relative, scale};
 /// The parts of the error of a quantity, in its unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Parts {
-    /// The weighted errors of all elements.
+    /// The sum of the weighted errors of all elements.
     signed: f64,
-    /// The weighted errors of all elements without their signs: some errors of opposite sign cancel by chance only.
+    /// The sum of the sizes of the weighted errors of all elements: some errors of opposite sign cancel by chance only.
     absolute: f64,
-    /// The weighted errors of the elements away from the contact: near the contact, where the dual solution of a peak
-    /// has a singular point, errors mostly cancel; errors from far away do not.
+    /// The sum of the sizes of the weighted errors of elements away from the contact. Near the contact, where the dual
+    /// solution of a peak has a singular point, errors mostly cancel; errors from far away do not.
     away: f64,
-    /// The part of the weighted errors that exceeds those around it, at a singular point, where recovery sees only a
-    /// part of the error.
+    /// The part of the weighted errors of elements that exceeds those of the elements around. Elements stand out at a
+    /// singular point, where recovery sees only a part of the error.
     standing_out: f64,
     /// The change of the quantity if the pressure, quadratic between nodes, is moved to the nodes.
     consistency: f64,
-    /// The error due to the gap between the nodes within the edges at the ends of contact.
+    /// The error due to the gap between the nodes within the edges at the ends of contact, where only some nodes touch.
     gap: f64,
-    /// The square of the distance between the nodes at the ends of contact, in lengths of the contact, times the
-    /// quantity: its change if the end moves by a node, since it is nearly stationary there.
+    /// The value of the quantity times the square of the distance between the nodes at the ends of contact, in lengths
+    /// of the contact: the change of the quantity, nearly stationary there, if an end of contact moves by a node.
     ends: f64,
     /// The error due to the distance between nodes, [`Quantity::spacing`].
     spacing: f64,
-    /// The error due to the law between its points, [`Quantity::between`].
+    /// The error because the law is evaluated at its points only, [`Quantity::between`].
     between: f64,
-    /// The error due to an obstacle that ends inside an edge that is left out, [`Quantity::truncation`].
+    /// The error due to the end of an obstacle inside an edge, which is left out, [`Quantity::truncation`].
     truncation: f64,
     /// The pressure of a shape of the obstacle that the nodes miss, [`Quantity::unseen`].
     unseen: f64,
-    /// The change of a force by the mean of that shape of the obstacle.
+    /// The change of the quantity by the mean, over an edge, of shapes of the obstacle that the nodes miss.
     unseen_mean: f64,
     /// The size of the quantity itself, for rounding and errors that no other part contains.
     value: f64,
@@ -104,7 +104,8 @@ impl Parts {
 /// (`tests/verification/far_away.rs`).
 const STANDING_OUT: f64 = 4.0;
 
-/// The calibrated factors of [`Parts`], in its order. Parts that did not improve the bound have the factor 0.
+/// The calibrated factors of [`Parts`], in the order of its fields; parts without a factor here have functions or
+/// constants of their own. Parts that did not improve the bound have the factor 0.
 fn factors(name: QuantityName) -> [f64; 9] {
     use QuantityName::*;
     #[rustfmt::skip] // a table
@@ -120,9 +121,9 @@ fn factors(name: QuantityName) -> [f64; 9] {
     factors
 }
 
-/// The factor of [`Parts::truncation`]: twice what flat punches show. If they are made longer by some part, their force
+/// The factor of [`Parts::truncation`]: twice what flat punches show. If a punch is made longer by some part, its force
 /// grows by 0.25 to 0.3 of that part (`tests/verification/obstacle_points.rs`). Friction with a prescribed bound grows
-/// by all of it.
+/// by the whole part.
 fn truncation_factor(name: QuantityName) -> f64 {
     use QuantityName::*;
     match name {
@@ -133,22 +134,23 @@ fn truncation_factor(name: QuantityName) -> f64 {
     }
 }
 
-/// Friction acts in one direction if its sum equals the sum of its sizes up to this part.
+/// The largest relative difference between the size of the tangential force and the friction force with which friction
+/// counts as acting in one direction.
 const ONE_WAY: f64 = 1e-9;
 
-/// A final state with what is reported of it.
+/// A final state with its results.
 #[derive(Clone, Copy)]
 pub struct Solved<'a> {
-    /// The problem on Γ_C.
+    /// The problem, condensed to Γ_C.
     pub system: &'a System<'a>,
-    /// The state.
+    /// The final state.
     pub finished: &'a Finished,
-    /// Its results.
+    /// The results of the final state.
     pub reported: &'a Reported,
 }
 
-/// Computes the errors of all quantities and the verdict. `increments`: the same solution in more increments, where the
-/// end depends on the path.
+/// Computes the errors of all quantities and the verdict. `increments`: the quantities of the same solution in more
+/// increments, if the solution depends on the load path.
 pub fn assess(
     solved: Solved<'_>,
     increments: Option<&Increments>,
@@ -205,7 +207,7 @@ pub fn assess(
     conclude(reported.summary.outcome, found, &doubts, &[])
 }
 
-/// The size that the error of a quantity is compared with.
+/// The reference size of a quantity, by which its error is divided.
 fn scale_of(quantity: &Quantity, all: &[Quantity]) -> f64 {
     let own = |name: QuantityName| {
         let same = all
@@ -221,22 +223,23 @@ fn scale_of(quantity: &Quantity, all: &[Quantity]) -> f64 {
 struct Bounds {
     /// The error due to the mesh.
     mesh: f64,
-    /// The error because gaps are linear in an indentation along a direction.
+    /// The error because gaps are computed as linear in an indentation along a direction.
     displaced: f64,
 }
 
-/// A factor: different gaps also make the contact grow or shrink, which changes quantities by more than the first order
-/// (`tests/verification/directions.rs`).
+/// A factor on the error due to an indentation along a direction: wrong gaps also make the contact grow or shrink,
+/// which changes quantities by more than the first order (`tests/verification/directions.rs`).
 const SECOND_ORDER: f64 = 2.0;
 
-/// Where parts cancel to the first order, this part of the sum of their sizes is left as an error.
+/// The error due to an indentation along a direction where its parts cancel, as a part of the sum of their sizes.
 const UNSURE: f64 = 0.05;
 
-/// The work for one element, and for one place between nodes, for each quantity, in multiplications.
+/// The work for one element, for each quantity, in multiplications.
 const WORK_OF_AN_ELEMENT: usize = 100;
+/// The work for one place between nodes, for each quantity, in multiplications.
 const WORK_OF_A_PLACE: usize = 30;
 
-/// The bounds of the errors of all quantities; none if the linearised problem has no unique solution, or the observer
+/// The bounds of the errors of all quantities. None if the linearised problem has no unique solution, or the observer
 /// stops.
 fn bounds(
     solved: Solved<'_>,
@@ -340,13 +343,14 @@ fn bounds(
     Some(of_quantities.map(one_way).collect())
 }
 
-/// ∫ (σ* − σ_h) : C⁻¹ (σ_z* − σ_z,h) of every element, for every dual; none if the observer stops.
+/// ∫ (σ* − σ_h) : C⁻¹ (σ_z* − σ_z,h) over each element, by dual solution and element. None if the observer stops.
 fn weighted_errors(
     solved: Solved<'_>,
     influences: &[Vec<f64>],
     observer: &mut dyn Observer,
 ) -> Option<Vec<Vec<f64>>> {
-    /// Dual solutions that are treated together: eight numbers fill a cache line, but many problems have few.
+    /// The number of dual solutions that are treated together: eight numbers fill a cache line, but many problems have
+    /// few.
     const MANY: usize = 8;
     const FEW: usize = 4;
     let threads = solved.system.body.threads(observer);
@@ -363,7 +367,7 @@ fn weighted_errors(
     Some(errors)
 }
 
-/// [`weighted_errors`] for at most `DUALS` dual solutions.
+/// Like [`weighted_errors`], for at most `DUALS` dual solutions.
 fn weighted_errors_of<const DUALS: usize>(
     solved: Solved<'_>,
     influences: &[Vec<f64>],
@@ -379,8 +383,8 @@ fn weighted_errors_of<const DUALS: usize>(
     Ok(products.into_iter().take(influences.len()).collect())
 }
 
-/// Adds the parts from elements and edges to the error of a quantity with a gradient: weighted errors, and pressures
-/// moved to the nodes.
+/// The error of a quantity with a gradient by element and edge: weighted errors of elements, and on edges the effect of
+/// moving the pressure to the nodes.
 fn by_weight(
     quantity: &Quantity,
     system: &System<'_>,
@@ -415,7 +419,7 @@ fn by_weight(
     added
 }
 
-/// Adds the parts of the error that the distances between nodes and between friction points cause.
+/// Adds the parts of the error that the distances between nodes and between friction points cause, by edge.
 fn by_spacing(quantity: &Quantity, all: &[Quantity], parts: &Parts, added: &mut Added) {
     let [_, _, _, _, gap, ends, spacing, between, _] = factors(quantity.name);
     let at_ends: Vec<(usize, f64)> = all
@@ -429,7 +433,7 @@ fn by_spacing(quantity: &Quantity, all: &[Quantity], parts: &Parts, added: &mut 
     added.spread(parts.unseen + parts.unseen_mean, &quantity.unseen_at);
 }
 
-/// The mesh nodes in contact.
+/// The nodes of the mesh that are in contact.
 fn touching(system: &System<'_>, finished: &Finished) -> impl Iterator<Item = u32> {
     let active = &finished.state.active;
     let patches = system.patches.iter();
@@ -440,13 +444,13 @@ fn touching(system: &System<'_>, finished: &Finished) -> impl Iterator<Item = u3
     })
 }
 
-/// Whether a quantity is an end of the contact.
+/// Whether a quantity is the start or end of an interval of contact, in the contact `patch`.
 fn is_end(quantity: &Quantity, patch: usize) -> bool {
     use QuantityName::{ContactEnd, ContactStart};
     matches!(quantity.name, ContactStart | ContactEnd) && quantity.patch == patch
 }
 
-/// The largest distance between the nodes at the ends of the contact, in lengths of the contact.
+/// The largest distance between nodes at the ends of contact, divided by the length of the contact.
 fn end_spacing(quantity: &Quantity, all: &[Quantity]) -> f64 {
     let ends = all.iter().filter(|q| is_end(q, quantity.patch));
     let ends: Vec<&Quantity> = ends.collect();
@@ -468,7 +472,7 @@ fn end_spacing(quantity: &Quantity, all: &[Quantity]) -> f64 {
     }
 }
 
-/// The change of every nodal reaction if the pressure between the nodes is moved to the nodes: ∫ h_i p − R_i.
+/// The change of every nodal reaction R_i if the pressure p between the nodes is moved to the nodes: ∫ h_i p − R_i.
 fn smoothing_of_reactions(system: &System<'_>, finished: &Finished) -> Vec<f64> {
     let reactions = system.reactions(&finished.state);
     let pressures = system.pressures(&reactions);
@@ -491,7 +495,7 @@ fn smoothing_of_reactions(system: &System<'_>, finished: &Finished) -> Vec<f64> 
     change
 }
 
-/// p_z at the contact nodes: the pressure of the dual solution under `force`.
+/// The pressure p_z of a dual solution at the contact nodes. `force`: Ŝ z.
 fn dual_pressures(system: &System<'_>, finished: &Finished, force: &[f64]) -> Vec<f64> {
     let reaction = |node: usize| match system.nodes[node].normal {
         Dof::Free(dof) if finished.state.active[node] => force[dof],
@@ -501,8 +505,8 @@ fn dual_pressures(system: &System<'_>, finished: &Finished, force: &[f64]) -> Ve
     system.pressures(&reactions)
 }
 
-/// The change of a quantity by displaced obstacles, under the dual solution z for this force: by other gaps at the
-/// nodes in contact and by reactions that are turned. The second value is the sum of the sizes of its parts.
+/// The change of a quantity by displaced obstacles: by other gaps at the nodes in contact, and by reactions that are
+/// turned. The second value is the sum of the sizes of these parts. `z`, `force`: the dual solution z, and Ŝ z.
 fn by_displaced(
     system: &System<'_>,
     active: &[bool],
@@ -526,8 +530,8 @@ fn by_displaced(
     found
 }
 
-/// ∫ p_z (gap − parabola through the gap at the nodes) over edges with all nodes in contact, by the trapezoidal rule
-/// between the places at which the obstacle is given.
+/// ∫ p_z (gap − parabola through the gaps at the nodes) over edges whose nodes are all in contact, by the trapezoidal
+/// rule between the places at which the obstacle is given. p_z: the pressure of the dual solution z. `force`: Ŝ z.
 fn unseen_gap(system: &System<'_>, finished: &Finished, force: &[f64]) -> f64 {
     let pressures = dual_pressures(system, finished, force);
     let mut sum = 0.0;
@@ -558,7 +562,7 @@ fn unseen_gap(system: &System<'_>, finished: &Finished, force: &[f64]) -> f64 {
     sum
 }
 
-/// ∫ p_z (gap − u_n) over edges with a node in contact, p_z the pressure of the dual solution under `force`.
+/// ∫ p_z (gap − u_n) over edges with a node in contact. p_z: the pressure of the dual solution z. `force`: Ŝ z.
 fn gap_between_nodes(system: &System<'_>, finished: &Finished, force: &[f64]) -> f64 {
     let state = &finished.state;
     let pressures = dual_pressures(system, finished, force);

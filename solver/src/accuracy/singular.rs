@@ -2,27 +2,28 @@
 //!
 //! At a corner of the supports, a reentrant corner, the end of a load or of an interface, stresses grow without limit.
 //! The elements that meet there hold most of the error that the body contributes, however fine the mesh is. Recovery
-//! sees only a part of it: a fifth at a clamped corner of an orthotropic body, where one element has no neighbour to be
-//! compared with. Such points are found from the errors themselves, whatever their cause.
+//! sees only a part of that error: a fifth at a clamped corner of an orthotropic body, where one element has no
+//! neighbour to be compared with. Such points are found from the errors themselves, whatever their cause.
 //!
 //! A body continues beyond a line of symmetry: elements there also have mirror images as neighbours, with the same
-//! errors. Half a model is therefore judged like the whole.
+//! errors. Half a model is therefore judged like the whole model.
 
 use crate::contact::edge_normals;
 use crate::model::{Held, Model};
 
-/// The elements around every corner node of a mesh.
+/// By node of a mesh, the elements that meet at the node, and the elements around these.
 pub(super) struct Surroundings {
-    /// By node: the elements that have it as a corner.
+    /// By node: the elements that have the node as a corner.
     stars: Vec<Vec<u32>>,
-    /// By node: the other elements that share a corner with one of those that meet there, mirror images included.
+    /// By node: the elements, mirror images included, that share a corner with an element of the star but are not in
+    /// it.
     rings: Vec<Vec<u32>>,
 }
 
-/// A set of lines of symmetry, one bit each: those across x, and others.
+/// A set of lines of symmetry, one bit each: for lines across x, and for other lines.
 type Lines = u8;
 
-/// An element, or its mirror image in some lines of symmetry.
+/// An element, or its mirror image in the given lines of symmetry.
 type Imaged = (u32, Lines);
 
 impl Surroundings {
@@ -58,8 +59,9 @@ impl Surroundings {
         Surroundings { stars, rings }
     }
 
-    /// By element, the part of its error that stands out: by how much the errors of the elements at one of its corners
-    /// exceed those of all elements around, as a part of the former.
+    /// By element, the part of its error that stands out. At a node with the errors a of the elements that meet there
+    /// and b of the elements around these, that part is 1 − b/a; an element has the largest part of its corners, at
+    /// least 0.
     pub(super) fn standing_out(&self, errors: &[f64]) -> Vec<f64> {
         let sum = |elements: &[u32]| -> f64 {
             let errors = elements.iter().map(|e| errors[*e as usize].abs());
@@ -78,8 +80,8 @@ impl Surroundings {
         parts
     }
 
-    /// By element, whether it is away from some nodes: it contains none, and shares no corner with an element that
-    /// does.
+    /// By element, whether it is away from the given nodes: it has none of them as a corner, and shares no corner with
+    /// an element that does.
     pub(super) fn away_from(&self, nodes: impl Iterator<Item = u32>) -> Vec<bool> {
         let count = self
             .stars
@@ -96,7 +98,8 @@ impl Surroundings {
     }
 }
 
-/// By node, the lines of symmetry through it: straight sides whose nodes are held across the side and free along it.
+/// By node, the lines of symmetry through the node: straight sides whose nodes are held across the side and free along
+/// it.
 fn lines_of_symmetry(model: &Model) -> Vec<Lines> {
     let mut lines = vec![0; model.mesh.nodes.len()];
     for side in model.mesh.surface() {

@@ -1,4 +1,4 @@
-//! The verdict on a solution by the errors of its quantities, and its reasons in words.
+//! The verdict on a solution, from the errors of its quantities, and the reasons for it in words.
 
 use std::collections::BTreeSet;
 
@@ -6,46 +6,49 @@ use crate::solution::{
     Accuracy, ErrorMethod, EstimatedQuantity, Outcome, QuantityName, Verdict, Warning, WarningCode,
 };
 
-/// Largest relative errors for the verdict `good`, and for `fair`: of forces, and of peaks and extents. `good` promises
-/// 1 % and 5 %. Since one stated error in twenty is too small, the limits are three quarters of that for forces and
-/// three fifths for the others, some of which are too small by more (`tests/verification/calibration.rs`).
+/// The largest relative errors of forces for the verdicts `good` and `fair`. `good` promises 1 %; since one stated
+/// error in twenty is too small, the limit is three quarters of that (`tests/verification/calibration.rs`).
 const FORCES: [f64; 2] = [0.0075, 0.05];
+
+/// The largest relative errors of peaks and extents for the verdicts `good` and `fair`. `good` promises 5 %; since one
+/// stated error in twenty is too small, and some by more than for forces, the limit is three fifths of that
+/// (`tests/verification/calibration.rs`).
 const OTHERS: [f64; 2] = [0.03, 0.2];
 
-/// Why a quantity has no error.
+/// The reason why a quantity has no error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Doubt {
     /// The obstacle reaches into the body between the nodes.
     Unseen,
-    /// There is a value on the refined mesh, but no estimate that would show whether the two agree by chance.
+    /// There is a value on the refined mesh, but no estimate that would show whether both values agree by chance.
     Unestimated,
-    /// There is neither an estimate nor a counterpart on the refined mesh.
+    /// There is no estimate, and no such quantity on the refined mesh.
     Alone,
 }
 
-/// Quantities of one kind and contact whose number differs on the refined mesh.
+/// A kind of quantity of a contact whose number of values differs on the refined mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Unpaired {
     pub(super) name: QuantityName,
     pub(super) contact: String,
-    /// Their number on the mesh of the solution.
+    /// The number of values on the mesh of the solution.
     pub(super) here: usize,
-    /// Their number on the refined mesh.
+    /// The number of values on the refined mesh.
     pub(super) there: usize,
 }
 
-/// What one quantity contributes to the verdict.
+/// The contribution of one quantity to the verdict.
 struct Finding {
-    /// The best verdict that it permits.
+    /// The best verdict that the quantity permits.
     verdict: Verdict,
-    /// How serious it is: its error divided by the limit for `good`.
+    /// The error of the quantity divided by the limit for `good`: the most serious reasons come first.
     seriousness: f64,
     reason: String,
 }
 
-/// The reference size for the error of a quantity, without its sign: a force or a peak itself; for a tangential force
-/// the friction force; for an end the length of the contact. `own`: values of that kind at the same contact, which has
-/// `images` parts like the one that is modelled.
+/// The reference size, not negative, by which the error of a quantity is divided: for a force or a peak its own size;
+/// for a tangential force the friction force; for an end the length of the contact. `own`: the values of a kind at the
+/// same contact. `images`: the number of equal parts of the contact, of which one is modelled.
 pub(super) fn scale(
     name: QuantityName,
     value: f64,
@@ -66,12 +69,12 @@ pub(super) fn scale(
     f64::abs(scale)
 }
 
-/// The length from the first start of contact to its last end, in the part that is modelled.
+/// The length from the first start of contact to the last end, in the part of a contact that is modelled.
 pub(super) fn length(starts: impl Iterator<Item = f64>, ends: impl Iterator<Item = f64>) -> f64 {
     ends.fold(f64::NEG_INFINITY, f64::max) - starts.fold(f64::INFINITY, f64::min)
 }
 
-/// An error divided by its reference size; none if that is 0.
+/// An error divided by a reference size; none if that size is 0 and the error is not.
 pub(super) fn relative(error: f64, scale: f64) -> Option<f64> {
     let relative = match error {
         0.0 => 0.0,
@@ -80,8 +83,8 @@ pub(super) fn relative(error: f64, scale: f64) -> Option<f64> {
     Some(relative).filter(|relative| relative.is_finite())
 }
 
-/// The verdict and its reasons. `doubts`: why quantities have no error. `unpaired`: quantities whose number differs on
-/// the refined mesh.
+/// The verdict and its reasons. `doubts`: by quantity, why it has no error. `unpaired`: kinds of quantities whose
+/// number differs on the refined mesh.
 pub(super) fn conclude(
     outcome: Outcome,
     quantities: Vec<EstimatedQuantity>,
@@ -114,7 +117,7 @@ pub(super) fn conclude(
     }
 }
 
-/// Warnings with which stated errors cannot be relied on, the best verdict that each permits, and the reason.
+/// Warnings that make stated errors unreliable, the best verdict that each permits, and the reason in words.
 #[rustfmt::skip] // a table
 const DOUBTFUL: [(WarningCode, Verdict, &str); 3] = [
     (WarningCode::NotUnique, Verdict::Poor,
@@ -125,7 +128,7 @@ const DOUBTFUL: [(WarningCode, Verdict, &str); 3] = [
         "The mesh is too coarse for a nonlocal radius (`mesh_too_coarse_for_radius`), so that the stated errors of friction may be too small."),
 ];
 
-/// Lowers the verdict to the best one that these warnings permit.
+/// Lowers the verdict to the best verdict that the warnings permit.
 pub fn limit_by(warnings: &[Warning], accuracy: &mut Accuracy) {
     for (code, best, reason) in DOUBTFUL {
         let given = warnings.iter().any(|warning| warning.code == code);
@@ -139,7 +142,7 @@ pub fn limit_by(warnings: &[Warning], accuracy: &mut Accuracy) {
     }
 }
 
-/// What a quantity contributes by its error, or because it has none; nothing if it is good.
+/// The contribution of a quantity to the verdict, by its error or because it has none; none if the error is `good`.
 fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<Finding> {
     let (name, contact) = (<&str>::from(q.quantity), &q.contact);
     let [good, fair] = match q.quantity {
@@ -194,7 +197,7 @@ fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<Finding> {
     })
 }
 
-/// The value of a quantity, how far it may be wrong, and mostly why.
+/// The value of a quantity, how far it may be wrong, and the main cause, in words.
 fn uncertainty(q: &EstimatedQuantity, error: f64, relative: f64) -> String {
     let is_end = matches!(
         q.quantity,
@@ -243,7 +246,7 @@ fn uncertainty(q: &EstimatedQuantity, error: f64, relative: f64) -> String {
     }
 }
 
-/// Why the error of a quantity is unknown.
+/// The reason, in words, why the error of a quantity is unknown.
 fn why_unknown(q: &EstimatedQuantity, doubt: Option<Doubt>) -> String {
     let why = match doubt {
         Some(Doubt::Unseen) => "the shape of the obstacle between the nodes is not resolved",

@@ -1,14 +1,14 @@
 //! The change of a quantity of the solution by small forces on the contact unknowns: the adjoint of the linearised
 //! contact problem.
 //!
-//! Free unknowns F move, those of nodes in contact and of held tangents, A, do not; their reactions answer. With H =
-//! ∂r/∂v_F of [`newton`](super::newton), a quantity J(v, R, Q) of displacements, normal reactions R = (f̂ − Ŝ v)_A and
-//! tangential ones Q = (Ŝ v − f̂)_A changes by z · δf̂,
+//! The free unknowns F move. The unknowns A of nodes in contact and of held tangents do not move, but their reactions
+//! change. With H = ∂r/∂v_F of [`newton`](super::newton), a quantity J(v, R, Q) of displacements v, normal reactions R
+//! = (f̂ − Ŝ v)_A and tangential reactions Q = (Ŝ v − f̂)_A changes by z · δf̂,
 //!
 //!   Hᵀ z_F = J_v − Ŝ_FA J_R + Ŝ_FA J_Q,    z_A = J_R − Bᵀ z_F  or  −J_Q,
 //!
-//! where B = ∂(friction forces)/∂R. These z are also displacements of the contact nodes: those of the dual solution, by
-//! which the errors of the body's stresses are weighted.
+//! where B = ∂(friction forces)/∂R. The values z are also displacements of the contact nodes: those of the dual
+//! solution, by which the errors of the body's stresses are weighted.
 
 use crate::algorithm::factors::{dense, free_dofs};
 use crate::algorithm::newton::jacobian;
@@ -68,7 +68,7 @@ impl Gradient {
         }
     }
 
-    /// Adds `factor` times the derivatives of a node's pressure.
+    /// Adds `factor` times the derivatives of the pressure of a node.
     pub(super) fn add_pressure(&mut self, system: &System<'_>, node: usize, factor: f64) {
         for (other, weight) in system.pressure_weights(node, factor) {
             self.reaction[other] += weight;
@@ -76,11 +76,11 @@ impl Gradient {
     }
 }
 
-/// The work for the law at one friction point, in multiplications.
+/// The work for evaluating the law at one friction point, in multiplications.
 const WORK_OF_A_POINT: usize = 100;
 
-/// z of every quantity, on the contact unknowns: dJ = z · δf̂. None if the linearised problem has no unique solution,
-/// or the observer stops.
+/// By quantity J, the influence z of forces on the contact unknowns: dJ = z · δf̂. None if the linearised problem has
+/// no unique solution, or the observer stops.
 pub fn influences(
     system: &System<'_>,
     state: &State,

@@ -1,16 +1,16 @@
 //! Decisions after a solution about the ends of contacts: which contact owns each common end, and which nodes on the
-//! axis are open.
+//! axis stay open.
 
 use std::collections::BTreeSet;
 
 use crate::algorithm::system::{Patch, State, System};
 use crate::model::Alone;
 
-/// An obstacle reaches into a body if it does so by more than this part of its contact's length.
+/// The smallest penetration of an obstacle into the body, as a part of the length of the contact, that is not rounding.
 const ROUNDING: f64 = 1e-10;
 
-/// Common nodes that were assigned to one contact alone, though the obstacle of the other one reaches into the body
-/// there.
+/// Common nodes of two contacts that were assigned to one contact alone, although the obstacle of the other contact
+/// reaches into the body there.
 pub fn touched_by_both(system: &System<'_>, state: &State) -> Vec<u32> {
     let mut found = Vec::new();
     for patch in &system.patches {
@@ -26,8 +26,8 @@ pub fn touched_by_both(system: &System<'_>, state: &State) -> Vec<u32> {
     found
 }
 
-/// The better assignment of each common node to one contact, judged by this solution; the nodes in `both` are known to
-/// touch both. None if the assignment does not change. Without a state there is no solution yet.
+/// The better assignment of each common node to one contact, judged by `state`, or without a solution so far by `both`
+/// alone. The nodes in `both` are known to touch both obstacles. None if the assignment does not change.
 pub fn better(system: &System<'_>, state: Option<&State>, both: &BTreeSet<u32>) -> Option<Alone> {
     let model = system.model;
     let mut alone = model.alone.clone();
@@ -60,7 +60,7 @@ pub fn better(system: &System<'_>, state: Option<&State>, both: &BTreeSet<u32>) 
     (alone != model.alone).then_some(alone)
 }
 
-/// Nodes on the axis that are open while the midside node beside them is pressed: the obstacle is hollow there.
+/// Nodes on the axis that are open while the midside node beside them is pressed, since the obstacle is hollow there.
 pub fn open_on_axis(system: &System<'_>, state: &State) -> BTreeSet<u32> {
     let beside = |patch: &Patch<'_>, i: usize| {
         let end = system.nodes[i].beside_axis?;

@@ -1,11 +1,12 @@
-//! Factorisations of H on the free unknowns, reused while they are accurate enough.
+//! Factorisations of H on the free unknowns, which are used again while they are accurate enough.
 
 use crate::algorithm::system::System;
 use crate::elasticity::Dof;
 use crate::linear::{Cholesky, Dense, Interrupt, Unsolved};
 use crate::observer::{Observer, Progress, take};
 
-/// The free unknowns: normal ones of nodes that are not `held`, and tangential ones.
+/// The free unknowns: normal displacements of nodes that are not `held`, and tangential displacements that are not
+/// prescribed.
 pub(super) fn free_dofs(system: &System<'_>, held: impl Fn(usize) -> bool) -> Vec<usize> {
     let mut free = Vec::with_capacity(system.load.len());
     for (i, node) in system.nodes.iter().enumerate() {
@@ -19,9 +20,9 @@ pub(super) fn free_dofs(system: &System<'_>, held: impl Fn(usize) -> bool) -> Ve
     free
 }
 
-/// Added to the diagonal of H where Ŝ leaves rigid motions free: a step along one is then long but
-/// finite, until contact ends it. Where contact holds the body it costs a step or two but no accuracy, since the
-/// gradient does not depend on it.
+/// The number that is added to the diagonal of H if Ŝ leaves rigid motions free: a step along such a motion is then
+/// long but finite, until contact ends it. If contact holds the body, the shift costs a step or two but no accuracy,
+/// since the gradient does not depend on it.
 pub(super) fn semidefinite_shift(system: &System<'_>) -> f64 {
     let size = system.stiffness.size().max(1);
     let diagonal: f64 = (0..system.stiffness.size())
@@ -30,8 +31,8 @@ pub(super) fn semidefinite_shift(system: &System<'_>) -> f64 {
     1e-9 * diagonal / size as f64
 }
 
-/// Dense work on a matrix of this size, for which the observer is called first. None if it has no solution, or the
-/// observer stops.
+/// Solves a problem with a dense matrix of this size, after asking the observer for the memory. None if there is no
+/// solution or not enough memory, or the observer stops.
 pub(super) fn dense<T>(
     size: usize,
     observer: &mut dyn Observer,
@@ -49,8 +50,8 @@ pub(super) fn dense<T>(
     }
 }
 
-/// The last factor of H = Ŝ + Σ w τ φ′ h hᵀ on some unknowns. It is reused as long as steps with it are nearly as good
-/// as with a new one: from sweep to sweep friction bounds change little.
+/// The last factor of H = Ŝ + Σ w τ φ′ h hᵀ on some unknowns. The factor is used again as long as steps with it are
+/// nearly as good as with a new factor: from sweep to sweep friction bounds change little.
 #[derive(Default)]
 pub(super) struct Factors {
     last: Option<(Vec<usize>, Cholesky)>,
@@ -58,8 +59,8 @@ pub(super) struct Factors {
 }
 
 impl Factors {
-    /// Makes sure that there is a factor on the free unknowns; true if a new one was made, for this state. None if H
-    /// has no factor, or the observer stops.
+    /// Makes sure that there is a factor on the free unknowns; true if a new factor was made, for the state v. None if
+    /// H has no factor, or the observer stops.
     pub(super) fn prepare(
         &mut self,
         system: &System<'_>,
@@ -79,7 +80,7 @@ impl Factors {
         Some(true)
     }
 
-    /// The step −H⁻¹ ∇J on the unknowns that the factor is for, 0 on the others. `force`: ∇J.
+    /// The step −H⁻¹ ∇J on the unknowns of the factor, 0 on the others. `force`: ∇J.
     pub(super) fn direction(&self, force: &[f64]) -> Option<Vec<f64>> {
         let (free, factor) = self.last.as_ref()?;
         let mut moved: Vec<f64> = free.iter().map(|&dof| -force[dof]).collect();
@@ -91,13 +92,13 @@ impl Factors {
         direction.iter().all(|d| d.is_finite()).then_some(direction)
     }
 
-    /// Discards the last factor.
+    /// Makes the next [`prepare`](Self::prepare) compute a new factor.
     pub(super) fn renew(&mut self) {
         self.old = true;
     }
 }
 
-/// The factor of H on the free unknowns.
+/// Computes the factor of H on the free unknowns. `room`: an old factor whose memory is used again.
 fn factor(
     system: &System<'_>,
     bound: &[f64],

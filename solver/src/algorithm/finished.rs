@@ -1,4 +1,4 @@
-//! The end of the iterations: what every method returns.
+//! The end of the iterations, as every method returns it.
 
 use crate::algorithm::recorder::{Cycle, Measured, Recorder};
 use crate::algorithm::rounding::{self, Rounding};
@@ -7,7 +7,7 @@ use crate::algorithm::system::{State, System};
 use crate::problem::Algorithm;
 use crate::solution::{Iteration, Outcome, Residuals, Stage};
 
-/// The end of the iterations at one load level.
+/// The result of the iterations at one load level.
 #[derive(Clone)]
 pub struct Finished {
     /// The final state.
@@ -18,7 +18,7 @@ pub struct Finished {
     pub bound: Vec<f64>,
     /// The tangential stress σ_t at every friction point.
     pub tractions: Vec<f64>,
-    /// Whether the tractions are those of the thesis's own iteration, instead of those of the law in this state.
+    /// Whether `tractions` are those of the thesis's own iteration, and not those of the law in the final state.
     pub own_tractions: bool,
     /// How the iteration ended.
     pub outcome: Outcome,
@@ -26,34 +26,34 @@ pub struct Finished {
     pub stage: Stage,
     /// The residuals kkt, friction and monolithic; equilibrium is computed from the body later.
     pub residuals: Residuals,
-    /// The last contraction q = |Δτ_k|/|Δτ_{k−1}| of sweeps that were not accelerated.
+    /// The last contraction q = |Δτ_k|/|Δτ_{k−1}| of the sweeps, as long as they were not accelerated.
     pub contraction: Option<f64>,
-    /// All iterations, a row each.
+    /// All iterations, one row each.
     pub history: Vec<Iteration>,
-    /// Period and nodes of a cycle.
+    /// The cycle that the iterations fell into, if any.
     pub cycle: Option<Cycle>,
-    /// Why there is no equilibrium, where the body slides away.
+    /// The motion by which the body slides away, if there is no equilibrium.
     pub slide: Option<Slide>,
-    /// Present where rounding keeps residuals above the tolerance.
+    /// Present if rounding keeps residuals above the tolerance.
     pub rounding: Option<Rounding>,
 }
 
-/// The end of one method: its best state and how it ended.
+/// The result of one method: its best state, and how the method ended.
 pub(super) struct End {
     pub(super) measured: Measured,
     pub(super) stage: Stage,
     pub(super) outcome: Outcome,
     pub(super) cycle: Option<Cycle>,
-    /// The last contraction q of sweeps that were not accelerated.
+    /// The last contraction q of the sweeps, as long as they were not accelerated.
     pub(super) contraction: Option<f64>,
-    /// Whether the limit of iterations is reached.
+    /// Whether the method has reached the limit of iterations.
     pub(super) exhausted: bool,
-    /// Rounding keeps residuals above the tolerance.
+    /// Present if rounding keeps residuals above the tolerance.
     pub(super) rounding: Option<Rounding>,
 }
 
 impl End {
-    /// An end without a cycle or a contraction, and with iterations left.
+    /// The result of a method without cycle and contraction, and with iterations left.
     pub(super) fn new(measured: Measured, stage: Stage, outcome: Outcome) -> Self {
         End {
             measured,
@@ -66,9 +66,9 @@ impl End {
         }
     }
 
-    /// Marks the end of a method where only rounding keeps the residuals above the tolerance. If rounding is small, the
-    /// state is converged; if it is not, no other method would get further. A cycle or a contraction is not reported
-    /// then, since rounding causes them.
+    /// Sets outcome and rounding if only rounding keeps the residuals above the tolerance. If that rounding is small,
+    /// the state is converged; if it is not, no other method would get further. Cycles and contractions that rounding
+    /// causes are removed.
     pub(super) fn settled(
         mut self,
         system: &System<'_>,
@@ -97,7 +97,7 @@ impl End {
         self
     }
 
-    /// Reports a method that did not converge and has no cycle with the cycle that the other method found.
+    /// Adds the cycle of another method to the result of this one, if this method did not converge and has no cycle.
     pub(super) fn with_cycle_of(mut self, other: &End) -> Self {
         if self.outcome == Outcome::NotConverged && other.cycle.is_some() {
             self.cycle.clone_from(&other.cycle);
@@ -106,7 +106,7 @@ impl End {
         self
     }
 
-    /// Whether no other method is to be tried: this one converged, or rounding, the observer or the limit ended it.
+    /// Whether no other method is to be tried: this method converged, or rounding, the observer or the limit ended it.
     pub(super) fn ended(&self) -> bool {
         matches!(self.outcome, Outcome::Converged | Outcome::Canceled)
             || self.exhausted

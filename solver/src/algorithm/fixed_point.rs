@@ -1,6 +1,6 @@
-//! The outer sweeps, thesis (1.18)–(1.22) and 3.1: freeze the friction bound, solve the convex
-//! problem, take the bound that its pressure implies, and repeat. Where the sweeps contract slowly,
-//! the next bound is extrapolated from the last few (Anderson acceleration).
+//! The outer sweeps, thesis (1.18)–(1.22) and 3.1. A sweep freezes the friction bound and solves the convex problem;
+//! the next sweep takes the bound that the pressure of the solution implies. If the sweeps contract slowly, the next
+//! bound is extrapolated from the last few (Anderson acceleration).
 
 use crate::algorithm::convex::{Minimum, minimise_with};
 use crate::algorithm::finished::End;
@@ -16,19 +16,20 @@ use crate::solution::{Outcome, Stage};
 /// The contraction q above which sweeps are accelerated.
 const SLOW: f64 = 0.7;
 
-/// The number of sweeps that an acceleration uses.
+/// The number of earlier sweeps that an acceleration uses.
 const DEPTH: usize = 5;
 
-/// Sweeps without progress after which another method is tried.
+/// The number of sweeps without progress after which another method is tried.
 const PATIENCE: usize = 15;
 
-/// A residual above this part of the one before may consist of rounding.
+/// The part of the previous residual above which a residual may consist of rounding.
 const STEADY: f64 = 0.5;
 
-/// Sweeps in a row that leave only rounding, after which no better one is expected: each has tried several steps.
+/// The number of sweeps in a row with only rounding left after which no better sweep is expected: each has tried
+/// several steps.
 const SETTLED: u32 = 3;
 
-/// Solves one convex problem; its solution is measured and reported. Also returns whether to stop.
+/// Solves the convex problem for one bound, and measures and records its solution. Also returns whether to stop.
 pub(super) fn sweep(
     recorder: &mut Recorder<'_, '_>,
     stage: Stage,
@@ -67,10 +68,10 @@ pub(super) fn sweep(
     (measured, stopped)
 }
 
-/// Sweeps from a state and the bound it implies until state and bound no longer change.
+/// Sweeps from a state and the bound that it implies until state and bound no longer change.
 ///
-/// Converged means: contact set unchanged, and the kkt, friction and monolithic residuals at or below the tolerance
-/// (formulation 4.4).
+/// The sweeps have converged if the contact set is unchanged and the kkt, friction and monolithic residuals are at or
+/// below the tolerance (formulation 4.4).
 pub(super) fn run(
     recorder: &mut Recorder<'_, '_>,
     start: Measured,
@@ -177,7 +178,8 @@ pub(super) fn run(
     swept
 }
 
-/// Updates the best of the sweeps in a row that leave only rounding above the tolerance, and their number.
+/// Counts the sweeps in a row that leave only rounding above the tolerance, and keeps the best of them. None if `now`
+/// is not such a sweep.
 fn nearer(
     before: Option<(Measured, u32)>,
     now: &Measured,
@@ -193,7 +195,7 @@ fn nearer(
     }
 }
 
-/// The last sweeps: the bounds tried, and the difference between each and the bound that its pressure implied.
+/// The last sweeps: by sweep its bound, and the difference between the bound that its pressure implies and its bound.
 #[derive(Default)]
 struct Memory {
     bounds: Vec<Vec<f64>>,
@@ -211,8 +213,8 @@ impl Memory {
             .push(implied.iter().zip(bound).map(|(a, b)| a - b).collect());
     }
 
-    /// Anderson's step: the combination of the last sweeps with the smallest difference, plus that difference. A
-    /// friction bound is never negative.
+    /// Anderson's step: the combination of the last bounds that has the smallest difference, plus that difference.
+    /// Negative bounds become 0.
     fn extrapolate(&self) -> Vec<f64> {
         let last = self.bounds.len() - 1;
         let (bound, defect) = (&self.bounds[last], &self.defects[last]);
@@ -238,8 +240,8 @@ impl Memory {
     }
 }
 
-/// The state with u_t at rest on the obstacle at every contact node with friction: every point
-/// sticks and acts with full stiffness.
+/// The state with u_t = d, at rest on the obstacle, at every node of contacts with friction: every point sticks and
+/// acts with full stiffness.
 pub(super) fn all_sticking(system: &System<'_>, state: &State) -> State {
     let mut state = state.clone();
     for patch in system.patches.iter().filter(|patch| patch.law.is_some()) {

@@ -1,13 +1,14 @@
 //! A warning for bodies that slide farther than their contact is long. Gaps are evaluated at the places before
-//! deformation: however far a body slides, its contact stays on the same material, which is then no longer at the
-//! obstacle.
+//! deformation: however far a body slides, contact stays at the same points of the material, which then are no longer
+//! at the obstacle.
 
 use crate::algorithm::system::{Patch, System};
 use crate::error::rounded;
 use crate::problem::Condition;
 use crate::solution::{Warning, WarningCode};
 
-/// The slip, in lengths of the contact, above which no point that touches would still touch.
+/// The largest slip, in lengths of the contact, without a warning: with more slip no point that touches would still
+/// touch.
 const LARGE_SLIP: f64 = 1.0;
 
 /// A piece of contact: its mean slip along the obstacle, weighted by the pressure, and its length.
@@ -22,7 +23,8 @@ impl Sliding {
     }
 }
 
-/// A warning about the piece of contact that slides farthest in relation to its length, if that is far.
+/// A warning about the piece of contact with the largest slip in relation to its length, if that is above
+/// [`LARGE_SLIP`].
 pub(super) fn large_slip(system: &System<'_>, v: &[f64], reactions: &[f64]) -> Option<Warning> {
     let of_patch = |patch| pieces(system, patch, v, reactions).map(move |piece| (patch, piece));
     let largest = system
@@ -42,8 +44,8 @@ pub(super) fn large_slip(system: &System<'_>, v: &[f64], reactions: &[f64]) -> O
     })
 }
 
-/// The pieces of a contact that can slide as a whole and matter: a piece that ends on a line of symmetry is not one,
-/// nor is one along a straight obstacle without ends.
+/// The pieces of a contact that can slide as a whole. Pieces that end on a line of symmetry are left out, and so is
+/// contact along a straight obstacle without ends, where slip does not matter.
 fn pieces<'a>(
     system: &'a System<'_>,
     patch: &'a Patch<'_>,

@@ -1,10 +1,10 @@
 //! The iterations on the nodes that may touch.
 //!
 //! Often most of a contact boundary is far from the obstacle. Where no node touches and no friction acts, the unknowns
-//! follow from the others by a linear system. They are eliminated once, by a partial Cholesky factorisation of Ŝ. Every
-//! method then works on the remaining system, whose matrices are as large as the part of the boundary that may touch.
-//! The result is checked on the whole boundary: where another node would pass the obstacle, or friction would act at
-//! another point, the part is enlarged and the iterations continue.
+//! follow from the other unknowns by a linear system. They are eliminated once, by a partial Cholesky factorisation of
+//! Ŝ. Every method then works on the remaining system, whose matrices are as large as the part of the boundary that may
+//! touch. The result is checked on the whole boundary: if an eliminated node would pass the obstacle, or friction would
+//! act at one, the part is enlarged and the iterations continue.
 
 use std::sync::Arc;
 
@@ -23,23 +23,26 @@ use crate::observer::Observer;
 use crate::problem::{Algorithm, Condition, FrictionPoints, SolverControls};
 use crate::solution::{Iteration, Outcome};
 
-/// Below this number of unknowns the whole system costs next to nothing.
+/// The number of unknowns below which nothing is eliminated: the whole system costs next to nothing.
 const LEAST: usize = 64;
 
-/// Elimination is worth its cost if at most this part of the unknowns remains.
+/// The largest part of the unknowns that may remain for elimination to be worth its cost.
 const WORTH: f64 = 0.7;
 
-/// Parts of the boundary that may touch are widened on each side by this part of their length, and by a few nodes.
+/// Parts of the boundary that may touch are widened on each side by this part of their length.
 const MARGIN: f64 = 0.1;
+
+/// Parts of the boundary are also widened on each side by this number of nodes.
 const MARGIN_NODES: usize = 4;
 
-/// Parts that turned out to be too small are widened by this part of their length.
+/// Parts of the boundary that turned out too small are widened on each side by this part of their length.
 const GROWTH: f64 = 0.5;
 
-/// Parts of the boundary are cached, for problems that return to them, up to this size in total.
+/// The largest total size (bytes) of the eliminated parts of the boundary that are kept, for problems that need them
+/// again.
 const KEPT_BYTES: u64 = 16 << 20;
 
-/// The part of the boundary that may touch, from one load level to the next.
+/// The part of the boundary that may touch. It is kept from one load level to the next.
 #[derive(Default)]
 pub struct Region {
     near: Option<Arc<MayTouch>>,
@@ -50,36 +53,36 @@ pub struct Region {
     made: Vec<Arc<MayTouch>>,
 }
 
-/// How far a region extends.
+/// The extent of a [`Region`].
 #[derive(Clone, Default, PartialEq)]
 pub struct Extent {
-    /// By contact node: whether it may touch. Empty while this is unknown.
+    /// By contact node: whether it may touch. Empty while that is unknown.
     touches: Vec<bool>,
-    /// By contact node: whether its unknowns remain, since it may touch or friction may act there. None until that is
-    /// decided.
+    /// By contact node: whether its unknowns are to remain, since it may touch or friction may act there. None until
+    /// that is decided.
     wanted: Option<Vec<bool>>,
-    /// Elimination is not worth its cost for this system.
+    /// Whether nothing is eliminated, since that is not worth its cost for this system.
     whole: bool,
 }
 
-/// The unknowns of nodes that may touch, or where friction may act; the others are eliminated.
+/// A system reduced to the unknowns of nodes that may touch, or where friction may act; the others are eliminated.
 struct MayTouch {
-    /// By contact node: whether it was requested.
+    /// By contact node: whether its unknowns were requested to remain.
     wanted: Vec<bool>,
     /// By contact node: whether its unknowns remain.
     kept: Vec<bool>,
-    /// All unknowns in order: first those that are eliminated, then the others.
+    /// The order of all unknowns: first the eliminated unknowns, then the others.
     order: Vec<usize>,
     eliminated: Eliminated,
     stiffness: Dense,
-    /// The friction points all of whose nodes remain.
+    /// The numbers of the friction points whose nodes all remain.
     points: Vec<usize>,
-    /// By contact: the friction that acts, which determines the friction points.
+    /// By contact: the kind of points where friction acts; none if the contact is frictionless.
     acting: Vec<Option<FrictionPoints>>,
 }
 
-/// As [`run`](super::run), on the part of the boundary that may touch if that is worth it. `region`: the region of the
-/// last load level, for the same body and the same contact boundaries.
+/// Like [`run`](super::run), on the part of the boundary that may touch if elimination is worth its cost. `region`:
+/// that of the last load level, for the same body and the same contact boundaries.
 pub fn run_reduced(
     system: &System<'_>,
     controls: &SolverControls,
@@ -131,9 +134,9 @@ pub fn run_reduced(
     }
 }
 
-/// The solution close to that of a neighbour, a problem with the same body and contact boundaries and slightly
-/// different numbers, and the number of steps to it. None if it is not close. With v of the neighbour before it, the
-/// steps begin at the extrapolation of both.
+/// The solution close to that of a neighbour, and the number of steps to it; none if there is no solution close to it.
+/// The neighbour is a problem with the same body and contact boundaries and slightly different numbers. `before`: v of
+/// the neighbour's own neighbour, if known; the steps then begin at the extrapolation of both.
 pub fn follow_neighbour(
     system: &System<'_>,
     controls: &SolverControls,
@@ -164,8 +167,9 @@ pub fn follow_neighbour(
     settled.then_some((finished, steps))
 }
 
-/// The solution close to a start, if steps from the problem's own frictionless state lead to it too. Beyond a fold,
-/// friction and pressure may support each other in a state that can only be reached from a neighbour.
+/// The solution close to `start`, if steps from the problem's own frictionless state lead to the same solution; else
+/// none. Beyond a fold, friction and pressure may support each other in a state that can only be reached from a
+/// neighbour.
 fn follow_as_alone(
     system: &System<'_>,
     controls: &SolverControls,
@@ -173,7 +177,8 @@ fn follow_as_alone(
     factors: &mut Factors,
     observer: &mut dyn Observer,
 ) -> Option<(Finished, u32)> {
-    /// Friction bounds of one solution agree to this part, far above the error that the tolerance permits.
+    /// The largest relative difference of the friction bounds of one solution, far above the error that the tolerance
+    /// permits.
     const AGREES: f64 = 1e-5;
     let (found, steps) = follow(system, controls, start, factors, observer)?;
     let given = |source: &Source| matches!(source, Source::Given(_));
@@ -203,12 +208,12 @@ fn follow_as_alone(
 }
 
 impl Region {
-    /// The present extent of the region.
+    /// The extent of the region.
     pub fn extent(&self) -> Extent {
         self.extent.clone()
     }
 
-    /// Extends the region as far as for a neighbour. Its last factors are used if `with_last_factors`.
+    /// Gives the region the extent of a neighbour's region. The last factors are used only if `with_last_factors`.
     pub fn reach(&mut self, extent: &Extent, with_last_factors: bool) {
         let same = self.extent == *extent;
         if !same {
@@ -230,7 +235,7 @@ impl Region {
         self.factors.renew();
     }
 
-    /// Eliminates the unknowns that may not touch, unless that is done already or not worth it.
+    /// Eliminates the unknowns of nodes that may not touch, unless that is done already or not worth its cost.
     fn prepare(
         &mut self,
         system: &System<'_>,
@@ -280,7 +285,7 @@ impl Region {
         }
     }
 
-    /// Enlarges the part of the boundary, which is then eliminated again.
+    /// Enlarges the part of the boundary by the nodes `outside` and a margin. Unknowns must then be eliminated anew.
     fn grow(&mut self, outside: &[usize]) {
         let touches = &mut self.extent.touches;
         for &node in outside {
@@ -298,8 +303,8 @@ impl Region {
 }
 
 /// By contact node, whether it may touch: where the obstacle overlaps the body before it deforms, and where nodes
-/// touched at the last level, with a margin. This includes all nodes of a contact without an obstacle, or with a
-/// friction bound that does not depend on its pressure.
+/// touched at the last level, with a margin. All nodes of a contact may touch if it has no obstacle, or a friction
+/// bound that does not depend on its pressure.
 fn may_touch(system: &System<'_>, last: Option<&Finished>) -> Vec<bool> {
     let steps = system.model.steps.iter().map(|step| step.indentation);
     let deepest = steps.fold(system.level.indentation, f64::max);
@@ -322,7 +327,7 @@ fn may_touch(system: &System<'_>, last: Option<&Finished>) -> Vec<bool> {
     touches
 }
 
-/// Runs of nodes, widened on both sides by a part of their length and some nodes.
+/// Widens each run of marked nodes on both sides by a part of its length and by [`MARGIN_NODES`] nodes.
 fn widened(nodes: &[bool], part: f64) -> Vec<bool> {
     let mut wide = nodes.to_vec();
     let mut end = 0;
@@ -338,7 +343,8 @@ fn widened(nodes: &[bool], part: f64) -> Vec<bool> {
     wide
 }
 
-/// The nodes that may touch, those where friction may act then, and those that share unknowns with one of them.
+/// By contact node, whether its unknowns must remain if the nodes in `touches` may touch: these nodes, nodes where
+/// friction may act, and nodes that share unknowns with one of them.
 fn rubbed(system: &System<'_>, touches: &[bool]) -> Vec<bool> {
     let mut kept = touches.to_vec();
     for point in &system.points {
@@ -363,7 +369,8 @@ fn rubbed(system: &System<'_>, touches: &[bool]) -> Vec<bool> {
 }
 
 impl MayTouch {
-    /// Eliminates the unknowns of all nodes but `kept`. None if that is not worth it, or the observer stops.
+    /// Eliminates the unknowns of all nodes that are not in `kept`. None if that is not worth its cost, or the observer
+    /// stops.
     fn new(system: &System<'_>, kept: Vec<bool>, observer: &mut dyn Observer) -> Option<Self> {
         let size = system.load.len();
         let mut keeps = vec![false; size];
@@ -398,7 +405,7 @@ impl MayTouch {
         })
     }
 
-    /// The memory that this part takes (bytes).
+    /// The memory that the reduced system takes (bytes).
     fn bytes(&self) -> u64 {
         let (all, kept) = (self.order.len() as u64, self.stiffness.size() as u64);
         8 * (all * (all - kept) + kept * kept)
@@ -409,7 +416,8 @@ impl MayTouch {
         self.order.len() - self.stiffness.size()
     }
 
-    /// The system of this part, and f̂ reduced and in the order of this part, which [`MayTouch::on_whole`] needs again.
+    /// The reduced system; and f̂ of all unknowns, reduced and in the order of [`MayTouch::order`], for
+    /// [`MayTouch::on_whole`].
     fn part<'a>(&'a self, system: &System<'a>) -> (System<'a>, Vec<f64>) {
         let mut load: Vec<f64> = self.order.iter().map(|&dof| system.load[dof]).collect();
         self.eliminated.reduce(&mut load);
@@ -452,7 +460,7 @@ impl MayTouch {
         (part, load)
     }
 
-    /// Restricts a state of the whole system to this part.
+    /// Restricts a state of the whole system to the reduced system.
     fn state_on_part(&self, whole: &State) -> State {
         let kept = self.order[self.count()..].iter();
         State {
@@ -461,7 +469,7 @@ impl MayTouch {
         }
     }
 
-    /// Restricts the end of the iterations on the whole system to a start on this part.
+    /// Restricts the result of iterations on the whole system to a start on the reduced system.
     fn on_part(&self, whole: &Finished) -> Finished {
         Finished {
             state: self.state_on_part(&whole.state),
@@ -472,8 +480,8 @@ impl MayTouch {
         }
     }
 
-    /// Extends the result on this part to the whole system and measures it there; also the eliminated nodes that are
-    /// needed.
+    /// Extends the result on the reduced system to the whole system and measures it there. Also returns the eliminated
+    /// nodes that would pass the obstacle, or at which friction would act.
     fn on_whole(
         &self,
         system: &System<'_>,
@@ -532,7 +540,7 @@ impl MayTouch {
     }
 }
 
-/// By contact, the friction that acts, if any.
+/// By contact, the kind of points where friction acts; none if the contact is frictionless.
 fn acting(system: &System<'_>) -> Vec<Option<FrictionPoints>> {
     let points = |patch: &Patch<'_>| patch.law.as_ref().map(|law| law.points);
     system.patches.iter().map(points).collect()

@@ -67,11 +67,11 @@ use finished::{End, finish};
 use fixed_point::{all_sticking, sweep};
 use recorder::{Measured, Recorder, Row};
 
-/// Newton steps before giving up.
+/// The largest number of Newton steps after the sweeps.
 const NEWTON_STEPS: u32 = 60;
 
-/// Solves a system at its load level with the chosen algorithm, from the end of the previous increment
-/// if there is one. Says so where the loads push the body away.
+/// Solves a system at its load level with the chosen algorithm, from the result of the previous increment if there is
+/// one. If the loads push the body away, the result has a `slide`.
 pub fn run(
     system: &System<'_>,
     controls: &SolverControls,
@@ -93,7 +93,7 @@ pub fn run(
     Finished { slide, ..finished }
 }
 
-/// The end for a body that slides away: the bonded state with all the friction that its pressure permits.
+/// The result for a body that slides away: the bonded state with all the friction that its pressure permits.
 fn away(mut recorder: Recorder<'_, '_>, slide: Slide, observer: &mut dyn Observer) -> Finished {
     let (bonded, stopped) = bonded_state(recorder.system, recorder.controls, observer);
     let measured = slides::slid(recorder.system, bonded, &slide);
@@ -154,8 +154,8 @@ fn iterate(
     finish(recorder, end)
 }
 
-/// The state that friction starts from: that of the previous increment; else the frictionless
-/// solution with u_t = d (friction pulls with full stiffness at first).
+/// The state from which iterations with friction start, and whether to stop: the state of the previous increment, or
+/// without one the frictionless solution with u_t = d, from which friction at first pulls with full stiffness.
 fn start(
     recorder: &mut Recorder<'_, '_>,
     before: Option<&Finished>,
@@ -191,7 +191,7 @@ fn start(
     (measured, stopped)
 }
 
-/// The bonded state, u_t = d throughout, and the friction bound that it implies.
+/// The bonded state, u_t = d throughout, measured with the friction bound that it implies, and whether to stop.
 fn bonded_state(
     system: &System<'_>,
     controls: &SolverControls,
@@ -211,7 +211,7 @@ fn bonded_state(
     (Measured::new(system, found.state, none), stopped)
 }
 
-/// The observer of iterations that are not shown to it: it may still stop them.
+/// An observer for iterations that are not shown to `observer`, which may still stop them.
 pub(crate) fn quiet(observer: &mut dyn Observer) -> Filtered<'_> {
     Filtered {
         observer,
@@ -219,8 +219,8 @@ pub(crate) fn quiet(observer: &mut dyn Observer) -> Filtered<'_> {
     }
 }
 
-/// Sweeps; where they do not converge, Newton's method from the best sweep; where that fails too, both
-/// again from the bonded state: beyond a fold the free branch ends, and only a jammed state exists.
+/// Sweeps; if they do not converge, Newton's method from the best sweep; if that fails too, both again from the bonded
+/// state: beyond a fold the free branch of solutions ends, and only a jammed state exists.
 fn auto(mut recorder: Recorder<'_, '_>, start: Measured, observer: &mut dyn Observer) -> Finished {
     let first = both(&mut recorder, start, observer);
     if first.ended() {

@@ -1,8 +1,8 @@
-//! Steps from the solution of a neighbour, a problem with slightly different numbers, to that of a system.
+//! Steps from the solution of a neighbour, a problem with slightly different numbers, to the solution of a system.
 //!
-//! Each step takes the friction bound that the present pressure implies, and one step of the convex problem with the
-//! last factor while that is accurate enough: sweeps with one inner step each. The residual shrinks by a constant
-//! factor, down to rounding. Where it does not, the neighbour is too different, and the usual methods start anew.
+//! Each step takes the friction bound that the present pressure implies, and makes one step of the convex problem with
+//! the last factor while that is accurate enough: sweeps with one inner step each. The residual shrinks by a constant
+//! factor, down to rounding. If it does not, the neighbour is too different, and the usual methods start anew.
 
 use crate::algorithm::convex::{close, least_along, update_active};
 use crate::algorithm::factors::{Factors, free_dofs};
@@ -15,19 +15,19 @@ use crate::solution::{Outcome, Residuals, Stage};
 /// The largest number of steps; eight to twelve are usual.
 const MOST_STEPS: u32 = 40;
 
-/// The part of the tolerance to reach, so that the start has hardly any influence on the result.
+/// The part of the tolerance that the residual must reach, so that the start has hardly any influence on the result.
 const AIM: f64 = 0.1;
 
-/// A step that leaves more than this part of the residual requires a new factor.
+/// The part of the residual above which a step that leaves so much requires a new factor.
 const SERVES: f64 = 0.2;
 
-/// The number of steps that may leave more than [`SLOW`] of the residual: contact sets change at first.
+/// The largest number of steps that leave more than [`SLOW`] of the residual: at first contact sets change.
 const PATIENCE: u32 = 6;
 
-/// If steps leave more than this part of the residual, the solution may not be the only one.
+/// The part of the residual above which a step is slow. If many steps are slow, the solution may not be the only one.
 const SLOW: f64 = 0.7;
 
-/// The solution and the number of steps. None if the steps do not converge to it quickly.
+/// The solution of a system close to `start`, and the number of steps to it. None if the steps do not converge quickly.
 pub(super) fn follow(
     system: &System<'_>,
     controls: &SolverControls,
@@ -109,8 +109,9 @@ pub(super) fn follow(
     None
 }
 
-/// Anderson's acceleration with one step remembered (formulation 4.9): from two steps d₁, d₂ and the places x₁, x₂
-/// where they began, −γ (x₂ − x₁ + d₂ − d₁) with the γ that makes d₂ − γ (d₂ − d₁) smallest. Empty unless |γ| < 1.
+/// Anderson's acceleration with one step remembered (formulation 4.9). From two steps d₁, d₂ and the places x₁, x₂
+/// where they began, the further step is −γ (x₂ − x₁ + d₂ − d₁) with the γ that makes d₂ − γ (d₂ − d₁) smallest. Empty
+/// unless |γ| < 1.
 fn further(
     (place_before, step_before): &(Vec<f64>, Vec<f64>),
     (place, step): (&[f64], &[f64]),

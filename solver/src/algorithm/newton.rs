@@ -1,5 +1,5 @@
-//! One monolithic semi-smooth Newton iteration for contact, friction and averaging together, formulation 4.3. The
-//! friction bound is a function of the displacements here,
+//! Newton's method: one monolithic semi-smooth iteration for contact, friction and averaging together, formulation 4.3.
+//! The friction bound is a function of the displacements here,
 //!
 //!   τ(v) = bound(W p),   p = P R,   R = f̂_n − Ŝ_n v on active nodes,
 //!
@@ -7,8 +7,8 @@
 //!
 //!   H = Ŝ + Σ_g w τ φ′ h hᵀ − Σ_g w φ τ′ h (W P Ŝ_n)_g
 //!
-//! Not symmetric. A step that does not reduce the residual is shortened to the smallest energy along it, for the
-//! friction bound before the step; there is no other safeguard. Where the iteration converges it takes four to twenty
+//! H is not symmetric. A step that does not reduce the residual is shortened to the smallest energy along it, for the
+//! friction bound before the step; there is no other safeguard. If the iteration converges, it takes four to twenty
 //! steps.
 
 use crate::algorithm::convex::{close, least_along, update_active};
@@ -22,7 +22,7 @@ use crate::linear::{Dense, General, Interrupt, Unsolved};
 use crate::observer::Observer;
 use crate::solution::{Outcome, Stage};
 
-/// Steps without progress after which the method gives up.
+/// The number of steps without progress after which the method gives up.
 const PATIENCE: u32 = 20;
 
 /// Iterates from a state; returns the best state reached.
@@ -92,8 +92,8 @@ pub(super) fn run(
     end
 }
 
-/// The state after a step, the whole step if it reduces the residual, else the part of it with the smallest energy; and
-/// whether the contact set changed.
+/// The state after a step, and whether the contact set changed. The whole step is taken if it reduces the residual,
+/// else the part of it with the smallest energy.
 fn next(
     system: &System<'_>,
     state: &State,
@@ -127,7 +127,7 @@ fn implied_bound(system: &System<'_>, state: &State, force: &[f64]) -> Vec<f64> 
     system.friction_bound(&system.pressures(&system.reactions_of(state, force)))
 }
 
-/// v after one Newton step; active nodes stay on the obstacle.
+/// The displacements v after one Newton step; active nodes stay on the obstacle.
 fn step(system: &System<'_>, state: &State, observer: &mut dyn Observer) -> Option<Vec<f64>> {
     let free = free_dofs(system, |i| state.active[i]);
     let mut place = vec![usize::MAX; system.load.len()];
@@ -159,7 +159,7 @@ fn step(system: &System<'_>, state: &State, observer: &mut dyn Observer) -> Opti
     Some(v)
 }
 
-/// H on the free unknowns. `place`: for each unknown, its position among the free ones.
+/// The matrix H on the free unknowns. `place`: for each unknown, its position among the free unknowns.
 pub(super) fn jacobian(
     system: &System<'_>,
     state: &State,

@@ -11,15 +11,15 @@ use crate::solution::{ContactCount, ForcePair, FrictionCount, Iteration, Residua
 /// The place of the iterations in the load history.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Place {
-    /// Load step, from 0.
+    /// The number of the load step, from 0.
     pub step: u32,
-    /// Increment within the step, from 0.
+    /// The number of the increment within the step, from 0.
     pub increment: u32,
-    /// The number of rows of the history before.
+    /// The number of rows that the history has already.
     pub rows: u32,
 }
 
-/// A state with the friction bound used for it, and the quantities that both imply.
+/// A state, the friction bound used for it, and the quantities that follow from both.
 #[derive(Clone)]
 pub(super) struct Measured {
     pub(super) state: State,
@@ -87,7 +87,7 @@ impl Measured {
     }
 }
 
-/// Relative difference up to which residuals count as equal: a cycle repeats them, an approach does not.
+/// The largest relative difference of residuals that count as equal: a cycle repeats residuals, an approach does not.
 const SAME: f64 = 0.01;
 
 /// The parts of a row of the history that do not follow from its state.
@@ -100,33 +100,33 @@ pub(super) struct Row {
     pub(super) inner: u32,
     /// The tangential stress σ_t at every friction point.
     pub(super) tractions: Vec<f64>,
-    /// R_F as the stage computes it; none: it is computed from the nodal pressures.
+    /// The change R_F as the stage computes it; `None`: it is computed from the nodal pressures.
     pub(super) own_r_f: Option<f64>,
 }
 
-/// A cycle: states that repeat.
+/// A cycle of the iterations: states that repeat.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cycle {
-    /// Iterations from one occurrence to the next.
+    /// The number of iterations from one occurrence of a state to the next.
     pub period: u32,
     /// Contact nodes that change between contact and gap, or whose friction points change between
     /// stick and slip, numbered over all contacts.
     pub nodes: Vec<usize>,
 }
 
-/// The history of one increment.
+/// Records the history of one increment.
 pub(super) struct Recorder<'s, 'a> {
     pub(super) system: &'s System<'a>,
     pub(super) controls: &'s SolverControls,
     pub(super) place: Place,
     pub(super) history: Vec<Iteration>,
     before: Option<(Vec<bool>, Vec<f64>)>,
-    /// Whether the last row's contact set differs from that of the row before.
+    /// Whether the contact set of the last row differs from that of the row before.
     pub(super) contact_changed: bool,
-    /// The states so far, with their number and their residual.
+    /// By code of each state so far: its number and its residual.
     met: HashMap<Vec<u8>, (usize, f64)>,
     states: Vec<Vec<u8>>,
-    /// Factors that the convex problems of the sweeps share.
+    /// Factors that the convex problems of all sweeps share.
     pub(super) factors: Factors,
 }
 
@@ -145,7 +145,7 @@ impl<'s, 'a> Recorder<'s, 'a> {
         }
     }
 
-    /// Adds a row to the history and shows it to the observer; whether to stop.
+    /// Adds a row to the history and shows it to the observer; returns whether to stop.
     pub(super) fn record(
         &mut self,
         measured: &Measured,
@@ -205,8 +205,8 @@ impl<'s, 'a> Recorder<'s, 'a> {
         observer.stop()
     }
 
-    /// Records contact and slip of a state. Returns a cycle if the same state occurred before, with others since then
-    /// and the same residual.
+    /// Records contact and slip of a state. Returns a cycle if the same state occurred before with the same residual,
+    /// and other states since then.
     pub(super) fn note(&mut self, state: &State, residual: f64) -> Option<Cycle> {
         let code = code(self.system, state);
         let now = self.states.len();
@@ -236,14 +236,14 @@ impl<'s, 'a> Recorder<'s, 'a> {
         cycle
     }
 
-    /// Clears the states so far, when another method begins.
+    /// Forgets the recorded states, when another method begins.
     pub(super) fn forget(&mut self) {
         self.met.clear();
         self.states.clear();
     }
 }
 
-/// A code for the contact of every node and the slip of every friction point: backward, stick or forward.
+/// A code of a state: the contact of every node, and the slip of every friction point (backward, stick or forward).
 fn code(system: &System<'_>, state: &State) -> Vec<u8> {
     let contact = state.active.iter().map(|active| u8::from(*active));
     let slip = system.points.iter().map(|point| {
@@ -257,7 +257,7 @@ fn code(system: &System<'_>, state: &State) -> Vec<u8> {
     contact.chain(slip).collect()
 }
 
-/// The numbers of friction points with a bound that slip, and that stick.
+/// The number of friction points that slip, and of those that stick; points without a bound do not count.
 fn slipping(system: &System<'_>, state: &State, bound: &[f64]) -> (u32, u32) {
     let (mut slip, mut stick) = (0, 0);
     let points = system.points.iter().zip(bound);
@@ -268,7 +268,8 @@ fn slipping(system: &System<'_>, state: &State, bound: &[f64]) -> (u32, u32) {
     (slip, stick)
 }
 
-/// The relative change R_F of thesis 3.5, ‖σ_n − σ_n′‖ / ‖σ_n′‖, also defined where nothing touched before.
+/// The relative change R_F of thesis 3.5, ‖σ_n − σ_n′‖ / ‖σ_n′‖, from σ_n′ (`before`) to σ_n (`now`). If nothing
+/// touched before, the change is relative to σ_n.
 pub(super) fn relative_change(now: &[f64], before: &[f64]) -> f64 {
     let change: f64 = now.iter().zip(before).map(|(a, b)| (a - b) * (a - b)).sum();
     let scale: f64 = before.iter().map(|b| b * b).sum();

@@ -18,31 +18,32 @@ use crate::solution::{
     Summary, Warning, WarningCode, at_all_points,
 };
 
-/// Forces with a larger relative imbalance than this have lost half of their digits: the result is not reliable.
+/// The largest relative imbalance of forces without a warning: with a larger imbalance, they have lost half of their
+/// digits.
 const OUT_OF_BALANCE: f64 = 1e-7;
 
-/// The largest imbalance where a material is nearly incompressible: its bulk modulus multiplies the rounding of
-/// displacements, and long thin elements do so again. Forces are still known to six digits.
+/// The largest relative imbalance without a warning if a material is nearly incompressible: its bulk modulus multiplies
+/// the rounding of displacements, and long thin elements do so again. Forces are still known to six digits.
 const OUT_OF_BALANCE_INCOMPRESSIBLE: f64 = 1e-6;
 
-/// Forces count as more than rounding when they exceed this part of modulus × displacement × depth, and of the
-/// problem's own force, which a body that is at rest again may have borne.
+/// The smallest forces that count as more than rounding, as a part of modulus × displacement × depth, and as a part of
+/// the problem's own force, which a body that is at rest again may have borne.
 const FORCE_FLOOR: f64 = 1e-6;
 
-/// How many calls of the observer may still answer "stop" before a state is given up. A stopped solution has its last
-/// state if computing the results is little work, else none.
+/// The number of calls that the observer may answer with "stop" before the results of a state are given up. A stopped
+/// solution has its last state if computing the results is little work, else none.
 const PATIENCE: u32 = 6;
 
-/// The contraction q above which the sweeps barely converge.
+/// The contraction q above which sweeps barely converge.
 const SLOW_CONTRACTION: f64 = 0.9;
 
 /// The results of a final state.
 pub struct Reported {
-    /// Scalars, extents and warnings.
+    /// The summary: scalars, extents and warnings.
     pub summary: Summary,
     /// The results along the contacts.
     pub along: AlongContacts,
-    /// Displacements and stresses.
+    /// The displacements and stresses of the body.
     pub fields: Fields,
     /// The difference between recovered stresses and those of the elements.
     pub difference: StressDifference,
@@ -51,25 +52,26 @@ pub struct Reported {
 /// The results along the contacts.
 #[derive(Default)]
 pub struct AlongContacts {
-    /// Columns along each contact boundary, by its name, at all points.
+    /// By contact boundary: the columns along it, at all points.
     pub profiles: BTreeMap<String, ContactProfile>,
-    /// Columns at the nodes, by contact boundary.
+    /// By contact boundary: the columns at the nodes.
     pub node_profiles: BTreeMap<String, ContactProfile>,
-    /// Columns at the points where friction acts, by contact boundary.
+    /// By contact boundary: the columns at the points where friction acts.
     pub friction_profiles: BTreeMap<String, ContactProfile>,
     /// The quantities for which an error is stated.
     pub quantities: Vec<Quantity>,
-    /// Places between the nodes at which the obstacle reaches into the body, of all contacts: where a mesh needs nodes.
+    /// Places of all contacts where a mesh needs nodes: the obstacle reaches into the body between the nodes, or
+    /// recedes there.
     pub missed: Vec<Missed>,
-    /// The displaced obstacles compared with the linear ones, at all contact nodes, where obstacles were pushed along a
+    /// By contact node: the displaced obstacle compared with the linear one, for obstacles that are pushed along a
     /// direction.
     pub displaced: Vec<DisplacedNode>,
     summaries: BTreeMap<String, ContactSummary>,
-    /// [`Fields::contact_state`].
+    /// The contact states of the nodes, [`Fields::contact_state`].
     states: Vec<i8>,
 }
 
-/// The results of a final state that need no displacements inside the body: numbers by contact, and warnings.
+/// The results of a final state that need no displacements inside the body: the numbers of each contact, and warnings.
 pub fn numbers(
     system: &System<'_>,
     finished: &Finished,
@@ -87,8 +89,8 @@ pub fn numbers(
     Ok((contacts, warnings))
 }
 
-/// The quantities with stated errors (forces, peaks and extents) in a final state, without the displacements inside the
-/// body. None if the observer stops.
+/// The quantities with stated errors (forces, peaks and extents) in a final state, computed without the displacements
+/// inside the body. Empty if the observer stops.
 pub fn quantities(
     system: &System<'_>,
     finished: &Finished,
@@ -103,8 +105,8 @@ pub fn quantities(
     }
 }
 
-/// One observer shared by many functions that read a state. They are not interrupted themselves; after a stop their
-/// results are discarded.
+/// One observer that is shared by many functions which read a state. These functions are not interrupted; after a stop
+/// their results are discarded.
 struct Questions<'a> {
     interrupt: RefCell<Interrupt<'a>>,
     stopped: Cell<bool>,
@@ -118,7 +120,7 @@ impl<'a> Questions<'a> {
         }
     }
 
-    /// As [`Interrupt::worked`]; after one stop it stops always.
+    /// Like [`Interrupt::worked`]; after the first stop, every call returns a stop.
     fn worked(&self, work: f64) -> Result<(), Stopped> {
         if self.stopped.get() || self.interrupt.borrow_mut().worked(work).is_err() {
             self.stopped.set(true);
@@ -152,7 +154,7 @@ impl<'a> FinalState<'a> {
 
     /// Calls a function for each contact, unless the observer stops.
     fn view(&self, mut read: impl FnMut(&Patch<'_>, &PatchView<'_>)) -> Result<(), Stopped> {
-        /// The work for each node and friction point of all contacts, apart from averages, in multiplications.
+        /// The work for each node and friction point of all contacts, without averages, in multiplications.
         const WORK: usize = 100;
         let system = self.system;
         let work = (WORK * (system.nodes.len() + system.points.len())) as f64;
@@ -165,7 +167,7 @@ impl<'a> FinalState<'a> {
         self.questions.worked(0.0)
     }
 
-    /// Warns of how the iterations ended and how far the body slides; returns whether that is too far.
+    /// Warns of how the iterations ended and of a body that slides too far; returns whether it does.
     fn warn(&self, warnings: &mut Vec<Warning>) -> bool {
         let (system, finished) = (self.system, self.finished);
         warn_of_iteration(finished, warnings);
@@ -217,7 +219,7 @@ impl AlongContacts {
 }
 
 /// The results of a final state: forces, extents, profiles, fields and warnings. [`SolveError::Stopped`] if the
-/// observer stops and still does at the next calls.
+/// observer stops, and still does at several more calls.
 pub fn report(
     system: &System<'_>,
     finished: &Finished,
@@ -260,7 +262,8 @@ pub fn report(
     })
 }
 
-/// Checks that the contacts of the final state, with their friction, prevent the motions that the supports do not.
+/// Checks that the contacts of the final state, with their friction, prevent all motions that the supports do not
+/// prevent.
 fn held(system: &System<'_>, finished: &Finished) -> Result<(), SolveError> {
     let mut hindered = Vec::new();
     for patch in &system.patches {
@@ -290,8 +293,8 @@ fn held(system: &System<'_>, finished: &Finished) -> Result<(), SolveError> {
     }
 }
 
-/// The force on every contact unknown: the obstacle's reaction −R along n; friction and the reaction of bonded nodes
-/// along t.
+/// The force on every contact unknown: along n the obstacle's reaction −R; along t friction, and the reaction of bonded
+/// nodes.
 fn contact_force(system: &System<'_>, finished: &Finished, forces: &Forces) -> Vec<f64> {
     let mut friction = vec![0.0; finished.state.v.len()];
     system.add_traction_force(&finished.tractions, &mut friction);
@@ -410,7 +413,7 @@ impl Inside {
         }
     }
 
-    /// Whether all results are numbers.
+    /// Whether all results are finite numbers.
     fn is_finite(&self, summary: &Summary) -> bool {
         let numbers = [
             summary.normal_force,
@@ -431,9 +434,9 @@ impl Inside {
         work * system.level.loads + self.recovered.work_on_bubbles
     }
 
-    /// The imbalance |Σ forces| / Σ|forces| of loads, contact, friction and the supports' reactions, the last computed
+    /// The imbalance |Σ forces| / Σ|forces| of loads, contact, friction and the supports' reactions, which are computed
     /// from the stresses in the body. In axisymmetry only the axial sum is a balance. Forces below [`FORCE_FLOOR`] are
-    /// rounding of larger ones.
+    /// rounding of larger forces.
     fn equilibrium(&self, state: &FinalState<'_>) -> f64 {
         let system = state.system;
         let (model, body, loads) = (system.model, system.body, system.level.loads);
@@ -577,7 +580,7 @@ fn warn_of_iteration(finished: &Finished, warnings: &mut Vec<Warning>) {
     }
 }
 
-/// A number to two digits, rounded up, so that a number above a limit is also shown above it.
+/// A number to two digits, rounded up, so that a number above a limit is also shown as above it.
 fn rounded_up(value: f64) -> String {
     let nearest = format!("{value:.1e}");
     match nearest.parse::<f64>() {
@@ -586,7 +589,7 @@ fn rounded_up(value: f64) -> String {
     }
 }
 
-/// Warns where rounding keeps residuals above the tolerance, and says what would lower them.
+/// Warns if rounding keeps residuals above the tolerance, and says what would lower them.
 fn warn_of_rounding(model: &Model, finished: &Finished, warnings: &mut Vec<Warning>) {
     let Some(rounding) = finished.rounding else {
         return;

@@ -1,41 +1,44 @@
 //! The smallest residuals that rounding permits, formulation 4.4: no iteration gets below them.
 //!
-//! Displacements are known to a part η = 2⁻⁵² of themselves. Slip is a small difference of them, and friction divides
-//! it by ε, so that σ_t is known to τ φ′ η (|u_t| + |d| + |g|) / ε only; elastic forces are known to η (|Ŝ| |v| +
-//! |f̂|). Both are divided by what the residuals are divided by: no unit enters.
+//! Displacements are known to a part η = 2⁻⁵² of themselves. Slip is a small difference of displacements, and friction
+//! divides it by ε, so that σ_t is known to τ φ′ η (|u_t| + |d| + |g|) / ε only; elastic forces are known to η (|Ŝ| |v|
+//! +
+//! f̂|). Both are divided by the same scale as the residuals, so that no unit enters.
 
 use crate::algorithm::recorder::Measured;
 use crate::algorithm::system::{Point, State, System};
 use crate::elasticity::Dof;
 use crate::solution::Residuals;
 
-/// The number of operations that round one after the other: a sum, a product, the interpolation between nodes, the
+/// The number of operations that round one after another: a sum, a product, the interpolation between nodes, the
 /// division by ε.
 const OPERATIONS: f64 = 4.0;
 
-/// Where rounding may leave a residual above this, no state counts as a solution. The estimated error of a force or a
-/// peak is never a smaller part of it (formulation 3.9), and rounding should not add to it. The actual residual is
-/// mostly 30 times smaller, but that depends on chance and on units, so the outcome follows from the bound.
+/// The largest residual from rounding with which a state counts as a solution. The estimated error of a force or a peak
+/// is never a smaller part of it than this (formulation 3.9), and rounding should not add to that error. The actual
+/// residual is mostly 30 times smaller than the bound, but depends on chance and on units, so the outcome follows from
+/// the bound.
 const MOST: f64 = 1e-4;
 
-/// The number of states in a row with only rounding left, after which no better one is expected.
+/// The number of states in a row with only rounding left after which no better state is expected.
 pub(super) const PATIENCE: u32 = 5;
 
-/// Why a residual stays above the tolerance: rounding.
+/// The rounding that keeps a residual above the tolerance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rounding {
-    /// The largest residual.
+    /// The largest residual of the state.
     pub residual: f64,
-    /// The largest residual that rounding may leave.
+    /// The largest value of that residual which rounding may leave.
     pub floor: f64,
-    /// The slip that is rounded; `None`: the displacements are large compared with those that strain the body.
+    /// The slip that is rounded most; `None` if elastic forces are rounded more, since displacements are large compared
+    /// with those that strain the body.
     pub slip: Option<RoundedSlip>,
 }
 
-/// The friction point where rounding leaves most.
+/// The slip at the friction point where rounding leaves most.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoundedSlip {
-    /// The contact of this point.
+    /// The contact of the friction point, by its place in the system.
     pub patch: usize,
     /// The size |u_t| + |d| + |g| of the displacements whose difference is the slip (length).
     pub displacement: f64,
@@ -48,8 +51,8 @@ impl Rounding {
     }
 }
 
-/// The rounding in a state whose residuals are above the tolerance for no other reason, and the floor of the friction
-/// residual.
+/// The rounding in a state, and the floor of the friction residual. None if the residuals are within the tolerance, or
+/// above it for other reasons than rounding.
 pub(super) fn limit(
     system: &System<'_>,
     measured: &Measured,
@@ -81,7 +84,7 @@ pub(super) fn limit(
     Some((rounding, floors.friction))
 }
 
-/// Whether a [`System::kkt_residual`] above the tolerance is rounding. `reactions`: those of the state.
+/// Whether a [`System::kkt_residual`] is above the tolerance because of rounding only. `reactions`: those of the state.
 pub(super) fn is_rounding(
     system: &System<'_>,
     (state, reactions, bound): (&State, &[f64], &[f64]),
@@ -91,8 +94,8 @@ pub(super) fn is_rounding(
     residual > tolerance && residual <= floors(system, state, reactions, bound).0.kkt
 }
 
-/// The largest value that rounding may leave of each residual, and the friction point where it is largest, unless it is
-/// not friction.
+/// The largest value of each residual that rounding may leave, and the friction point where rounding leaves most, if
+/// friction is rounded more than elastic forces.
 fn floors(
     system: &System<'_>,
     state: &State,
@@ -159,7 +162,7 @@ fn floors(
     (floors, worst.1.filter(|_| by_slip))
 }
 
-/// The size of the displacements whose difference is the slip at a point.
+/// The size |u_t| + |d| + |g| of the displacements whose difference is the slip at a point.
 fn displacement(system: &System<'_>, v: &[f64], point: &Point) -> f64 {
     let size = |i: usize| {
         let node = point.nodes[i];

@@ -1,5 +1,5 @@
-//! Bodies that only friction holds against some motion, and that the loads push along it by more than friction can
-//! resist. They have no equilibrium, so iterations would diverge.
+//! Bodies that slide away: only friction holds them against some motion, and the loads push them along it by more than
+//! friction can resist. They have no equilibrium, so iterations would diverge.
 
 use crate::algorithm::recorder::Measured;
 use crate::algorithm::system::{Patch, Point, State, System};
@@ -9,28 +9,30 @@ use crate::friction::{BoundLaw, Source};
 use crate::model::{Hold, RigidMotion};
 use crate::problem::Condition;
 
-/// Push and friction that differ by less are equal: limits for rounding, and for the error of the iterations.
+/// The largest relative differences of push and friction that count as equal: because of rounding, and because of the
+/// error of the iterations.
 const EQUAL: [f64; 2] = [1e-9, 1e-6];
 
-/// Two directions are parallel, or perpendicular, if they are so to this part.
+/// The largest deviation from parallel or perpendicular of directions that count as such.
 const ALIGNED: f64 = 1e-9;
 
-/// A body that slides away is moved by this many elastic slips: all of its friction then acts, also with `tanh`.
+/// How far a body that slides away is moved, in elastic slips: all of its friction then acts, also with `tanh`.
 const MOVED: f64 = 20.0;
 
 /// A body that slides away.
 #[derive(Clone, Debug)]
 pub struct Slide {
     motion: RigidMotion,
-    /// Along the motion, with its sign: the power of the loads, and the power of the largest friction (with 2π).
+    /// The power of the loads along the motion, with its sign (with 2π).
     push: f64,
+    /// The power of the largest friction along the motion (with 2π).
     hold: f64,
-    /// Whether the friction is the largest that equilibrium permits, rather than that of the computed pressure.
+    /// Whether `hold` is the largest friction that equilibrium permits, and not the friction at the computed pressure.
     certain: bool,
 }
 
 impl Slide {
-    /// The message: the cause, both forces or moments, and what to do.
+    /// The message for users: the cause, both forces or moments, and what to do.
     pub(super) fn message(&self) -> String {
         let (kind, arm) = match self.motion.arm {
             None => ("", 1.0),
@@ -55,7 +57,7 @@ impl Slide {
     }
 }
 
-/// A slide that follows from equilibrium alone, whatever the pressure.
+/// The motion by which the body slides away, if that follows from equilibrium alone, whatever the pressure.
 pub(super) fn certain(system: &System<'_>) -> Option<Slide> {
     let motions = motions(system, |_| true).into_iter();
     let slide = |motion: RigidMotion| {
@@ -73,7 +75,8 @@ pub(super) fn certain(system: &System<'_>) -> Option<Slide> {
     motions.filter_map(slide).next()
 }
 
-/// The slide, if there is one, in a state at the end of iterations, with its contacts and its pressure.
+/// The motion by which the body slides away in a state at the end of iterations, by the contacts and pressure of the
+/// state.
 pub(super) fn found(system: &System<'_>, state: &State) -> Option<Slide> {
     let active = &state.active;
     let reactions = system.reactions(state);
@@ -111,7 +114,7 @@ pub(super) fn slid(system: &System<'_>, bonded: Measured, slide: &Slide) -> Meas
     Measured::new(system, state, bonded.implied_bound)
 }
 
-/// Motions that only friction prevents, if these nodes touch.
+/// The rigid motions that only friction prevents, if the nodes in `touches` are in contact.
 fn motions(system: &System<'_>, touches: impl Fn(usize) -> bool) -> Vec<RigidMotion> {
     let mut hindered = Vec::new();
     for patch in &system.patches {
@@ -128,7 +131,7 @@ fn motions(system: &System<'_>, touches: impl Fn(usize) -> bool) -> Vec<RigidMot
     system.model.free_motions(&hindered)
 }
 
-/// The displacement of every node by a motion; none for nodes that do not take part.
+/// The displacement of every node by a rigid motion; `None` for nodes of parts that do not move.
 struct Moved(Vec<Option<[f64; 2]>>);
 
 impl Moved {
@@ -144,12 +147,12 @@ impl Moved {
         self.0[node as usize].unwrap_or_default()
     }
 
-    /// The power of the loads, with 2π.
+    /// The power of the loads along the motion, with 2π.
     fn push(&self, system: &System<'_>) -> f64 {
         system.circumference * self.load(system, |moved| moved)
     }
 
-    /// Σ of the loads times a direction at each node.
+    /// The sum over moved nodes of the load times a direction. `along`: the direction, from the displacement of a node.
     fn load(&self, system: &System<'_>, along: impl Fn([f64; 2]) -> [f64; 2]) -> f64 {
         let loads = system.body.nodal_loads.iter().zip(&self.0);
         let power = loads.filter_map(|(f, moved)| Some(dot(*f, along((*moved)?))));
@@ -161,21 +164,21 @@ impl Moved {
         dot(boundary.tangent(i), self.of(boundary.nodes[i]))
     }
 
-    /// How far a friction point moves along its tangent.
+    /// How far the motion moves a friction point along its tangent.
     fn at(&self, system: &System<'_>, point: &Point) -> f64 {
         let patch = &system.patches[point.patch];
         let along = |k: usize| self.along_tangent(patch, point.nodes[k] - patch.first);
         (0..3).map(|k| point.shape[k] * along(k)).sum()
     }
 
-    /// The largest power of friction with these bounds, with 2π.
+    /// The largest power of friction along the motion with these bounds, with 2π.
     fn hold(&self, system: &System<'_>, bound: &[f64]) -> f64 {
         let points = system.points.iter().zip(bound);
         let power = points.map(|(point, tau)| point.weight * tau * self.at(system, point).abs());
         system.circumference * power.sum::<f64>()
     }
 
-    /// Whether an obstacle that does not touch yet would stop the motion.
+    /// Whether an obstacle that does not touch yet would stop the motion. `push`: its sign is the direction.
     fn stopped(&self, system: &System<'_>, active: &[bool], push: f64) -> bool {
         system.patches.iter().any(|patch| {
             let boundary = &patch.contact.boundary;
@@ -189,9 +192,10 @@ impl Moved {
         })
     }
 
-    /// The largest power of friction (without 2π), if it is known before solving: with prescribed bounds or caps, or if
-    /// the sum of all pressures follows from equilibrium. The first value is for averaged pressures that are nowhere
-    /// negative, the second for any: parabolas between the nodes may be negative where contact ends.
+    /// The largest power of friction along the motion (without 2π), if it is known before solving: with prescribed
+    /// bounds or caps, or if the sum of all pressures follows from equilibrium. The first value is for averaged
+    /// pressures that are nowhere negative, the second for any averaged pressures: parabolas between nodes may be
+    /// negative where contact ends.
     fn most(&self, system: &System<'_>) -> Option<[f64; 2]> {
         let (mut given, mut capped, mut cohesive) = (0.0, 0.0, 0.0);
         let mut coefficients = [0.0f64; 2];
@@ -234,8 +238,9 @@ impl Moved {
         }
     }
 
-    /// The largest factor from a reaction to the averaged pressure: 1 inside a contact. The second value, somewhat
-    /// larger, ignores negative parts of the pressure.
+    /// The largest power along the motion, per friction coefficient, that a unit reaction gives friction by the
+    /// averaged pressure: 1 inside a contact, for unit motion. The second value, somewhat larger, leaves negative parts
+    /// of the pressure out.
     fn gain(&self, system: &System<'_>, p: usize) -> [f64; 2] {
         let mut sums = vec![[0.0; 2]; system.nodes.len()];
         for point in system.points.iter().filter(|point| point.patch == p) {
@@ -254,7 +259,7 @@ impl Moved {
         gains.fold([0.0; 2], |[a, b], [c, d]| [a.max(c), b.max(d)])
     }
 
-    /// The sum of all reactions on the body that moves, where it follows from equilibrium: all contacts have the same
+    /// The sum of all reactions on the body that moves, if it follows from equilibrium: all contacts have the same
     /// normal, and nothing else holds the body.
     fn pressed(&self, system: &System<'_>) -> Option<f64> {
         let mut bonded = Vec::new();

@@ -1,5 +1,5 @@
-//! A warning where strains are not small, as linear elasticity assumes, judged where the load acts and not by the size
-//! of the body.
+//! A warning where strains are not small, as linear elasticity assumes. Strains are judged where the load acts, and not
+//! by the size of the body.
 
 use crate::algorithm::system::{Patch, System};
 use crate::contact::edge_nodes;
@@ -7,15 +7,16 @@ use crate::elasticity::{COMPONENTS, Recovered, inverse};
 use crate::model::Model;
 use crate::solution::{Warning, WarningCode};
 
-/// Mean strain of the elements in contact above which linear elasticity is only a guess: at a quarter the common measures
-/// of finite strain (ln λ, λ − 1, (λ² − 1)/2) already differ from each other by an eighth. The thesis's examples reach .22.
+/// The mean strain of the elements in contact above which linear elasticity is only a guess: at a quarter the common
+/// measures of finite strain (ln λ, λ − 1, (λ² − 1)/2) already differ from each other by an eighth. The thesis's
+/// examples reach 0.22.
 const LARGE_STRAIN: f64 = 0.25;
 
-/// Displacements above this part of the body's size are not small.
+/// The largest displacement that counts as small, as a part of the body's size.
 const LARGE_DISPLACEMENT: f64 = 0.1;
 
-/// A warning about the contact with the largest strain, or else about displacements relative to the size of the body.
-/// A body that `slides` too far has a warning already.
+/// A warning about the contact with the largest strain, or else about displacements that are large compared with the
+/// body. `slides`: the body slides too far, which has a warning already, so that its displacements have none.
 pub(super) fn large_strain(
     system: &System<'_>,
     active: &[bool],

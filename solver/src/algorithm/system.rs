@@ -1,5 +1,4 @@
-//! The problem reduced to Γ_C at one load level: contact nodes, friction points, and the forces between
-//! them.
+//! The problem reduced to Γ_C at one load level: contact nodes, friction points, and the forces between them.
 
 use crate::body::{AXIS_SHARE, ElasticBody};
 use crate::elasticity::Dof;
@@ -10,33 +9,34 @@ use crate::model::{ContactModel, Level, Model};
 use crate::observer::{Observer, go_on};
 use crate::problem::{Condition, FrictionPoints};
 
-/// A friction point whose bound is below this part of the largest counts as open: its anchor follows it.
+/// The part of the largest bound below which a friction point counts as open: its anchor then follows it.
 const OPEN: f64 = 1e-12;
 
-/// The data of the iterations, for all contacts in a row.
+/// The data of the iterations; nodes and points of all contacts are in a row.
 pub struct System<'a> {
     /// The condensed stiffness Ŝ.
     pub stiffness: &'a Dense,
     /// The condensed load f̂ at this load level.
     pub load: Vec<f64>,
-    /// Contact nodes.
+    /// The contact nodes of all contacts.
     pub nodes: Vec<ContactNode>,
     /// Points where friction acts; none in a frictionless contact.
     pub points: Vec<Point>,
-    /// The contacts, one each.
+    /// The contacts of the model.
     pub patches: Vec<Patch<'a>>,
-    /// The factor from a sum of nodal forces to a total: 2π in axisymmetry, else 1.
+    /// The factor between a sum of nodal forces and a total force: 2π in axisymmetry, else 1.
     pub circumference: f64,
-    /// The load level that all of the above is for.
+    /// The load level of `load`, and of gaps and drags of the nodes.
     pub level: Level,
     /// Whether Ŝ has rigid motions that only contact can prevent.
     pub semidefinite: bool,
-    /// What sliding has dissipated in the increments so far, under the incremental law (force × length, without 2π).
+    /// The work that sliding has dissipated in the increments so far, under the incremental law (force × length,
+    /// without 2π).
     pub dissipated: f64,
-    /// A typical nodal force of this problem, for levels where nothing acts: the force of the full loads, or that on a
-    /// contact node pushed by the indentation or the drag.
+    /// A typical nodal force of this problem, for levels at which nothing acts: the force of the full loads, or the
+    /// force on a contact node that is pushed by the indentation or the drag.
     pub reference_force: f64,
-    /// How many threads may compute the fields of the whole body; 1 until more are free.
+    /// The number of threads that may compute the fields of the whole body; 1 until more are free.
     pub threads: usize,
     /// The body, condensed to Γ_C.
     pub body: &'a ElasticBody,
@@ -44,30 +44,31 @@ pub struct System<'a> {
     pub model: &'a Model,
 }
 
-/// One contact node: two unknowns and a bound on the first of them.
+/// One contact node: two unknowns, and a bound on the first of them.
 ///
-/// A constraint is a bound on one unknown, and not a row of coefficients on several, also where two bodies would
-/// meet: `body` would turn the condensed unknowns so that the displacement relative to the other body is one of
+/// A constraint is a bound on one unknown, and not a row of coefficients on several. That would hold where two bodies
+/// meet, too: `body` would turn the condensed unknowns so that the displacement relative to the other body is one of
 /// them (docs/theory.md, "Where a second body would enter").
 #[derive(Clone, Copy, Debug)]
 pub struct ContactNode {
-    /// u_n; at a node beside the axis the part of it that [`AXIS_SHARE`] leaves.
+    /// The unknown u_n; at a node beside the axis the part of u_n that [`AXIS_SHARE`] leaves.
     pub normal: Dof,
-    /// u_t, where it is a component of its own; at a node with oblique axes it counts as held, and `oblique` gives it.
+    /// The unknown u_t, if it is one of the components; at a node with oblique axes it counts as held, and `oblique`
+    /// gives u_t.
     pub tangent: Dof,
-    /// The node's axes, where they are oblique.
+    /// The axes of the node, if they are oblique.
     pub oblique: Option<Oblique>,
-    /// Present where the node belongs to another contact alone: then `normal` and `tangent` are no unknowns.
+    /// Present if the node belongs to another contact alone: then `normal` and `tangent` are no unknowns.
     pub follows: Option<Follows>,
     /// The bound on u_n, `normal` ≤ gap; infinite where there is no obstacle.
     pub gap: f64,
-    /// Whether u_n = gap, whatever the reaction.
+    /// Whether u_n = gap is prescribed, whatever the reaction.
     pub bonded: bool,
-    /// d: the obstacle's own displacement along t at this level.
+    /// The obstacle's own displacement d along t at this level.
     pub drag: f64,
-    /// The prescribed u_t where the tangent is held.
+    /// The prescribed u_t, if the node is held along t.
     pub held_tangent: Option<f64>,
-    /// The area for the reaction of `normal`: ∫ h_i, and on the axis ∫ h₀ + h₁/8.
+    /// The area that belongs to the reaction of `normal`: ∫ h_i, and on the axis ∫ h₀ + h₁/8.
     pub weight: f64,
     /// Whether the node is on the axis of a body of revolution.
     pub on_axis: bool,
@@ -84,7 +85,7 @@ impl ContactNode {
         }
     }
 
-    /// Whether u_t is held at 0: on a line of symmetry.
+    /// Whether the node is on a line of symmetry, where u_t is held at 0.
     pub fn symmetric(&self) -> bool {
         match self.oblique {
             None => matches!(self.tangent, Dof::Fixed(value) if value == 0.0),
@@ -93,9 +94,10 @@ impl ContactNode {
     }
 }
 
-/// A node whose displacement is measured along its normal and another direction, not perpendicular to it: the normal of
-/// another contact, or the direction of a support. No friction acts on it: slip is continued to it from the other two
-/// nodes of its edge, and friction forces are passed on to these (formulation 3.3).
+/// The axes of a node whose displacement is measured along its normal and another direction that is not perpendicular
+/// to the normal: the normal of another contact, or the direction of a support. No friction acts on such a node: slip
+/// is continued to it from the other two nodes of its edge, and friction forces are passed on to these nodes
+/// (formulation 3.3).
 #[derive(Clone, Copy, Debug)]
 pub struct Oblique {
     /// The displacement along the other direction.
@@ -109,7 +111,7 @@ pub struct Oblique {
 }
 
 impl Oblique {
-    /// Of a node that follows another contact: slip is continued to it, as to a common end that both touch.
+    /// The axes of a node that follows another contact: slip is continued to it, as to a common end that touches both.
     const OF_FOLLOWING: Self = Oblique {
         other: Dof::Fixed(0.0),
         part: [0.0; 2],
@@ -118,7 +120,7 @@ impl Oblique {
     };
 }
 
-/// The point of the load path that increments have reached.
+/// A point of the load path, with what increments have accumulated up to there.
 pub struct Path {
     /// The anchor g of every friction point.
     anchors: Vec<f64>,
@@ -126,7 +128,7 @@ pub struct Path {
     level: Level,
 }
 
-/// How a common end of two contacts follows the other contact, if it belongs to that one alone: gives u_n and u_t.
+/// How a common end of two contacts that belongs to the other contact alone follows that contact: gives u_n and u_t.
 #[derive(Clone, Copy, Debug)]
 pub struct Follows {
     /// The displacements along the normal and the tangent of the other contact.
@@ -146,32 +148,32 @@ impl Follows {
 /// A point at which friction acts.
 #[derive(Clone, Debug)]
 pub struct Point {
-    /// The contact of this point.
+    /// The contact of this point, by its place in the system.
     pub patch: usize,
-    /// The arc length.
+    /// The arc length of the point.
     pub s: f64,
-    /// The three nodes of its edge.
+    /// The three nodes of the edge that the point is on.
     pub nodes: [usize; 3],
     /// The shape functions of these nodes at the point.
     pub shape: [f64; 3],
     /// The weight w_g of the point in integrals.
     pub weight: f64,
-    /// The averaging row that gives its bound from the pressures of all nodes.
+    /// The source of the friction bound: a given value, or the averaging row over the pressures of all nodes.
     pub source: Source,
     /// The anchor g, from which slip is measured; 0 under the total law.
     pub anchor: f64,
 }
 
-/// Averaging operators of contacts, with those rows that are computed already. Problems that differ in other numbers
-/// than the radius share them.
+/// Averaging operators of contacts, with the rows that are computed already. Problems that differ in other numbers than
+/// the radius share the operators.
 #[derive(Default)]
 pub struct Averages(Vec<(usize, Average, Averaging)>);
 
 impl Averages {
-    /// The number of operators that are kept, each with its rows.
+    /// The largest number of operators that are kept, each with its rows.
     const MOST: usize = 16;
 
-    /// The law of a contact along its chain.
+    /// The friction law of a contact with the operator that averages along its chain of edges.
     fn law(&mut self, patch: usize, law: &FrictionLaw<Average>, chain: Chain) -> FrictionLaw {
         law.along(|average| {
             // radii in turn come back after all others
@@ -189,21 +191,21 @@ impl Averages {
     }
 }
 
-/// One contact of the model in the system.
+/// A contact of the model, in the system.
 #[derive(Clone)]
 pub struct Patch<'a> {
-    /// The contact.
+    /// The contact in the model.
     pub contact: &'a ContactModel,
-    /// Number of its first node.
+    /// The number of the contact's first node.
     pub first: usize,
-    /// The friction law; none: frictionless.
+    /// The friction law; none if the contact is frictionless.
     pub law: Option<FrictionLaw>,
 }
 
 /// A state of the system: displacements and the contact set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
-    /// The contact unknowns.
+    /// The values of the contact unknowns.
     pub v: Vec<f64>,
     /// Whether each node is in contact.
     pub active: Vec<bool>,
@@ -220,7 +222,7 @@ impl<'a> System<'a> {
         System::with_averages(model, body, &mut Averages::default(), observer)
     }
 
-    /// As [`System::new`], using the averages of earlier systems on this body and adding those of this one.
+    /// Like [`System::new`], using the averages of earlier systems on this body and adding the averages of this system.
     pub fn with_averages(
         model: &'a Model,
         body: &'a ElasticBody,
@@ -401,7 +403,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// Resets anchors and dissipated work to the start of the load path; returns the path so far, with its level.
+    /// Resets anchors and dissipated work to the start of the load path; returns what they were, with the level.
     pub fn restart(&mut self) -> Path {
         let anchors = self.points.iter_mut();
         Path {
@@ -459,7 +461,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// The same system with u_t = d prescribed at all nodes of contacts with friction: everything sticks.
+    /// A copy of the system with u_t = d prescribed at all nodes of contacts with friction, so that everything sticks.
     pub fn bonded(&self) -> Self {
         // without friction points, whose averages are most of a large system
         let mut bonded = System {
@@ -478,7 +480,8 @@ impl<'a> System<'a> {
         bonded
     }
 
-    /// Ends an increment: the anchors of points that slide or are open move with the slip, which dissipates τ|Δg|.
+    /// Ends an increment: the anchors of points that slide or are open move with the slip by Δg, which dissipates
+    /// τ|Δg|.
     pub fn move_anchors(&mut self, v: &[f64], bound: &[f64]) {
         let largest = bound.iter().fold(0.0f64, |a, b| a.max(*b));
         for (g, tau) in bound.iter().enumerate() {
@@ -502,7 +505,7 @@ impl<'a> System<'a> {
         self.dissipated + work.sum::<f64>()
     }
 
-    /// The initial state: no displacement, and only bonded nodes in contact.
+    /// The initial state: no displacement, and no nodes in contact but bonded nodes.
     pub fn rest(&self) -> State {
         State {
             v: vec![0.0; self.load.len()],
@@ -561,7 +564,7 @@ impl<'a> System<'a> {
             .sum()
     }
 
-    /// The slip e = u_t − d − g at a friction point: the displacement that friction acts on.
+    /// The slip e = u_t − d − g at a friction point, which friction acts against.
     pub fn slip(&self, v: &[f64], point: &Point) -> f64 {
         self.relative_displacement(v, point) - point.anchor
     }
@@ -574,7 +577,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// The elastic force on the contact unknowns, Ŝ v − f̂.
+    /// The elastic force Ŝ v − f̂ on the contact unknowns.
     pub fn elastic_force(&self, v: &[f64]) -> Vec<f64> {
         self.stiffness
             .times(v)
@@ -584,7 +587,7 @@ impl<'a> System<'a> {
             .collect()
     }
 
-    /// σ_t = −τ φ at every friction point (stress, along t).
+    /// The tangential stress σ_t = −τ φ at every friction point (along t).
     pub fn tractions(&self, v: &[f64], bound: &[f64]) -> Vec<f64> {
         // a node belongs to several points
         let relative = |i: usize| self.tangential_displacement(v, i) - self.nodes[i].drag;
@@ -598,7 +601,7 @@ impl<'a> System<'a> {
         self.points.iter().zip(bound).map(traction).collect()
     }
 
-    /// Adds the nodal forces −Σ w σ_t h of tangential tractions, on the left-hand side, thesis (2.29).
+    /// Adds the nodal forces −Σ w σ_t h of tangential tractions to `force`, on the left-hand side, thesis (2.29).
     pub fn add_traction_force(&self, tractions: &[f64], force: &mut [f64]) {
         for (point, traction) in self.points.iter().zip(tractions) {
             for i in 0..3 {
@@ -609,12 +612,13 @@ impl<'a> System<'a> {
         }
     }
 
-    /// Reactions R = f̂_n − (Ŝ v)_n of the obstacle on the unknowns of active nodes; exactly 0 on the others.
+    /// The reactions R = f̂_n − (Ŝ v)_n of the obstacle on active nodes; exactly 0 on the other nodes.
     pub fn reactions(&self, state: &State) -> Vec<f64> {
         self.reactions_of(state, &self.elastic_force(&state.v))
     }
 
-    /// As [`System::reactions`], from the elastic force Ŝ v − f̂, which takes a product with a dense matrix.
+    /// Like [`System::reactions`], from the elastic force Ŝ v − f̂ (`force`), which takes a product with a dense
+    /// matrix.
     pub(super) fn reactions_of(&self, state: &State, force: &[f64]) -> Vec<f64> {
         let reaction = |(node, active): (&ContactNode, &bool)| match node.normal {
             Dof::Free(dof) if *active => -force[dof],
@@ -623,8 +627,8 @@ impl<'a> System<'a> {
         self.nodes.iter().zip(&state.active).map(reaction).collect()
     }
 
-    /// Tangential forces of the obstacle on nodes whose tangential displacement is held; exactly 0 on the others.
-    /// `force`: Ŝ v − f̂.
+    /// The tangential forces of the obstacle on nodes whose tangential displacement is held; exactly 0 on the other
+    /// nodes. `force`: Ŝ v − f̂.
     pub(super) fn tangential_reactions(&self, force: &[f64]) -> Vec<f64> {
         let reaction = |node: &ContactNode| match (node.tangent, node.held_tangent) {
             (Dof::Free(dof), Some(_)) => force[dof],
@@ -633,8 +637,8 @@ impl<'a> System<'a> {
         self.nodes.iter().map(reaction).collect()
     }
 
-    /// The sums ∫σ_t and ∫|σ_t| over friction points with these tractions, and over nodes that are held along t; in
-    /// axisymmetry without 2π.
+    /// The sums ∫σ_t and ∫|σ_t| over friction points with these tractions, and over the forces `held` on nodes that are
+    /// held along t (without 2π).
     pub fn tangential_forces<'b>(
         &self,
         tractions: impl Iterator<Item = (&'b Point, &'b f64)>,
@@ -646,7 +650,7 @@ impl<'a> System<'a> {
             .fold([0.0; 2], |[sum, size], f| [sum + f, size + f.abs()])
     }
 
-    /// Nodal pressures: p = R / ∫h, with a correction beside the axis so that the profile adds up to the reactions
+    /// The nodal pressures p = R / ∫h, with a correction beside the axis so that the profile adds up to the reactions
     /// (formulation 3.5); exactly 0 where there is no reaction.
     pub fn pressures(&self, reactions: &[f64]) -> Vec<f64> {
         let nodes = self.nodes.iter().zip(reactions);
@@ -663,7 +667,7 @@ impl<'a> System<'a> {
         pressures
     }
 
-    /// `factor` times the pressure of a node in contact as a sum over reactions: nodes and their weights.
+    /// `factor` times the pressure of a node in contact, as a sum over reactions: returns nodes and their weights.
     pub fn pressure_weights(
         &self,
         node: usize,
@@ -678,7 +682,7 @@ impl<'a> System<'a> {
         std::iter::once((node, own * factor / area)).chain(beside)
     }
 
-    /// The averaged pressure of a point as a sum over reactions, by W P: nodes in contact and their weights.
+    /// The averaged pressure at a point as a sum over reactions, by W P: returns nodes in contact and their weights.
     pub fn reaction_weights(&self, state: &State, point: &Point) -> Vec<(usize, f64)> {
         let Source::Average(row) = &point.source else {
             return Vec::new();
@@ -694,7 +698,7 @@ impl<'a> System<'a> {
         weights
     }
 
-    /// The normal force ∫p on some nodes, from their reactions (without 2π).
+    /// The normal force ∫p on some nodes, from the reactions of the nodes (without 2π).
     pub fn normal_force(&self, nodes: std::ops::Range<usize>, reactions: &[f64]) -> f64 {
         nodes.map(|i| self.nodes[i].force() * reactions[i]).sum()
     }
@@ -711,7 +715,7 @@ impl<'a> System<'a> {
     }
 
     /// The largest force or complementarity defect for a given friction bound, divided by the largest nodal reaction.
-    /// Where nothing touches it is divided by the largest load or friction force or, since a body may be at rest again,
+    /// If nothing touches, it is divided by the largest load or friction force or, since a body may be at rest again,
     /// by the problem's own force. `elastic`: Ŝ v − f̂ of the state.
     pub(super) fn kkt_residual(&self, state: &State, elastic: &[f64], bound: &[f64]) -> f64 {
         let mut friction = vec![0.0; state.v.len()];
@@ -719,7 +723,7 @@ impl<'a> System<'a> {
         self.kkt_residual_of(state, elastic, &friction)
     }
 
-    /// As [`System::kkt_residual`], with the friction forces of [`System::add_traction_force`].
+    /// Like [`System::kkt_residual`], with friction forces from [`System::add_traction_force`].
     pub(super) fn kkt_residual_of(&self, state: &State, elastic: &[f64], friction: &[f64]) -> f64 {
         let force: Vec<f64> = elastic.iter().zip(friction).map(|(a, b)| a + b).collect();
         let reactions = self.reactions_of(state, elastic);
@@ -750,7 +754,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// The force that the KKT residual is divided by, > 0.
+    /// The force, > 0, by which [`System::kkt_residual`] divides.
     pub fn force_scale(&self, state: &State, reactions: &[f64], bound: &[f64]) -> f64 {
         let mut friction = vec![0.0; state.v.len()];
         self.add_traction_force(&self.tractions(&state.v, bound), &mut friction);
@@ -769,8 +773,8 @@ impl<'a> System<'a> {
     }
 }
 
-/// How a contact node follows another contact, if it belongs to that one alone. `dofs`: the displacements along the
-/// normal and the tangent of that one.
+/// How the node i of a contact follows another contact; none unless the node belongs to that other contact alone.
+/// `dofs`: the displacements along the normal and the tangent of that other contact.
 fn follows(model: &Model, contact: &ContactModel, i: usize, dofs: [Dof; 2]) -> Option<Follows> {
     let node = contact.boundary.nodes[i];
     let owner = &model.contacts[*model.alone.get(&node)?];
@@ -801,8 +805,8 @@ fn oblique(model: &Model, contact: &ContactModel, i: usize, other: Dof, part: [f
     }
 }
 
-/// The shape functions of an edge (start, end, midside) without the nodes that have oblique axes, which are replaced by
-/// the straight line through the other two nodes. They still add up to 1.
+/// The shape functions of an edge (start, end, midside) without nodes that have oblique axes: their values are replaced
+/// by those of the straight line through the other two nodes. The shape functions still add up to 1.
 pub(super) fn shape_without_oblique(
     nodes: &[ContactNode],
     edge: [usize; 3],

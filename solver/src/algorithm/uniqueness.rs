@@ -1,4 +1,4 @@
-//! Comparisons with a second solution: one that starts from the bonded state, as a test of uniqueness, and one in twice
+//! Comparisons with a second solution: with one from the bonded state, as a test of uniqueness, and with one in twice
 //! the increments.
 
 use crate::algorithm::recorder::{Measured, Recorder};
@@ -40,7 +40,7 @@ pub fn note_uniqueness(summary: &mut Summary, second: Comparison) {
     summary.uniqueness = Some(second);
 }
 
-/// Adds a comparison with a solution in twice the increments to the summary, and a warning if it differs.
+/// Adds a comparison with a solution in twice the increments to the summary, and a warning if that solution differs.
 pub fn note_doubled_increments(summary: &mut Summary, second: Comparison) {
     if !second.agrees {
         summary.warnings.push(Warning {
@@ -67,7 +67,7 @@ pub struct EndForces {
 }
 
 impl EndForces {
-    /// The forces in a final state, under the anchors that led to it.
+    /// The forces in a final state, with the anchors from which its slip was measured.
     pub fn new(system: &System<'_>, finished: &Finished) -> Self {
         let (state, bound) = (finished.state.clone(), finished.bound.clone());
         EndForces {
@@ -76,7 +76,7 @@ impl EndForces {
         }
     }
 
-    /// Compares these forces with those of a solution, which should agree to `tolerance`.
+    /// Compares these forces with the forces of a solution, which should agree to `tolerance`.
     pub fn compared(&self, solution: &Summary, tolerance: f64) -> Comparison {
         let first = [
             solution.normal_force,
@@ -96,12 +96,12 @@ impl EndForces {
     }
 }
 
-/// Forces at the end of a step count as accurate if more increments change them by no more than this part: their error
-/// is then less than twice that, and `good` promises 1 %.
+/// The largest relative change of the forces at the end of a step, by more increments, with which they count as
+/// accurate: their error is then less than twice that, and `good` promises 1 %.
 const KNOWN: f64 = 0.004;
 
-/// Adds a warning to an earlier step whose forces depend on the number of increments; for the last step errors are
-/// stated instead. `more`: the forces at the end of that step in at least twice as many increments.
+/// Adds a warning to a step before the last whose forces depend on the number of increments; for the last step errors
+/// are stated instead. `more`: the forces at the end of the step in at least twice as many increments.
 pub fn warn_of_increments(step: &mut StepSolution, more: &EndForces) {
     let compared = more.compared(&step.summary, KNOWN);
     if compared.agrees {
@@ -124,16 +124,16 @@ pub fn warn_of_increments(step: &mut StepSolution, more: &EndForces) {
     });
 }
 
-/// The error of a sum of forces may be this many times the largest residual, which is that of one node.
+/// The error of a sum of forces, as a multiple of the largest residual, which is the residual of one node.
 const NODES: f64 = 10.0;
 
-/// The error of the forces of two solutions due to rounding.
+/// The error, due to rounding, of the forces of two solutions.
 pub fn rounding_of_forces(solutions: [Option<Rounding>; 2]) -> f64 {
     let residuals = solutions.iter().flatten().map(|rounding| rounding.residual);
     NODES * residuals.fold(0.0, f64::max)
 }
 
-/// Largest difference of forces, relative to the largest force.
+/// The largest difference of the forces a and b, relative to the largest force.
 fn force_change(a: [f64; 3], b: [f64; 3]) -> f64 {
     let scale = a.iter().chain(&b).fold(0.0f64, |m, f| m.max(f.abs()));
     (0..3)
@@ -145,11 +145,11 @@ fn relative(a: f64, b: f64, scale: f64) -> f64 {
     if a == b { 0.0 } else { (a - b).abs() / scale }
 }
 
-/// Two solutions are equal if their forces and friction bounds agree to this part: far above the error that the
-/// tolerance leaves, far below the difference of two states.
+/// The largest relative difference of forces and friction bounds with which two solutions are equal: far above the
+/// error that the tolerance leaves, far below the difference of two states.
 const AGREES: f64 = 1e-6;
 
-/// Solves a system from the bonded state (u_t = d everywhere) and compares with `first`.
+/// Solves a system from the bonded state (u_t = d everywhere) and compares the solution with `first`.
 pub fn other_solution(
     system: &System<'_>,
     controls: &SolverControls,

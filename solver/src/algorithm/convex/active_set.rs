@@ -8,16 +8,16 @@ use crate::algorithm::system::{State, System};
 use crate::elasticity::Dof;
 use crate::observer::Observer;
 
-/// A reaction below this part of the problem's own force counts as zero.
+/// The largest reaction that counts as zero, as a part of the problem's own force.
 const NO_FORCE: f64 = 1e-30;
 
-/// A step that leaves more than this part of the residual is followed by a damped one.
+/// The part of the residual above which a step that leaves so much is followed by a damped step.
 const STALLED: f64 = 0.7;
 
-/// The largest number of steps before the other method takes over.
+/// The largest number of steps; then projected Newton takes over.
 const ACTIVE_SET_STEPS: u32 = 30;
 
-/// Guesses the active set, solves with one Newton step, and corrects the guess.
+/// Minimises J: guesses the active set, solves with one Newton step, and corrects the guess, again and again.
 pub(super) fn run(
     system: &System<'_>,
     bound: &[f64],
@@ -93,9 +93,9 @@ struct Next {
     residual: f64,
 }
 
-/// A step with the factor that was used last, if that is good enough, else with a new factor and without the result of
-/// the old one. A `damped` step ends where J is smallest along it, since whole steps may alternate between stick and
-/// slip.
+/// Makes a step with the factor that was used last; if the residual shrinks too little, discards the result and makes
+/// the step with a new factor. A `damped` step ends where J is smallest along it, since whole steps may alternate
+/// between stick and slip. None if there is no factor, or the observer stops.
 fn step_from(
     (system, bound, factors): (&System<'_>, &[f64], &mut Factors),
     (state, elastic_force): (&State, &[f64]),
@@ -103,8 +103,8 @@ fn step_from(
     damped: bool,
     observer: &mut dyn Observer,
 ) -> Option<Next> {
-    /// The part of the residual that a step with an older factor may leave. A step with a new factor costs as much as
-    /// several.
+    /// The largest part of the residual that a step with an older factor may leave. A step with a new factor costs as
+    /// much as several steps with an older one.
     const SERVES: f64 = 0.1;
     let free: Vec<usize> = free_dofs(system, |i| state.active[i]);
     let force = gradient(system, &state.v, elastic_force, bound);
@@ -134,8 +134,8 @@ fn step_from(
     }
 }
 
-/// Removes nodes that are pulled from the active set and adds nodes that have passed the obstacle; true on any change.
-/// `force`: Ŝ v − f̂. Friction acts along t only and does not enter the reactions.
+/// Removes nodes that are pulled from the active set, and adds nodes that have passed the obstacle; true if the set
+/// changes. `force`: Ŝ v − f̂; friction acts along t only and does not enter the reactions.
 pub(in crate::algorithm) fn update_active(
     system: &System<'_>,
     force: &[f64],

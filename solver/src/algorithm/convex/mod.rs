@@ -2,9 +2,9 @@
 //!
 //!   J(v) = ½ vᵀŜv − f̂ᵀv + Σ_g w_g τ_g ψ_ε(u_t(g) − d)     subject to u_n ≤ gap
 //!
-//! First a primal–dual active set with semi-smooth Newton steps, which mostly needs one to five; where that does not
-//! converge, projected Newton with a line search. The number of steps shows which of them was needed; it is reported
-//! with the residual.
+//! First a primal–dual active set with semi-smooth Newton steps is tried, which mostly needs one to five steps; if it
+//! does not converge, projected Newton with a line search. The number of steps shows which method was needed; it is
+//! reported with the residual.
 
 mod active_set;
 mod projected_newton;
@@ -19,8 +19,8 @@ use crate::algorithm::factors::Factors;
 use crate::algorithm::system::{State, System};
 use crate::observer::Observer;
 
-/// Minimises J from `start` until the KKT residual is below `tolerance`, and somewhat further where that is cheap. The
-/// observer is called at every Newton step, and within long ones, and may stop the iterations.
+/// Minimises J from `start` until the KKT residual is below `tolerance`, and somewhat further if that is cheap. The
+/// observer is called at every Newton step, and during long steps, and may stop the iterations.
 pub fn minimise(
     system: &System<'_>,
     bound: &[f64],
@@ -38,7 +38,7 @@ pub fn minimise(
     )
 }
 
-/// As [`minimise`], using the factors of a similar problem on this system where they help.
+/// Like [`minimise`], using the factors of a similar problem on this system where they help.
 pub(super) fn minimise_with(
     system: &System<'_>,
     bound: &[f64],

@@ -11,8 +11,8 @@ use crate::observer::Observer;
 /// The largest number of steps; a dozen are usual.
 const PROJECTED_STEPS: u32 = 300;
 
-/// Projected Newton (Bertsekas): hold the nodes that press against the obstacle, step in the others, and cut the step
-/// off at the obstacle where it would pass it.
+/// Minimises J by projected Newton (Bertsekas): holds the nodes that press against the obstacle, steps in the other
+/// unknowns, and cuts the step off where it would pass the obstacle.
 pub(super) fn run(
     system: &System<'_>,
     bound: &[f64],
@@ -88,7 +88,7 @@ pub(super) fn run(
     best
 }
 
-/// Projects v onto the constraints.
+/// Projects the displacements v onto the constraints: no node passes the obstacle, and bonded nodes are on it.
 fn project(system: &System<'_>, v: &mut [f64]) {
     for node in &system.nodes {
         let Dof::Free(dof) = node.normal else {
@@ -102,7 +102,7 @@ fn project(system: &System<'_>, v: &mut [f64]) {
     }
 }
 
-/// The active set at a point: nodes on the obstacle and pressed against it.
+/// The active set at v: the nodes on the obstacle that are pressed against it. `force`: ∇J.
 fn pressed(system: &System<'_>, v: &[f64], force: &[f64]) -> Vec<bool> {
     let state = |node: &ContactNode| match node.normal {
         Dof::Fixed(_) => false,
@@ -111,7 +111,8 @@ fn pressed(system: &System<'_>, v: &[f64], force: &[f64]) -> Vec<bool> {
     system.nodes.iter().map(state).collect()
 }
 
-/// Bertsekas' set: nodes so close to the obstacle, considering the force on them, that a step would reach it.
+/// Bertsekas' set: nodes so close to the obstacle, considering the force on them, that a step would reach it. `force`:
+/// ∇J.
 fn binding(system: &System<'_>, v: &[f64], force: &[f64]) -> Vec<bool> {
     // nearness is measured by the natural residual: it shrinks as the solution is approached
     let mut natural: f64 = 0.0;
@@ -131,8 +132,8 @@ fn binding(system: &System<'_>, v: &[f64], force: &[f64]) -> Vec<bool> {
     system.nodes.iter().map(holds).collect()
 }
 
-/// Moves v along d: exactly to the minimum where no obstacle blocks the way, else by Armijo's rule
-/// along the projected path. False if J cannot be reduced further.
+/// Moves v along d: exactly to the minimum of J if no obstacle blocks the way, else by Armijo's rule along the
+/// projected path. False if J cannot be reduced further.
 fn line_search(
     system: &System<'_>,
     bound: &[f64],
@@ -175,7 +176,7 @@ fn line_search(
     false
 }
 
-/// The α in (0, 1] with the smallest J along v + α d; 1 where d is no direction of descent.
+/// The α in (0, 1] with the smallest J along v + α d; 1 if J does not decrease along d.
 pub(in crate::algorithm) fn least_along(
     system: &System<'_>,
     bound: &[f64],
@@ -195,7 +196,8 @@ pub(in crate::algorithm) fn least_along(
 struct Along<'a> {
     slope: f64,
     curvature: f64,
-    /// At each friction point with a bound and a change: w τ, u_t − d, its change along d, and the law.
+    /// For each friction point with a bound at which the slip changes along d: w τ, the slip at v, its change along d,
+    /// and the law.
     friction: Vec<(f64, f64, f64, &'a FrictionLaw)>,
 }
 
@@ -232,7 +234,7 @@ impl<'a> Along<'a> {
         }
     }
 
-    /// dJ/dα.
+    /// The derivative dJ/dα.
     fn derivative(&self, alpha: f64) -> f64 {
         let friction: f64 = self
             .friction
@@ -244,7 +246,7 @@ impl<'a> Along<'a> {
         self.slope + alpha * self.curvature + friction
     }
 
-    /// J(1) − J(0).
+    /// The change J(1) − J(0).
     fn change(&self) -> f64 {
         let friction: f64 = self
             .friction
@@ -256,7 +258,7 @@ impl<'a> Along<'a> {
         self.slope + 0.5 * self.curvature + friction
     }
 
-    /// The α in (0, most] with the smallest J: the derivative grows, so its root is bracketed.
+    /// The α in (0, `most`] with the smallest J. The derivative grows with α, so its root is bracketed.
     fn minimum(&self, most: f64) -> f64 {
         if self.derivative(most) <= 0.0 {
             return most;

@@ -1,4 +1,4 @@
-//! What the nodes of a contact do not see: an obstacle that reaches into the body between them or recedes from it; and
+//! What the nodes of a contact do not see: an obstacle that reaches into the body between nodes or recedes from it; and
 //! kinks of the obstacle and corners of the body, where the pressure has no limit.
 
 use std::collections::BTreeMap;
@@ -13,51 +13,51 @@ use crate::friction::BoundLaw;
 use crate::problem::{Condition, NormalOf};
 use crate::solution::{Outcome, Warning, WarningCode};
 
-/// Severity from which a place is reported. A kink that points at the body between the nodes of a contact that is
-/// resolved has up to 0.4, a smooth obstacle up to 0.11 (the random problems of `tests/verification`).
+/// The smallest severity with which a place is reported. In a contact that is resolved, a kink that points at the body
+/// between nodes has up to 0.4, a smooth obstacle up to 0.11 (the random problems of `tests/verification`).
 const SERIOUS: f64 = 0.5;
 
 /// The factor on the pressure of a wave whose crests touch while the hollows between them do not; 1.1 would be enough
-/// where they almost do.
+/// if the hollows almost touch.
 const PARTIAL: f64 = 1.5;
 
-/// A shape of the obstacle between the nodes counts if it adds more than this part to the peak of the pressure. A
-/// circle adds less on any mesh that resolves its contact.
+/// The largest pressure, as a part of its peak, that a shape of the obstacle between the nodes may add without
+/// counting. A circle adds less on any mesh that resolves its contact.
 const SLIGHT: f64 = 1e-3;
 
-/// Where no stated error of a peak contains it, a shape of the obstacle between the nodes is reported if it adds more
-/// than this part of the mean pressure, which is the accuracy of peaks of a `fair` result.
+/// The largest pressure, as a part of its mean, that a shape of the obstacle between the nodes may add without a
+/// report, if no stated error of a peak contains it. This is the accuracy of peaks of a `fair` result.
 const TELLING: f64 = 0.2;
 
-/// A slope is measured over at least this part of the distance of the nodes.
+/// The shortest length, as a part of the distance of the nodes, over which a slope is measured.
 const SHORTEST: f64 = 1.0 / 16.0;
 
-/// Penetration counts as more than rounding above this part of the length of the contact.
+/// The largest penetration that counts as rounding, as a part of the length of the contact boundary.
 const ROUNDING: f64 = 1e-9;
 
-/// A kink shapes the pressure if each halving of the mesh adds more than this part to its peak.
+/// A kink shapes the pressure if each halving of the mesh adds more than this part of the peak pressure.
 const SHAPING: f64 = 0.01;
 
-/// A shape of the obstacle between the nodes of an edge that the nodes do not see.
+/// A shape of the obstacle between the nodes of an edge, which the nodes do not see.
 pub(super) struct Wave {
     pub(super) edge: usize,
-    /// The distance of the obstacle from the parabola through the nodes (length).
+    /// The largest distance of the obstacle from the parabola through the nodes (length).
     height: f64,
     /// Distance between the nodes on either side (length).
     spacing: f64,
-    /// The pressure that it may add (stress).
+    /// The pressure that the wave may add (stress).
     pub(super) pressure: f64,
 }
 
-/// A kink of the obstacle in contact, or a corner of the body.
+/// A kink of the obstacle in contact, or a corner of the body in contact.
 pub(super) struct Kink {
     pub(super) edge: usize,
     s: f64,
     /// Change of slope of the gap, > 0; infinite at an edge of the obstacle.
     change: f64,
-    /// The angle by which the body's surface turns there; 0 where it is smooth.
+    /// The angle by which the body's surface turns at the kink; 0 where the surface is smooth.
     turn: f64,
-    /// The pressure that each halving of the mesh adds there (stress).
+    /// The pressure that each halving of the mesh adds at the kink (stress).
     growth: f64,
     /// Distance between the nodes on either side (length).
     spacing: f64,
@@ -76,7 +76,7 @@ struct Corner {
 
 impl PatchView<'_> {
     /// Places where the obstacle reaches into the body between the nodes or recedes from it, at most one for each edge,
-    /// the deepest first. Only what the nodes do not see counts: a smooth obstacle is a parabola between them, and its
+    /// the deepest first. Only what the nodes do not see counts: a smooth obstacle is a parabola between nodes, and its
     /// error at the ends of contact belongs to the errors of the mesh.
     pub(in crate::algorithm) fn missed(&self) -> &[Missed] {
         self.missed.get_or_init(|| self.find_missed())
@@ -141,10 +141,10 @@ impl PatchView<'_> {
         found
     }
 
-    /// The shape of the obstacle between the nodes of an edge that they do not see, at the edges where there is one. A
+    /// The shapes of the obstacle between nodes that the nodes do not see, one for each edge that has such a shape. A
     /// wave of height h and length λ presses with the amplitude π E* h/(2 λ) on a half-plane in full contact, and with
-    /// more where only its crests touch. Its length is taken as the distance of the nodes, or shorter if it is steeper
-    /// than that.
+    /// more if only its crests touch. The length of a wave is taken as the distance of the nodes, or as shorter if the
+    /// wave is steeper.
     pub(super) fn unseen_waves(&self) -> Vec<Wave> {
         let contact = self.patch.contact;
         if contact.condition != Condition::Unilateral {
@@ -201,8 +201,8 @@ impl PatchView<'_> {
         found
     }
 
-    /// The edges with waves that matter and that no stated error contains: where the peak of the pressure has no limit,
-    /// no error is stated for it. A kink between the nodes has a warning of its own.
+    /// The edges with waves that matter and that no stated error contains, since the peak of the pressure has no limit
+    /// and therefore no error. A kink between nodes has a warning of its own and is left out.
     fn waves_without_error(&self) -> Vec<usize> {
         let contact = self.patch.contact;
         let mut waves = self.unseen_waves();
@@ -227,9 +227,9 @@ impl PatchView<'_> {
         waves.iter().map(|wave| wave.edge).collect()
     }
 
-    /// The stress that an unseen wave may add to |σ_t|: μ times the amplitude that averaging leaves of a wave twice as
-    /// long, the longest that nodes do not see, times the part of full friction at the largest slip. The wave itself
-    /// moves the surface along t by less than its height.
+    /// The stress that an unseen wave may add to |σ_t|: the product of μ, the amplitude that averaging leaves of a wave
+    /// twice as long (the longest that nodes do not see), and the part of full friction at the largest slip. The wave
+    /// itself moves the surface along t by less than the wave's height.
     pub(super) fn friction_of(&self, wave: &Wave) -> f64 {
         let Some(law) = &self.patch.law else {
             return 0.0;
@@ -351,8 +351,8 @@ impl PatchView<'_> {
         });
     }
 
-    /// Corners of the body in contact or beside it where the obstacle has none. An obstacle that follows the body's
-    /// surface has its corners.
+    /// Corners of the body in contact or beside it, with the change of slope that the obstacle leaves. An obstacle that
+    /// follows the body's surface has the same corners, and leaves none.
     fn body_corners(&self) -> Vec<Corner> {
         let contact = self.patch.contact;
         if !contact.in_space || contact.condition != Condition::Unilateral {
@@ -375,8 +375,8 @@ impl PatchView<'_> {
         0.5 / PI * LN_2 * moduli[edge] * change
     }
 
-    /// Warns of corners that point into the body: the obstacle does not reach into them, so that the one contact which
-    /// the nodes show is really two, one on each side.
+    /// Warns of corners that point into the body: the obstacle does not reach into them, so that the nodes show one
+    /// contact where there are two, one on each side of the corner.
     fn warn_of_notches(&self, warnings: &mut Vec<Warning>) {
         let mut notches = self.body_corners();
         notches.retain(|notch| notch.change < 0.0);
@@ -407,10 +407,10 @@ impl PatchView<'_> {
         });
     }
 
-    /// Kinks in contact that shape the pressure: kinks of the obstacle, also where it meets its mirror image at a line
-    /// of symmetry, and corners of the body. Beside a kink with the change of slope Δ the pressure of a half-plane with
-    /// the contact modulus E* grows like E* Δ/(2π) · ln(1/distance); on the axis of a cone like E* Δ/4 ·
-    /// ln(1/distance).
+    /// Kinks in contact that shape the pressure: kinks of the obstacle, corners of the body, and places where the
+    /// obstacle meets its mirror image at a line of symmetry. Beside a kink with the change of slope Δ the pressure of
+    /// a half-plane with the contact modulus E* grows like E* Δ/(2π) · ln(1/distance); on the axis of a cone like E*
+    /// Δ/4 · ln(1/distance).
     pub(super) fn kinks(&self) -> Vec<Kink> {
         let contact = self.patch.contact;
         if contact.condition != Condition::Unilateral {
@@ -503,7 +503,7 @@ impl PatchView<'_> {
         along(0) + along(1) - cosine * (place.profile.distance - pushed)
     }
 
-    /// The largest stiffness of a node of an edge against its normal displacement.
+    /// The largest stiffness of the nodes of an edge against their normal displacements.
     fn stiffness(&self, edge: usize) -> f64 {
         let own = edge_nodes(edge).map(|i| match self.system.nodes[self.patch.first + i].normal {
             Dof::Free(dof) => self.system.stiffness.at(dof, dof),
@@ -512,7 +512,7 @@ impl PatchView<'_> {
         own.into_iter().fold(0.0, f64::max)
     }
 
-    /// The nodes on either side of a place; at a node, that node twice.
+    /// The nodes on either side of a place; if the place is at a node, that node twice.
     fn beside(&self, place: &Place) -> [usize; 2] {
         let [start, end, middle] = edge_nodes(place.edge);
         match place.xi {
@@ -538,7 +538,7 @@ impl PatchView<'_> {
         edge3::interpolate(&edge3::shape(place.xi), &arc)
     }
 
-    /// E* of the material below every edge (stress): E/(1 − ν²), and E in plane stress.
+    /// The contact modulus E* of the material below every edge (stress): E/(1 − ν²), in plane stress E.
     fn contact_moduli(&self) -> Vec<f64> {
         let boundary = &self.patch.contact.boundary;
         let model = self.system.model;
@@ -562,7 +562,7 @@ impl PatchView<'_> {
     }
 }
 
-/// The first and the last of some points (place, height), and those between at which the height stops rising or
+/// Of points (place, height) the first and the last, and the points between at which the height stops rising or
 /// falling.
 fn turning_points(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
     let mut found: Vec<(f64, f64)> = Vec::new();

@@ -1,25 +1,27 @@
 //! The error of a push along a direction that is not the normal: gaps are linear in the indentation, as if the obstacle
-//! kept the normal and the slope that each node faced before, while those of the displaced obstacle differ.
+//! kept the normal and the slope that each node faced at first, but those of the displaced obstacle differ.
 
 use super::{DisplacedGaps, DisplacedNode, PatchView};
 use crate::contact::Displaced;
 use crate::problem::{Condition, NormalOf};
 use crate::solution::{Warning, WarningCode};
 
-/// What is reported: a difference whose mean over the pressure exceeds this part of the largest gap or overlap in
-/// contact, which changes forces by as much or twice as much; or an end of the contact that is wrong by more than this
-/// part of its length.
+/// The largest error of gaps without a warning, as its mean weighted by the pressure and a part of the largest gap or
+/// overlap in contact: it changes forces by as much or twice as much.
 const TOLD_OF_FORCES: f64 = 0.004;
+
+/// The largest error of an end of contact without a warning, as a part of the contact's length.
 const TOLD_OF_ENDS: f64 = 0.025;
 
-/// Differences up to this part of the length of the contact boundary are rounding in the place on a curve.
+/// The largest difference of gaps, as a part of the length of the contact boundary, that is rounding of places on a
+/// curve.
 const ROUNDING: f64 = 1e-8;
 
-/// The work for one node, in multiplications.
+/// The work for the displaced gap of one node, in multiplications.
 const WORK_OF_A_NODE: f64 = 2e3;
 
 impl PatchView<'_> {
-    /// The gaps of the displaced obstacle relative to the linear ones; empty without a direction.
+    /// The gaps of the displaced obstacle relative to the linear gaps; zero if the contact has no direction.
     pub(in crate::algorithm) fn displaced_gaps(&self) -> &DisplacedGaps {
         self.displaced_gaps.get_or_init(|| {
             let contact = self.patch.contact;
@@ -53,8 +55,9 @@ impl PatchView<'_> {
         })
     }
 
-    /// The constraint of the displaced obstacle relative to the linear one at a node. u_n ≤ gap is a condition on the
-    /// displacement along the body's normal m, where the displaced obstacle may have another normal.
+    /// The constraint at a node by the displaced obstacle, compared with the linear one; none if the displaced obstacle
+    /// does not face the node. u_n ≤ gap is a condition on the displacement along the body's normal m, but the
+    /// displaced obstacle may have another normal. `by`: the displacement of the obstacle.
     fn beside_linear(
         &self,
         i: usize,
@@ -88,8 +91,8 @@ impl PatchView<'_> {
         })
     }
 
-    /// The largest difference at a node in contact, and the largest gap or overlap there (lengths), if the difference
-    /// is large enough for a warning.
+    /// The largest difference of gaps at a node in contact, and the largest gap or overlap there (lengths); none if the
+    /// difference is too small for a warning.
     fn told(&self) -> Option<(f64, f64)> {
         let found = self.displaced_gaps();
         let level = self.system.level.indentation;
@@ -110,7 +113,7 @@ impl PatchView<'_> {
             .then_some((most.max(found.past_end), largest))
     }
 
-    /// How far into the body the displaced obstacle reaches where nothing touches the linear one (length).
+    /// How far the displaced obstacle reaches into the body (length), if nothing touches the linear obstacle; else 0.
     pub(super) fn overlap_without_contact(&self) -> f64 {
         let found = self.displaced_gaps();
         if (0..self.count()).any(|i| self.active(i)) {
@@ -123,9 +126,9 @@ impl PatchView<'_> {
         (0..self.count()).map(overlap).fold(0.0, f64::max)
     }
 
-    /// The error of an end of contact at a node (length): how far the linear gap, from its smallest value on, must go
-    /// to change by the difference there. Where the displaced obstacle does not face the node any more it ends
-    /// elsewhere.
+    /// The error of an end of contact at a node (length): the distance over which the linear gap, from its smallest
+    /// value on, changes by as much as the displaced gap differs at the node. If the displaced obstacle faces the node
+    /// no longer, at least the distance by which the obstacle ends elsewhere.
     pub(super) fn displaced_end(&self, end: usize) -> f64 {
         let found = self.displaced_gaps();
         let level = self.system.level.indentation;
@@ -148,7 +151,7 @@ impl PatchView<'_> {
         found.past_end.max((more / slope).min(all)).min(all)
     }
 
-    /// The length from the first node in contact to the last.
+    /// The length from the first node in contact to the last node in contact.
     pub(super) fn contact_length(&self) -> f64 {
         let s = &self.patch.contact.boundary.s;
         let first = (0..self.count()).find(|i| self.active(*i));
@@ -159,7 +162,7 @@ impl PatchView<'_> {
         }
     }
 
-    /// The part of the contact that the displaced obstacle does not cover, or covers in addition.
+    /// The part of the contact, 0 … 1, by which the displaced obstacle ends elsewhere.
     pub(super) fn displaced_part(&self) -> f64 {
         let past_end = self.displaced_gaps().past_end;
         if past_end > 0.0 {

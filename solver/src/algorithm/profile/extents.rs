@@ -1,4 +1,4 @@
-//! Forces and peaks of a contact, and where it touches, sticks and slips.
+//! The forces and peaks of a contact, and the intervals in which it touches, sticks and slips.
 
 use std::cmp::Ordering;
 
@@ -9,10 +9,10 @@ use crate::element::gauss::GAUSS_3;
 use crate::problem::Condition;
 use crate::solution::{ContactSummary, Peak};
 
-/// Samples per edge in the search for a peak, before it is narrowed down.
+/// The number of samples per edge in the search for a peak, before its place is narrowed down.
 const SAMPLES: usize = 16;
 
-/// Extents as intervals of arc length.
+/// The extents of a contact, each as intervals of arc length.
 struct Extents {
     contact: Vec<[f64; 2]>,
     stick: Vec<[f64; 2]>,
@@ -46,7 +46,7 @@ impl PatchView<'_> {
         }
     }
 
-    /// The contact between its outermost nodes, divided into stick and slip by |e| < ε.
+    /// The intervals of contact between outermost nodes, divided into stick and slip by the slip e: |e| < ε sticks.
     fn extents(&self) -> Extents {
         let s = &self.patch.contact.boundary.s;
         let (mut contact, mut stick, mut slip) =
@@ -106,7 +106,7 @@ impl PatchView<'_> {
             < law.elastic_slip
     }
 
-    /// Arc lengths at which |e| = ε, in order.
+    /// The arc lengths at which the size |e| of the slip equals ε, in order.
     fn stick_ends(&self) -> Vec<f64> {
         let boundary = &self.patch.contact.boundary;
         let at = |(edge, xi): (usize, f64)| {
@@ -118,14 +118,14 @@ impl PatchView<'_> {
         ends
     }
 
-    /// The edges, and the places on them, at which |e| = ε: roots of a quadratic on each.
+    /// The edges and the places on them at which the size |e| of the slip equals ε: on each edge roots of a quadratic.
     pub(super) fn turns(&self) -> Vec<(usize, f64)> {
         let edges = 0..self.patch.contact.boundary.edge_count();
         let on = |edge: usize| self.turns_on(edge).into_iter().map(move |xi| (edge, xi));
         edges.flat_map(on).collect()
     }
 
-    /// The places on one edge at which |e| = ε.
+    /// The places on one edge at which the size |e| of the slip equals ε.
     fn turns_on(&self, edge: usize) -> Vec<f64> {
         let Some(law) = &self.patch.law else {
             return Vec::new();
@@ -164,7 +164,7 @@ impl PatchView<'_> {
         }))
     }
 
-    /// The largest pressure.
+    /// The largest pressure and its place; none without contact.
     pub(super) fn highest_pressure(&self) -> Option<Highest> {
         let edges = 0..self.patch.contact.boundary.edge_count();
         let in_contact = edges.filter(|edge| edge_nodes(*edge).iter().any(|&i| self.active(i)));
@@ -201,12 +201,12 @@ impl PatchView<'_> {
         self.highest_traction().map(|highest| self.peak(highest))
     }
 
-    /// The σ_t that is largest in size.
+    /// The tangential stress σ_t that is largest in size, and its place; none without friction.
     pub(super) fn highest_traction(&self) -> Option<Highest> {
         if self.patch.law.is_none() && self.tractions.is_none() {
             return None;
         }
-        /// Relative difference of two values that count as equal: solutions within the tolerance differ by less.
+        /// The relative difference of two values that count as equal: solutions within the tolerance differ by less.
         const EQUAL: f64 = 1e-9;
         let step = 2.0 / SAMPLES as f64;
         let (mut highest, mut most) = (None, 0.0f64);
@@ -262,8 +262,8 @@ impl PatchView<'_> {
     }
 }
 
-/// The place of the largest value between two places with one peak between them, by golden section: to 10⁻⁵ of their
-/// distance, and the value of a smooth peak to the square of that.
+/// The place of the largest value between two places with one peak between them, by golden section. The place is exact
+/// to 10⁻⁵ of their distance, and the value of a smooth peak to the square of that.
 fn narrowed(value: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     const STEPS: usize = 24;
     let ratio = 0.5 * (5f64.sqrt() - 1.0);

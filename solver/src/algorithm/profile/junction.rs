@@ -1,4 +1,4 @@
-//! Junctions: materials that meet under a contact, where the pressure may have no limit.
+//! Junctions: points where materials meet under a contact, and the pressure may have no limit.
 
 use std::f64::consts::{LN_2, TAU};
 
@@ -9,14 +9,14 @@ use crate::element::edge3;
 use crate::problem::Condition;
 use crate::solution::{Warning, WarningCode};
 
-/// A junction shapes the pressure if each halving of the mesh adds more than this part to its peak.
+/// A junction shapes the pressure if each halving of the mesh adds more than this part of the peak pressure.
 const SHAPING: f64 = 0.01;
 
-/// Angles that differ by less are equal: those of sides of elements that meet in a node.
+/// The largest difference of angles that are equal, between sides of elements that meet in a node.
 const SAME_ANGLE: f64 = 1e-6;
 
 impl PatchView<'_> {
-    /// The junction at which the pressure grows most, if it shapes the pressure.
+    /// The junction at which the pressure grows fastest; none if no junction shapes the pressure.
     pub(super) fn junction(&self) -> Option<Junction> {
         *self.worst_junction.get_or_init(|| {
             let highest = self.highest_pressure();
@@ -59,7 +59,7 @@ impl PatchView<'_> {
         });
     }
 
-    /// The growth of the pressure at a node, if materials meet there.
+    /// The junction at a node, with the growth of the pressure; none if no materials meet there.
     fn junction_at(&self, i: usize) -> Option<Junction> {
         let last = self.count() - 1;
         let inner = i > 0 && i < last;
@@ -114,8 +114,8 @@ impl PatchView<'_> {
         })
     }
 
-    /// Whether a node sticks on edges over which the strain would move it by more than ε: as far as the mesh sees,
-    /// nothing slides there.
+    /// Whether a node sticks although the strain would move it by more than ε over the edges beside it: as far as the
+    /// mesh sees, nothing slides there.
     fn sticks_unresolved(&self, i: usize) -> bool {
         let Some(law) = &self.patch.law else {
             return false;
@@ -131,8 +131,8 @@ impl PatchView<'_> {
         self.system.nodes[self.patch.first + i].on_axis
     }
 
-    /// The wedges of material around a node, counter-clockwise from the edge before it to the edge after it; at an end
-    /// of the boundary, from or to the next side of the body's surface.
+    /// The wedges of material around a node, counter-clockwise from the edge before it to the edge after it. At an end
+    /// of the boundary, the next side of the body's surface takes the place of the missing edge.
     fn wedges_at(&self, i: usize) -> Option<Vec<Wedge>> {
         let (model, boundary) = (self.system.model, &self.patch.contact.boundary);
         let node = boundary.nodes[i];

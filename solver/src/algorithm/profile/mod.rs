@@ -1,4 +1,4 @@
-//! The profile of one contact in the final state. Forces, extents, peaks and warnings are in files of their own.
+//! The profile of one contact in the final state. Submodules have its forces, extents, peaks and warnings.
 //!
 //! # Where to look
 //!
@@ -41,13 +41,13 @@ pub(super) struct PatchView<'a> {
     v: &'a [f64],
     finished: &'a Finished,
     forces: &'a Forces,
-    /// The displacement relative to the obstacle, u_t − d, at the nodes.
+    /// The displacement u_t − d relative to the obstacle, at the nodes.
     relative: Vec<f64>,
     /// The largest pressure at a node (stress).
     largest: f64,
-    /// Arc lengths between which the pressure is not zero; empty where nothing touches.
+    /// The arc lengths between which the pressure is not zero; none if nothing touches.
     pressed: Option<[f64; 2]>,
-    /// The anchors g at start, end and midside of every edge; 0 under the total law.
+    /// The anchors g at start, end and midside of every edge, from which slip is measured; 0 under the total law.
     anchors: Vec<[f64; 3]>,
     /// The junction with the fastest growth of the pressure, computed when first needed.
     worst_junction: OnceCell<Option<Junction>>,
@@ -55,15 +55,15 @@ pub(super) struct PatchView<'a> {
     displaced_gaps: OnceCell<DisplacedGaps>,
     /// The places between nodes where a node is needed, found when first needed.
     missed: OnceCell<Vec<Missed>>,
-    /// Called with the work done (multiplications). If it returns false, the results will not be used and may be
-    /// anything.
+    /// A function that is told the work done (multiplications). If it returns false, the results will not be used, and
+    /// may be anything.
     go_on: &'a dyn Fn(f64) -> bool,
-    /// σ_t at start, end and midside of every edge where it does not follow from the law: in the thesis's own iteration
+    /// σ_t at start, end and midside of every edge, if it does not follow from the law: in the thesis's own iteration
     /// and in bonded contacts.
     tractions: Option<Vec<[f64; 3]>>,
 }
 
-/// The place where a stress is largest in size.
+/// A stress that is largest in size, and its place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Highest {
     /// The pressure, or σ_t with its sign (stress).
@@ -77,48 +77,50 @@ struct Highest {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Junction {
     s: f64,
-    /// λ, if the pressure grows like a power of the distance, r^(λ−1); else like its logarithm.
+    /// The exponent λ, if the pressure grows like a power r^(λ−1) of the distance r; none if it grows like its
+    /// logarithm.
     exponent: Option<f64>,
-    /// The pressure that each halving of the mesh adds there (stress).
+    /// The pressure that each halving of the mesh adds at the junction (stress).
     growth: f64,
 }
 
 /// A place between nodes where a node is needed: either the obstacle reaches into the body without resistance, or it
-/// recedes from a body that touches it on both sides.
+/// recedes from a body that touches it on both sides of the place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Missed {
     /// The contact, by its place in the model.
     pub patch: usize,
     /// Arc length from the start of the named boundary.
     pub s: f64,
-    /// How far the obstacle reaches into the body there (length); negative where it recedes.
+    /// How far the obstacle reaches into the body at the place (length); negative if it recedes.
     pub penetration: f64,
     /// Distance between the nodes on either side (length).
     pub spacing: f64,
-    /// The force that would push a node to the obstacle there, divided by the largest nodal reaction; infinite where
-    /// nothing touches.
+    /// The force that would push a node at the place to the obstacle, divided by the largest nodal reaction; infinite
+    /// if nothing touches.
     pub severity: f64,
 }
 
 /// The displaced obstacle at a contact node, compared with the linear one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DisplacedNode {
-    /// By how much the gap along the contact's normal is larger (length).
+    /// How much larger the gap of the displaced obstacle along the contact's normal is (length).
     pub gap: f64,
-    /// By how much the contact's normal is turned away from t (angle); 0 where it is the body's.
+    /// The angle by which the contact's normal is turned away from t; 0 if contact uses the body's normal.
     pub turn: f64,
 }
 
 /// The displaced obstacle at all nodes of a contact, compared with the linear one.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(in crate::algorithm) struct DisplacedGaps {
-    /// By node; zero where it is unknown.
+    /// By node: the comparison; zero where the displaced gap is unknown.
     pub(in crate::algorithm) nodes: Vec<DisplacedNode>,
-    /// The largest displacement of the obstacle along t at a node in contact that it does not face any more (length).
+    /// The largest displacement of the obstacle along t at a node in contact that the obstacle faces no longer
+    /// (length).
     past_end: f64,
 }
 
-/// Nodal forces of a state, all contacts in a row.
+/// The nodal forces of a state, with those of all contacts in a row.
 pub(super) struct Forces {
     pub(super) reactions: Vec<f64>,
     pub(super) tangential_reactions: Vec<f64>,
@@ -193,7 +195,7 @@ impl<'a> PatchView<'a> {
         view
     }
 
-    /// The arc lengths from the first edge with a pressure to the last.
+    /// The arc lengths from the start of the first edge with a pressure to the end of the last.
     fn pressed(&self) -> Option<[f64; 2]> {
         let (s, pressures) = (&self.patch.contact.boundary.s, self.own_pressures());
         let first = pressures.iter().position(|p| *p != 0.0)?;
@@ -201,8 +203,8 @@ impl<'a> PatchView<'a> {
         Some([s[first.saturating_sub(2)], s[(last + 2).min(s.len() - 1)]])
     }
 
-    /// Interpolates values at friction points to start, end and midside of every edge: by the parabola through its
-    /// three Gauss points, or directly for points at the nodes.
+    /// Interpolates values at friction points to start, end and midside of every edge: by the parabola through the
+    /// three Gauss points of the edge, or directly if the points are the nodes.
     fn carried_to_nodes(&self, value: &dyn Fn(usize) -> f64) -> Vec<[f64; 3]> {
         let points = &self.system.points;
         let own: Vec<usize> = (0..points.len())
@@ -242,7 +244,7 @@ impl<'a> PatchView<'a> {
         self.patch.contact.boundary.nodes.len()
     }
 
-    /// Whether friction may act at a node: in contact, or without an obstacle.
+    /// Whether friction may act at a node, which is in contact or has no obstacle.
     fn engaged(&self, i: usize) -> bool {
         self.active(i) || self.patch.contact.condition == Condition::None
     }
@@ -274,7 +276,7 @@ impl<'a> PatchView<'a> {
         &self.forces.pressures[self.system.range(self.patch)]
     }
 
-    /// Whether friction may act somewhere on an edge: there is pressure within the distance ρ.
+    /// Whether friction may act somewhere on an edge, since there is pressure within the distance ρ.
     fn may_rub(&self, edge: usize) -> bool {
         let reach = self.patch.law.as_ref().and_then(|law| law.bound.reach());
         let [start, end, _] = self.patch.contact.boundary.edge_arc(edge);
@@ -311,7 +313,7 @@ impl<'a> PatchView<'a> {
         )
     }
 
-    /// σ_t(s) = −τ(s) φ(e(s)), with W evaluated at s.
+    /// The tangential stress σ_t(s) = −τ(s) φ(e(s)) at a place of an edge, with W evaluated at its arc length s.
     fn tangential_stress_at(&self, edge: usize, xi: f64) -> f64 {
         let h = edge3::shape(xi);
         if let Some(tractions) = &self.tractions {
@@ -324,7 +326,7 @@ impl<'a> PatchView<'a> {
         -self.averaged_and_bound(s).1 * law.phi(self.slip_at(edge, xi))
     }
 
-    /// A value at a node: the mean of those of the edges that meet there.
+    /// The value at a node: the mean of the values on the edges that meet there.
     fn at_node(&self, i: usize, value: impl Fn(usize, f64) -> f64) -> f64 {
         if i % 2 == 1 {
             return value(i / 2, 0.0);
@@ -376,7 +378,7 @@ impl<'a> PatchView<'a> {
         profile
     }
 
-    /// The columns where friction acts, see [`ContactProfile`]; `nodal`: the columns at the nodes.
+    /// The columns of [`ContactProfile`] at the points where friction acts. `nodal`: the columns at the nodes.
     pub(super) fn friction_profile(&self, nodal: &ContactProfile) -> ContactProfile {
         let (points, tractions) = (&self.system.points, &self.finished.tractions);
         let own: Vec<usize> = (0..points.len())
@@ -403,8 +405,8 @@ impl<'a> PatchView<'a> {
         profile
     }
 
-    /// The columns at the places of the peaks, by the law there, in order of arc length; `nodal`: the columns at the
-    /// nodes.
+    /// The columns of [`ContactProfile`] at the places of the peaks, in order of arc length, with σ_t by the law there.
+    /// `nodal`: the columns at the nodes.
     pub(super) fn peak_profile(&self, nodal: &ContactProfile) -> ContactProfile {
         let pressure = self.highest_pressure();
         let traction = self.highest_traction();
@@ -424,8 +426,8 @@ impl<'a> PatchView<'a> {
         profile
     }
 
-    /// Adds the columns at a place ξ of an edge, with the given σ_t. The place is open if one of the nodes beside it
-    /// is.
+    /// Adds a row for the place ξ of an edge, with the given σ_t. The place is open if one of the nodes beside it is
+    /// open.
     fn push_place(
         &self,
         profile: &mut ContactProfile,

@@ -17,35 +17,35 @@ pub struct Quantity {
     pub patch: usize,
     /// The value in the solution.
     pub value: f64,
-    /// The derivatives; none where the quantity depends only on the place of the nodes.
+    /// The derivatives; none if the quantity depends only on the places of the nodes.
     pub gradient: Option<Gradient>,
-    /// The change of the quantity per change of the function that `gradient` belongs to. It is 1 except for an end of
-    /// stick, which moves with the slip there.
+    /// The change of the quantity per change of the function that `gradient` belongs to: 1, except at an end of stick,
+    /// which moves with the slip at that end.
     pub factor: f64,
-    /// The error due to the place of the nodes, in the unit of the value. At an end of contact or of stick: the
-    /// distance to the next node. At a peak of the pressure: its distance from a smooth curve through the nodes around
-    /// it. At a peak of σ_t: the change of friction where the motion turns near it. In friction forces: cancellation
-    /// within edges, singularities, and stick between points.
+    /// The error due to the places of the nodes, in the unit of the value. At an end of contact or of stick: the
+    /// distance to the next node. At a peak of the pressure: the peak's distance from a smooth curve through the nodes
+    /// around it. At a peak of σ_t: the change of friction if the motion turns near the peak. In friction forces:
+    /// cancellation within edges, singularities, and stick between points.
     pub spacing: f64,
     /// The error because the law is evaluated at friction points only, in the unit of the value. In friction forces:
-    /// the law between the points. Beside a peak of the pressure: a jump of σ_t. At a peak of σ_t: the change of its
-    /// bound.
+    /// the friction by the law between the points. Beside a peak of the pressure: a jump of σ_t. At a peak of σ_t: the
+    /// change of the bound τ.
     pub between: f64,
-    /// The error by truncation, where the obstacle ends inside an edge and that edge is left out: for extents the
-    /// length that is left out, else the quantity times that length divided by the length of the contact.
+    /// The error by truncation, if the obstacle ends inside an edge, which is left out: for extents the length that is
+    /// left out, else the quantity times that length divided by the length of the contact.
     pub truncation: f64,
-    /// The error of an indentation along a direction, in the unit of the value, in addition to that by `gradient` and
-    /// [`AlongContacts::displaced`](crate::algorithm::AlongContacts).
+    /// The error of an indentation along a direction, in the unit of the value, in addition to the error by `gradient`
+    /// and [`AlongContacts::displaced`](crate::algorithm::AlongContacts).
     pub displaced: f64,
-    /// For a peak: the pressure of a shape of the obstacle between the nodes that they do not see; else 0.
+    /// For a peak: the stress due to a shape of the obstacle between the nodes that they do not see; else 0.
     pub unseen: f64,
     /// The edges of the contact that contribute to `spacing`, with their parts in any unit.
     pub spacing_at: Vec<(usize, f64)>,
     /// The edges of the contact that contribute to `between`, with their parts in any unit.
     pub between_at: Vec<(usize, f64)>,
-    /// The edges between whose nodes the obstacle has a shape that they do not see, with their parts in any unit.
+    /// The edges on which the obstacle has a shape that the nodes do not see, with their parts in any unit.
     pub unseen_at: Vec<(usize, f64)>,
-    /// The number of equal parts of the contact, of which one is modelled: two where it continues beyond a line of
+    /// The number of equal parts of the contact, of which one is modelled: two if it continues beyond a line of
     /// symmetry.
     pub images: f64,
     /// Whether an error can be stated.
@@ -59,7 +59,7 @@ pub enum Estimable {
     Yes,
     /// The quantity has no limit as the mesh is refined.
     NoLimit,
-    /// An end of stick in a contact with more ends than have a stated error.
+    /// The quantity is an end of stick in a contact that has too many such ends for stated errors.
     TooMany,
     /// The obstacle reaches into the body between the nodes or recedes from it, with an unknown effect.
     Unseen,
@@ -72,22 +72,22 @@ pub(super) struct EndOfContact {
     pub(super) node: usize,
     /// The arc length of that node.
     s: f64,
-    /// The length from there to the end of the obstacle, if it ends inside the next edge, which is left out of the
+    /// The length from the node to the end of the obstacle, if that is inside the next edge, which is left out of the
     /// contact.
     truncation: f64,
-    /// The distance from there to the next node (length).
+    /// The distance between the outermost node in contact and the next node (length).
     pub(super) spacing: f64,
-    /// The edge between these two nodes.
+    /// The edge between the outermost node in contact and the next node.
     pub(super) edge: usize,
 }
 
-/// The most ends of stick of a contact that have stated errors: each costs as much as another recovery of the stresses.
-/// A rough obstacle has hundreds, and where stick and slip alternate from point to point, their places depend on the
-/// mesh.
+/// The largest number of ends of stick of a contact that have stated errors: each costs as much as another recovery of
+/// the stresses. A rough obstacle has hundreds of ends, and if stick and slip alternate from point to point, the places
+/// of the ends depend on the mesh.
 const MOST_STICK_ENDS: usize = 8;
 
-/// A slip that equals ε along a whole edge and changes by less than this part of it is constant up to rounding: no end
-/// of stick. The incremental law leads to this where the load rests.
+/// The change of slip along an edge, as a part of ε, up to which the slip is constant apart from rounding: if it equals
+/// ε, there is no end of stick. The incremental law leads to such slip where the load rests.
 const STEADY: f64 = 1e-6;
 
 fn limited(has_limit: bool) -> Estimable {
@@ -99,8 +99,8 @@ fn limited(has_limit: bool) -> Estimable {
 }
 
 impl PatchView<'_> {
-    /// Forces, peaks and extents. None where σ_t does not follow from the law, as in a false state of the thesis's own
-    /// iteration.
+    /// The forces, peaks and extents of the contact. Empty if σ_t does not follow from the law, as in a false state of
+    /// the thesis's own iteration.
     pub(in crate::algorithm) fn quantities(&self) -> Vec<Quantity> {
         if self.finished.own_tractions && self.finished.outcome != Outcome::Converged {
             return Vec::new();
@@ -121,7 +121,7 @@ impl PatchView<'_> {
         found
     }
 
-    /// Adds the error by truncation to the quantities other than the extents that begin or end there.
+    /// Adds the error by truncation to all quantities except starts and ends of contact.
     fn add_truncation(&self, quantities: &mut [Quantity]) {
         let ends = self.ends_of_contact();
         let truncation: f64 = ends.iter().map(|end| end.truncation).sum();
@@ -146,7 +146,7 @@ impl PatchView<'_> {
         }
     }
 
-    /// Adds the error of an indentation along a direction where the displaced obstacle ends elsewhere.
+    /// Adds the error of an indentation along a direction, if the displaced obstacle ends elsewhere.
     fn add_displaced(&self, quantities: &mut [Quantity]) {
         let part = self.displaced_part();
         for quantity in quantities {
@@ -159,7 +159,7 @@ impl PatchView<'_> {
         }
     }
 
-    /// Adds the error of peaks by the shape of the obstacle between the nodes.
+    /// Adds to peaks the error by shapes of the obstacle that the nodes do not see.
     fn add_unseen(&self, quantities: &mut [Quantity]) {
         let waves = self.unseen_waves();
         let most = |of_wave: &dyn Fn(&Wave) -> f64| waves.iter().map(of_wave).fold(0.0, f64::max);
@@ -176,7 +176,7 @@ impl PatchView<'_> {
         }
     }
 
-    /// The largest τ that the law allows (stress); infinite without a cap.
+    /// The largest bound τ that the law allows (stress); infinite without a cap.
     fn shear_cap(&self) -> f64 {
         match self.patch.law.as_ref().map(|law| &law.bound) {
             Some(BoundLaw::Pressure { shear_cap, .. }) => *shear_cap,
@@ -184,8 +184,8 @@ impl PatchView<'_> {
         }
     }
 
-    /// The friction force of a prescribed bound on the part of the contact that is left out (force, without 2π). Such a
-    /// bound acts whether or not the body touches.
+    /// The friction force of a prescribed bound on the parts of the contact that are left out (force, without 2π). A
+    /// prescribed bound acts whether or not the body touches.
     fn prescribed_friction_left_out(&self) -> f64 {
         let Some(law) = self.patch.law.as_ref() else {
             return 0.0;
@@ -203,7 +203,7 @@ impl PatchView<'_> {
         [(0, 0), (last, last / 2 - 1)].into_iter().map(at_end).sum()
     }
 
-    /// The length that the obstacle covers beyond the first or the last node.
+    /// The length of the obstacle beyond the first or the last node of the boundary, given as `node`.
     fn left_out(&self, node: usize) -> f64 {
         let contact = &self.patch.contact;
         let number = contact.boundary.nodes[node];
@@ -234,7 +234,7 @@ impl PatchView<'_> {
         }
     }
 
-    /// The number of ends of the boundary on lines of symmetry, beyond which the contact continues.
+    /// The number of ends of the boundary that lie on lines of symmetry, beyond which the contact continues.
     pub(super) fn mirrored_ends(&self) -> usize {
         let goes_on = |i: &usize| self.engaged(*i) && self.symmetric(*i);
         [0, self.count() - 1].iter().filter(|i| goes_on(i)).count()
@@ -347,21 +347,21 @@ impl PatchView<'_> {
         found
     }
 
-    /// Whether the pressure grows without limit: at a sharp end of the obstacle, where materials meet and, slowly, at a
+    /// Whether the pressure grows without limit: at a sharp end of the obstacle, where materials meet, or slowly at a
     /// kink.
     pub(super) fn pressure_without_limit(&self) -> bool {
         let sharp = |i: usize| self.active(i) && self.may_be_sharp(i);
         sharp(0) || sharp(self.count() - 1) || !self.kinks().is_empty() || self.junction().is_some()
     }
 
-    /// Whether the bound follows the pressure itself instead of its average.
+    /// Whether the friction bound follows the pressure itself instead of its average.
     pub(super) fn averages_nothing(&self) -> bool {
         let friction = self.patch.contact.friction.as_ref();
         friction.is_some_and(|law| law.bound.radius() == Some(0.0))
     }
 
     /// The ends of contact and of stick, as quantities. An end of contact lies between two nodes; an end of stick moves
-    /// with the slip.
+    /// with the slip there.
     fn ends(&self) -> Vec<Quantity> {
         let ends = self.ends_of_contact().into_iter();
         let quantity = |end: EndOfContact| Quantity {
@@ -409,13 +409,13 @@ impl PatchView<'_> {
         found
     }
 
-    /// The derivative de/dξ of the slip along an edge.
+    /// The derivative de/dξ of the slip e along an edge, at ξ.
     fn slope_of_slip(&self, edge: usize, xi: f64) -> f64 {
         let step = 1e-4;
         (self.slip_at(edge, xi + step) - self.slip_at(edge, xi - step)) / (2.0 * step)
     }
 
-    /// Where intervals of contact begin and end.
+    /// The starts and ends of all intervals of contact.
     pub(super) fn ends_of_contact(&self) -> Vec<EndOfContact> {
         let s = &self.patch.contact.boundary.s;
         let last = self.count() - 1;
@@ -445,7 +445,7 @@ impl PatchView<'_> {
         found
     }
 
-    /// A point for evaluating the law at any place, with the anchor interpolated there.
+    /// A point for evaluating the law at the place ξ of an edge, with the anchor interpolated there.
     fn point(&self, edge: usize, xi: f64) -> Point {
         let shape = edge3::shape(xi);
         let s = edge3::interpolate(&shape, &self.patch.contact.boundary.edge_arc(edge));

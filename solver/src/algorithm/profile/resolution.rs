@@ -1,5 +1,5 @@
-//! Errors of a contact's quantities due to the distances between nodes and between friction points, in addition to
-//! those by recovery.
+//! Errors of a contact's quantities due to the distances between nodes and between friction points. They are added to
+//! the errors by recovery.
 
 use std::collections::BTreeSet;
 
@@ -8,27 +8,28 @@ use crate::element::edge3;
 use crate::element::gauss::GAUSS_3;
 use crate::friction::BoundLaw;
 
-/// Halvings of an edge in the search for a jump: down to 1/256 of a quarter of it.
+/// The number of halvings of a quarter of an edge in the search for a jump: down to 1/256 of the quarter.
 const HALVINGS: u32 = 8;
 
-/// The number of nodes around the peak of the pressure for a smooth curve. A cubic through seven agrees best with the
-/// errors of random problems, among curves through five and through seven (`tests/verification/catalogue.rs`).
+/// The number of nodes around the peak of the pressure through which a smooth curve is laid. Of curves through five and
+/// through seven nodes, a cubic through seven agrees best with the errors of random problems
+/// (`tests/verification/catalogue.rs`).
 const AROUND: usize = 7;
 
 /// The number of coefficients of a cubic.
 const CUBIC: usize = 4;
 
-/// The distance from a peak of σ_t, in half edges, within which the direction of friction may change: calibrated.
+/// The distance from a peak of σ_t, in half edges, within which the direction of friction may change; calibrated.
 const TURN_REACH: f64 = 0.75;
 
-/// The part of the change of friction from full slip to opposite slip that the points resolve: calibrated.
+/// The part of the change of friction from full slip to opposite slip that friction points resolve; calibrated.
 const FOLLOWED: f64 = 0.3;
 
-/// The error of the friction force at a kink, as a part of the force on the edges beside it: calibrated.
+/// The error of the friction force at a kink, as a part of the friction force on the edges beside the kink; calibrated.
 const AT_KINKS: f64 = 0.2;
 
 impl PatchView<'_> {
-    /// A value at ξ of an edge, which may lie on one of its neighbours.
+    /// A value at ξ of an edge; a ξ beyond −1 … 1 is a place on the neighbouring edge.
     pub(super) fn along(
         &self,
         edge: usize,
@@ -43,9 +44,9 @@ impl PatchView<'_> {
         }
     }
 
-    /// The distance of the largest pressure from a smooth curve (stress): a cubic through the [`AROUND`] nearest nodes
-    /// in contact, mirror images included, by least squares. The whole pressure where there are too few nodes for a
-    /// cubic.
+    /// The distance of the largest pressure from the peak of a smooth curve (stress): a cubic by least squares through
+    /// the [`AROUND`] nearest nodes in contact, mirror images included. The whole pressure if there are too few nodes
+    /// for a cubic.
     pub(super) fn off_smooth_pressure(&self, largest: f64, edge: usize, xi: f64) -> f64 {
         let arc = self.patch.contact.boundary.edge_arc(edge);
         let peak = edge3::interpolate(&edge3::shape(xi), &arc);
@@ -64,8 +65,8 @@ impl PatchView<'_> {
         (highest_of_cubic(&within) - largest).abs()
     }
 
-    /// Arc length, pressure and length of the nodes in contact on the edges near `edge`, including those beyond a line
-    /// of symmetry.
+    /// Arc length, pressure and weight (the length of the boundary that belongs to it) of each node in contact on the
+    /// edges near `edge`, including nodes beyond a line of symmetry.
     fn pressed_nodes_near(&self, edge: usize) -> Vec<[f64; 3]> {
         let s = &self.patch.contact.boundary.s;
         let last = self.count() - 1;
@@ -94,7 +95,7 @@ impl PatchView<'_> {
         found
     }
 
-    /// The part of friction's change from full slip to opposite slip that happens around a place, beyond what the
+    /// The part of the change of friction from full slip to opposite slip that happens around a place, without what the
     /// points there resolve: between them u_t is a parabola, and a peak of σ_t may be due to that parabola.
     pub(super) fn turn_around(&self, edge: usize, xi: f64) -> f64 {
         const STEPS: i32 = 6;
@@ -109,7 +110,7 @@ impl PatchView<'_> {
         (0.5 * (high - low) - FOLLOWED).max(0.0)
     }
 
-    /// An edge and its neighbours.
+    /// The numbers of an edge and its neighbours.
     pub(super) fn neighbours(&self, edge: usize) -> std::ops::RangeInclusive<usize> {
         let last = self.patch.contact.boundary.edge_count() - 1;
         edge.saturating_sub(1)..=(edge + 1).min(last)
@@ -121,9 +122,10 @@ impl PatchView<'_> {
         places.iter().map(|place| place.weight).sum()
     }
 
-    /// How much σ_t jumps within a small part of an edge (stress). Beside a jump the pressure grows like the logarithm
-    /// of the distance, down to the length over which σ_t changes. The sum of the changes over the steepest half, the
-    /// steepest quarter and so on is the jump times the logarithm of the part of the edge that it takes.
+    /// The jump of σ_t within a small part of an edge, times a logarithm (stress). Beside a jump the pressure grows
+    /// like the logarithm of the distance, down to the length over which σ_t changes. Here the changes over the
+    /// steepest half, the steepest quarter and so on are added, which gives the jump times the logarithm of the part of
+    /// the edge that it takes.
     pub(super) fn jump_within(&self, edge: usize) -> f64 {
         let stress = |xi: f64| self.tangential_stress_at(edge, xi);
         let steepest = |quarter: u32| {
@@ -145,8 +147,8 @@ impl PatchView<'_> {
         (0..4).map(steepest).fold(0.0, f64::max)
     }
 
-    /// How much τ changes over half an edge on either side of a place (stress): a peak of σ_t is at an end of stick and
-    /// moves with it.
+    /// The larger change of τ over half an edge on either side of a place (stress): a peak of σ_t is at an end of stick
+    /// and moves with that end.
     pub(super) fn change_of_bound(&self, edge: usize, xi: f64) -> f64 {
         let bound = |view: &Self, edge: usize, xi: f64| {
             let arc = view.patch.contact.boundary.edge_arc(edge);
@@ -181,9 +183,9 @@ impl PatchView<'_> {
         found
     }
 
-    /// The error of the friction force at kinks, by the edges beside them (force, without 2π). Depending on its place
-    /// between the nodes, a kink makes friction too large or too small, so that the errors of several edges add up like
-    /// random numbers.
+    /// The error of the friction force at kinks, by the edges beside them (force, without 2π). A kink makes friction
+    /// too large or too small, depending on the kink's place between nodes, so that the errors of several edges add up
+    /// like random numbers.
     fn open_at_kinks(&self) -> Vec<(usize, f64)> {
         let with_kinks: BTreeSet<usize> = self.kinks().iter().map(|kink| kink.edge).collect();
         let beside: BTreeSet<usize> = with_kinks
@@ -195,8 +197,8 @@ impl PatchView<'_> {
         beside.into_iter().map(open).collect()
     }
 
-    /// The friction on parts that stick where the motion turns, if the whole part lies between two friction points, or
-    /// between a line of symmetry and the first point, so that no point is inside; by edges (force, without 2π).
+    /// By edge, the friction on parts that stick where the motion turns, if no friction point is inside (force, without
+    /// 2π): the part lies between two friction points, or between a line of symmetry and the first point.
     fn unseen_stick(&self) -> Vec<(usize, f64)> {
         let Some(law) = &self.patch.law else {
             return Vec::new();
@@ -235,13 +237,13 @@ impl PatchView<'_> {
         found
     }
 
-    /// ∫|σ_t| over an edge (force, without 2π).
+    /// The friction ∫|σ_t| over an edge (force, without 2π).
     fn friction_on(&self, edge: usize) -> f64 {
         self.weight(edge) * mean(|xi| self.tangential_stress_at(edge, xi).abs())
     }
 
-    /// The error of the friction force because the law is evaluated at the friction points only: the difference between
-    /// ∫σ_t over each edge by these points and by many more (force, without 2π).
+    /// By edge, the error of the friction force because the law is evaluated at the friction points only: the
+    /// difference between ∫σ_t by many more points and by these points (force, without 2π).
     pub(super) fn between_points(&self) -> Vec<f64> {
         let boundary = &self.patch.contact.boundary;
         if self.patch.law.is_none() {
@@ -266,8 +268,8 @@ impl PatchView<'_> {
     }
 }
 
-/// The largest value of a cubic through points (place between −1 and 1, value, weight) by least squares, within half of
-/// the reach of the points.
+/// The largest value of a cubic through points by least squares, within half of the reach of the points. Each point has
+/// a place between −1 and 1, a value, and a weight.
 fn highest_of_cubic(points: &[[f64; 3]]) -> f64 {
     const SAMPLES: usize = 41;
     let sample = |k: usize| -0.5 + k as f64 / (SAMPLES - 1) as f64;

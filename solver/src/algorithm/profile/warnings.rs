@@ -6,32 +6,34 @@ use crate::friction::BoundLaw;
 use crate::problem::{Condition, Measure, Normalization};
 use crate::solution::{Outcome, Warning, WarningCode};
 
-/// The relative error of a smooth peak, times the square of the number of elements across the contact.
+/// The relative error of the peak of a smooth pressure, times the square of the number of elements across the contact.
 const SMOOTH_PEAK: f64 = 0.28;
 
-/// Stick tractions oscillate if more than this part of the friction force cancels inside edges.
+/// The largest part of the friction force that may cancel inside edges before stick tractions count as oscillating.
 const OSCILLATING: f64 = 3e-3;
 
-/// Friction below this part of the normal force, or below ten times the tolerance, cannot be distinguished from zero:
-/// rounding and the iterations leave that much. (The residuals are relative to the largest reaction.)
+/// The largest friction, as a part of the normal force, that cannot be distinguished from zero, as rounding leaves that
+/// much. The same holds for ten times the tolerance, which the iterations leave: residuals are relative to the largest
+/// reaction.
 const UNKNOWN: f64 = 1e-9;
 
-/// Friction above this part of what the bound allows is meaningful however small it is.
+/// The part of the friction that the bound allows above which friction is meaningful however small it is.
 const SLIGHT: f64 = 1e-3;
 
-/// One edge may contribute this part, because the motion may turn there.
+/// The part of the friction force that may cancel inside one edge without being an oscillation, since the motion may
+/// turn there.
 const TURN: f64 = 0.02;
 
-/// The largest part of the friction that may be lost at the ends without a warning.
+/// The largest part of the friction that may be lost at the ends of the boundary without a warning.
 const MOST_LOST: f64 = 0.05;
 
 /// The largest distance from the obstacle at which a node may press, as a part of the largest normal displacement.
 const MOST_EARLY: f64 = 0.01;
 
-/// With fewer edges than this across a contact, of which half may be modelled, its pressure is not reliable.
+/// The smallest number of edges across a contact, of which half may be modelled, with which its pressure is reliable.
 const FEWEST_EDGES: usize = 6;
 
-/// Adds a warning about the contact.
+/// A function that adds a warning about the contact.
 type Warn<'a> = dyn FnMut(WarningCode, String) + 'a;
 
 impl PatchView<'_> {
@@ -75,7 +77,7 @@ impl PatchView<'_> {
         self.warn_of_ends(first, last, warn);
     }
 
-    /// Warns of a friction bound that jumps, where the iterations do not come to rest.
+    /// Warns of a friction bound that jumps as a function of the pressure, so that the iterations do not come to rest.
     fn warn_of_jumps(&self, warn: &mut Warn<'_>) {
         let settled = matches!(
             self.finished.outcome,
@@ -100,7 +102,7 @@ impl PatchView<'_> {
         }
     }
 
-    /// How far the obstacle is from a body that no node of which touches it.
+    /// The message for a body that touches the obstacle at no node: how far the obstacle is from it.
     fn without_contact(&self) -> String {
         let contact = self.patch.contact;
         let moved = |i: usize| {
@@ -161,8 +163,8 @@ impl PatchView<'_> {
         }
     }
 
-    /// Warns of the ends of the obstacle, and of averages that reach beyond ends. `first` and `last`: the outermost
-    /// nodes in contact.
+    /// Warns of contact at the ends of the obstacle, and of averages that reach beyond ends. `first` and `last`: the
+    /// outermost nodes in contact.
     fn warn_of_ends(&self, first: usize, last: usize, warn: &mut Warn<'_>) {
         let contact = self.patch.contact;
         let s = &contact.boundary.s;
@@ -201,7 +203,7 @@ impl PatchView<'_> {
         }
     }
 
-    /// The part of ∫p whose average lies beyond the ends of the contact boundary, where no friction acts.
+    /// The part of ∫p that averaging moves beyond the ends of the contact boundary, where no friction acts.
     fn lost_at_ends(&self) -> f64 {
         let averages = self.patch.law.as_ref().map(|law| &law.bound);
         let (
@@ -232,8 +234,8 @@ impl PatchView<'_> {
         if whole > 0.0 { lost / whole } else { 0.0 }
     }
 
-    /// The possible error of the peak pressure with so few elements in contact, as a sentence. The worst of many meshes
-    /// of Hertz's cylinder is .28/n², with n elements across the whole contact (`tests/verification`).
+    /// The possible error of the peak pressure with few elements in contact, as a sentence. The worst of many meshes of
+    /// Hertz's cylinder is 0.28/n², with n elements across the whole contact (`tests/verification`).
     fn peak_uncertainty(&self, across: usize) -> String {
         let mut ends = [0, self.count() - 1].into_iter();
         if across == 0 {
@@ -248,7 +250,7 @@ impl PatchView<'_> {
 
     /// Warns of stick tractions that oscillate. Inside an edge the tangential stress changes its sign where the motion
     /// turns, mostly once. Any other cancellation inside edges is an oscillation, and `friction_force` is too large by
-    /// about that part.
+    /// about the part that cancels.
     fn warn_of_oscillation(&self, warnings: &mut Vec<Warning>) {
         let (canceling, total) = self.oscillation();
         if canceling > OSCILLATING * total && !self.is_noise(total) {
@@ -263,8 +265,8 @@ impl PatchView<'_> {
         }
     }
 
-    /// Whether a friction force (without 2π) is only rounding: where nothing slides, as under a uniform pressure with ν
-    /// = 0, it has any sign.
+    /// Whether a friction force (without 2π) is only rounding: if nothing slides, as under a uniform pressure with ν =
+    /// 0, the tangential stress may have any sign.
     fn is_noise(&self, friction: f64) -> bool {
         let (system, p) = (self.system, self.p);
         let pressed = system.normal_force(system.range(self.patch), &self.forces.reactions);
@@ -280,7 +282,7 @@ impl PatchView<'_> {
         friction <= known * scale && friction <= SLIGHT * most
     }
 
-    /// The part of the friction force that cancels inside edges where the motion does not turn, and the whole friction
+    /// The part of the friction force that cancels inside edges, except where the motion turns; and the whole friction
     /// force (both without 2π).
     pub(super) fn oscillation(&self) -> (f64, f64) {
         let points = self.system.points.iter().zip(&self.finished.tractions);
@@ -314,7 +316,7 @@ impl PatchView<'_> {
         (canceling, total)
     }
 
-    /// The part of the friction force that cancels inside each edge (force, without 2π).
+    /// By edge, the part of the friction force that cancels inside the edge (force, without 2π).
     pub(super) fn canceling(&self) -> Vec<f64> {
         let points = self.system.points.iter().zip(&self.finished.tractions);
         let own = points.filter(|(point, _)| point.patch == self.p);
@@ -329,7 +331,7 @@ impl PatchView<'_> {
     }
 
     /// The distance from the obstacle at which the midside node beside an open node on the axis is pressed, by u₁ −
-    /// u₀/8 ≤ s₁ − s₀/8 (formulation 3.5); none if that is small compared with the displacements.
+    /// u₀/8 ≤ s₁ − s₀/8 (formulation 3.5); none if the distance is small compared with the displacements.
     fn pressed_beside_open_axis(&self) -> Option<f64> {
         let first = self.patch.first;
         let moved = |i: usize| self.system.normal_displacement(self.v, first + i).abs();
@@ -345,13 +347,13 @@ impl PatchView<'_> {
             .filter(|opening| *opening > MOST_EARLY * largest)
     }
 
-    /// Whether a node lies on a line of symmetry: on the axis, or held along the tangent.
+    /// Whether a node lies on a line of symmetry: it is on the axis, or held along the tangent.
     pub(super) fn symmetric(&self, i: usize) -> bool {
         let node = &self.system.nodes[self.patch.first + i];
         node.on_axis || node.symmetric()
     }
 
-    /// Whether the obstacle may end at a node: one that is not on a line of symmetry and not in a corner that another
+    /// Whether the obstacle may end at a node: the node is not on a line of symmetry and not in a corner that another
     /// obstacle touches too.
     pub(super) fn may_be_sharp(&self, i: usize) -> bool {
         let (system, node) = (self.system, self.patch.contact.boundary.nodes[i]);
@@ -364,7 +366,7 @@ impl PatchView<'_> {
         !self.symmetric(i) && !touched
     }
 
-    /// The largest |σ_t| that a prescribed bound exerts on edges without a node in contact.
+    /// The largest |σ_t| that a prescribed bound exerts on edges without a node in contact; none without such friction.
     fn bound_beyond_contact(&self) -> Option<f64> {
         let BoundLaw::Prescribed(_) = self.patch.contact.friction.as_ref()?.bound else {
             return None;
@@ -377,8 +379,8 @@ impl PatchView<'_> {
         (largest > 0.0).then_some(largest)
     }
 
-    /// The length of the edge under the peak of σ_t, with ρ, if it is longer than ρ. None if all edges are longer,
-    /// which has a warning before the solution.
+    /// The length of the edge under the peak of σ_t, and ρ, if the edge is longer than ρ. None if it is not, and if all
+    /// edges are longer, which has a warning before the solution.
     fn unresolved_radius(&self) -> Option<(f64, f64)> {
         let contact = &self.patch.contact;
         let radius = contact.friction.as_ref()?.bound.averaged_over()?;
@@ -399,7 +401,7 @@ impl PatchView<'_> {
     }
 }
 
-/// The part of the forces at the points of an edge that cancels.
+/// The sum of the sizes of the forces at the points of an edge, less the size of their sum: what cancels.
 fn cancels(edge: &[f64]) -> f64 {
     let size: f64 = edge.iter().map(|force| force.abs()).sum();
     size - edge.iter().sum::<f64>().abs()

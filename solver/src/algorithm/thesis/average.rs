@@ -3,20 +3,20 @@
 use crate::element::gauss;
 use crate::friction::BoundLaw;
 
-/// A piece of the line of integration: one element, with values at its Gauss points.
+/// One element of the line of integration, with values at its Gauss points.
 pub(super) struct Stretch<'a> {
-    /// Arc length of its start.
+    /// The arc length of the element's start.
     pub(super) from: f64,
-    /// Arc length of its end.
+    /// The arc length of the element's end.
     pub(super) to: f64,
     /// σ_n at the points of the integration rule.
     pub(super) values: &'a [f64],
 }
 
-/// The average ∫ω_ρ(|s − y|) σ_n(y) dy over the given pieces (stress).
+/// The average ∫ω_ρ(|s − y|) σ_n(y) dy over the given elements (stress).
 ///
 /// The part of each element under the kernel has `local_points` Gauss points of its own, to which σ_n is interpolated
-/// linearly, 3.4.2 (i). For ρ = 0 it is the value at s.
+/// linearly, 3.4.2 (i). For ρ = 0 the average is σ_n at s.
 pub(super) fn nonlocal(
     law: &BoundLaw,
     stretches: &[Stretch<'_>],

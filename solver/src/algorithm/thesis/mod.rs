@@ -1,10 +1,11 @@
 //! The thesis's own iteration (3.1), exactly as described there.
 //!
-//! It exists because the thesis is our source, and because it shows which faults the other algorithms correct: at the
-//! thesis's parameters it does not solve the problem (formulation 4.5). Friction enters as a load that is one iteration
-//! old, and the gain of that loop, μS/ε × tangential compliance, is in the hundreds. Without the sign it converges to a
-//! false state of full slip, friction pushing along the motion; with the sign it falls into a cycle of two. So the
-//! residuals of the result are those of the true problem, and the outcome is `FalseConvergence` when they are large.
+//! This iteration exists because the thesis is our source, and because it shows which faults the other algorithms
+//! correct: at the thesis's parameters it does not solve the problem (formulation 4.5). Friction enters as a load that
+//! is one iteration old, and the gain of that loop, μS/ε × tangential compliance, is in the hundreds. Without the sign
+//! of friction the iteration converges to a false state of full slip, in which friction pushes along the motion; with
+//! the sign it falls into a cycle of two states. So the residuals of the result are those of the true problem, and the
+//! outcome is `FalseConvergence` when they are large.
 //!
 //! Where the thesis leaves a choice: f̂ is a stress along t, so that K u = F − F̂ with σ_n < 0 pushes the body along
 //! +t; the pressure is `lumped` (R/∫h) or `extrapolated` from internal Gauss points (3.3, file `rows`); it is averaged
@@ -28,13 +29,13 @@ use crate::solution::{Outcome, Stage};
 use friction::{Friction, relax, signed_ratio};
 use rows::Rows;
 
-/// Where the thesis's own test is met but the true residual is still large, the iteration continues while the residual
-/// falls in each row by at least this part of the relaxation. R_F measures one full step, so that a relaxed iteration
-/// on its way to a solution may meet the test a thousand rows before the residual does. In a false state the residual
-/// does not fall.
+/// The smallest relative decrease of the residual from row to row of the history, divided by the relaxation, with which
+/// the iteration continues although the thesis's own test is met. R_F measures one full step, so that a relaxed
+/// iteration on its way to a solution may meet the test a thousand rows before the residual is small. In a false state
+/// the residual does not fall.
 const STILL_FALLING: f64 = 0.1;
 
-/// Runs the iteration; returns the final state with the tractions used for it.
+/// Runs the iteration; returns its result, and the tractions used for the final state.
 pub(super) fn run(recorder: &mut Recorder<'_, '_>, observer: &mut dyn Observer) -> (End, Vec<f64>) {
     let system = recorder.system;
     let options = recorder.controls.thesis.clone().unwrap_or_default();
@@ -138,7 +139,8 @@ fn first_guess(system: &System<'_>, options: &ThesisOptions) -> State {
     state
 }
 
-/// Steps 1 and 2 of the thesis's iteration: u_n = s on Γ_C*, σ_n = 0 off it, and K u = F − F̂.
+/// Steps 1 and 2 of the thesis's iteration: solves K u = F − F̂ with u_n = s on Γ_C* and σ_n = 0 off it. None if there
+/// is no solution, or the observer stops.
 fn solve(
     system: &System<'_>,
     active: &[bool],
@@ -201,8 +203,8 @@ fn new_friction(
     friction
 }
 
-/// τ by the mesh-free average of the nodal pressures at every friction point. φ is taken there (way 1 of 3.2)
-/// or extrapolated from the two nearest rows of internal Gauss points (way 2).
+/// The bound τ at every friction point, by the mesh-free average of the nodal pressures, and the traction. φ is taken
+/// at the point (way 1 of 3.2) or extrapolated from the two nearest rows of internal Gauss points (way 2).
 fn averaged(
     system: &System<'_>,
     state: &State,

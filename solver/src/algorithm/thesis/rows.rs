@@ -22,25 +22,25 @@ use crate::elasticity::Deformed;
 use crate::element::{Family, edge3, gauss, quad8};
 use crate::problem::{ThesisOptions, ThesisPressure};
 
-/// The two rows of Gauss points in the elements that Γ_C runs along.
+/// The two rows of Gauss points nearest to Γ_C, in the elements along it.
 pub(super) struct Rows {
     edges: Vec<EdgeRows>,
-    /// The Gauss points of one direction.
+    /// The Gauss points and weights in one direction.
     rule: &'static [(f64, f64)],
 }
 
-/// One contact edge and its element.
+/// A contact edge and the element that it belongs to.
 struct EdgeRows {
     patch: usize,
     /// The number of the edge in its contact.
     edge: usize,
     element: usize,
-    /// Master coordinates of the edge's start, end and midside.
+    /// The master coordinates of the edge's start, end and midside.
     side: [[f64; 2]; 3],
 }
 
 impl EdgeRows {
-    /// Master coordinates at ζ along the edge (−1 … 1) and `depth` below it (0 … 2).
+    /// The master coordinates of a place at ζ along the edge (−1 … 1) and `depth` below it (0 … 2).
     fn place(&self, zeta: f64, depth: f64) -> [f64; 2] {
         let [start, end, middle] = self.side;
         [0, 1].map(|a| middle[a] * (1.0 - depth) + 0.5 * zeta * (end[a] - start[a]))
@@ -53,8 +53,9 @@ pub(super) struct RowValues {
     pub(super) node_stress: Vec<f64>,
     /// The ratio φ with its sign, extrapolated to every friction point.
     pub(super) phi: Vec<f64>,
-    /// By edge: σ_n on both rows at every Gauss point, and φ likewise.
+    /// By edge: σ_n on both rows, at every Gauss point.
     stress: Vec<[Vec<f64>; 2]>,
+    /// By edge: φ with its sign on both rows, at every Gauss point.
     row_phi: Vec<[Vec<f64>; 2]>,
     /// The contact and the number of each edge.
     edges: Vec<(usize, usize)>,
@@ -94,7 +95,7 @@ impl Rows {
         }
     }
 
-    /// Evaluates a state at the rows, as far as the options need it.
+    /// Evaluates a state at the rows and at the boundary, as far as the options need it.
     pub(super) fn evaluate(
         &self,
         system: &System<'_>,
@@ -232,8 +233,8 @@ impl RowValues {
     }
 
     /// Step 5 of the thesis's iteration with extrapolated stresses. Way 1 of 3.2 carries σ_n and φ to the boundary and
-    /// evaluates f̂ there; way 2 evaluates f̂ on both rows and carries it to the boundary (carrying its nodal integrals
-    /// is the same: both are linear, with equal weights on all rows).
+    /// evaluates f̂ there; way 2 evaluates f̂ on both rows and carries it to the boundary (to carry the nodal integrals
+    /// of f̂ instead is the same: both are linear, with equal weights on all rows).
     pub(super) fn friction(&self, system: &System<'_>, options: &ThesisOptions) -> Friction {
         let averaged = |stress: &[Vec<f64>]| self.bound(system, stress, options);
         if options.friction_force == 1 {
