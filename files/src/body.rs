@@ -76,7 +76,7 @@ impl<T: DeserializeOwned + JsonSchema> Body<T> {
     /// A message if the text is not JSON. All other faults are listed in the content's `violations`.
     pub fn read<'a>(&'static self, text: &'a str) -> Result<Content<'a, T>, String> {
         if text.trim().is_empty() {
-            return Err("the body is empty; expected an object".to_owned());
+            return Err("the body of the request is empty; expected an object".to_owned());
         }
         if let Some(place) = json::too_deep(text) {
             return Err(format!("{place}; expected at most {}", json::MOST_NESTED));
@@ -134,7 +134,8 @@ impl<'a, T> Content<'a, T> {
     pub fn into_violations(self) -> Vec<Violation> {
         let mut found = self.violations.into_violations();
         if let (Some(place), Some(last)) = (self.unchecked, found.last_mut()) {
-            let note = format!(" (From {place} on no problem was checked.)");
+            let note =
+                format!(" (The problem at {place} and the problems after it were not checked.)");
             last.hint.push_str(&note);
         }
         found

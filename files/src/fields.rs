@@ -193,7 +193,9 @@ pub(crate) fn check(fields: &Fields) -> Result<(), String> {
     same("element_error", f.element_error.len(), f.elements.len())?;
     for (number, element) in f.elements.iter().enumerate() {
         if let Some(node) = element.iter().find(|node| **node as usize >= nodes) {
-            return Err(format!("element {number} has the node {node} of {nodes}"));
+            return Err(format!(
+                "element {number} has the node {node}, but there are only {nodes} nodes"
+            ));
         }
     }
     let g = &f.gauss;

@@ -669,7 +669,7 @@ fn messages_say_what_to_do() {
     assert!(
         list[0]
             .got
-            .ends_with("1 of its 2 sides lie inside the body, those of elements 1, 2"),
+            .ends_with("1 of its 2 sides lie inside the body, at elements 1, 2"),
         "{list:#?}"
     );
 }

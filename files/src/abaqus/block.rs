@@ -253,7 +253,7 @@ impl Deck {
                     Some(_) => self.doubt(
                         at,
                         "*ELASTIC a second time for one material",
-                        "it once",
+                        "*ELASTIC once for each material",
                         "Give the second one a material of its own.",
                     ),
                     None => self.doubt(
@@ -570,7 +570,7 @@ impl Deck {
                 Reason::Malformed,
                 format!("`{text:.40}`"),
                 "an element or a set of elements, and a side S1 … S4",
-                "Write it like `TOP, S3`; without the side, all sides of these elements that lie on the surface of the body are meant. The element or set must be given.",
+                "Write the line like `TOP, S3`; `TOP` alone means all sides of its elements that lie on the surface of the body. The element or set must be given.",
             ),
         }
     }

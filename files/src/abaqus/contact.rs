@@ -287,7 +287,7 @@ impl Source<'_> {
                 body.line,
                 "a rigid body that shares nodes with the elastic body",
                 "a rigid body by itself",
-                "Support those nodes by *BOUNDARY instead.",
+                "Support the shared nodes by *BOUNDARY instead.",
             );
         }
         let edges = self.mesh.boundaries.get(name);

@@ -1,4 +1,4 @@
-//! The content of a deck: the supported parts, and violations where it has others.
+//! The content of a deck: its supported parts, and violations for all other parts.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -23,7 +23,7 @@ pub(super) enum Inside {
 /// The position of an instance: a translation, then a rotation (centre and angle in radians).
 pub(super) type Placement = ([f64; 3], Option<([f64; 2], f64)>);
 
-/// The supported parts of a deck, and violations where it has others.
+/// The supported parts of a deck, and violations for all other parts.
 #[derive(Default)]
 pub(super) struct Deck {
     /// The part, instance or assembly that the present lines belong to.

@@ -148,7 +148,7 @@ impl Deck {
                     line,
                     format!("*RIGID BODY with {parameter}"),
                     "a rigid body that holds no node of the elastic body",
-                    "Support those nodes by *BOUNDARY instead.",
+                    "Support the nodes of the elastic body by *BOUNDARY instead.",
                 );
             }
         }
@@ -214,9 +214,7 @@ impl Deck {
         for (name, _) in &keyword.parameters {
             if !KNOWN.contains(&&name[..]) {
                 let hint = match &name[..] {
-                    "ROUGH" => {
-                        "A contact without slip is one with a large friction coefficient here."
-                    }
+                    "ROUGH" => "For a contact without slip, give a large friction coefficient.",
                     _ => {
                         "Give one friction coefficient; or see `friction` of a problem as JSON, with this deck as its mesh."
                     }

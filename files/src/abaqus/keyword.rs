@@ -228,7 +228,7 @@ impl Deck {
                     line,
                     format!("*{} with {name:.40}{value}", keyword.name),
                     &format!("*{} without {name:.40}", keyword.name),
-                    "Values are those at the end of one linear step.",
+                    "Values are read as displacements or loads at the end of one linear step.",
                 );
             }
         }
@@ -308,7 +308,7 @@ impl Deck {
                     line,
                     format!("the material `{name:.60}` a second time"),
                     "each material once",
-                    "Give one of them another name.",
+                    "Give one of the two materials another name.",
                 );
             }
             self.materials.entry(name).or_default();

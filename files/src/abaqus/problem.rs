@@ -103,7 +103,7 @@ pub fn problem_with_warnings(text: &str) -> Result<(Problem, Vec<Warning>), Vec<
     }
     if thickness != 1.0 {
         warnings.push(contact::differs(format!(
-            "In plane strain forces are per unit of thickness here: those of the deck, for a thickness of {thickness}, are {thickness} times as large."
+            "In plane strain, forces of the result are per unit of thickness: the forces of the deck, for a thickness of {thickness}, are {thickness} times as large."
         )));
     }
     if !violations.is_empty() {
@@ -506,7 +506,7 @@ fn loads(built: &mut Built, thickness: f64) -> Vec<Load> {
             (all, inside) => built.doubt(
                 row.line,
                 format!(
-                    "a pressure on `{name:.60}`: {inside} of its {all} sides lie inside the body, those of {}",
+                    "a pressure on `{name:.60}`: {inside} of its {all} sides lie inside the body, at {}",
                     elements_at(&built.raw, &built.raw.lines[&name], &inner)
                 ),
                 "sides on the surface of the body",

@@ -145,7 +145,7 @@ impl Built {
                 line,
                 got,
                 "supports that hold from the first step on",
-                &format!("It would hold the body from the beginning. Write it in the first step if that is intended. {WRITTEN_INSTEAD}"),
+                &format!("The support would hold the body from the beginning. Write it in the first step if that is intended. {WRITTEN_INSTEAD}"),
             );
         }
         let found = [
@@ -158,7 +158,7 @@ impl Built {
                 self.doubt(
                     line,
                     format!("a step whose {what} are in another proportion to each other than in the last step"),
-                    &format!("in each step one factor on all {what}"),
+                    &format!("all {what} multiplied by one factor in each step"),
                     WRITTEN_INSTEAD,
                 );
                 vec![1.0; count]

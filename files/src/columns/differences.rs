@@ -172,7 +172,7 @@ impl Reader<'_> {
                 at_random: 0,
                 at: 0,
             }),
-            Ok(_) => Err(damaged("some of it is missing")),
+            Ok(_) => Err(damaged("some bytes are missing")),
             Err(error) => Err(damaged(&error.to_string())),
         }
     }
@@ -263,14 +263,16 @@ impl Reader<'_> {
         if (self.at, self.at_random) == (self.stream.len(), self.random.len()) {
             Ok(())
         } else {
-            Err(damaged("there is more than fields"))
+            Err(damaged("there are more bytes than the fields need"))
         }
     }
 }
 
 fn take<'a>(from: &'a [u8], at: &mut usize, count: usize) -> Result<&'a [u8], String> {
     let end = at.saturating_add(count);
-    let taken = from.get(*at..end).ok_or_else(|| damaged("it ends early"))?;
+    let taken = from
+        .get(*at..end)
+        .ok_or_else(|| damaged("the bytes end early"))?;
     *at = end;
     Ok(taken)
 }

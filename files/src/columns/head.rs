@@ -85,7 +85,7 @@ impl Head {
         let content = self.random.saturating_add(self.stream);
         let most = self.sum(MOST_CONTENT).saturating_add(MOST_BESIDE);
         if self.sum(LEAST_JSON) > json_bytes || content > most {
-            return Err(damaged("larger than its content"));
+            return Err(damaged("sizes larger than the content"));
         }
         if (3 * self.elements..=9 * self.elements).contains(&self.points) {
             Ok(())
@@ -122,7 +122,9 @@ pub(super) fn put_size(to: &mut Vec<u8>, mut size: usize) {
 pub(super) fn take_size(from: &mut &[u8]) -> Result<usize, String> {
     let mut size = 0usize;
     for shift in (0..63).step_by(7) {
-        let (byte, rest) = from.split_first().ok_or_else(|| damaged("it ends early"))?;
+        let (byte, rest) = from
+            .split_first()
+            .ok_or_else(|| damaged("the bytes end early"))?;
         *from = rest;
         size |= usize::from(byte & 0x7f) << shift;
         if byte & 0x80 == 0 {

@@ -282,7 +282,7 @@ impl<'de> DeserializeSeed<'de> for Value<'_, '_, 'de> {
             let value = <&RawValue>::deserialize(reader)?;
             let expected =
                 "this field to be absent, since it cannot be combined with the other fields";
-            let hint = "Remove it, or choose another form.";
+            let hint = "Remove the field, or choose another form.";
             let got = || words::value(value.get());
             let not_used = |at| Violation::new(at, Reason::NotUsed, got(), expected, hint);
             return self.walk.report(not_used);
@@ -443,7 +443,7 @@ impl<'de> Visitor<'de> for Value<'_, '_, 'de> {
                 checked?;
             } else {
                 members.next_value::<IgnoredAny>()?;
-                let hint = "Remove one of them; one would be ignored.";
+                let hint = "Remove one of the two values; one would be ignored.";
                 let (reason, got, expected) =
                     (Reason::DuplicateName, "the name twice", "each name once");
                 walk.report_inside(known, |at| Violation::new(at, reason, got, expected, hint))?;
@@ -455,7 +455,7 @@ impl<'de> Visitor<'de> for Value<'_, '_, 'de> {
                 return walk.report_inside(name.as_str(), |at| words::bare(at, name));
             }
             let expected = format!("a value for `{name}`");
-            let (reason, hint) = (Reason::Missing, "It has no default.");
+            let (reason, hint) = (Reason::Missing, "The field has no default.");
             walk.report_inside(name.as_str(), |at| {
                 Violation::new(at, reason, "nothing", expected, hint)
             })?;

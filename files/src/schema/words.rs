@@ -63,7 +63,7 @@ pub(super) fn unknown_name<'a>(
 ) -> Violation {
     let known: Vec<_> = known.map(String::as_str).collect();
     let expected = match &known[..] {
-        [] => "no name at all".to_owned(),
+        [] => "no field".to_owned(),
         known => format!("one of {}", listed(known, ", ")),
     };
     let hint = meant(name, known)

@@ -1,6 +1,6 @@
-//! Chooses the member from whose solution another member starts: one that differs from it in one value of a grid, by
-//! one place. The choice depends on the sweep alone, so that a member's numbers have the same bits whichever members
-//! were solved before, by which worker, and when.
+//! Chooses the member from whose solution another member of a sweep starts: in a grid, a member whose value on one axis
+//! is the value before. The choice depends on the sweep alone, so that a member's numbers have the same bits whichever
+//! members were solved before, by which worker, and when.
 
 use super::check::Group;
 use super::plan::{Plan, Values};

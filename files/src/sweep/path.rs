@@ -52,7 +52,7 @@ pub(super) fn path(at: String, text: &str, found: &mut Findings) -> Option<Path>
                 Reason::Malformed,
                 format!("{:?}", quoted(text)),
                 "a JSON Pointer (RFC 6901) to a part of the problem, such as /contacts/0/indentation",
-                "It begins with / and has ~1 for / and ~0 for ~ in names.",
+                "A pointer begins with / and has ~1 for / and ~0 for ~ in names.",
             ));
             None
         }
@@ -87,7 +87,7 @@ pub(super) fn are_apart(paths: &[Path], found: &mut Findings) -> bool {
                     quoted(&other.text)
                 ),
                 expected,
-                "Remove one of them: one value would replace the other.",
+                "Remove one of the two pointers: one value would replace the other.",
             ));
         }
     }

@@ -158,7 +158,7 @@ fn leads_nowhere(path: &Path, nowhere: &Nowhere) -> Violation {
         if names.is_empty() {
             "Check the pointer (RFC 6901).".to_owned()
         } else {
-            format!("It has: {}.", names.join(", "))
+            format!("Names there: {}.", names.join(", "))
         }
     });
     Violation::new(

@@ -18,7 +18,7 @@ const MOST_STEPS: u32 = 40;
 /// The part of the tolerance that the residual must reach, so that the start has hardly any influence on the result.
 const AIM: f64 = 0.1;
 
-/// The part of the residual above which a step that leaves so much requires a new factor.
+/// The part of the residual that a step may leave; if it leaves more, the next step has a new factor.
 const SERVES: f64 = 0.2;
 
 /// The largest number of steps that leave more than [`SLOW`] of the residual: at first contact sets change.

@@ -119,7 +119,7 @@ pub fn warn_of_increments(step: &mut StepSolution, more: &EndForces) {
         code: WarningCode::IncrementsMatter,
         pointer: "/steps".to_owned(),
         message: format!(
-            "This step has too few increments for the incremental law: at its end {found}. Give this step and those before it more `increments`."
+            "This step has too few increments for the incremental law: at its end {found}. Give this step and the steps before it more `increments`."
         ),
     });
 }

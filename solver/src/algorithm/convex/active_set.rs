@@ -11,7 +11,7 @@ use crate::observer::Observer;
 /// The largest reaction that counts as zero, as a part of the problem's own force.
 const NO_FORCE: f64 = 1e-30;
 
-/// The part of the residual above which a step that leaves so much is followed by a damped step.
+/// The part of the residual that a step may leave; if it leaves more, the next step is damped.
 const STALLED: f64 = 0.7;
 
 /// The largest number of steps; then projected Newton takes over.
