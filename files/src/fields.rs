@@ -70,9 +70,9 @@ fn stresses(fields: &Fields) -> impl Iterator<Item = Stress> {
         .map(|((xx, yy), (xy, zz))| [*xx, *yy, *xy, *zz])
 }
 
-/// Adds the fields to an archive, their names after `prefix`.
+/// Adds fields to an archive, each array named `prefix` and its own name.
 ///
-/// Elements are in two arrays, `quads` and `triangles`, each with an array of their numbers in the mesh;
+/// Elements are in two arrays, `quads` and `triangles`, each with an array of the elements' numbers in the mesh;
 /// `element_error` has one entry per element of the mesh, `gauss_element` the element of each integration point.
 ///
 /// # Errors

@@ -1,10 +1,10 @@
 //! Meshes from Gmsh: MSH 2.2 and 4.1, ASCII and binary.
 //!
-//! Written by hand: the crate for this format reads 4.1 only and wants the whole file in memory; here a
-//! file is read as a stream, and five of its dozen sections are needed.
+//! The reader is written by hand: the crate for this format reads 4.1 only and wants the whole file in memory; here a
+//! file is read as a stream, and five of the dozen sections of the format are needed.
 //!
-//! Physical curves become boundaries, physical surfaces groups of elements, physical points sets of
-//! nodes, all by their names (or numbers, where they have none).
+//! Physical curves become boundaries, physical surfaces groups of elements, physical points sets of nodes, all by their
+//! names (or by numbers, where they have no names).
 
 use std::collections::BTreeMap;
 use std::io::BufRead;

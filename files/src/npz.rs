@@ -1,6 +1,5 @@
-//! NumPy's archive: a zip of arrays with names. The `.npy` header is a dozen lines and is written
-//! here: the crates for it bring a whole matrix library (`ndarray-npy`) or five compression methods
-//! with their C code (`npyz`).
+//! NumPy's archive: a zip of arrays with names. The `.npy` header of an array is a dozen lines and is written here: the
+//! crates for it bring a whole matrix library (`ndarray-npy`) or five compression methods with their C code (`npyz`).
 
 use std::io::{Cursor, Write};
 

@@ -32,7 +32,7 @@ fn decoded(bytes: Vec<u8>) -> String {
         .unwrap_or_else(|error| error.as_bytes().iter().map(|byte| *byte as char).collect())
 }
 
-/// Why a mesh could not be read.
+/// The reason why a mesh could not be read.
 #[derive(Debug)]
 pub enum ReadError {
     /// The bytes could not be read.
@@ -326,7 +326,7 @@ impl Plane {
         self.extent = self.extent.max(x.abs()).max(y.abs());
     }
 
-    /// A violation if the nodes do not lie in one plane z = const.
+    /// The violation for nodes that do not lie in one plane z = const.; none if they do.
     pub(crate) fn fault(&self) -> Option<Violation> {
         /// The largest relative difference of z that counts as rounding, in files with some nine digits.
         const FLAT: f64 = 1e-9;

@@ -5,7 +5,7 @@ use std::{borrow::Cow, fmt::Write};
 
 use solver::solution::{ContactProfile, Iteration};
 
-/// Columns of equal length, in their order.
+/// Columns of equal length, in the order in which they are written.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
     /// The columns; their names are unique.
@@ -33,7 +33,7 @@ pub enum Values {
 }
 
 impl Values {
-    /// The number of entries.
+    /// The number of entries of the column.
     pub fn len(&self) -> usize {
         match self {
             Values::Real(values) => values.len(),
@@ -42,7 +42,7 @@ impl Values {
         }
     }
 
-    /// Whether there is no entry.
+    /// Whether the column has no entries.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

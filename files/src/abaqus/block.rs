@@ -11,7 +11,7 @@ use solver::element::{Element, Family};
 use solver::error::Reason;
 use solver::mesh::NO_NODE;
 
-/// The targets of rows of loads.
+/// What rows of loads act on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Rows {
     /// Sides of elements, `*DLOAD`.

@@ -1,4 +1,4 @@
-//! Combines the parts of a deck into one mesh, with names for the targets of its rows.
+//! Combines the parts of a deck into one mesh, and names there what the rows of the deck refer to.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -51,7 +51,7 @@ pub(super) struct Built {
 }
 
 impl Deck {
-    /// Builds the mesh with all its names, and its violations.
+    /// Builds the mesh of the deck with all names, and lists the violations.
     pub(super) fn build(mut self) -> Built {
         let mut merged = Merged::default();
         let scopes = merged.add_all(&mut self);
@@ -358,7 +358,7 @@ impl Merged {
         used
     }
 
-    /// Nodes of plane elements must lie in one plane; others, like reference points, may be anywhere.
+    /// Checks that the nodes of plane elements lie in one plane; other nodes, like reference points, may be anywhere.
     fn check_plane(&mut self, used: &[bool]) {
         let mut plane = Plane::default();
         for (node, height) in self
@@ -373,7 +373,7 @@ impl Merged {
         self.faults.extend(plane.fault());
     }
 
-    /// All sets; sets of nodes also get their names in the mesh.
+    /// Resolves all sets, and gives sets of nodes their names in the mesh.
     fn sets(&mut self, names: &Names<'_>) -> Sets {
         let mesh = (self.raw.nodes.len() + self.numbered.len()) as u64;
         let mut room = Room::new((1 << 16) + 2 * self.written + MOST_TIMES * mesh);
@@ -453,7 +453,7 @@ impl Merged {
         pairs.into_iter().max_by(|p, q| far(*p).total_cmp(&far(*q)))
     }
 
-    /// Multiplies values by their amplitude at the end of the step.
+    /// Multiplies each value of a row by the factor of the row's amplitude at the end of the step.
     fn apply_amplitudes(&mut self, deck: &Deck) {
         let rows = &mut self.rows;
         let prescribed = rows.prescribed.iter_mut();
@@ -558,7 +558,7 @@ impl Merged {
         );
     }
 
-    /// Adds the surfaces of the deck and the sides that it loads; returns the rows of loads.
+    /// Adds the surfaces of the deck, and the sides that the deck loads, to the mesh; returns the rows of pressures.
     fn surfaces(&mut self, names: &Names<'_>, sets: &mut Sets) -> Vec<Row<Pressure>> {
         let mut building = Building {
             names,

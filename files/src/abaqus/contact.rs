@@ -40,13 +40,13 @@ pub(super) struct Translated {
 /// The parts of a deck that contacts are made from.
 pub(super) struct Source<'a> {
     pub(super) said: &'a DeckContact,
-    /// For each contact pair the names of its surfaces in the mesh.
+    /// For each contact pair: the names of its two surfaces in the mesh.
     pub(super) pairs: &'a [[String; 2]],
     pub(super) tools: &'a Tools,
     pub(super) mesh: &'a Mesh,
     pub(super) materials: &'a [Material],
     pub(super) axisymmetric: bool,
-    /// The motion of each rigid body; `None` if it is unknown.
+    /// The motion of each rigid body; `None` for a motion that was refused.
     pub(super) motions: &'a [Option<Motion>],
 }
 

@@ -26,7 +26,7 @@ pub(super) type Placement = ([f64; 3], Option<([f64; 2], f64)>);
 /// The supported parts of a deck, and violations for all other parts.
 #[derive(Default)]
 pub(super) struct Deck {
-    /// The part, instance or assembly that the present lines belong to.
+    /// The part, instance or assembly that the lines being read belong to.
     pub(super) here: Part,
     pub(super) inside: Inside,
     /// The assembly, set aside while lines of a part or an instance are read.
@@ -41,14 +41,14 @@ pub(super) struct Deck {
     pub(super) names: usize,
     /// The spelling of each name, by the name in capitals.
     spelling: HashMap<String, Name>,
-    /// The material that the present properties belong to.
+    /// The material that the keywords and data lines being read belong to.
     pub(super) material: Option<Name>,
     pub(super) materials: BTreeMap<Name, MaterialDefinition>,
     pub(super) orientations: BTreeMap<Name, Orientation>,
     pub(super) amplitudes: BTreeMap<Name, Amplitude>,
     pub(super) temperatures: Temperatures,
     pub(super) steps: usize,
-    /// The position of the present instance.
+    /// The position of the instance that is being read.
     pub(super) placement: Option<Placement>,
     /// The length of time of the current step; `None`: 1.
     pub(super) period: Option<f64>,
@@ -92,7 +92,7 @@ impl Deck {
         }
     }
 
-    /// The material that the present properties belong to.
+    /// The material that the keywords and data lines being read belong to; none outside a material.
     pub(super) fn material(&mut self) -> Option<&mut MaterialDefinition> {
         let name = self.material.as_ref()?;
         self.materials.get_mut(name)

@@ -92,7 +92,7 @@ impl Deck {
         Some(Block::Contact(block))
     }
 
-    /// Refuses `*MODEL CHANGE`, which removes elements or contact pairs between steps, or adds them.
+    /// Refuses `*MODEL CHANGE`, which removes or adds elements or contact pairs between steps.
     fn model_change(&mut self, keyword: &Keyword, line: u64) {
         let is_pair = keyword.is("TYPE", "CONTACT PAIR");
         let what = if is_pair { "CONTACT PAIR" } else { "ELEMENT" };

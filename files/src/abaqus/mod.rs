@@ -1,10 +1,12 @@
 //! Decks of Abaqus and CalculiX (`.inp`): nodes, elements, sets and surfaces, and the supported parts of the analysis.
 //!
-//! Written by hand: there is no crate for the format. A keyword begins with `*`, a comment with `**`, data lines follow
-//! their keyword; names are compared without regard to case, as both programs do, and kept as they were first written.
+//! The reader is written by hand, since there is no crate for the format. A keyword begins with `*`, a comment with
+//! `**`; data lines follow their keyword. Names are compared without regard to case, as both programs do, and kept as
+//! they were first written.
 //!
 //! As a mesh a deck needs elements of a plane and nothing else: other elements are left out or, if they are lines, name
-//! boundaries, and its analysis is not read. As a problem, everything that changes the solution must be understood.
+//! boundaries, and the deck's analysis is not read. As a problem, everything that changes the solution must be
+//! understood.
 //!
 //! # Where to look
 //!

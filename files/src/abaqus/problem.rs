@@ -1,4 +1,4 @@
-//! Reads a deck as a whole problem: a part that is not supported is a violation with its line.
+//! Reads a deck as a whole problem. A part of the deck that is not supported is a violation that names its line.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -172,7 +172,7 @@ impl Built {
     }
 }
 
-/// A list in words such as `displacement 1 of L (line 3) and 2 others`.
+/// Supports or loads as a list in words, such as `displacement 1 of L (line 3) and 2 others`.
 fn listed(ended: &[(&Key, u64)], what: Replaces) -> String {
     let names: Vec<String> = ended
         .iter()

@@ -1,4 +1,4 @@
-//! Rigid bodies of a deck: their elements, the surfaces on them, and the rows that move them.
+//! Rigid bodies of a deck: their elements and surfaces, and the rows of `*BOUNDARY` that move them.
 
 use std::collections::{BTreeMap, BTreeSet};
 

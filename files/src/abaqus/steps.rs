@@ -12,7 +12,7 @@ use super::written::{Force, Pressure};
 /// The motion of a reference node.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Motion {
-    /// The displacement at the end of each step.
+    /// The displacement of the reference node at the end of each step.
     pub(super) ends: Vec<Point>,
 }
 

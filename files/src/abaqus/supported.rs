@@ -134,7 +134,7 @@ pub(super) const MOST_UNKNOWN: usize = 50;
 #[derive(Clone)]
 pub(super) struct UnknownKeyword {
     pub(super) name: String,
-    /// The line where it first occurs.
+    /// The line where the keyword first occurs.
     pub(super) line: u64,
     /// The number of occurrences after the first.
     pub(super) more: usize,

@@ -113,7 +113,7 @@ pub(super) struct Force {
 pub(super) struct Temperatures {
     /// The initial temperature of each target.
     pub(super) initial: Vec<(Target, f64)>,
-    /// Whether some of the initial temperatures are unknown.
+    /// Whether some of the initial temperatures are unknown, so that no row is known to leave a temperature as it is.
     pub(super) others: bool,
     /// The first line that changes a temperature, and what it changes, in words.
     pub(super) changed: Option<(u64, String)>,

@@ -1,12 +1,12 @@
 //! Fields as columns, compressed without loss: how results are stored.
 //!
 //! Fields consist mostly of stresses, which follow from displacements. Each column is stored as differences from a
-//! prediction that a reader can repeat: by Hooke's law for stresses, by the mean of the corners for midside nodes, and
-//! by the value before for the rest. Differences are taken between bit patterns, so that every number is restored
-//! exactly, however good the prediction is; most of them are zero or a few roundings, and take one byte instead of
-//! eight.
+//! prediction that a reader can repeat: stresses are predicted by Hooke's law, values at midside nodes by the mean of
+//! the corners, and other values by the value before. Differences are taken between bit patterns, so that every number
+//! is restored exactly, however good the prediction is; most differences are zero or a few roundings, and take one byte
+//! instead of eight.
 //!
-//! The predictions are a part of the format: a change of one of them, by a single rounding, needs another version.
+//! The predictions are a part of the format: a change of one prediction, by a single rounding, needs another version.
 
 mod differences;
 mod head;

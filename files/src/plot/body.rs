@@ -38,7 +38,7 @@ pub(super) struct Window {
 }
 
 impl Window {
-    /// The smallest window around points; `None` without any.
+    /// The smallest window around points; `None` if there are no points.
     pub(super) fn around(points: impl Iterator<Item = [f64; 2]>) -> Option<Window> {
         let mut window: Option<Window> = None;
         for p in points {

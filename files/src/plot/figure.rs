@@ -131,9 +131,9 @@ pub struct Above {
 pub struct Panel {
     /// The name of the x axis; empty if the panel below has the same axis, so that numbers are enough.
     pub x: String,
-    /// Name of the y axis.
+    /// The name of the y axis.
     pub y: String,
-    /// Scale of the y axis.
+    /// The scale of the y axis.
     pub scale: Scale,
     /// The curves in the order in which they are drawn.
     pub curves: Vec<Curve>,

@@ -227,7 +227,7 @@ impl Sample {
     }
 }
 
-/// The entries of the legend: the first boundaries, the number of the others, and the obstacle.
+/// The entries of the legend: the first boundaries, the number of further boundaries, and the obstacle.
 fn entries(problem: &Problem, names: &[String], has_obstacle: bool) -> Vec<(String, Sample)> {
     let named = names.iter().take(MOST).enumerate();
     let mut entries: Vec<(String, Sample)> = named

@@ -6,7 +6,7 @@ use strum::{IntoStaticStr, VariantArray};
 
 use super::theme::{Palette, Theme};
 
-/// The use of a figure, which determines its width in relation to its letters.
+/// What a figure is for, which determines its width in relation to its letters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, IntoStaticStr, VariantArray)]
 #[strum(serialize_all = "snake_case")]
 pub enum Size {
@@ -54,9 +54,9 @@ impl Size {
 /// The style of a figure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Style {
-    /// The colours.
+    /// The colours of the figure.
     pub theme: Theme,
-    /// The size.
+    /// The use of the figure, which determines its width.
     pub size: Size,
     /// The stress that the contours of `deformed` show.
     pub stress: Stress,

@@ -6,14 +6,14 @@ use std::str::FromStr;
 use plotters::style::RGBColor;
 use strum::IntoStaticStr;
 
-/// The background of a figure.
+/// The background for which a figure is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, IntoStaticStr)]
 #[strum(serialize_all = "snake_case")]
 pub enum Theme {
-    /// Paper.
+    /// A light background, for paper.
     #[default]
     Light,
-    /// A dark page or slide.
+    /// A dark background, for a dark page or slide.
     Dark,
 }
 

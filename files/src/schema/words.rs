@@ -39,7 +39,7 @@ pub(super) fn value(json: &str) -> String {
     quoted(json)
 }
 
-/// A list or an object described by the number of its entries.
+/// Describes a list or an object by the number of its entries, such as `a list of 3 items`.
 pub(super) fn counted(count: usize, what: &str, of: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
     let article = if what.starts_with('o') { "an" } else { "a" };

@@ -1,8 +1,8 @@
-//! Sweeps: one problem, and many that differ from it in a few values.
+//! Sweeps: one base problem, and many problems that differ from it in a few values, the members.
 //!
-//! A sweep is stored as text: the base problem with gaps for values, and the values. A member is that text with its
-//! values filled in, which is then read as any other problem. The mesh of the base is not part of this text unless the
-//! sweep changes it, so that a large mesh is read only once.
+//! A sweep is stored as text: the base problem with gaps for values, and the values. A member is that text with the
+//! member's values filled in, which is then read as any other problem. The mesh of the base is not part of this text
+//! unless the sweep changes it, so that a large mesh is read only once.
 //!
 //! # Where to look
 //!

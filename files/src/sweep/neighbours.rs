@@ -23,8 +23,8 @@ pub struct Neighbour {
 }
 
 impl Plan {
-    /// How many values `Neighbour::line` can have: 0, one for each path of the sweep, and one for members that start
-    /// from the first member of their group for want of another.
+    /// The number of possible values of `Neighbour::line`: 0, one for each path of the sweep, and one for members that
+    /// start from the first member of their group for want of another.
     pub fn lines(&self) -> usize {
         self.paths.len() + 2
     }

@@ -59,7 +59,7 @@ pub(super) fn path(at: String, text: &str, found: &mut Findings) -> Option<Path>
     }
 }
 
-/// Checks that no path equals another one or leads inside it.
+/// Checks that no path equals another path or leads inside it.
 pub(super) fn are_apart(paths: &[Path], found: &mut Findings) -> bool {
     let mut apart = true;
     for (k, path) in paths.iter().enumerate() {

@@ -60,7 +60,7 @@ pub(super) enum Values {
 }
 
 impl Plan {
-    /// The number of members; they are numbered from 0.
+    /// The number of members, which are numbered from 0.
     pub fn count(&self) -> usize {
         match &self.values {
             Values::Grid(axes) => axes
@@ -76,7 +76,7 @@ impl Plan {
         &self.paths
     }
 
-    /// Whether members differ in their mesh, so that each has its own.
+    /// Whether the sweep changes the mesh, so that each member has its own mesh.
     pub fn changes_mesh(&self) -> bool {
         self.with_mesh
     }

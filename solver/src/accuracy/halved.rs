@@ -160,7 +160,7 @@ fn scale_of(quantity: &EstimatedQuantity, all: &[EstimatedQuantity], images: f64
     scale(quantity.quantity, quantity.value, own, images)
 }
 
-/// Replaces the error of a quantity by the bound that follows from its values on the other meshes.
+/// Replaces the error of a quantity by the bound that follows from the values of the quantity on the other meshes.
 fn compare(
     quantity: &mut EstimatedQuantity,
     finer: &OnOtherMesh,

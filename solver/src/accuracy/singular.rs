@@ -1,4 +1,4 @@
-//! Elements whose weighted errors stand out from those around them, at a singular point of the stresses.
+//! Elements whose weighted errors exceed those of the elements around them, at a singular point of the stresses.
 //!
 //! At a corner of the supports, a reentrant corner, the end of a load or of an interface, stresses grow without limit.
 //! The elements that meet there hold most of the error that the body contributes, however fine the mesh is. Recovery

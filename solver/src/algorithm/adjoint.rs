@@ -29,7 +29,7 @@ pub struct Gradient {
 }
 
 impl Gradient {
-    /// The gradient of a constant.
+    /// The gradient of a constant: all derivatives are 0.
     pub fn zero(system: &System<'_>) -> Self {
         Gradient {
             displacement: vec![0.0; system.load.len()],

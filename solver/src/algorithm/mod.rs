@@ -245,7 +245,7 @@ fn auto(mut recorder: Recorder<'_, '_>, start: Measured, observer: &mut dyn Obse
     finish(recorder, nearest.with_cycle_of(&other))
 }
 
-/// Sweeps, then Newton's method from the best of them.
+/// Sweeps, then Newton's method from the best sweep; returns the better result of both.
 fn both(recorder: &mut Recorder<'_, '_>, start: Measured, observer: &mut dyn Observer) -> End {
     let (system, tolerance) = (recorder.system, recorder.controls.tolerance);
     let swept = fixed_point::run(recorder, start, true, observer);

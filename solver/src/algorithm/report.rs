@@ -45,7 +45,7 @@ pub struct Reported {
     pub along: AlongContacts,
     /// The displacements and stresses of the body.
     pub fields: Fields,
-    /// The difference between recovered stresses and those of the elements.
+    /// The difference between recovered stresses and the stresses of the elements.
     pub difference: StressDifference,
 }
 
@@ -347,7 +347,7 @@ impl Inside {
         Ok((inside, difference))
     }
 
-    /// The summary of a state. Adds a warning if its forces do not balance.
+    /// The summary of a state. A warning is added if the forces do not balance.
     fn summary(
         &self,
         state: &FinalState<'_>,

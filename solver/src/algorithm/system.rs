@@ -60,7 +60,7 @@ pub struct ContactNode {
     pub oblique: Option<Oblique>,
     /// Present if the node belongs to another contact alone: then `normal` and `tangent` are no unknowns.
     pub follows: Option<Follows>,
-    /// The bound on u_n, `normal` ≤ gap; infinite where there is no obstacle.
+    /// The bound on `normal`, `normal` ≤ gap; infinite where there is no obstacle.
     pub gap: f64,
     /// Whether u_n = gap is prescribed, whatever the reaction.
     pub bonded: bool,

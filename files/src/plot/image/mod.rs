@@ -1,4 +1,4 @@
-//! Figures as PNG and PDF, made from their SVG: `svg` reads it, `pixels` and `pdf` draw.
+//! Figures as PNG and PDF, made from their SVG: `svg` reads the SVG, `pixels` and `pdf` draw.
 //!
 //! Letters are those of DejaVu Sans, which the program contains: a figure is the same on every machine, with or without
 //! fonts. Letters that this font lacks become empty boxes.
@@ -25,7 +25,7 @@ pub enum Image {
     Pdf,
 }
 
-/// The largest SVG that is converted (bytes); drawing it takes several times this memory.
+/// The largest SVG that is converted (bytes); to draw an SVG takes several times this memory.
 const LARGEST: usize = 4 << 20;
 
 /// Writes a figure that was drawn as SVG as a file of the format `image`.

@@ -43,7 +43,7 @@ pub(super) struct Wave {
     pub(super) edge: usize,
     /// The largest distance of the obstacle from the parabola through the nodes (length).
     height: f64,
-    /// Distance between the nodes on either side (length).
+    /// The distance between the nodes on either side of the wave (length).
     spacing: f64,
     /// The pressure that the wave may add (stress).
     pub(super) pressure: f64,
@@ -53,13 +53,13 @@ pub(super) struct Wave {
 pub(super) struct Kink {
     pub(super) edge: usize,
     s: f64,
-    /// Change of slope of the gap, > 0; infinite at an edge of the obstacle.
+    /// The change of slope of the gap at the kink, > 0; infinite at an edge of the obstacle.
     change: f64,
     /// The angle by which the body's surface turns at the kink; 0 where the surface is smooth.
     turn: f64,
     /// The pressure that each halving of the mesh adds at the kink (stress).
     growth: f64,
-    /// Distance between the nodes on either side (length).
+    /// The distance between the nodes on either side of the kink (length).
     spacing: f64,
     /// Whether the kink is on a line of symmetry and due, at least in part, to the mirror image.
     mirrored: bool,
@@ -68,9 +68,9 @@ pub(super) struct Kink {
 /// A corner of the body.
 struct Corner {
     node: usize,
-    /// The angle by which the body's surface turns.
+    /// The angle by which the body's surface turns at the corner.
     turn: f64,
-    /// Change of slope of the gap; < 0 where the corner points into the body.
+    /// The change of slope of the gap at the corner; < 0 where the corner points into the body.
     change: f64,
 }
 
@@ -524,7 +524,7 @@ impl PatchView<'_> {
         }
     }
 
-    /// Distance between the nodes on either side of a place.
+    /// The distance between the nodes on either side of a place, along the arc.
     fn spacing(&self, place: &Place) -> f64 {
         let [start, end, middle] = self.patch.contact.boundary.edge_arc(place.edge);
         match place.xi {

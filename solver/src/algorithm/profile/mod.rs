@@ -90,18 +90,18 @@ pub(super) struct Junction {
 pub struct Missed {
     /// The contact, by its place in the model.
     pub patch: usize,
-    /// Arc length from the start of the named boundary.
+    /// The arc length of the place, from the start of the named boundary.
     pub s: f64,
     /// How far the obstacle reaches into the body at the place (length); negative if it recedes.
     pub penetration: f64,
-    /// Distance between the nodes on either side (length).
+    /// The distance between the nodes on either side of the place (length).
     pub spacing: f64,
     /// The force that would push a node at the place to the obstacle, divided by the largest nodal reaction; infinite
     /// if nothing touches.
     pub severity: f64,
 }
 
-/// The displaced obstacle at a contact node, compared with the linear one.
+/// The displaced obstacle at a contact node, compared with the obstacle whose gaps are linear in the indentation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DisplacedNode {
     /// How much larger the gap of the displaced obstacle along the contact's normal is (length).
@@ -110,7 +110,8 @@ pub struct DisplacedNode {
     pub turn: f64,
 }
 
-/// The displaced obstacle at all nodes of a contact, compared with the linear one.
+/// The displaced obstacle at all nodes of a contact, compared with the obstacle whose gaps are linear in the
+/// indentation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(in crate::algorithm) struct DisplacedGaps {
     /// By node: the comparison; zero where the displaced gap is unknown.

@@ -166,7 +166,7 @@ fn solve(
     state.v.iter().all(|x| x.is_finite()).then_some(state.v)
 }
 
-/// Step 4 of the thesis's iteration: a node of Γ_C* with σ_n > 0 leaves it; a node off it with u_n ≥ s enters.
+/// Step 4 of the thesis's iteration: a node of Γ_C* with σ_n > 0 leaves Γ_C*; a node off Γ_C* with u_n ≥ s enters it.
 fn next_contact(system: &System<'_>, state: &State, node_stress: &[f64]) -> Vec<bool> {
     let stays = |(i, node): (usize, &ContactNode)| match node.normal {
         Dof::Fixed(_) => false,
@@ -176,8 +176,8 @@ fn next_contact(system: &System<'_>, state: &State, node_stress: &[f64]) -> Vec<
     system.nodes.iter().enumerate().map(stays).collect()
 }
 
-/// Step 5 of the thesis's iteration: f̂ = τ φ along Γ_C*, 0 off it; along +t, or against the motion with option
-/// `signed`.
+/// Step 5 of the thesis's iteration: f̂ = τ φ along Γ_C*, and 0 elsewhere; along +t, or against the motion with the
+/// option `signed`.
 fn new_friction(
     system: &System<'_>,
     state: &State,

@@ -32,7 +32,7 @@ pub(super) struct Rows {
 /// A contact edge and the element that it belongs to.
 struct EdgeRows {
     patch: usize,
-    /// The number of the edge in its contact.
+    /// The number of the edge in the contact.
     edge: usize,
     element: usize,
     /// The master coordinates of the edge's start, end and midside.
@@ -261,7 +261,7 @@ impl RowValues {
         }
     }
 
-    /// The bound τ at the Gauss points of every edge, from σ_n there.
+    /// The bound τ at the Gauss points of every edge, from σ_n at these points.
     fn bound(
         &self,
         system: &System<'_>,
