@@ -36,7 +36,7 @@ KILLS = 400 if SOAK else 5
 # columns and tables under the names that they had
 OLD_NAMES = {("job", "twin_of"): "coalesced_into"}
 # what a table has that was filled from another one, or belongs to the new store alone
-NOT_COPIED = ("_sqlx_migrations", "sqlite_sequence", "progress", "owner_size")
+NOT_COPIED = ("_sqlx_migrations", "sqlite_sequence", "progress", "owner_size", "queue", "owner_queue", "waiting")
 # the first version that stores results compactly, and the first that has nothing but content by its hash
 COMPACT, CONTENT = 10, 18
 MOVED = ("problem", "result_part", "result_info", "mesh_piece", "sweep_definition", "content", "content_piece", "attachment")

@@ -33,7 +33,6 @@ pub mod spans;
 pub mod formats;
 
 // Takes jobs from the queue, solves them, records and ends them.
-#[expect(clippy::too_many_lines)] // `solving::solve_and_store`
 pub mod queue;
 
 // The operations, whatever the protocol.

@@ -78,21 +78,21 @@ async fn admit_new(
     request: ReadRequest,
 ) -> Result<NewJob, ApiError> {
     enum Read {
-        Checked(NewJob),
-        OnStoredMesh(Prepared),
+        Checked(Box<NewJob>),
+        OnStoredMesh(Box<Prepared>),
     }
     let budget_bytes = service.memory_budget_bytes;
     let read = move || {
         let prepared = Prepared::new(request()?, None)?;
         if prepared.has_stored_mesh() {
-            Ok(Read::OnStoredMesh(prepared))
+            Ok(Read::OnStoredMesh(Box::new(prepared)))
         } else {
-            prepared.check(None, budget_bytes).map(Read::Checked)
+            Ok(Read::Checked(Box::new(prepared.check(None, budget_bytes)?)))
         }
     };
     match service.work(read).await?? {
-        Read::Checked(new) => Ok(new),
-        Read::OnStoredMesh(prepared) => admit(service, caller, prepared).await,
+        Read::Checked(new) => Ok(*new),
+        Read::OnStoredMesh(prepared) => admit(service, caller, *prepared).await,
     }
 }
 
