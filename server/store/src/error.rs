@@ -135,6 +135,8 @@ impl Record {
 const IOERR_READ: i32 = 266;
 /// SQLite's code of a read that ended early, which [`ErrorCode`] does not distinguish from other errors.
 const IOERR_SHORT_READ: i32 = 522;
+/// Reading failed with an error of the disk, where SQLite has not made "malformed" of it.
+const IOERR_CORRUPTFS: i32 = 8458;
 /// SQLite's code of a failed write: over a quota, a limit on file sizes, or on a disk that fails.
 const IOERR_WRITE: i32 = 778;
 
@@ -160,7 +162,7 @@ impl From<SqlError> for StoreError {
             }
             // a gigabyte and more: nothing that was written is so large
             (ErrorCode::TooBig, _) => Record::named("record").damaged(told),
-            (_, IOERR_READ | IOERR_SHORT_READ) => {
+            (_, IOERR_READ | IOERR_SHORT_READ | IOERR_CORRUPTFS) => {
                 Record::named("page of the database").damaged(told)
             }
             (ErrorCode::DiskFull, _) | (_, IOERR_WRITE) => StoreError::Full,

@@ -84,11 +84,11 @@ async fn admit_new(
     let budget_bytes = service.memory_budget_bytes;
     let read = move || {
         let prepared = Prepared::new(request()?, None)?;
-        if prepared.has_stored_mesh() {
-            Ok(Read::OnStoredMesh(Box::new(prepared)))
+        Ok::<_, ApiError>(if prepared.has_stored_mesh() {
+            Read::OnStoredMesh(Box::new(prepared))
         } else {
-            Ok(Read::Checked(Box::new(prepared.check(None, budget_bytes)?)))
-        }
+            Read::Checked(Box::new(prepared.check(None, budget_bytes)?))
+        })
     };
     match service.work(read).await?? {
         Read::Checked(new) => Ok(*new),
