@@ -761,7 +761,7 @@ class Smoothing(Part):
 class Table(Part):
     """Profile by a table of points; there is no obstacle outside of it.
 
-    gap: Profile at these coordinates (length, any sign).
+    gap: Profile at the coordinates `x` (length, any sign).
     x: Coordinates c, strictly increasing; at most 100,000.
     along: The coordinate c along the boundary.
     from_: Where the obstacle begins; absent: at the start of the boundary.
@@ -879,7 +879,7 @@ Condition = Literal["unilateral", "bonded", "none"]
 class BoundTable(Part):
     """A friction bound by arc length.
 
-    bound: Friction bound τ at these places, ≥ 0 (stress).
+    bound: Friction bound τ at the places `s`, ≥ 0 (stress).
     s: Arc length from the start of the named boundary, strictly increasing.
     """
 
@@ -1021,12 +1021,12 @@ class Contact(Part):
     """A boundary that may touch a rigid obstacle.
 
     boundary: Name of the boundary.
-    obstacle: The obstacle that faces it.
+    obstacle: The obstacle that faces the boundary.
     condition: The contact condition.
     direction: The direction `[x, y]` that the indentation moves the obstacle along, as a rigid body; its length
         does not matter. Absent: against the body's normal at each node, which on a curved boundary is no motion of
         a rigid body.
-    friction: Absent: frictionless.
+    friction: The friction law; absent: frictionless.
     indentation: How far the obstacle is pushed against the body (length, either sign): gap = profile − indentation.
     normal: The direction that gap and normal displacement are measured along.
     tangential_displacement: Displacement of the obstacle along t, the outward normal turned clockwise (length). The
@@ -1118,7 +1118,7 @@ AccuracyMode = Literal["estimate", "verify"]
 `estimate`: Estimated on the mesh of the solution, at little cost.
 
 `verify`: By a second solution with every element split in two in each direction; with `refine` of 1 or more also by
-one on the mesh before the last refinement, which gives orders of convergence."""
+a solution on the mesh before the last refinement, which gives orders of convergence."""
 
 
 Algorithm = Literal["auto", "fixed_point", "newton", "thesis"]
@@ -1130,8 +1130,8 @@ Algorithm = Literal["auto", "fixed_point", "newton", "thesis"]
 
 `newton`: One semi-smooth Newton iteration for contact, friction and averaging together.
 
-`thesis`: The thesis's own iteration (3.1), exactly as described there. At the thesis's parameters it does not solve
-the problem; the outcome is then `false_convergence`."""
+`thesis`: The thesis's own iteration, exactly as described in thesis 3.1. At the thesis's parameters it does not
+solve the problem; the outcome is then `false_convergence`."""
 
 
 ThesisPressure = Literal["lumped", "extrapolated"]
@@ -1153,7 +1153,7 @@ class ThesisOptions(Part):
         than the next element; for extrapolated pressure only. 0: the mesh-free average of nodal values.
     pressure: The source of the normal stress.
     relaxation: Fraction of the new friction force that is applied (0 < relaxation ≤ 1).
-    signed: Whether friction opposes the motion, as in (1.8), instead of acting along t everywhere.
+    signed: Whether friction opposes the motion, as in thesis (1.8), instead of acting along t everywhere.
     """
 
     contact_guess: dict[str, Pair] | None = None
@@ -1224,8 +1224,8 @@ Spacing = Literal["uniform", "contact_width"]
 
 @dataclass(kw_only=True, repr=False)
 class Step(Part):
-    """One load step: factors on the values given elsewhere, reached in equal or growing increments from those of the
-    previous step (from zero at first).
+    """One load step: factors on the values given elsewhere, reached in equal or growing increments from the factors of
+    the previous step (in the first step from zero).
 
     increments: Increments of the step (≥ 1).
     indentation: Factor on the indentation of every contact at the end of the step.
@@ -1265,7 +1265,8 @@ class Support(Part):
     tangent; other displacements stay free.
 
     boundary: Name of the boundary.
-    nodes: Name of a set of nodes instead; a side is held where all its nodes are held, before the mesh is refined.
+    nodes: Name of a set of nodes, instead of a boundary; a side is held where all its nodes are held, before the
+        mesh is refined.
     un: Displacement along the outward normal (length).
     ut: Displacement along t, the outward normal turned clockwise (length).
     ux: Displacement along x (length).
