@@ -233,9 +233,6 @@ fn count_again(tx: &Connection) -> Result<()> {
 pub(super) struct Line<'a> {
     connection: &'a Connection,
     groups: Vec<Group>,
-    /// For a priority and owner: the key of the last job whose place among theirs was counted, and the number of jobs
-    /// before it.
-    counted: HashMap<(i32, String), (i64, i64)>,
 }
 
 /// The waiting jobs of one priority and owner.
@@ -246,6 +243,8 @@ struct Group {
     running: i64,
     /// The number of the owner's last turn.
     turn: i64,
+    /// The key of the last job of the group whose place was counted, and the number of jobs of the group before it.
+    counted: Option<(i64, i64)>,
 }
 
 impl Line<'_> {
@@ -258,13 +257,10 @@ impl Line<'_> {
                 jobs: row.get("jobs")?,
                 running: row.get("running")?,
                 turn: row.get("turn")?,
+                counted: None,
             })
         })?;
-        Ok(Line {
-            connection,
-            groups,
-            counted: HashMap::new(),
-        })
+        Ok(Line { connection, groups })
     }
 
     /// The number of running jobs of this owner; 0 if the owner has no waiting jobs.
@@ -276,12 +272,12 @@ impl Line<'_> {
     /// The number of jobs ahead of this one; `None` if it does not wait for a worker. Owners who have as many running
     /// jobs as they may are counted as if they had fewer.
     pub(super) fn ahead(&mut self, job: &Job) -> Result<Option<i64>> {
-        let own = |group: &&Group| group.priority == job.priority && group.owner == job.owner;
-        let Some(group) = self.groups.iter().find(own) else {
+        let own = |group: &Group| group.priority == job.priority && group.owner == job.owner;
+        let Some(place) = self.groups.iter().position(own) else {
             return Ok(None);
         };
-        let (turn, jobs) = (group.turn, group.jobs);
-        let Some(here) = self.before(job, jobs)? else {
+        let turn = self.groups[place].turn;
+        let Some(here) = self.before(job, place)? else {
             return Ok(None);
         };
         // before its own turn with number `here`, each of the others has had as many, or one more
@@ -295,33 +291,48 @@ impl Line<'_> {
         Ok(Some(here + others.sum::<i64>()))
     }
 
-    /// How many of the `jobs` waiting jobs with the priority and owner of `job` are before it; `None` if it does not
-    /// wait. It is counted from the last job that was asked for: for a page of jobs, each row is counted once.
-    fn before(&mut self, job: &Job, jobs: i64) -> Result<Option<i64>> {
+    /// The number of waiting jobs of the group at `place`, which is that of `job`, before `job`; `None` if the job does
+    /// not wait. It is counted from the last job that was asked for: for a page of jobs, each row is counted once.
+    fn before(&mut self, job: &Job, place: usize) -> Result<Option<i64>> {
         /// The number of jobs at the end of the queue that are tried first: a new job is usually among them.
         const NEAR: i64 = 100;
-        let group = (job.priority, job.owner.as_str());
-        let there = "select exists (select 1 from job indexed by job_queue where status = 'queued' and coalesced_into is null
-             and priority = ? and owner = ? and id = ?)";
-        if !self.connection.value(there, (group.0, group.1, job.key))? {
+        /// Counts the jobs of a group from one key to another, at most as many as asked for; with the least and the
+        /// greatest of their keys.
+        const COUNT: &str = "select count(*), min(id), max(id) from (select id from job indexed by job_queue
+             where status = 'queued' and coalesced_into is null and priority = ? and owner = ? and id between ? and ?
+             order by id limit ?)";
+        let Some(group) = self.groups.get_mut(place) else {
+            return Ok(None);
+        };
+        let (connection, key) = (self.connection, job.key);
+        let count = |from: i64, to: i64, most: i64| -> Result<(i64, Option<i64>, Option<i64>)> {
+            let asked = (job.priority, &job.owner, from, to, most);
+            let found = connection.row(COUNT, asked, |row| Ok(row.try_into()?))?;
+            Ok(found.unwrap_or_default())
+        };
+        let (before, waits) = match group.counted {
+            Some((last, before)) if last < key => {
+                let (more, _, greatest) = count(last + 1, key, i64::MAX)?;
+                (before + more, greatest == Some(key))
+            }
+            Some((last, before)) => {
+                let (less, least, _) = count(key, last - 1, i64::MAX)?;
+                (before - less, least == Some(key) || last == key)
+            }
+            None => {
+                let (behind, least, _) = count(key, i64::MAX, NEAR)?;
+                let before = if behind < NEAR {
+                    group.jobs - behind
+                } else {
+                    count(0, key - 1, i64::MAX)?.0
+                };
+                (before, least == Some(key))
+            }
+        };
+        if !waits {
             return Ok(None);
         }
-        let between = |from: i64, to: i64, most: i64| -> Result<i64> {
-            let count = "select count(*) from (select 1 from job indexed by job_queue where status = 'queued'
-                 and coalesced_into is null and priority = ? and owner = ? and id >= ? and id < ? limit ?)";
-            self.connection
-                .value(count, (group.0, group.1, from, to, most))
-        };
-        let known = (group.0, group.1.to_owned());
-        let before = match self.counted.get(&known) {
-            Some(&(key, before)) if key <= job.key => before + between(key, job.key, i64::MAX)?,
-            Some(&(key, before)) => before - between(job.key, key, i64::MAX)?,
-            None => match between(job.key, i64::MAX, NEAR)? {
-                last if last < NEAR => jobs - last,
-                _ => between(0, job.key, i64::MAX)?,
-            },
-        };
-        self.counted.insert(known, (job.key, before));
+        group.counted = Some((key, before));
         Ok(Some(before))
     }
 }
