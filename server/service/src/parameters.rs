@@ -36,6 +36,7 @@ impl<V: Values> Parameter<V> {
     pub fn describe(&self) -> Description {
         Description {
             location: Location::Query,
+            kind: "",
             name: self.name,
             schema: self.values.schema(),
             meaning: self.meaning,
@@ -103,6 +104,7 @@ impl<V: Values> Variable<V> {
     pub fn describe(&self) -> Description {
         Description {
             location: Location::Path,
+            kind: self.kind,
             name: self.name,
             schema: self.values.schema(),
             meaning: self.meaning,
@@ -128,6 +130,8 @@ pub enum Location {
 pub struct Description {
     /// The place of the parameter in the request.
     pub location: Location,
+    /// The kind of thing that a variable of a path names, such as `job`; empty for other parameters.
+    pub kind: &'static str,
     /// The name; a name that ends in `{key}` stands for one parameter for each key.
     pub name: &'static str,
     /// The allowed values, as JSON Schema.

@@ -24,6 +24,7 @@ pub fn describe() -> Vec<Description> {
         let schema = (field.schema)();
         Description {
             location: Location::Query,
+            kind: "",
             name: field.name,
             schema: if field.several {
                 json!({ "type": "array", "items": schema })

@@ -26,6 +26,7 @@ impl Input for FormatOf {
         let names: Vec<&str> = self.0.iter().map(|format| format.name()).collect();
         vec![Description {
             location: Location::Query,
+            kind: "",
             name: FORMAT,
             schema: json!({ "type": "string", "enum": names }),
             meaning: "Format of the data; takes precedence over Accept",

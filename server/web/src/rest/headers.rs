@@ -47,6 +47,7 @@ impl<V: Values> Input for Header<V> {
 pub(super) fn header(name: &'static str, schema: Value, meaning: &'static str) -> Description {
     Description {
         location: Location::Header,
+        kind: "",
         name,
         schema,
         meaning,

@@ -225,11 +225,8 @@ impl Operation {
         if self.body.is_some() {
             codes.push(Code::RequestTimeout);
         }
-        // all that reads jobs, problems or meshes, and all that writes
-        if ["/v1/jobs", "/v1/problems", "/v1/meshes", "/v1/sweeps"]
-            .iter()
-            .any(|path| self.path.starts_with(path))
-        {
+        // what is stored may be damaged, tokens and the queue, too
+        if matches!(self.access, Access::Needs(_)) {
             codes.push(Code::CorruptData);
         }
         if self.errors.contains(&Code::StorageFull) {
@@ -245,8 +242,9 @@ impl Operation {
         if self.parameters.iter().any(in_path) {
             codes.push(Code::NotFound);
         }
-        let by_id = ["/v1/jobs/{id}", "/v1/sweeps/{id}"];
-        if by_id.iter().any(|path| self.path.starts_with(path)) {
+        // their ids are kept for a while after their deletion
+        let is_deletable = |parameter: &Description| ["job", "sweep"].contains(&parameter.kind);
+        if self.parameters.iter().any(is_deletable) {
             codes.push(Code::Deleted);
         }
         let accepts = |media| self.body.iter().flatten().any(|(name, _)| *name == media);
