@@ -226,7 +226,9 @@ fn run_steps<'a>(
         }
     }
     let Some(mut solution) = so_far else {
-        unreachable!("there is at least one step: a problem without steps is one step")
+        unreachable!(
+            "there is at least one load step: `steps_of` gives one for a problem that lists none"
+        )
     };
     // those of the last step are a part of its errors
     let earlier = solution.steps.len().saturating_sub(1);
@@ -339,7 +341,9 @@ pub fn run_to_numbers(
             let followed = load_history.follow(&steps_of(model), observer);
             std::mem::swap(&mut load_history.region, region);
             let Some(finished) = followed else {
-                unreachable!("there is at least one step: a problem without steps is one step")
+                unreachable!(
+                    "there is at least one load step: `steps_of` gives one for a problem that lists none"
+                )
             };
             (finished, load_history.row_count)
         }

@@ -386,7 +386,7 @@ fn angle(built: &mut Built, section: &Section) -> f64 {
                 section.line,
                 got,
                 "*ORIENTATION with two points in the plane of x and y, and a rotation about 3 at most",
-                "Give `orthotropic.angle` in a problem of Signorini.",
+                "Give `orthotropic.angle` of a material in a problem as JSON, with this deck as its mesh.",
             );
             0.0
         }

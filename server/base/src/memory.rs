@@ -148,7 +148,8 @@ pub struct Allowance<'a> {
 }
 
 impl Reservation {
-    /// Frees the bodies that were dropped. Call this before the job begins, on a thread that may block.
+    /// Frees the memory of the prepared bodies that the budget no longer keeps, to make room for this reservation.
+    /// Call this before the job that holds the reservation begins, on a thread that may block.
     pub fn free_dropped(&mut self) {
         self.dropped.clear();
     }

@@ -47,8 +47,8 @@ pub(super) enum Exit {
 }
 
 impl Exit {
-    /// The number that the process exits with. Commands for a store and commands for a running service share some
-    /// numbers.
+    /// The number that the process exits with. Some numbers have two meanings: one for commands that open a store,
+    /// and another for commands that call a running service.
     pub(super) fn code(self) -> u8 {
         match self {
             Exit::Ok => 0,

@@ -146,7 +146,8 @@ fn count_coalesced(change: &mut Change<'_>, primary: i64) -> Result<i64> {
 }
 
 /// Coalesces a job whose turn it is, and the jobs coalesced into it, into a running job of the same input; false if
-/// none is running, or if they are too many. Two such jobs arise where the later one had a higher priority.
+/// none is running, or if they are too many. This happens if the later of two jobs of the same input had the higher
+/// priority: it was not coalesced into the waiting one when it was submitted, and runs first.
 pub(super) fn coalesce_into_running(change: &mut Change<'_>, job: &Job) -> Result<bool> {
     let same = (&job.input_hash, ONLY_RUNNING, &job.owner);
     let primary = change.sql()?.optional_value(PRIMARY, same)?;

@@ -365,7 +365,8 @@ impl Content {
         }
     }
 
-    /// The piece with this number, from 0; it is not compared with anything.
+    /// The piece with this number, counted from 0. It is not verified: the hash is that of the whole content, which
+    /// `read` and `check` compare.
     pub(super) fn piece(&self, connection: &Connection, number: usize) -> Result<Vec<u8>> {
         let body = "select body from content_piece where content = ? and piece = ?";
         // a text, too: only its hash tells whether it is as it was written

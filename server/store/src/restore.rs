@@ -175,8 +175,8 @@ fn put_aside(data: &Path) -> io::Result<PathBuf> {
     Ok(aside)
 }
 
-/// The folder to which a restore that was killed has moved a part of this store, if there is one: no file is in both
-/// folders.
+/// The folder, within the store's folder `data`, to which a killed restore has moved some of the store's files;
+/// `None` if there is none. A folder counts only if none of the files in it is in `data` too.
 fn begun(data: &Path) -> io::Result<Option<PathBuf>> {
     for entry in fs::read_dir(data)? {
         let entry = entry?;

@@ -335,9 +335,9 @@ Ok(())
         if jobs > 0 {
             tracing::warn!(
                 jobs, bytes, %begins,
-                "this store was written by a version that kept everything; at {begins} about {jobs} jobs with {} are removed, and from \
-                 then on what is too old or too much: to keep them, pin them, or set other limits (--retain-days, --retain-bytes \
-                 and others, 0 for none)",
+                "this store was written by a version that kept everything; at {begins} about {jobs} jobs with {} will be removed, \
+                 and from then on all jobs that exceed the limits on age, number and size: to keep jobs, pin them, or set other \
+                 limits (--retain-days, --retain-bytes and others, 0 for none)",
                 size(bytes)
             );
         }

@@ -23,7 +23,7 @@ use super::{
 const PAUSE: Duration = Duration::from_secs(86_400);
 /// How often a table that cannot be read, for lack of memory or of files, is read again.
 const TRIES: u32 = 5;
-/// The time before a table is read again.
+/// The time between two tries to read a table that cannot be read.
 const BEFORE_ANOTHER: Duration = Duration::from_secs(1);
 /// The number of jobs that are read at a time.
 const JOBS_AT_ONCE: i64 = 500;

@@ -59,7 +59,7 @@ impl Checks {
             Obstacle::Circle { radius, .. }
             | Obstacle::Parabola { radius, .. }
             | Obstacle::RoundedFlat { radius, .. } => {
-                let hint = "The obstacle is convex towards the body.";
+                let hint = "The obstacle must be convex towards the body.";
                 all.check(self.require(*radius > 0.0, at("radius"), *radius, lengths, hint));
             }
             Obstacle::Wedge { angle, .. } | Obstacle::Cone { angle, .. } => {
@@ -76,7 +76,7 @@ impl Checks {
                 exponent,
                 ..
             } => {
-                let hint = "The obstacle is convex towards the body.";
+                let hint = "The obstacle must be convex towards the body.";
                 all.check(self.require(
                     *coefficient > 0.0,
                     at("coefficient"),

@@ -97,7 +97,7 @@ impl Checks {
                     Reason::Missing,
                     "nothing",
                     format!("a value for `{name}`"),
-                    "It is optional only in plane stress.",
+                    format!("`{name}` is optional only in plane stress."),
                 ));
             }
         }

@@ -47,7 +47,7 @@ pub struct Solution {
 }
 
 impl Solution {
-    /// Whether every number is finite, also the numbers that are not part of the document.
+    /// Whether every number is finite, also those that are not serialized (`node_profiles` and `friction_profiles`).
     pub fn is_finite(&self) -> bool {
         // all of them by name, here and below, so that a new one is not forgotten
         let Solution {

@@ -29,7 +29,7 @@ pub enum Points {
     All,
     /// At the nodes of the boundary.
     Nodes,
-    /// At the points where friction acts, from which forces and peaks are computed.
+    /// At the points where friction acts; forces and peaks are computed from the values there.
     Friction,
     /// At this number of points, equally spaced in arc length, including the ends.
     Spaced(usize),

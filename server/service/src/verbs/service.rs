@@ -72,7 +72,7 @@ impl Room {
         }
     }
 
-    /// Fails if these bytes alone exceed the limit.
+    /// Fails if `bytes` exceeds the owner's limit of stored bytes even without what the owner already stores.
     pub(super) fn would_hold(&self, bytes: u64) -> Result<(), ApiError> {
         match self.limit {
             Some(limit) if bytes > limit => Err(self.refusal(limit, bytes)),

@@ -78,7 +78,7 @@ impl Checks {
                 return self.report(
                     "/mesh",
                     Reason::TooMany,
-                    format!("{count} parts that are connected at single nodes only, e.g. at node {node} ({x}, {y}), and not each held by itself"),
+                    format!("{count} parts that are connected at single nodes only and not all held (one of their nodes is {node}, at ({x}, {y}))"),
                     format!("at most {MOST_HINGED} such parts in one mechanism, and {MOST_IN_MECHANISMS} in total"),
                     "Elements that share a side (all three nodes of it) form one part: join them along sides, or support each part.",
                 );
