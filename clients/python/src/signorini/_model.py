@@ -20,8 +20,7 @@ from ._parametrised import Parametrised, read_file, scalar
 from ._parts import simple
 from .client import Client
 from .errors import InvalidProblem, SignoriniError, Violation, invalid
-from .job import Job
-from .result import Result
+from .job import Job, Result
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 """The names that a model may have: they stand in the names and labels of jobs."""

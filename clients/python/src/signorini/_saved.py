@@ -66,6 +66,15 @@ def key(call: Call[Any]) -> str:
     return f"{call.method} {call.path}?{urlencode(call.params)}"
 
 
+def write(path: str | os.PathLike[str], content: bytes) -> pathlib.Path:
+    """Writes a file under another name first, so that what has the name is whole."""
+    target = pathlib.Path(path)
+    part = target.with_name(target.name + ".part")
+    part.write_bytes(content)
+    part.replace(target)
+    return target
+
+
 class Saved:
     """What a client is to a job and its result, from a file."""
 

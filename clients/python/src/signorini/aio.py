@@ -27,12 +27,11 @@ from ._job import JobView, changes
 from ._pool import AsyncPool
 from ._progress import Waiting, goes_on
 from ._retry import BROKEN, LOG, Attempts
-from ._saved import AsyncSaved, key, packed, requests
+from ._saved import AsyncSaved, key, packed, requests, write
 from ._sweep import TABLE_S, Member, SweepTable, SweepView
 from .errors import NotFound, SignoriniError
 from .local import LocalServer
 from .problem import Problem
-from .result import write
 
 if TYPE_CHECKING:
     import pandas
