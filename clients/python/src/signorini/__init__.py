@@ -21,21 +21,22 @@ From the ground up:
     errors      what can go wrong
     umbridge    a problem as a function of vectors, also for programs that speak UM-Bridge; imported by itself
 
-Where to look in this package, for those who change it:
+Where to look in this package, for those who change it. Each module uses only those that are named before it; what
+type checkers alone read (TYPE_CHECKING) may also name a type that comes later.
 
-    problem, _parts, _shapes     types of a problem (generated); what is wrong with a value; where its parts lie
-    _calls                       each request, as data
-    _answer, _events             whether an answer is the service's, and whole; the stream of events
-    _retry                       when a request is sent again
-    _pool, _connection           connections, one for each call; address, token and certificates
-    client, job, result, sweep   the blocking client
-    aio                          the same with asyncio
-    _job, _sweep                 what both clients share
-    _data, _saved                numbers with their errors, profiles, histories, fields; a result in a file
-    figures, _style, _about      figures, their look, and the texts in them
-    _html, _progress             what notebooks show; the line of progress
-    local                        a service for as long as a script runs
-    umbridge, _model, _parametrised   the server of UM-Bridge; a problem as a function; its definition, paths of numbers
+    errors, pointer, _extras          what can go wrong; places in a problem; packages that need not be installed
+    _style, _shapes, figures          the look of figures, and texts in them; where the parts of a problem lie; figures
+    _data                             numbers with their errors, profiles, histories, fields
+    _parts, _whole, problem           what is wrong with a value; what a problem can do; its types (generated)
+    mesh, obstacle, examples          from which a problem is made
+    _retry, _answer, _events          when a request is sent again; whether an answer is whole; the stream of events
+    _calls                            each request, as data
+    _connection, _pool, local         address and certificates; connections, one for each call; a service of one's own
+    _progress, _html                  the line of progress; what notebooks show
+    _job, _sweep, _about, _saved      what both clients share; what figures say of a result; a result in a file
+    job, result, sweep, client        the blocking client; `Result` is in job
+    aio                               the same with asyncio
+    _parametrised, _model, umbridge   paths of numbers; a problem as a function; the server of UM-Bridge
 """
 
 from . import errors, examples, figures, mesh, obstacle, problem

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ._data import Summary
+from ._style import parameters
 
 
 def about(result: Summary, problem: Mapping[str, Any], step: int | str | None = None) -> dict[str, Any]:
@@ -43,10 +44,3 @@ def about(result: Summary, problem: Mapping[str, Any], step: int | str | None = 
 def obstacles(problem: Mapping[str, Any]) -> list[str]:
     """The boundaries of contacts with an obstacle: without a condition there is only a friction that is prescribed."""
     return [contact["boundary"] for contact in problem.get("contacts") or [] if contact.get("condition") != "none"]
-
-
-def parameters(contact: Mapping[str, Any]) -> dict[str, float]:
-    """The numbers of the friction law by their symbols; empty without friction."""
-    friction = contact.get("friction") or {}
-    symbols = {"μ": "coefficient", "ρ": "nonlocal_radius", "ε": "elastic_slip"}
-    return {symbol: friction[name] for symbol, name in symbols.items() if friction.get(name) is not None}

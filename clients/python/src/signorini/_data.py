@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from . import figures
 from ._extras import load
 from .errors import Violation
 
@@ -240,8 +241,6 @@ class Profile(Columns):
 
     def plot(self, **options: Any) -> Figure:
         """Draws the stresses along the contact; see `signorini.figures.profile`."""
-        from . import figures
-
         return figures.profile(self, **options)
 
     def _which(self) -> str:
@@ -276,8 +275,6 @@ class History(Columns):
 
     def plot(self, **options: Any) -> Figure:
         """Draws the convergence; see `signorini.figures.convergence`."""
-        from . import figures
-
         return figures.convergence(self, **options)
 
 
@@ -337,8 +334,6 @@ class Fields:
 
     def plot(self, **options: Any) -> Figure:
         """Draws the deformed body; see `signorini.figures.deformed`."""
-        from . import figures
-
         return figures.deformed(self, **options)
 
 

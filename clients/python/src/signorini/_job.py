@@ -6,6 +6,7 @@ import datetime
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from . import _html
 from ._data import Warning
 from ._progress import job_line
 from .errors import JobCanceled, JobFailed
@@ -125,8 +126,6 @@ class JobView:
         return (self.progress or {}).get("residual")
 
     def _card(self, residuals: Sequence[float]) -> str:
-        from . import _html
-
         return _html.job(self, residuals)
 
     def _repr_html_(self) -> str:

@@ -7,15 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from . import problem as p
-from ._data import Fields, Profile
-
-Array = NDArray[Any]
+if TYPE_CHECKING:
+    from . import problem as p
+    from ._data import Array, Fields, Profile
 
 
 def mesh_lines(mesh: p.MeshInput) -> Iterator[Array]:
@@ -139,12 +137,12 @@ def normals(points: Array) -> Array:
 def obstacle(mesh: p.MeshInput, contact: p.Contact) -> Array:
     """The face of the obstacle before it is pushed, as points in space; empty if it is not known here."""
     shape = contact.obstacle
-    if isinstance(shape, p.Polyline):
+    if shape.kind == "polyline":
         return np.asarray(shape.points, float)
     face = boundary(mesh, contact.boundary)
     if len(face) < 2:
         return np.empty((0, 2))
-    if isinstance(shape, p.Line):
+    if shape.kind == "line":
         angle, size = math.radians(shape.angle), np.ptp(face, axis=0).max() / 2
         middle, along = np.asarray(shape.point, float), np.array([math.cos(angle), math.sin(angle)])
         return np.array([middle - size * along, middle + size * along])
@@ -166,23 +164,23 @@ def obstacle(mesh: p.MeshInput, contact: p.Contact) -> Array:
 
 def profile(shape: p.Obstacle, c: Array) -> Array:
     """The distance of an obstacle from the surface before it is pushed; NaN where there is none."""
-    if isinstance(shape, p.Table):
+    if shape.kind == "table":
         x, gap = np.asarray(shape.x, float), np.asarray(shape.gap, float)
         return np.asarray(np.interp(c, x, gap, left=np.nan, right=np.nan))
-    if isinstance(shape, p.Flat):
+    if shape.kind == "flat":
         return np.zeros(len(c))
-    if isinstance(shape, (p.Polyline, p.Line)):
+    if shape.kind == "polyline" or shape.kind == "line":
         raise TypeError("a curve in space has no profile of its own")
     c = c - shape.center
-    if isinstance(shape, p.Circle):
+    if shape.kind == "circle":
         return _circle(np.abs(c), shape.radius)
-    if isinstance(shape, p.Parabola):
+    if shape.kind == "parabola":
         return np.asarray(c**2 / (2 * shape.radius))
-    if isinstance(shape, (p.Wedge, p.Cone)):
+    if shape.kind == "wedge" or shape.kind == "cone":
         return np.asarray(np.abs(c) * math.tan(math.radians(shape.angle)))
-    if isinstance(shape, p.Tilted):
+    if shape.kind == "tilted":
         return np.asarray(shape.slope * c)
-    if isinstance(shape, p.Power):
+    if shape.kind == "power":
         return np.asarray(shape.coefficient * np.abs(c) ** shape.exponent)
     return _circle(np.maximum(np.abs(c) - shape.half_width, 0), shape.radius)
 

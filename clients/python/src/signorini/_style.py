@@ -150,14 +150,21 @@ def settings(theme: Theme, points: float) -> dict[str, Any]:
     }
 
 
+def parameters(contact: Mapping[str, Any]) -> dict[str, float]:
+    """The numbers of the friction law by their symbols; empty without friction."""
+    friction = contact.get("friction") or {}
+    symbols = {"μ": "coefficient", "ρ": "nonlocal_radius", "ε": "elastic_slip"}
+    return {symbol: friction[name] for symbol, name in symbols.items() if friction.get(name) is not None}
+
+
 def subtitle(about: Mapping[str, Any], boundary: str | None = None) -> str:
     """The parameters by which the figures of a study differ; of one contact or, on a line for each, of all of them."""
-    parameters = about.get("parameters") or {}
-    shown = {name: found for name, found in parameters.items() if boundary in (None, "", name)}
+    contacts = about.get("parameters") or {}
+    shown = {name: found for name, found in contacts.items() if boundary in (None, "", name)}
     parts = []
     for name, found in shown.items():
         text = "   ".join(f"{SYMBOLS[symbol]} = {value:.4g}" for symbol, value in found.items()) or "no friction"
-        parts.append(f"{name}:  {text}" if len(parameters) > 1 else text)
+        parts.append(f"{name}:  {text}" if len(contacts) > 1 else text)
     if about.get("step") is not None:
         parts[-1:] = ["      ".join([*parts[-1:], f"load step {about['step']}"])]
     return "\n".join(parts)

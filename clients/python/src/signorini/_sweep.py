@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from . import _html, figures
 from . import pointer as pointers
 from ._data import Array
 from ._extras import load
@@ -89,8 +90,6 @@ class SweepView:
         return self._repr_html_()
 
     def _repr_html_(self) -> str:
-        from . import _html
-
         return _html.sweep(self)
 
 
@@ -144,8 +143,6 @@ class SweepTable:
 
     def plot(self, quantity: str, **options: Any) -> Figure:
         """Draws a column over the parameters; see `signorini.figures.sweep`."""
-        from . import figures
-
         return figures.sweep(self, quantity, **options)
 
     def notes(self) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, cast
 
+from . import figures
 from ._parts import Part
 
 if TYPE_CHECKING:
@@ -23,6 +24,4 @@ class WholeProblem(Part):
 
     def plot(self, **options: Any) -> Figure:
         """Draws mesh, supports, loads and obstacles; see `signorini.figures.problem`."""
-        from . import figures
-
         return figures.problem(cast("Problem", self), **options)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import httpx
 
 from . import _calls as calls
+from . import _html
 from ._about import about, obstacles
 from ._answer import check_events
 from ._calls import Call, MeshSource, Submission
@@ -403,8 +404,6 @@ class AsyncResult(Summary):
         return about(self, self._problem, step)
 
     def _repr_html_(self) -> str:
-        from . import _html
-
         return _html.result(self)
 
 

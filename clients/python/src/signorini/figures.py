@@ -25,13 +25,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _shapes as shapes
-from ._data import Array, Fields, History, Profile
-from ._style import PARAMETERS, QUANTITIES, Theme, panels, style, subtitle, unit
-from ._sweep import SweepTable
-from .problem import Problem
+from ._style import PARAMETERS, QUANTITIES, Theme, panels, parameters, style, subtitle, unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from ._data import Array, Fields, History, Profile
+    from ._sweep import SweepTable
+    from .problem import Problem
 
 __all__ = ["convergence", "deformed", "problem", "profile", "sweep"]
 
@@ -402,8 +403,6 @@ def problem(
         unique = dict(zip(labels, handles, strict=True))
         outside = {} if ax is not None else {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}
         axes.legend(unique.values(), unique.keys(), ncols=1, **outside)
-        from ._about import parameters
-
         friction = {contact.boundary: parameters(contact.to_dict(defaults=True)) for contact in found.contacts}
         about = {"title": found.title or "", "parameters": friction}
         if ax is not None:
