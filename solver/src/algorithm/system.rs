@@ -754,7 +754,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// The force, > 0, by which [`System::kkt_residual`] divides.
+    /// The force, > 0, by which the KKT residual divides.
     pub fn force_scale(&self, state: &State, reactions: &[f64], bound: &[f64]) -> f64 {
         let mut friction = vec![0.0; state.v.len()];
         self.add_traction_force(&self.tractions(&state.v, bound), &mut friction);
