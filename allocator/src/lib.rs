@@ -27,18 +27,24 @@ thread_local! {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Counting;
 
-/// Sets, from now on, what glibc gives back to the system when it is freed: every allocation of 128 KiB and more at once,
-/// and of smaller ones what lies at the end of an arena, once that is 2 MiB.
-///
-/// Without the first, glibc raises that limit by itself, up to 32 MiB, when an allocation of that size is freed: the memory
-/// of a hundred responses or a large mesh then stays with the process, in pieces. It costs no measurable time in a
-/// solution. Without the second, whose limit is 128 KiB otherwise, memory goes back and forth with every few requests,
-/// which costs a service a fifth of the submissions that it takes in a second.
+/// Makes memory of 128 KiB and more go back to the system as soon as it is freed, from now on. Otherwise glibc raises
+/// this limit by itself, up to 32 MiB, when an allocation of that size is freed: the memory of a hundred responses or a
+/// large mesh then stays with the process, in pieces. It costs no measurable time in a solution.
 pub fn give_back_large_memory() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    // SAFETY: it only sets a parameter of malloc, whatever the other threads do
+    unsafe {
+        libc::mallopt(libc::M_MMAP_THRESHOLD, 128 << 10);
+    }
+}
+
+/// Lets the process keep up to 2 MiB of freed memory at the end of each arena, from now on. Otherwise glibc gives it back
+/// to the system from 128 KiB on: in a service, memory then goes back and forth with every few requests, which costs a
+/// fifth of the submissions that it takes in a second. A command that runs once has no use for it.
+pub fn keep_freed_memory() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     // SAFETY: it only sets parameters of malloc, whatever the other threads do
     unsafe {
-        libc::mallopt(libc::M_MMAP_THRESHOLD, 128 << 10);
         libc::mallopt(libc::M_TRIM_THRESHOLD, 2 << 20);
         libc::mallopt(libc::M_TOP_PAD, 512 << 10);
     }

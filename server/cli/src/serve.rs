@@ -15,6 +15,7 @@ use super::{exit::Exit, log, notify, settings};
 
 /// Runs the service until SIGTERM or SIGINT. `lost` counts the lines of the log that were lost.
 pub(super) async fn run(config: &Config, lost: ErrorCounter) -> anyhow::Result<Exit> {
+    allocator::keep_freed_memory();
     // Installed first, so that no signal arrives before its handler.
     let hangup = signal(SignalKind::hangup()).context("SIGHUP cannot be caught")?;
     survive(
