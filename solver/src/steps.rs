@@ -6,8 +6,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::accuracy::{self, Increments, Solved};
 use crate::algorithm::{
-    self, Averages, EndForces, Extent, Finished, Place, Quantity, Region, Reported, Rounding,
-    System, follow_neighbour, report, run_reduced,
+    self, AlongContacts, Averages, EndForces, Extent, Finished, Place, Quantity, Region, Reported,
+    Rounding, System, follow_neighbour, report, run_reduced,
 };
 use crate::body::ElasticBody;
 use crate::error::SolveError;
@@ -193,34 +193,15 @@ fn run_steps<'a>(
         }
         summary.increments = load_history.increments;
         summary.cut_backs = load_history.cut_backs;
-        summary.iterations = rows.len() as u32;
-        let (mut history, mut ends) = match so_far.take() {
-            Some(solution) => (solution.history, solution.steps),
-            None => (Vec::new(), Vec::new()),
-        };
-        history.extend(rows.iter().cloned());
-        ends.push(StepSolution {
-            name: step.name.clone().unwrap_or_else(|| number.to_string()),
-            summary: Summary {
-                accuracy: None,
-                ..summary.clone()
-            },
-            history: rows,
-            profiles: reported.along.profiles.clone(),
-            node_profiles: reported.along.node_profiles.clone(),
-            friction_profiles: reported.along.friction_profiles.clone(),
-        });
-        summary.iterations = history.len() as u32;
         fields = reported.fields;
-        so_far = Some(Solution {
+        let name = step.name.clone().unwrap_or_else(|| number.to_string());
+        so_far = Some(with_step(
+            so_far.take(),
+            name,
             summary,
-            history,
-            profiles: reported.along.profiles,
-            node_profiles: reported.along.node_profiles,
-            friction_profiles: reported.along.friction_profiles,
-            steps: ends,
-            fields: Fields::default(),
-        });
+            rows,
+            reported.along,
+        ));
         if !can_continue(outcome) {
             break;
         }
@@ -249,6 +230,44 @@ fn run_steps<'a>(
     }
     solution.fields = fields;
     Ok((solution, load_history))
+}
+
+/// The solution of the load steps `so_far` and of one more, which ended with `summary` after the iterations `rows`; `along` has
+/// its profiles. Fields of nodes and elements are left empty: those of the last step are added at the end.
+fn with_step(
+    so_far: Option<Solution>,
+    name: String,
+    mut summary: Summary,
+    rows: Vec<Iteration>,
+    along: AlongContacts,
+) -> Solution {
+    let (mut history, mut steps) = match so_far {
+        Some(solution) => (solution.history, solution.steps),
+        None => (Vec::new(), Vec::new()),
+    };
+    summary.iterations = rows.len() as u32;
+    history.extend(rows.iter().cloned());
+    steps.push(StepSolution {
+        name,
+        summary: Summary {
+            accuracy: None,
+            ..summary.clone()
+        },
+        history: rows,
+        profiles: along.profiles.clone(),
+        node_profiles: along.node_profiles.clone(),
+        friction_profiles: along.friction_profiles.clone(),
+    });
+    summary.iterations = history.len() as u32;
+    Solution {
+        summary,
+        history,
+        profiles: along.profiles,
+        node_profiles: along.node_profiles,
+        friction_profiles: along.friction_profiles,
+        steps,
+        fields: Fields::default(),
+    }
 }
 
 /// Data that problems on one body share.
