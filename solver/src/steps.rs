@@ -305,7 +305,8 @@ pub struct Numbers {
     pub finished: Finished,
     /// The scalars by the names of the contacts.
     pub contacts: BTreeMap<String, ContactSummary>,
-    /// The number of rows of the history, or of iterations from a neighbour.
+    /// The number of iterations: those of the history or, if the solution began at that of a similar problem, those since
+    /// this beginning.
     pub iterations: u32,
     /// What to consider before relying on the numbers.
     pub warnings: Vec<Warning>,

@@ -221,12 +221,12 @@ fn a_body_pushed_beyond_its_friction_is_said_to_slide_away() {
             assert_eq!(slides.outcome, Outcome::NotConverged, "{friction}, {part}");
             let message = told(&slides.warnings, WarningCode::SlidesAway);
             let push: f64 = format!("{:.5e}", part * limit).parse().unwrap();
-            let push = format!("with {push:?} along x");
+            let push = format!("with a force of {push:?} along x");
             says(
                 message,
                 &[
                     &push,
-                    "only friction holds",
+                    "Only friction resists",
                     "there is no equilibrium",
                     "Support the body",
                 ],
@@ -275,7 +275,7 @@ fn friction_is_checked_where_equilibrium_does_not_decide() {
     let pressed = json!([{"boundary": "top", "uy": -0.01}]);
     let slides = pushed(100.0, coulomb.clone(), pressed.clone()).summary;
     let message = told(&slides.warnings, WarningCode::SlidesAway);
-    says(message, &["with 100.0 along x", "at the computed pressure"]);
+    says(message, &["with a force of 100.0 along x", "at the computed pressure"]);
     assert_eq!(
         pushed(2.0, coulomb.clone(), pressed).summary.outcome,
         Outcome::Converged
@@ -296,7 +296,7 @@ fn friction_is_checked_where_equilibrium_does_not_decide() {
     assert_ne!(slides.outcome, Outcome::Converged);
     // π r² times the traction
     let message = told(&slides.warnings, WarningCode::SlidesAway);
-    says(message, &["with 157.08 along the axis"]);
+    says(message, &["with a force of 157.08 along the axis"]);
 
     let walled = |gap: f64| {
         let lines: Vec<f64> = (0..=8).map(|k| 0.25 * f64::from(k)).collect();

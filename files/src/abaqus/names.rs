@@ -29,7 +29,7 @@ pub(super) struct Names<'a> {
 }
 
 impl Names<'_> {
-    /// The name in the mesh of a set or surface of a scope.
+    /// The name that a set or surface of a scope gets in the mesh: `instance.name`, or `name` alone.
     pub(super) fn full(&self, scope: usize, name: &str) -> String {
         match &self.scopes[scope].name {
             None => name.to_owned(),

@@ -1,4 +1,4 @@
-//! The parts of a list or an object in a JSON text, without parsing them.
+//! The members of an object in a JSON text, whose values are not parsed.
 
 use std::{borrow::Cow, fmt};
 

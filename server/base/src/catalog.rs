@@ -212,7 +212,7 @@ catalog! {
     RangeNotSatisfiable: of_request("The range lies outside the data", 416, Grpc::OutOfRange, None,
         "The range starts beyond the end of the data. The Content-Range header of this response gives the length."),
     InvalidProblem: of_request("The problem or its request is invalid", 422, Grpc::InvalidArgument, None,
-        "The problem, or the request that contains it, has violations. `errors` lists all of them: where (a JSON Pointer), what was found, what is expected and what to do. The schema is at /v1/schema/problem.json."),
+        "The problem, or the request that contains it, has violations. `errors` lists them, at most 100: where (a JSON Pointer), what was found, what is expected and what to do. The schema is at /v1/schema/problem.json."),
     IdempotencyKeyReuse: of_request("The key was used for another request", 422, Grpc::AlreadyExists, None,
         "This Idempotency-Key (request_id) was used before with another payload. A key belongs to one request; use a new one."),
     QuotaExceeded: of_request("The owner's share is used up", 429, Grpc::ResourceExhausted, Some(10),

@@ -25,22 +25,21 @@ pub enum Point {
     MeshRead,
     /// The job's problem is read; it has one load level.
     Parsed,
-    // A phase of the solver begins.
-    /// The mesh is made.
+    /// The phase begins in which the mesh is made.
     Meshing,
-    /// The stiffness is assembled.
+    /// The phase begins in which the stiffness is assembled.
     Assembling,
-    /// The unknowns of the stiffness are ordered.
+    /// The phase begins in which the unknowns are ordered.
     Ordering,
-    /// The stiffness is factored.
+    /// The phase begins in which the stiffness is factored.
     Factoring,
-    /// The stiffness is condensed to the contact boundary.
+    /// The phase begins in which the stiffness is condensed to the contact boundary.
     Condensing,
     /// The iterations begin.
     Iterating,
-    /// Displacements and stresses are recovered.
+    /// The phase begins in which displacements and stresses are recovered.
     Recovering,
-    /// The result is compared with that of a finer mesh.
+    /// The phase begins in which the result is compared with that of a finer mesh.
     Verifying,
     /// The job has events that are not stored.
     EventsReported,

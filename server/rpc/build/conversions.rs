@@ -162,7 +162,7 @@ fn by_places(mirror: &Mirror, fields: &[Field]) -> Bodies {
     Bodies { read, write }
 }
 
-/// The bodies for a type that is the only field of its message.
+/// The bodies of the conversions for a type that holds what the only field of its message holds.
 fn by_content(mirror: &Mirror, fields: &[Field]) -> Bodies {
     let name = mirror.message;
     let content = fields.iter().map(Field::theirs).collect::<String>();

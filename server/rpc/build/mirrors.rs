@@ -21,7 +21,7 @@ pub(crate) struct Mirror {
     pub renamed: Option<(&'static str, &'static str)>,
     /// Fields of our type that are not fields of the message: the patterns that match them.
     pub ours: &'static [&'static str],
-    /// Fields of the message that our type does not have: their values in a literal.
+    /// Fields of the message that our type does not have, each as `name: value` for the expression that builds the message.
     pub theirs: &'static [&'static str],
 }
 

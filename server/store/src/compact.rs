@@ -38,8 +38,8 @@ pub(super) fn enable_giving_back(connection: &Connection, folder: &Path) -> Resu
     if let Err(cause) = rebuilt {
         tracing::warn!(
             %cause,
-            "the database is of an earlier version, and could not be rebuilt so that it returns space to the file system, for \
-             which it needs {} of space and no other reader; this is tried again at the next start: {cause}",
+            "the database is of an earlier version and could not be rebuilt to return free space to the file system: {cause}. \
+             Rebuilding it needs {} of free space, and no other process may read it; it is tried again at the next start",
             size(bytes.saturating_mul(2))
         );
     }

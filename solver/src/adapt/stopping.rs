@@ -64,7 +64,7 @@ impl StopReason {
             }
             StopReason::Meshes => "more meshes are not allowed".to_owned(),
             StopReason::Stalled => {
-                format!("the last {PATIENCE} meshes hardly reduced the error, so refinement stopped")
+                format!("the last {PATIENCE} meshes hardly reduced the error")
             }
             StopReason::Unknown => "the linearised problem has no unique solution, or the obstacle between the nodes is still not resolved".to_owned(),
             StopReason::Inverted => {
@@ -101,8 +101,8 @@ pub(super) fn given_up(sequence: &[Refinement], tolerance: f64) -> Option<StopRe
     (errors.len() >= FEWEST_MESHES && before.is_finite() && hopeless).then_some(StopReason::Stalled)
 }
 
-/// The warning that names what keeps the tolerance from being met, or a quantity that has no limit; `None` if there is
-/// nothing to warn of.
+/// The warning that says why the tolerance is not met, or which quantity grows without bound as the mesh is refined;
+/// `None` if there is nothing to warn of.
 pub(super) fn unfinished(
     problem: &Problem,
     goal: &AdaptiveRefine,
@@ -122,7 +122,7 @@ pub(super) fn unfinished(
         above.retain(|q| relative_error(q) > goal.tolerance);
         above.sort_by(|a, b| relative_error(b).total_cmp(&relative_error(a)));
         sentences.push(format!(
-            "After {} {}; the tolerance is {}: {why}.",
+            "Refinement ended after {} ({why}): {}, and the tolerance is {}.",
             match sequence.len() {
                 1 => "one mesh".to_owned(),
                 count => format!("{count} meshes"),
@@ -142,7 +142,7 @@ pub(super) fn unfinished(
     let mut quantities = accuracy.quantities.iter();
     if let Some(q) = quantities.find(|q| q.method == ErrorMethod::NoLimit) {
         sentences.push(format!(
-            "{} has no limit: it grows with every finer mesh at an edge, a tip or a kink of the obstacle, so the tolerance does not apply to it. Forces converge, and so does the averaged pressure.",
+            "{} is unbounded: it grows with every finer mesh at an edge, a tip or a kink of the obstacle, so the tolerance does not apply to it. Forces converge, and so does the averaged pressure.",
             name(q)
         ));
     }
@@ -167,7 +167,11 @@ fn remaining(above: &[&EstimatedQuantity], truncation: f64) -> String {
     };
     let others = match above.len() {
         1 => String::new(),
-        count => format!(" (and {} more)", count - 1),
+        2 => " (another quantity is above the tolerance too)".to_owned(),
+        count => format!(
+            " ({} other quantities are above the tolerance too)",
+            count - 1
+        ),
     };
     format!("the error of {} is {error}{others}", name(worst))
 }

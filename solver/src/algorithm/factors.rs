@@ -20,8 +20,8 @@ pub(super) fn free_dofs(system: &System<'_>, held: impl Fn(usize) -> bool) -> Ve
     free
 }
 
-/// The number that is added to the diagonal of H if Ŝ leaves rigid motions free: a step along such a motion is then
-/// long but finite, until contact ends it. If contact holds the body, the shift costs a step or two but no accuracy,
+/// The number that is added to the diagonal of H if Ŝ leaves rigid motions free. It keeps Newton's steps along such a
+/// motion finite, though long, until contact stops the motion. After that the shift costs a step or two but no accuracy,
 /// since the gradient does not depend on it.
 pub(super) fn semidefinite_shift(system: &System<'_>) -> f64 {
     let size = system.stiffness.size().max(1);

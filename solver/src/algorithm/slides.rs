@@ -35,8 +35,8 @@ impl Slide {
     /// The message for users: the cause, both forces or moments, and what to do.
     pub(super) fn message(&self) -> String {
         let (kind, arm) = match self.motion.arm {
-            None => ("", 1.0),
-            Some(arm) => ("a moment of ", arm),
+            None => ("a force of", 1.0),
+            Some(arm) => ("a moment of", arm),
         };
         let [push, hold] = [self.push.abs(), self.hold].map(|f| rounded(arm * f));
         let verb = match self.motion.arm {
@@ -52,7 +52,7 @@ impl Slide {
             )
         };
         format!(
-            "The loads {verb} the body with {kind}{push:?} {words}, where only friction holds it, and friction can resist {most}. Support the body against this motion, or {verb} it less."
+            "The loads {verb} the body with {kind} {push:?} {words}. Only friction resists this motion, and it can resist {most}. Support the body against this motion, or {verb} it less."
         )
     }
 }

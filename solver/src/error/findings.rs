@@ -130,7 +130,8 @@ impl Findings {
         *count <= self.most_of_a_kind
     }
 
-    /// The listed violations; their last hints give the numbers of violations that are not listed.
+    /// The listed violations. The hint of the last one of each reason, and of the last of all, says how many more there
+    /// are that are not listed.
     pub fn into_violations(mut self) -> Vec<Violation> {
         for (reason, count) in self.of_a_kind {
             let more = count.saturating_sub(self.most_of_a_kind);

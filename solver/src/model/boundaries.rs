@@ -104,8 +104,8 @@ impl Checks {
         ))
     }
 
-    /// Checks adaptive refinement, which needs a tolerance, a mesh to start with, and a contact whose results it
-    /// follows.
+    /// Checks that adaptive refinement has a tolerance within its limits, a first mesh that is not too large, and a
+    /// contact, whose errors it reduces.
     fn adaptive(&mut self, goal: &AdaptiveRefine, elements: usize, contacts: usize) -> Checked {
         let mut all = AllChecks::default();
         all.check(self.require(

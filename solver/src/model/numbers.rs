@@ -285,7 +285,7 @@ impl Checks {
             "/solver/thesis/local_points",
             f64::from(options.local_points),
             "0 … 100",
-            "0 averages nodal values independently of the mesh.",
+            "The number of Gauss points in the part of each element that the kernel covers; 0 averages the quadratic pressure between the nodes by a rule that does not depend on the elements.",
         ));
         if options.local_points > 0 && options.pressure == ThesisPressure::Lumped {
             all.fail(self.report(

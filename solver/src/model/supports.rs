@@ -347,7 +347,7 @@ impl Checks {
                 pointer,
                 Reason::TurnsCorner,
                 format!("a boundary that turns by more than 45° at ({x}, {y})"),
-                "a boundary without corners, where the normal is not defined",
+                "a boundary without corners (at a corner the normal is not defined)",
                 "Give each side a support of its own, with names under /mesh/boundaries.",
             ));
         }

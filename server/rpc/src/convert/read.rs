@@ -8,7 +8,7 @@ use solver::error::{Findings, Reason, Violation, escape};
 /// A type that can be read from a message, or from a field of a message.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not read from `{M}`",
-    note = "a field of a message and the field of its name in our struct have types that do not fit",
+    note = "a field of a message and the field of our struct with the same name have types between which there is no conversion",
     note = "`server/rpc/build/mirrors.rs` lists what is converted field by field, `server/rpc/src/convert` has the rest"
 )]
 pub trait FromMessage<M>: Sized {

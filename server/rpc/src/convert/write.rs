@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 /// A type that can be converted to a message, or to a field of a message.
 #[diagnostic::on_unimplemented(
     message = "`{M}` is not written from `{Self}`",
-    note = "a field of our struct and the field of its name in the message have types that do not fit",
+    note = "a field of our struct and the field of the message with the same name have types between which there is no conversion",
     note = "`server/rpc/build/mirrors.rs` lists what is converted field by field, `server/rpc/src/convert` has the rest"
 )]
 pub trait IntoMessage<M> {

@@ -47,7 +47,8 @@ pub(super) fn read_mesh(body: &[u8]) -> Result<Mesh, NoSolution> {
         .map_err(|error| NoSolution::Internal(format!("a stored mesh cannot be read: {error}")))
 }
 
-/// Reads the members of a sweep that a job still has to solve. Call this on a blocking thread.
+/// Reads the members of a sweep that belong to the job with this key, and which of them are not solved yet. Call this on a
+/// blocking thread.
 pub(super) fn members_of(store: &Arc<Store>, key: i64) -> Result<MembersTask, NoSolution> {
     let failed = |cause: String| NoSolution::Internal(format!("the members of the job: {cause}"));
     let task = tokio::runtime::Handle::current().block_on(store.members_task(key));

@@ -33,8 +33,8 @@ pub(super) struct Prepared {
     problem: Result<(Problem, String), Vec<Violation>>,
     violations: Findings,
     pub(super) id: Option<JobId>,
-    /// The fingerprint of everything that was submitted. Empty if the problem cannot be read: the job is then refused
-    /// before fingerprints are compared.
+    /// The fingerprint of everything that was submitted; empty if the problem cannot be read. Such a job is always
+    /// refused, and its own fingerprint is not compared.
     pub(super) payload: String,
 }
 

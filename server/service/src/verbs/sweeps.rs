@@ -602,7 +602,7 @@ async fn with_parameters(
     service.work_on(load, add).await?
 }
 
-/// Asks all jobs of a sweep to stop; finished rows of members are kept.
+/// Asks all jobs of a sweep to stop; the results of members that are solved already are kept.
 pub fn cancel<'a>(
     service: &'a Arc<Service>,
     caller: &'a Caller,

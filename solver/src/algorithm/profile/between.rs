@@ -1,5 +1,5 @@
-//! What the nodes of a contact do not see: an obstacle that reaches into the body between nodes or recedes from it; and
-//! kinks of the obstacle and corners of the body, where the pressure has no limit.
+//! Finds where an obstacle reaches into the body or recedes from it between nodes, and kinks of the obstacle and corners
+//! of the body, where the pressure is unbounded.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{LN_2, PI};
@@ -338,10 +338,10 @@ impl PatchView<'_> {
         };
         let message = match turn {
             0.0 => format!(
-                "The obstacle has a kink in the contact, at s = {s:.4}{mirrored}: {size}{count}. The pressure has no limit at a kink: {growth}. If the kinks only come from the points of a table or a polyline, choose \"interpolation\": \"cubic\", with `smoothing` if they were measured; else round the edge.{symmetric}"
+                "The obstacle has a kink in the contact, at s = {s:.4}{mirrored}: {size}{count}. The pressure is unbounded at a kink: {growth}. If the kinks only come from the points of a table or a polyline, choose \"interpolation\": \"cubic\", with `smoothing` if they were measured; else round the edge.{symmetric}"
             ),
             _ => format!(
-                "The body has a corner in the contact, at s = {s:.4}: {size}{count}. The pressure has no limit at a corner: {growth}; and friction changes from side to side. If the corners only come from straight sides of elements on a curve, mesh it with elements of second order, or name the curve under /mesh/curves; else round the corner."
+                "The body has a corner in the contact, at s = {s:.4}: {size}{count}. The pressure is unbounded at a corner: {growth}. Friction differs between its two sides. If the corners only come from straight sides of elements on a curve, mesh it with elements of second order, or name the curve under /mesh/curves; else round the corner."
             ),
         };
         warnings.push(Warning {

@@ -53,7 +53,7 @@ impl PatchView<'_> {
             code: WarningCode::MaterialJunction,
             pointer: self.patch.contact.pointer.clone(),
             message: format!(
-                "Materials meet in the contact, at s = {s:.4}: the pressure has no limit there, and grows {how}. Each halving of the mesh adds about {growth:.3e}, {:.1} % of the peak. Forces converge, and σ_t does for nonlocal_radius > 0.",
+                "Materials meet in the contact, at s = {s:.4}: the pressure is unbounded there, and grows {how}. Each halving of the mesh adds about {growth:.3e}, {:.1} % of the peak. Forces converge, and σ_t does for nonlocal_radius > 0.",
                 100.0 * growth / peak
             ),
         });

@@ -360,8 +360,8 @@ impl PatchView<'_> {
         friction.is_some_and(|law| law.bound.radius() == Some(0.0))
     }
 
-    /// The ends of contact and of stick, as quantities. An end of contact lies between two nodes; an end of stick moves
-    /// with the slip there.
+    /// The ends of contact and of stick, as quantities. An end of contact is known only to the distance between nodes; an
+    /// end of stick is where the slip equals ±ε, so that its error follows from that of the slip at this place.
     fn ends(&self) -> Vec<Quantity> {
         let ends = self.ends_of_contact().into_iter();
         let quantity = |end: EndOfContact| Quantity {

@@ -241,7 +241,7 @@ impl PatchView<'_> {
         if across == 0 {
             "The error of its peak is unknown.".to_owned()
         } else if ends.any(|i| self.active(i) && self.may_be_sharp(i)) {
-            "At the obstacle's end its peak has no limit.".to_owned()
+            "At the end of the obstacle the pressure is unbounded: its peak grows with every finer mesh.".to_owned()
         } else {
             let off = 100.0 * SMOOTH_PEAK / (across * across) as f64;
             format!("The peak of a smooth pressure is then wrong by up to {off:.1} %.")

@@ -77,7 +77,7 @@ pub(super) fn operations() -> Vec<Operation> {
             .fails(&[Code::InvalidProblem, Code::StaleVersion, Code::StorageFull]),
         post(CANCEL, "/v1/jobs/{id}/cancel", (ID,), cancel_job)
             .rpcs(&["CancelJob"])
-            .summary("Asks a job to stop, which ends within half a second")
+            .summary("Asks a job to stop; it ends within half a second")
             .answers(200, "The effect, and the job", json::<Canceled>())
             .with([etag()])
             .fails(&[Code::StorageFull]),
