@@ -275,7 +275,10 @@ fn friction_is_checked_where_equilibrium_does_not_decide() {
     let pressed = json!([{"boundary": "top", "uy": -0.01}]);
     let slides = pushed(100.0, coulomb.clone(), pressed.clone()).summary;
     let message = told(&slides.warnings, WarningCode::SlidesAway);
-    says(message, &["with a force of 100.0 along x", "at the computed pressure"]);
+    says(
+        message,
+        &["with a force of 100.0 along x", "at the computed pressure"],
+    );
     assert_eq!(
         pushed(2.0, coulomb.clone(), pressed).summary.outcome,
         Outcome::Converged

@@ -16,6 +16,16 @@ pub(super) fn shape(kernel: Kernel, t: f64) -> f64 {
     }
 }
 
+/// The total variation of the slope ω′(t) on the whole line, rounded up.
+pub(super) fn total_variation_of_slope(kernel: Kernel) -> f64 {
+    match kernel {
+        // from 0 to its largest value 0.7984…, to the opposite value and back
+        Kernel::Bump => 3.194,
+        // from 0 to 2 at the start of the kernel, to −2 and back to 0 at its end
+        Kernel::Parabola => 8.0,
+    }
+}
+
 /// ∫ ω(t) tᵏ dt from −1 to x, for k = 0, 1, 2; −1 ≤ x ≤ 1. The error for the bump is 10⁻¹⁵.
 #[rustfmt::skip]
 pub(super) fn moments_up_to(kernel: Kernel, x: f64) -> [f64; 3] {

@@ -6,6 +6,7 @@ use super::{Highest, PatchView};
 use crate::contact::edge_nodes;
 use crate::element::edge3;
 use crate::element::gauss::GAUSS_3;
+use crate::friction::BoundLaw;
 use crate::problem::Condition;
 use crate::solution::{ContactSummary, Peak};
 
@@ -203,6 +204,12 @@ impl PatchView<'_> {
 
     /// The tangential stress σ_t that is largest in size, and its place; none without friction.
     pub(super) fn highest_traction(&self) -> Option<Highest> {
+        *self
+            .highest_traction
+            .get_or_init(|| self.find_highest_traction())
+    }
+
+    fn find_highest_traction(&self) -> Option<Highest> {
         if self.patch.law.is_none() && self.tractions.is_none() {
             return None;
         }
@@ -216,7 +223,7 @@ impl PatchView<'_> {
         let edges = if rubbed.is_empty() {
             edges.rev().take(1).collect()
         } else {
-            rubbed
+            self.edges_with_highest(rubbed, 1.0 - EQUAL)
         };
         for edge in edges {
             let stress = |xi: f64| self.tangential_stress_at(edge, xi);
@@ -259,6 +266,57 @@ impl PatchView<'_> {
         let (_, xi) = places.fold((size(centre), centre), larger);
         let value = self.tangential_stress_at(edge, xi);
         Some(Highest { value, edge, xi })
+    }
+}
+
+/// A parabola through three values at the start, the middle and the end of an edge is nowhere on the edge larger in size
+/// than this many times the largest of them.
+const BETWEEN: f64 = 1.25;
+
+impl PatchView<'_> {
+    /// Those of some edges on which |σ_t| may reach the part `part` of its largest value at a node of them. On an edge much
+    /// shorter than ρ the averaged pressure is nearly linear, so that its values at the nodes bound it: few edges are left
+    /// on which it must be computed at many places.
+    fn edges_with_highest(&self, mut edges: Vec<usize>, part: f64) -> Vec<usize> {
+        let (None, Some(law)) = (&self.tractions, &self.patch.law) else {
+            return edges;
+        };
+        let BoundLaw::Pressure { average, .. } = &law.bound else {
+            return edges;
+        };
+        let pressures = self.own_pressures().iter();
+        let most = BETWEEN * pressures.fold(0.0, |most, p| p.abs().max(most));
+        let curvature = average.curvature_bound(most);
+        if !curvature.is_finite() {
+            return edges;
+        }
+        let at_nodes = self.averaged_and_bound_at_nodes();
+        let (mut largest_at_node, mut bounds) = (0.0f64, Vec::with_capacity(edges.len()));
+        for &edge in &edges {
+            let nodes = edge_nodes(edge).map(|i| at_nodes[i]);
+            let slips = [-1.0, 1.0, 0.0].map(|xi| self.slip_at(edge, xi));
+            let stresses = nodes
+                .iter()
+                .zip(slips)
+                .map(|((_, bound), slip)| bound * law.phi(slip));
+            largest_at_node = stresses.fold(largest_at_node, |most, stress| stress.abs().max(most));
+            let [start, end, middle] = self.patch.contact.boundary.edge_arc(edge);
+            let spacing = (middle - start).max(end - middle);
+            let averaged = nodes.iter().fold(0.0, |most: f64, node| node.0.max(most))
+                + 0.125 * curvature * spacing * spacing;
+            let slip = BETWEEN
+                * slips
+                    .iter()
+                    .fold(0.0, |most: f64, slip| slip.abs().max(most));
+            bounds.push(law.bound.of_average(averaged, self.largest) * law.phi(slip));
+        }
+        let mut bounds = bounds.into_iter();
+        edges.retain(|_| {
+            bounds
+                .next()
+                .is_none_or(|bound| bound >= part * largest_at_node)
+        });
+        edges
     }
 }
 

@@ -53,6 +53,10 @@ pub(super) struct PatchView<'a> {
     worst_junction: OnceCell<Option<Junction>>,
     /// The gaps of an obstacle that is pushed along a direction, computed when first needed.
     displaced_gaps: OnceCell<DisplacedGaps>,
+    /// The averaged pressure and the friction bound at the nodes, computed when first needed.
+    at_nodes: OnceCell<Vec<(f64, f64)>>,
+    /// The largest tangential stress in size, found when first needed.
+    highest_traction: OnceCell<Option<Highest>>,
     /// The places between nodes where a node is needed, found when first needed.
     missed: OnceCell<Vec<Missed>>,
     /// A function that is told the work done (multiplications). If it returns false, the results will not be used, and
@@ -169,6 +173,8 @@ impl<'a> PatchView<'a> {
             anchors: Vec::new(),
             worst_junction: OnceCell::new(),
             displaced_gaps: OnceCell::new(),
+            at_nodes: OnceCell::new(),
+            highest_traction: OnceCell::new(),
             missed: OnceCell::new(),
             go_on,
             tractions: None,
@@ -314,6 +320,14 @@ impl<'a> PatchView<'a> {
         )
     }
 
+    /// The averaged pressure S_ρ and the bound τ at the nodes.
+    fn averaged_and_bound_at_nodes(&self) -> &[(f64, f64)] {
+        self.at_nodes.get_or_init(|| {
+            let s = self.patch.contact.boundary.s.iter();
+            s.map(|s| self.averaged_and_bound(*s)).collect()
+        })
+    }
+
     /// The tangential stress σ_t(s) = −τ(s) φ(e(s)) at a place of an edge, with W evaluated at its arc length s.
     fn tangential_stress_at(&self, edge: usize, xi: f64) -> f64 {
         let h = edge3::shape(xi);
@@ -344,7 +358,7 @@ impl<'a> PatchView<'a> {
         let boundary = &self.patch.contact.boundary;
         let mut profile = ContactProfile::default();
         for i in 0..self.count() {
-            let (averaged, bound) = self.averaged_and_bound(boundary.s[i]);
+            let (averaged, bound) = self.averaged_and_bound_at_nodes()[i];
             let law = self.patch.law.as_ref();
             let phi = |edge, xi| law.map_or(0.0, |law| law.phi(self.slip_at(edge, xi)));
             let sticks = match law {
