@@ -18,6 +18,7 @@ use crate::algorithm::recorder::{Measured, Recorder, Row};
 use crate::algorithm::rounding;
 use crate::algorithm::system::{Point, State, System};
 use crate::elasticity::Dof;
+use crate::friction::{self, Source};
 use crate::linear::{Dense, General, Interrupt, Unsolved};
 use crate::observer::Observer;
 use crate::solution::{Outcome, Stage};
@@ -179,6 +180,7 @@ pub(super) fn jacobian(
         column[j] += shift;
         interrupt.worked(n as f64)?;
     }
+    let mut couplings = Vec::new();
     for (point, tau) in system.points.iter().zip(bound) {
         let (law, slip) = (system.law(point), system.slip(&state.v, point));
         let rows: Vec<(usize, f64)> = (0..3)
@@ -193,25 +195,83 @@ pub(super) fn jacobian(
                 h.column_mut(column)[row] += stiffness * a * b;
             }
         }
-        let coupling = point.weight * law.phi(slip) * law.bound.slope(averaged(point, pressures));
-        if coupling == 0.0 {
+        let slope = law.bound.slope(averaged(point, pressures));
+        let Source::Average(average) = &point.source else {
             continue;
-        }
-        for (node, weight) in system.reaction_weights(state, point) {
-            let Dof::Free(dof) = system.nodes[node].normal else {
-                continue;
-            };
-            // dR/dv = −Ŝ: the row of Ŝ is its column
-            let column = system.stiffness.column(dof);
-            for (k, &free_dof) in free.iter().enumerate() {
-                let value = coupling * weight * column[free_dof];
-                let h = h.column_mut(k);
-                rows.iter().for_each(|&(row, a)| h[row] -= a * value);
-            }
-            interrupt.worked(10.0 * n as f64)?; // each to another column: far slower than a sum
+        };
+        let coupling = point.weight * law.phi(slip) * slope;
+        if coupling != 0.0 {
+            couplings.push(Coupling {
+                rows: rows
+                    .into_iter()
+                    .map(|(row, a)| (row, a * coupling))
+                    .collect(),
+                average,
+            });
         }
     }
+    add_couplings(system, state, &couplings, free, &mut h, interrupt)?;
     Ok(h)
+}
+
+/// How the pressures around a friction point change its traction.
+struct Coupling<'a> {
+    /// The rows of H that the traction acts on, with its parts there: by the derivative of the traction with respect to
+    /// the averaged pressure.
+    rows: Vec<(usize, f64)>,
+    /// The average over the pressures.
+    average: &'a friction::Row,
+}
+
+/// Adds to H that friction bounds depend on pressures, and pressures on all free unknowns. The pressures of some nodes at
+/// a time: their part is a product of matrices.
+fn add_couplings(
+    system: &System<'_>,
+    state: &State,
+    couplings: &[Coupling<'_>],
+    free: &[usize],
+    h: &mut General,
+    interrupt: &mut Interrupt<'_>,
+) -> Result<(), Unsolved> {
+    /// The number of nodes at a time: few enough that their matrices take little memory beside H.
+    const AT_ONCE: usize = 64;
+    let n = free.len();
+    let first = couplings.iter().map(|c| c.average.first).min();
+    let end = couplings.iter().map(|c| c.average.end()).max();
+    let nodes: Vec<usize> = (first.unwrap_or(0)..end.unwrap_or(0))
+        .filter(|node| state.active[*node])
+        .collect();
+    for nodes in nodes.chunks(AT_ONCE) {
+        // by node: the derivatives of its pressure with respect to the free unknowns, and of the tractions with respect
+        // to its pressure
+        let mut pressures = vec![0.0; nodes.len() * n];
+        let mut tractions = vec![0.0; nodes.len() * n];
+        for (pressure, &node) in pressures.chunks_mut(n).zip(nodes) {
+            for (other, weight) in system.pressure_weights(node, 1.0) {
+                let (true, Dof::Free(dof)) = (state.active[other], system.nodes[other].normal)
+                else {
+                    continue;
+                };
+                // dR/dv = −Ŝ: the row of Ŝ is its column
+                let column = system.stiffness.column(dof);
+                let entries = pressure.iter_mut().zip(free);
+                entries.for_each(|(entry, &dof)| *entry -= weight * column[dof]);
+            }
+        }
+        for Coupling { rows, average } in couplings {
+            let from = nodes.partition_point(|node| *node < average.first);
+            let to = nodes.partition_point(|node| *node < average.end());
+            for (column, &node) in nodes.iter().enumerate().take(to).skip(from) {
+                let weight = average.weights[node - average.first];
+                for (row, part) in rows {
+                    tractions[column * n + row] += part * weight;
+                }
+            }
+        }
+        interrupt.worked((nodes.len() * (n + couplings.len())) as f64)?;
+        h.add_product(&tractions, &pressures, interrupt)?;
+    }
+    Ok(())
 }
 
 fn averaged(point: &Point, pressures: &[f64]) -> f64 {

@@ -135,6 +135,11 @@ pub struct Row {
 }
 
 impl Row {
+    /// The node after the last one with a weight.
+    pub fn end(&self) -> usize {
+        self.first + self.weights.len()
+    }
+
     /// The averaged pressure Σ W_j p_j.
     pub fn apply(&self, pressure: &[f64]) -> f64 {
         self.weights

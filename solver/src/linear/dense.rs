@@ -1,9 +1,10 @@
 //! Dense symmetric matrices.
 
-use faer::{MatMut, MatRef};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, MatMut, MatRef, Par};
 
 use super::blocked::{self, NoFactor};
-use super::interrupt::{Interrupt, Stopped, zeros};
+use super::interrupt::{Interrupt, PORTION, Stopped, zeros};
 
 /// A dense symmetric matrix, by columns, both triangles stored.
 #[derive(Clone, Debug, PartialEq)]
@@ -210,6 +211,37 @@ impl General {
     /// Column `j`, to be written.
     pub fn column_mut(&mut self, j: usize) -> &mut [f64] {
         &mut self.values[j * self.size..(j + 1) * self.size]
+    }
+
+    /// Adds the product of a matrix `left`, by columns, and a matrix `right`, by rows.
+    pub fn add_product(
+        &mut self,
+        left: &[f64],
+        right: &[f64],
+        interrupt: &mut Interrupt<'_>,
+    ) -> Result<(), Stopped> {
+        let n = self.size;
+        let inner = left.len().checked_div(n).unwrap_or(0);
+        let left = MatRef::from_column_major_slice(left, n, inner);
+        let right = MatRef::from_row_major_slice(right, inner, n);
+        // so few columns at once that whoever asks to stop does not wait for long
+        let work = (n * inner).max(1);
+        let columns = (PORTION as usize / work).max(1);
+        for first in (0..n).step_by(columns) {
+            let count = columns.min(n - first);
+            let part = &mut self.values[first * n..(first + count) * n];
+            let part = MatMut::from_column_major_slice_mut(part, n, count);
+            matmul(
+                part,
+                Accum::Add,
+                left,
+                right.subcols(first, count),
+                1.0,
+                Par::Seq,
+            );
+            interrupt.worked((work * count) as f64)?;
+        }
+        Ok(())
     }
 
     /// Transposes the matrix in place.
