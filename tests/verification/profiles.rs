@@ -248,6 +248,32 @@ fn the_profile_holds_the_peaks() {
     assert!(peaks > 80 && beside_nodes > 20, "{beside_nodes} of {peaks}");
 }
 
+/// The peak of σ_t is looked for on few edges where the average is wide beside the edges: it is the largest of all points
+/// of the law all the same.
+#[test]
+fn the_peak_under_a_wide_average_is_the_largest_of_all_points() {
+    use solver::problem::{Kernel, Normalization};
+    let mut problem = example("cylinder");
+    problem.mesh.refine = solver::problem::Refine::Times(3);
+    for (kernel, normalization) in [
+        (Kernel::Bump, Normalization::UnitIntegral),
+        (Kernel::Bump, Normalization::Conserving),
+        (Kernel::Parabola, Normalization::PeakOne),
+    ] {
+        for radius in [0.3, 1.0, 3.0] {
+            let friction = problem.contacts[0].friction.as_mut().unwrap();
+            friction.nonlocal_radius = Some(radius);
+            (friction.kernel, friction.normalization) = (kernel, normalization);
+            let solution = solver::solve(&problem, &mut quiet).unwrap();
+            let peak = solution.summary.contacts["top"].peak_tangential_stress;
+            let all = &solution.profiles["top"];
+            let law = all.friction_bound.iter().zip(&all.friction_ratio);
+            let largest = law.map(|(bound, ratio)| bound * ratio).fold(0.0, f64::max);
+            close(largest, peak.unwrap().value.abs(), 1e-9);
+        }
+    }
+}
+
 /// Between the points of the law u_t, a parabola, overshoots by more than a tiny ε: a σ_t of a sign that no point beside it
 /// has is no peak. The row of a peak is the law's: σ_t = τ φ.
 #[test]
