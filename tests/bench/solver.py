@@ -7,8 +7,8 @@ All tables but the last take some three minutes. Runs (5 when absent) of what is
 that slows down for a while slows both. Ratios are formed within a turn; each row has the least, the median and the
 most of them. Seconds are processor time, so that other work on the machine does not count, except where it says clock.
 
---only     of whole, growth, cholmod, pair, threads, iterations, increments, sweeps, fill, peers
---against  another binary, such as an older build, in the turns of `whole`
+--only     of whole, growth, cholmod, pair, threads, iterations, increments, nonlocal, sweeps, fill, peers
+--against  another binary, such as an older build, in the turns of `whole` and `nonlocal`
 --members  in `sweeps` also each of 1,000 members in a process of its own, some three minutes
 --large    also `peers`: GetFEM and CalculiX at 2e5 degrees of freedom, twice each, some ten minutes
 
@@ -38,6 +38,7 @@ from outside import BINARY
 
 MIB = 1 << 20
 PEER_RUNS = 2
+ADAPTIVE_TOLERANCE = 3e-4
 # Of the processors: what other programs may take of them while a clock is compared.
 QUIET = 0.05
 REFERENCE = BINARY.parent / "reference"
@@ -48,7 +49,9 @@ CONTACTS = {
                          "obstacle": {"kind": "circle", "radius": 8, "center": 1}}]}
     for name, held, contact in (("fillet", "bottom", "top"), ("sheet", "right", "bottom"), ("hertz", "base", "contact"))
 }
-GOALS = {  # of issue 14
+HALF_CONTACT = 0.68  # of the problem of tests/peers
+GOALS = {  # of issues 14 and 33
+    "nonlocal": "≤ 1.15", "adaptive nonlocal": "≤ 1.5", "unknowns": "≤ 2",
     "whole/factorisation": "≤ 1.3", "cholmod": "≤ 0.5", "GetFEM": "≥ 50", "CalculiX": "≥ 140",
     "growth": "≤ 1.35", "iterations/whole": "≤ 0.25", "pair": "≥ 1.7", "increments": "≤ 1.5",
     "iterations/dense": "≤ 1", "user 2e5": "≤ 0.6", "user 1e6": "≤ 4", "peak 1e6": "≤ 1,434", "peak": "≤ 1.3",
@@ -65,6 +68,15 @@ def long_contact(radius):
     x, y = problem.lines("500")
     made = problem.problem(x, [-problem.HEIGHT * (1 - j / 66) for j in range(67)], problem.COEFFICIENT, "body")
     made["contacts"][0]["obstacle"]["radius"] = radius
+    return made
+
+
+def averaged(lines, part, tolerance=None):
+    """P1 on the named lines, with friction averaged over a part of the half contact; adaptive if there is a tolerance."""
+    made = problem.problem(*problem.lines(lines), problem.COEFFICIENT, "body")
+    made["contacts"][0]["friction"]["nonlocal_radius"] = part * HALF_CONTACT
+    if tolerance:
+        made["mesh"]["refine"] = {"tolerance": tolerance}
     return made
 
 
@@ -413,6 +425,34 @@ def eighty_increments(folder, options):
           ])
 
 
+def nonlocal_law(folder, options):
+    """What the average over the pressure costs, on fine edges and on meshes that are refined where errors come from."""
+    binaries = [BINARY, *filter(None, [options.against])]
+    made = {("fixed", part): averaged("graded:3", part) for part in (0, 0.8)}
+    made |= {("adaptive", part): averaged("8", part, ADAPTIVE_TOLERANCE) for part in (0, 0.2, 0.8)}
+    runs = {(binary, case): [] for binary in binaries for case in made}
+    files = {case: folder.file("%s-%g" % case, content) for case, content in made.items()}
+    for _ in range(options.runs):
+        for (binary, case), done in runs.items():
+            done.append(solve(folder, files[case], binary))
+    for binary in binaries:
+        rows = []
+        for kind, part in made:
+            done, local = runs[binary, (kind, part)], runs[binary, (kind, 0)]
+            name = "%s mesh, ρ = %g of the contact: " % (kind, part)
+            rows.append((name + "CPU s", [run["cpu"] for run in done], ""))
+            if part:
+                goal = GOALS["nonlocal" if kind == "fixed" else "adaptive nonlocal"]
+                rows.append((name + "CPU/with ρ = 0", [a["cpu"] / b["cpu"] for a, b in zip(done, local)], goal))
+            if kind == "adaptive":
+                unknowns = [row["dofs"] for row in done[0]["summary"]["refinements"]]
+                rows.append((name + "{:,} unknowns on {} meshes, in sum/on the last".format(unknowns[-1], len(unknowns)),
+                             [sum(unknowns) / unknowns[-1]], GOALS["unknowns"]))
+        title = "The nonlocal law: {:,} unknowns, and adaptive to {:g} (%d runs%s)".format(
+            runs[binary, ("fixed", 0)][0]["summary"]["dofs"], ADAPTIVE_TOLERANCE)
+        table(title % (options.runs, ", the other binary" * (binary != BINARY)), rows)
+
+
 def sweep(folder, file):
     """Solves a sweep: the CPU seconds of the process, and the table."""
     table = folder.path / "table.json"
@@ -515,7 +555,7 @@ def main():
     parser.add_argument("--members", action="store_true")
     parser.add_argument("--large", action="store_true")
     options = parser.parse_args()
-    every = ["whole", "growth", "cholmod", "pair", "threads", "iterations", "increments", "sweeps", "fill"]
+    every = ["whole", "growth", "cholmod", "pair", "threads", "iterations", "increments", "nonlocal", "sweeps", "fill"]
     chosen = options.only or every + ["peers"] * options.large
     unknown = set(chosen) - {*every, "peers"}
     if unknown or options.runs < 1:
@@ -530,8 +570,8 @@ def main():
         if "growth" in chosen:
             growth(folder, options, done)
         for name, bench in (("cholmod", cholmod), ("pair", pair), ("threads", threads),
-                            ("iterations", iterations), ("increments", eighty_increments), ("sweeps", sweeps),
-                            ("fill", fill)):
+                            ("iterations", iterations), ("increments", eighty_increments),
+                            ("nonlocal", nonlocal_law), ("sweeps", sweeps), ("fill", fill)):
             if name in chosen:
                 bench(folder, options)
         if "peers" in chosen:

@@ -157,7 +157,7 @@ fn a_kink_of_the_obstacle_stands_in_the_way_and_is_named() {
 #[test]
 fn every_mesh_is_named_while_it_is_solved() {
     let mut told = Vec::new();
-    let problem = to(0.02, example("cylinder"));
+    let problem = to(0.002, example("cylinder"));
     let solution = solver::solve(&problem, &mut |progress: Progress<'_>| {
         if let Progress::Refinement {
             number,
@@ -185,7 +185,7 @@ fn every_mesh_is_named_while_it_is_solved() {
 /// On whichever mesh it is told to stop, it does so.
 #[test]
 fn adaptive_refinement_stops_at_any_question() {
-    let problem = to(0.03, example("cylinder"));
+    let problem = to(0.002, example("cylinder"));
     let mut questions = 0;
     let mut counts = watching(|progress| {
         questions += usize::from(progress.is_none());

@@ -11,7 +11,7 @@ use crate::support::example;
 
 fn cylinder() -> Problem {
     let mut problem = example("cylinder");
-    problem.mesh.refine = Refine::Adaptive(AdaptiveRefine { tolerance: 0.01 });
+    problem.mesh.refine = Refine::Adaptive(AdaptiveRefine { tolerance: 0.002 });
     problem
 }
 

@@ -2,7 +2,8 @@
 //! tolerance.
 //!
 //! Solves, divides the elements that hold most of the errors above the tolerance, as `accuracy` states them and
-//! `origins` places them, and repeats. Edges under a peak of σ_t that are wider than a part of ρ are divided in any
+//! `origins` places them, divides those of their parts again that are expected to hold most of what is left, and repeats.
+//! Edges under a peak of σ_t that are wider than a part of ρ are divided in any
 //! case, since an estimate does not see what the mesh does not resolve at all. So are edges inside which the obstacle
 //! ends, until the part that is left out of the contact is negligible.
 
@@ -25,6 +26,20 @@ const BULK: f64 = 0.6;
 
 /// At least this fraction of all elements is divided: fewer would not be worth another mesh.
 const LEAST_MARKED: f64 = 0.02;
+
+/// From one mesh to the next an element is divided at most this many times: where errors come from few elements, a mesh with
+/// one more division there would be nearly as large, and nearly as inaccurate.
+const MOST_DIVISIONS: usize = 4;
+
+/// Elements are divided again, for the same next mesh, until there are this many times as many as before.
+const GROWTH: f64 = 1.7;
+
+/// Elements are not divided again if the errors expected on the next mesh, as multiples of the tolerance, have a sum below
+/// this.
+const ENOUGH: f64 = 0.5;
+
+/// The relative difference of two contributions that count as equal: solutions within the tolerance differ by less.
+const EQUAL: f64 = 1e-9;
 
 /// Edges under a peak of σ_t are divided until their length is this fraction of ρ.
 const PART_OF_RADIUS: f64 = 0.25;
@@ -103,7 +118,8 @@ pub fn run(
             Some(reason)
         } else {
             let marked = marks(&contacts, &solution, &origins, &truncation.elements);
-            match finer(problem, &mut graded, &mesh, &mut parts, &marked) {
+            let of_parts = &origins.elements;
+            match finer(problem, &mut graded, &mesh, &mut parts, (&marked, of_parts)) {
                 Ok(mesh) => {
                     let warnings = notes.clone();
                     let given = ExternalMesh { mesh, warnings };
@@ -274,7 +290,7 @@ fn finer(
     graded: &mut GradedMesh,
     mesh: &Mesh,
     parts: &mut Vec<u32>,
-    marked: &[bool],
+    (marked, contributions): (&[bool], &[f64]),
 ) -> Result<Mesh, StopReason> {
     // closures have triangles, which the thesis's own iteration does not know
     let finer = if problem.solver.algorithm == Algorithm::Thesis {
@@ -283,11 +299,23 @@ fn finer(
         if !marked.contains(&true) {
             return Err(StopReason::Stalled);
         }
-        let mut divided = vec![false; graded.elements()];
-        for (part, _) in parts.iter().zip(marked).filter(|(_, marked)| **marked) {
-            divided[*part as usize] = true;
+        let before = graded.elements();
+        let mut divided = vec![false; before];
+        let mut known = vec![0.0; before];
+        for ((part, marked), contribution) in parts.iter().zip(marked).zip(contributions) {
+            divided[*part as usize] |= marked;
+            known[*part as usize] += contribution;
         }
+        graded.set_contributions(&known);
         graded.refine(&divided);
+        for _ in 1..MOST_DIVISIONS {
+            let expected = graded.contributions();
+            let enough = expected.iter().sum::<f64>() <= ENOUGH;
+            if enough || graded.elements() as f64 > GROWTH * before as f64 {
+                break;
+            }
+            graded.refine(&bulk(&expected));
+        }
         // those of divisions to come are made from them
         for (boundary, curve) in &problem.mesh.curves {
             graded.put_on_curve(boundary, curve);
@@ -376,19 +404,22 @@ fn marks(
 }
 
 /// Marks the fewest entries that together hold `BULK` of the sum, the largest first, but at least `LEAST_MARKED` of all
-/// entries if so many are not 0.
+/// entries if so many are not 0. Entries that are equal but for rounding are all marked or all not, so that marks depend
+/// neither on the order of elements nor on last digits.
 fn bulk(parts: &[f64]) -> Vec<bool> {
     let mut order: Vec<usize> = (0..parts.len()).collect();
     order.sort_by(|&a, &b| parts[b].total_cmp(&parts[a]).then(a.cmp(&b)));
     let total: f64 = parts.iter().sum();
     let least = (LEAST_MARKED * parts.len() as f64) as usize;
-    let mut held = 0.0;
+    let (mut held, mut smallest) = (0.0, f64::INFINITY);
     let mut chosen = vec![false; parts.len()];
     for (count, i) in order.into_iter().enumerate() {
-        if held >= BULK * total && count >= least || parts[i] == 0.0 {
+        let enough = held >= BULK * total && count >= least;
+        if enough && parts[i] < (1.0 - EQUAL) * smallest || parts[i] == 0.0 {
             break;
         }
         held += parts[i];
+        smallest = parts[i];
         chosen[i] = true;
     }
     chosen
@@ -431,5 +462,7 @@ mod tests {
     fn the_elements_with_most_of_the_error_are_marked() {
         assert_eq!(bulk(&[0.1, 5.0, 0.0, 4.0]), [false, true, false, true]);
         assert_eq!(bulk(&[0.0, 0.0]), [false, false]);
+        let equal = [0.2, 1.0, 1.0 + 1e-12, 0.9, 1.0];
+        assert_eq!(bulk(&equal), [false, true, true, false, true]);
     }
 }

@@ -27,6 +27,10 @@ use crate::problem::Curve;
 /// element that is itself almost inverted remain.
 const MOST_UNFOLDING: u32 = 4;
 
+/// The part of an element's contribution to the errors that is expected of all its parts together when it is divided:
+/// more than of a smooth solution, and less than at a singularity.
+const LEFT: f64 = 0.25;
+
 /// A mesh whose elements are refined one by one, again and again.
 #[derive(Clone)]
 pub struct GradedMesh {
@@ -52,6 +56,8 @@ struct Part {
     origin: u32,
     /// How often the element of the first mesh was halved to give this part.
     halved: u32,
+    /// The contribution of this part to the errors, [`GradedMesh::set_contributions`].
+    contribution: f64,
 }
 
 impl GradedMesh {
@@ -64,6 +70,7 @@ impl GradedMesh {
                     element: *element,
                     origin,
                     halved: 0,
+                    contribution: 0.0,
                 })
                 .collect(),
             halvings: halvings(mesh),
@@ -79,6 +86,18 @@ impl GradedMesh {
     /// several.
     pub fn elements(&self) -> usize {
         self.elements.len()
+    }
+
+    /// Sets the contribution of every element to the errors. Where an element is divided, its parts get what is left of it.
+    pub fn set_contributions(&mut self, contributions: &[f64]) {
+        for (part, contribution) in self.elements.iter_mut().zip(contributions) {
+            part.contribution = *contribution;
+        }
+    }
+
+    /// The contributions of the elements to the errors, as set, or as expected of elements divided since.
+    pub fn contributions(&self) -> Vec<f64> {
+        self.elements.iter().map(|part| part.contribution).collect()
     }
 
     /// Divides the elements that are marked, and others until the rest can be closed.
@@ -162,9 +181,10 @@ impl GradedMesh {
             element,
             origin,
             halved,
+            contribution,
         } = part;
         let halving = self.halvings[origin as usize];
-        let (children, halved) = match element {
+        let (children, halved): (Vec<Element>, u32) = match element {
             Element::Quad(p) if halved < halving.times => {
                 let across = turned(p, halving.sides);
                 for i in [0, 2] {
@@ -181,11 +201,13 @@ impl GradedMesh {
             }
             _ => (self.finer.children(&element).to_vec(), halved),
         };
+        let contribution = LEFT * contribution / children.len() as f64;
         self.elements
             .extend(children.into_iter().map(|element| Part {
                 element,
                 origin,
                 halved,
+                contribution,
             }));
     }
 
