@@ -32,13 +32,15 @@ const SHORT: f64 = 0.1;
 /// the weights of a row with pieces of this length have a sum of absolute values below 2·10⁻¹³, where the weights have a sum
 /// of 1 (`few_points_are_enough_on_short_edges`).
 const FEWER_POINTS: [(f64, usize); 5] = [(0.005, 4), (0.01, 5), (0.02, 6), (0.03, 7), (0.05, 10)];
-static FEWER_RULES: LazyLock<[(f64, Vec<(f64, f64)>); 5]> =
-    LazyLock::new(|| FEWER_POINTS.map(|(part, points)| (part, gauss::rule(points))));
+static FEWER_RULES: LazyLock<Vec<Vec<(f64, f64)>>> = LazyLock::new(|| {
+    let rules = FEWER_POINTS.iter();
+    rules.map(|(_, points)| gauss::rule(*points)).collect()
+});
 
 /// The integration rule for a piece that is this fraction of ρ long, below [`SHORT`].
 fn short_rule(part: f64) -> &'static [(f64, f64)] {
-    let fewer = FEWER_RULES.iter().find(|(most, _)| part <= *most);
-    fewer.map_or(&SHORT_RULE, |(_, rule)| rule)
+    let allowed = FEWER_POINTS.iter().position(|(most, _)| part <= *most);
+    allowed.map_or(&SHORT_RULE, |k| &FEWER_RULES[k])
 }
 
 /// Over rings, where a kernel value takes longer to compute, [`SHORT_RULE`] is also used on a piece whose distance from
