@@ -248,9 +248,15 @@ impl Averaging {
         if self.radius == 0.0 || self.measure != Measure::Line {
             return f64::INFINITY;
         }
-        // at a conserving average's ends at least half of the kernel lies inside
-        let scale = if self.conserving { 2.0 } else { 1.0 } * self.scale;
-        most * scale * total_variation_of_slope(self.kernel) / self.radius
+        // a conserving average divides by the part of the kernel inside the chain, which is smallest at the chain's ends
+        let ends = [self.chain.s[0], self.chain.s[self.chain.s.len() - 1]];
+        let inside = if self.conserving {
+            ends.iter()
+                .fold(1.0, |least: f64, s| least.min(self.part_inside(*s)))
+        } else {
+            1.0
+        };
+        most / inside * self.scale * total_variation_of_slope(self.kernel) / self.radius
     }
 
     /// The kernel ω_ρ at a distance.
