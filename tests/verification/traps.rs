@@ -18,6 +18,30 @@ fn block(x: &[f64], obstacle: Value, indentation: f64, friction: Value) -> Probl
     problem(&text.to_string())
 }
 
+/// A contact whose tangential displacements are all prescribed, and whose nodes all touch, leaves no unknown free: errors
+/// are stated all the same, by any algorithm.
+#[test]
+fn a_contact_without_free_unknowns_is_solved() {
+    use solver::problem::{Algorithm, Support};
+    let friction = json!({"coefficient": 0.3, "nonlocal_radius": 0.5, "elastic_slip": 1e-4});
+    let mut held = block(
+        &[-2.0, -1.0, 0.0, 1.0, 2.0],
+        json!({"kind": "flat"}),
+        0.05,
+        friction,
+    );
+    let support = json!({"boundary": "top", "ux": 0});
+    held.supports
+        .push(serde_json::from_value::<Support>(support).unwrap());
+    held.contacts[0].tangential_displacement = 0.02;
+    for algorithm in [Algorithm::default(), Algorithm::Newton] {
+        held.solver.algorithm = algorithm;
+        let summary = solve(&held).summary;
+        assert_eq!(summary.outcome, Outcome::Converged);
+        assert!(summary.normal_force > 1.0 && summary.friction_force.abs() > 0.1);
+    }
+}
+
 /// Cohesion acted where S is above zero by rounding, on one side and not on the other (the threshold itself is tested in
 /// `friction/bound.rs`). What is symmetric stays so, to the tolerance of the iterations.
 #[test]

