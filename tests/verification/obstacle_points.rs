@@ -440,9 +440,9 @@ fn low_waves_between_nodes_are_in_the_errors() {
         }
     }
     let mut adaptive = block(&lines(0.05, &[]), ripples("table", "cubic", 0.004), 0.04);
-    adaptive.mesh.refine = serde_json::from_value(json!({"tolerance": 0.05})).unwrap();
+    adaptive.mesh.refine = serde_json::from_value(json!({"tolerance": 0.005})).unwrap();
     let solution = solve(&adaptive);
-    assert!(solution.summary.refinements.len() > 1);
+    assert!(solution.summary.refinements.len() > 2);
     assert_eq!(warning(&solution, WarningCode::ObstacleBetweenNodes), None);
     assert!(
         peak(&solution)
