@@ -43,6 +43,22 @@ def strip(count):
 
 
 SQUARE = strip(1)
+# a rigid circle on the third side of the first square, with its node of reference
+TOUCHED = """*NODE
+99999999,0,0
+*SURFACE, TYPE=SEGMENTS, NAME=TOOL
+START,4,5
+CIRCL,0,1,0,5
+CIRCL,-4,5,0,5
+*RIGID BODY, ANALYTICAL SURFACE=TOOL, REF NODE=99999999
+*SURFACE, NAME=FACE
+1,S3
+*SURFACE INTERACTION, NAME=I
+*CONTACT PAIR, INTERACTION=I
+FACE,TOOL
+*BOUNDARY
+99999999,1,6
+"""
 
 
 def decks():
@@ -80,6 +96,18 @@ def decks():
     yield "the surface of a large set", lambda: strip(SIZE // 200) + fill(lambda k: "*SURFACE, NAME=S%d\nALL" % k)
     yield "forces on a large set without elements", lambda: nodes() + "*NSET, NSET=N\n" + labels() + "*CLOAD\n" + fill(lambda _: "N,1,2", size=SIZE // 3)
     yield "conditions on a large set", lambda: nodes() + "*NSET, NSET=N\n" + labels() + "*BOUNDARY\n" + fill(lambda _: "N,1,2", size=SIZE // 3)
+    held = lambda: strip(SIZE // 300) + "*NSET, NSET=N, ELSET=ALL\n" + TOUCHED + "N,1,2\n"
+    step = "*STEP\n*STATIC\n%s*END STEP\n"
+    yield "supports of a large set with elements, often", lambda: held() + fill(lambda _: "N,1,2", size=SIZE // 3)
+    yield "forces on a large set with elements, often", lambda: held() + "*CLOAD\n" + fill(lambda _: "N,1,2", size=SIZE // 3)
+    yield "surfaces of a large set beside a rigid body", lambda: held() + fill(
+        lambda k: "*SURFACE, NAME=S%d\nALL,S1" % k, size=SIZE // 3)
+    yield "supports of a large set in each step", lambda: held() + step % "*BOUNDARY\nN,1,2\n" * 999
+    yield "supports of a large set anew in each step", lambda: held() + "*NSET, NSET=M, ELSET=ALL\n" + "".join(
+        step % ("*BOUNDARY, OP=NEW\n%s,1,2\n99999999,1,6\n" % "NM"[k % 2]) for k in range(999))
+    yield "motions of a rigid body, and many steps", lambda: SQUARE + TOUCHED + fill(
+        lambda k: "99999999,1,1,%d" % k, size=half) + step % "" * 999
+    yield "steps without end", lambda: SQUARE + TOUCHED + fill(lambda _: step % "", joint="", size=half)
     yield "a name of a whole line at every node", lambda: SQUARE + "*NODE, NSET=" + "N" * 500_000 + "\n" + fill(
         lambda k: "%d,0,0" % (k + 10), size=half)
     yield "long names that are unknown", lambda: SQUARE + "*NSET, NSET=A\n" + fill(lambda k: "B%d%s" % (k, "x" * 2000))

@@ -50,6 +50,10 @@ pub fn problem_with_warnings(text: &str) -> Result<(Problem, Vec<Warning>), Vec<
     if built.deck.steps == 0 {
         return Err(without_step(built.faults));
     }
+    if let Some(violation) = built.too_long() {
+        built.faults.add(violation);
+        return Err(built.faults.into_violations());
+    }
     let analysis = analysis(&mut built);
     let axisymmetric = matches!(analysis, Analysis::Axisymmetric {});
     let quadrature = quadrature(&mut built);

@@ -2,7 +2,7 @@
 //! step does not repeat. If the step repeats all of them, `OP=NEW` has no effect; otherwise it is refused with the
 //! names of what it ends.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use super::build::Built;
 use super::contact_parts::WRITTEN_INSTEAD;
@@ -156,19 +156,26 @@ impl Built {
         ended
     }
 
-    /// The nodes that the given supports hold, each with the component.
-    fn nodes_held<'a>(&self, keys: impl Iterator<Item = &'a Key>) -> BTreeSet<(u64, u32)> {
-        keys.flat_map(|(component, name)| {
+    /// For each node, whether the given supports hold its displacements in x and in y.
+    fn nodes_held<'a>(&self, keys: impl Iterator<Item = &'a Key>) -> Vec<[bool; 2]> {
+        let mut held = vec![[false; 2]; self.raw.nodes.len()];
+        for (component, name) in keys {
             let nodes = self.raw.node_sets.get(name).into_iter().flatten();
-            nodes.map(|node| (*component, *node))
-        })
-        .collect()
+            for node in nodes {
+                // rotations are held by reference nodes only
+                if let Some(held) = held[*node as usize].get_mut(*component as usize - 1) {
+                    *held = true;
+                }
+            }
+        }
+        held
     }
 
-    /// Whether the displacement `component` of all nodes of a set is held. `held`: components and nodes.
-    fn is_held(&self, component: u64, set: &str, held: &BTreeSet<(u64, u32)>) -> bool {
+    /// Whether the displacement `component` of all nodes of a set is held, by `held` of [`Built::nodes_held`].
+    fn is_held(&self, component: u64, set: &str, held: &[[bool; 2]]) -> bool {
         let nodes = self.raw.node_sets.get(set);
-        nodes.is_some_and(|nodes| nodes.iter().all(|node| held.contains(&(component, *node))))
+        let of_node = |node: &u32| held[*node as usize].get(component as usize - 1) == Some(&true);
+        nodes.is_some_and(|nodes| nodes.iter().all(of_node))
     }
 }
 

@@ -1,6 +1,8 @@
 //! Rigid bodies of a deck: their elements and surfaces, and the rows of `*BOUNDARY` that move them.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use super::contact_parts::{Analytical, Held, MadeOf, RigidBody};
 use super::names::{Key, Meant, Names};
@@ -44,7 +46,7 @@ pub(super) struct Moving {
     pub(super) row: Held,
     /// For each reference or rotation node in the row: the number of its rigid body, and whether it is the rotation
     /// node.
-    pub(super) on: Vec<(usize, bool)>,
+    pub(super) on: Arc<[(usize, bool)]>,
     /// Whether the row holds no other nodes than reference nodes.
     pub(super) alone: bool,
 }
@@ -111,14 +113,14 @@ impl Search<'_> {
                 }
                 MadeOf::Elements(word) => {
                     let target = Target::Set(word.clone());
-                    for element in self.elements_of(*scope, &target) {
-                        owner.insert(element, number);
+                    for element in &*self.elements_of(*scope, &target) {
+                        owner.insert(*element, number);
                     }
                 }
                 MadeOf::Nodes(word) => {
-                    for node in self.nodes_of(*scope, &Target::Set(word.clone())) {
+                    for node in &*self.nodes_of(*scope, &Target::Set(word.clone())) {
                         // a node of several bodies counts for the first
-                        inside.entry(node).or_insert(number);
+                        inside.entry(*node).or_insert(number);
                     }
                 }
             }
@@ -155,28 +157,25 @@ impl Search<'_> {
         tools
     }
 
-    fn elements_of(&self, scope: usize, target: &Target) -> Vec<u32> {
+    fn elements_of(&self, scope: usize, target: &Target) -> Cow<'_, [u32]> {
         match self.names.meant(Kind::Elements, scope, target) {
             Some(Meant::Label(scope, label)) => {
                 let place = self.names.scopes[scope].place(Kind::Elements, label);
                 place.into_iter().collect()
             }
-            Some(Meant::Set(key)) => self.elements.get(&key).cloned().unwrap_or_default(),
-            None => Vec::new(),
+            Some(Meant::Set(key)) => members(self.elements.get(&key)),
+            None => Cow::default(),
         }
     }
 
-    fn nodes_of(&self, scope: usize, target: &Target) -> Vec<u32> {
+    fn nodes_of(&self, scope: usize, target: &Target) -> Cow<'_, [u32]> {
         match self.names.meant(Kind::Nodes, scope, target) {
             Some(Meant::Label(scope, label)) => {
                 let place = self.names.scopes[scope].place(Kind::Nodes, label);
                 place.into_iter().collect()
             }
-            Some(meant) => {
-                let set = self.raw.node_sets.get(&self.names.of(&meant));
-                set.cloned().unwrap_or_default()
-            }
-            None => Vec::new(),
+            Some(meant) => members(self.raw.node_sets.get(&self.names.of(&meant))),
+            None => Cow::default(),
         }
     }
 
@@ -236,13 +235,13 @@ impl Search<'_> {
         let mut body = None;
         let mut pieces = Vec::new();
         for (target, side) in sides {
-            for place in self.elements_of(scope, target) {
-                let number = *owner.get(&place)?;
+            for place in &*self.elements_of(scope, target) {
+                let number = *owner.get(place)?;
                 if body.is_some_and(|body| body != number) || pieces.len() > MOST_POINTS {
                     return None;
                 }
                 body = Some(number);
-                pieces.push(self.side_of(place, *side)?);
+                pieces.push(self.side_of(*place, *side)?);
             }
         }
         body.map(|body| (body, pieces))
@@ -294,18 +293,28 @@ impl Search<'_> {
             single.extend(body.rotation.map(|node| (node, (number, true))));
         }
         held.sort_by_key(|(_, row)| row.line);
+        // many rows may name the same large set
+        let mut known: BTreeMap<(usize, Target), (Arc<[(usize, bool)]>, bool)> = BTreeMap::new();
         let mut rows = Vec::new();
         for (scope, row) in held {
-            let nodes = self.nodes_of(scope, &row.target);
-            let on: Vec<(usize, bool)> = nodes
-                .iter()
-                .filter_map(|node| single.get(node).copied())
-                .collect();
-            if !on.is_empty() {
+            let of_target = known.entry((scope, row.target.clone()));
+            let (on, alone) = of_target.or_insert_with_key(|(scope, target)| {
+                let nodes = self.nodes_of(*scope, target);
+                let on = nodes.iter().filter_map(|node| single.get(node).copied());
+                let on: Arc<[(usize, bool)]> = on.collect();
                 let alone = on.len() == nodes.len();
+                (on, alone)
+            });
+            if !on.is_empty() {
+                let (on, alone) = (on.clone(), *alone);
                 rows.push(Moving { row, on, alone });
             }
         }
         rows
     }
+}
+
+/// The members of a set; none of a set that there is not.
+fn members(set: Option<&Vec<u32>>) -> Cow<'_, [u32]> {
+    set.map_or_else(Cow::default, |set| Cow::from(&set[..]))
 }

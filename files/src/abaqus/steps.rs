@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::build::{Built, Row};
 use super::contact_parts::WRITTEN_INSTEAD;
-use super::replaced::Key;
 use super::rigid::{Body, Moving};
 use super::tool::Point;
-use super::written::{Force, Pressure};
+use super::written::{Force, Prescribed, Pressure, on_line};
+use solver::error::{Reason, Violation};
 
 /// The motion of a reference node.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,6 +18,16 @@ pub(super) struct Motion {
 
 /// The largest relative difference of values that count as equal, since numbers in files are rounded.
 const SAME: f64 = 1e-9;
+
+/// As many steps as a problem may have.
+const MOST_STEPS: usize = 1000;
+
+/// The largest number of prescribed displacements of nodes, each counted as often as a row names it: of 64,000 nodes in
+/// each of 1,000 steps. More would take seconds.
+const MOST_DISPLACEMENTS: usize = 1 << 27;
+
+/// The largest number of motions of rigid bodies, likewise: of 1,000 bodies in each of 1,000 steps.
+const MOST_MOTIONS: usize = 1 << 20;
 
 impl Built {
     /// Removes the rows of reference nodes from the prescribed displacements; returns the motion of each rigid body, or
@@ -33,15 +43,22 @@ impl Built {
             let factor = row.amplitude.as_ref().map(|name| self.deck.factor(name));
             let value = row.value * factor.and_then(Result::ok).unwrap_or(1.0);
             let step = self.deck.contact.step_of(row.line);
-            for (number, rotates) in on {
+            for (number, rotates) in on.iter() {
                 for &component in &row.components {
                     let kind = match (component, rotates) {
                         (1 | 2, false) => component as usize - 1,
                         (6, false) | (3, true) => 2,
                         _ => continue,
                     };
-                    let later = held[*number][step..].iter_mut();
-                    later.for_each(|values| values[kind] = Some(value));
+                    held[*number][step][kind] = Some(value);
+                }
+            }
+        }
+        // what a step does not change stays
+        for ends in &mut held {
+            for step in 1..count {
+                for kind in 0..3 {
+                    ends[step][kind] = ends[step][kind].or(ends[step - 1][kind]);
                 }
             }
         }
@@ -104,43 +121,49 @@ impl Built {
         })
     }
 
+    /// What a deck has too much of to be followed through its steps: the steps, or the nodes that all rows of `*BOUNDARY`
+    /// name.
+    pub(super) fn too_long(&self) -> Option<Violation> {
+        if let Some((line, _)) = self.deck.contact.steps.get(MOST_STEPS) {
+            return Some(on_line(
+                *line,
+                Reason::TooMany,
+                format!("{} steps", self.deck.steps),
+                &format!("at most {MOST_STEPS}"),
+                "Divide the deck: each part begins with a step that has all supports and loads.",
+            ));
+        }
+        let of_nodes = self.prescribed.iter().map(|Row { row, name }| {
+            let components = (row.components.0..=row.components.1).count();
+            let nodes = self.raw.node_sets.get(name).map_or(0, Vec::len);
+            (row.line, components * nodes)
+        });
+        let moves = |moving: &Moving| {
+            (
+                moving.row.line,
+                moving.row.components.len() * moving.on.len(),
+            )
+        };
+        let of_tools = self.tools.rows.iter().map(moves);
+        let line =
+            beyond(of_nodes, MOST_DISPLACEMENTS).or_else(|| beyond(of_tools, MOST_MOTIONS))?;
+        Some(on_line(
+            line,
+            Reason::TooMany,
+            "one more row of *BOUNDARY, after many for large sets".to_owned(),
+            &format!(
+                "at most {MOST_DISPLACEMENTS} displacements of nodes, and {MOST_MOTIONS} of rigid bodies, each counted as often as rows name it"
+            ),
+            "Write each support once, and in later steps only those that change.",
+        ))
+    }
+
     /// The factors of loads and of prescribed displacements at the end of each step; in the last step both are 1 (0 if
     /// all values are 0). The values of each step must be in proportion to those of the last step, and are reported if
     /// they are not.
     pub(super) fn factors(&mut self) -> Vec<[f64; 2]> {
-        let steps = &self.deck.contact;
-        let count = steps.steps.len().max(1);
-        let mut loads = ByName::new();
-        for Row { row, name } in &self.pressures {
-            let rows = loads.entry((0, name.clone())).or_default();
-            add(rows, steps.step_of(row.line), row.value);
-        }
-        for Row { row, name } in &self.forces {
-            let rows = loads.entry((row.component, name.clone())).or_default();
-            add(rows, steps.step_of(row.line), row.value);
-        }
-        // by node, since the rows of several sets may hold it
-        let mut supports: BTreeMap<(u64, u32), Vec<(usize, f64)>> = BTreeMap::new();
-        // the first row that a later step adds for a node that was free
-        let mut late: Option<(u64, String)> = None;
-        for Row { row, name } in &self.prescribed {
-            let step = steps.step_of(row.line);
-            let nodes = self.raw.node_sets.get(name).into_iter().flatten();
-            let nodes = nodes.filter(|node| self.used[**node as usize]);
-            for component in row.components.0..=row.components.1 {
-                for node in nodes.clone() {
-                    let rows = supports.entry((component, *node)).or_default();
-                    if rows.is_empty() && step > 0 && late.is_none() {
-                        let got = format!(
-                            "a support that a later step adds: displacement {component} of `{name:.60}`"
-                        );
-                        late = Some((row.line, got));
-                    }
-                    rows.push((step, row.value));
-                }
-            }
-        }
-        if let Some((line, got)) = late {
+        let count = self.deck.contact.steps.len().max(1);
+        if let Some((line, got)) = self.late_support() {
             self.doubt(
                 line,
                 got,
@@ -148,9 +171,23 @@ impl Built {
                 &format!("The support would hold the body from the beginning. Write it in the first step if that is intended. {WRITTEN_INSTEAD}"),
             );
         }
+        let loads = self.values_of_loads();
+        let nodes = self.used.len();
         let found = [
-            ("loads", proportion(&loads, count)),
-            ("prescribed displacements", proportion(&supports, count)),
+            (
+                "loads",
+                proportion(count, loads.len(), |give| {
+                    for (step, load, value) in &loads {
+                        give(*step, *load, *value);
+                    }
+                }),
+            ),
+            (
+                "prescribed displacements",
+                proportion(count, 2 * nodes, |give| {
+                    self.each_support(|row, step, place| give(step, place, row.row.value));
+                }),
+            ),
         ];
         let found = found.map(|(what, found)| {
             found.unwrap_or_else(|step| {
@@ -169,6 +206,62 @@ impl Built {
             .into_iter()
             .zip(supports)
             .map(|(l, s)| [l, s])
+            .collect()
+    }
+
+    /// Calls `visit` for each displacement that the rows of `*BOUNDARY` prescribe for nodes of elements, in the order of
+    /// the deck, with the row, its step, and the place of the displacement: twice the node, and 1 more for y. By node,
+    /// since the rows of several sets may hold it.
+    fn each_support<'a>(&'a self, mut visit: impl FnMut(&'a Row<Prescribed>, usize, usize)) {
+        for support in &self.prescribed {
+            let step = self.deck.contact.step_of(support.row.line);
+            let nodes = self.raw.node_sets.get(&support.name).into_iter().flatten();
+            for node in nodes.filter(|node| self.used[**node as usize]) {
+                for component in support.row.components.0..=support.row.components.1 {
+                    visit(support, step, 2 * *node as usize + component as usize - 1);
+                }
+            }
+        }
+    }
+
+    /// The first row that adds a support in a later step to a node that was free: its line, and a text that names it.
+    fn late_support(&self) -> Option<(u64, String)> {
+        let mut held = vec![false; 2 * self.used.len()];
+        let mut late = None;
+        self.each_support(|row, step, place| {
+            if !held[place] && step > 0 && late.is_none() {
+                late = Some((row, 1 + place % 2));
+            }
+            held[place] = true;
+        });
+        let (Row { row, name }, component) = late?;
+        let got =
+            format!("a support that a later step adds: displacement {component} of `{name:.60}`");
+        Some((row.line, got))
+    }
+
+    /// The values that loads have from a step on, in the order of the steps: the step, the number of the load, and the
+    /// value. Rows of one step for the same load are summed.
+    fn values_of_loads(&self) -> Vec<(usize, usize, f64)> {
+        let pressures = self
+            .pressures
+            .iter()
+            .map(|Row { row, name }| ((0, name), row.line, row.value));
+        let forces = self
+            .forces
+            .iter()
+            .map(|Row { row, name }| ((row.component, name), row.line, row.value));
+        let mut numbers = BTreeMap::new();
+        let mut sums: BTreeMap<(usize, usize), f64> = BTreeMap::new();
+        for (load, line, value) in pressures.chain(forces) {
+            let next = numbers.len();
+            let number = *numbers.entry(load).or_insert(next);
+            *sums
+                .entry((self.deck.contact.step_of(line), number))
+                .or_default() += value;
+        }
+        sums.into_iter()
+            .map(|((step, load), value)| (step, load, value))
             .collect()
     }
 
@@ -191,44 +284,57 @@ impl Built {
     }
 }
 
-/// The values of each load with their steps, in the order of the deck.
-type ByName = BTreeMap<Key, Vec<(usize, f64)>>;
-
-/// Adds the value of a load in a step; values of the same step are summed.
-fn add(rows: &mut Vec<(usize, f64)>, step: usize, value: f64) {
-    match rows.last_mut() {
-        Some((last, sum)) if *last == step => *sum += value,
-        _ => rows.push((step, value)),
-    }
+/// The line of the first row by which the sum of the counts exceeds `most`.
+fn beyond(mut rows: impl Iterator<Item = (u64, usize)>, most: usize) -> Option<u64> {
+    let mut sum = 0;
+    let exceeds = |(_, count): &(u64, usize)| {
+        sum += count;
+        sum > most
+    };
+    rows.find(exceeds).map(|(line, _)| line)
 }
 
 /// The common factor of all values at the end of each step, in proportion to the last step; 0 if there are none. The
-/// error is the first step whose values are not in proportion to those of the last step.
-fn proportion<K>(rows: &BTreeMap<K, Vec<(usize, f64)>>, count: usize) -> Result<Vec<f64>, usize> {
-    let at = |rows: &[(usize, f64)], step: usize| {
-        let mut latest = rows.iter().rev();
-        latest
-            .find(|(s, _)| *s <= step)
-            .map_or(0.0, |(_, value)| *value)
+/// error is the first step whose values are not in proportion to those of the last step. `places`: the number of values,
+/// each 0 until it is given; `values` gives the step, the place and the new value of each that changes, in the order
+/// of the steps, and is called twice.
+fn proportion(
+    count: usize,
+    places: usize,
+    values: impl Fn(&mut dyn FnMut(usize, usize, f64)),
+) -> Result<Vec<f64>, usize> {
+    let mut ends = vec![0.0f64; places];
+    values(&mut |_, place, value| ends[place] = value);
+    let by_size = |a: &usize, b: &usize| ends[*a].abs().total_cmp(&ends[*b].abs());
+    let largest = (0..places)
+        .max_by(by_size)
+        .filter(|place| ends[*place] != 0.0);
+    let size = largest.map_or(0.0, |place| ends[place].abs());
+    let mut now = vec![0.0f64; places];
+    let mut factors: Vec<f64> = Vec::with_capacity(count);
+    // the factors of the steps from the last one known to before `step`, in which nothing changes after the first
+    let mut close = |now: &[f64], step: usize| {
+        if factors.len() == step {
+            return Ok(());
+        }
+        let factor = largest.map_or(0.0, |place| now[place] / ends[place]);
+        let mut pairs = now.iter().zip(&ends);
+        if !pairs.all(|(now, end)| (now - factor * end).abs() <= SAME * size.max(now.abs())) {
+            return Err(factors.len());
+        }
+        factors.resize(step, factor);
+        Ok(())
     };
-    let ends: Vec<f64> = rows.values().map(|rows| at(rows, count - 1)).collect();
-    let size = ends.iter().fold(0.0f64, |most, end| most.max(end.abs()));
-    let factor = |step: usize| {
-        let now: Vec<f64> = rows.values().map(|rows| at(rows, step)).collect();
-        let most = now
-            .iter()
-            .zip(&ends)
-            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-        let factor = most
-            .filter(|_| size > 0.0)
-            .map_or(0.0, |(now, end)| now / end);
-        let fits = now
-            .iter()
-            .zip(&ends)
-            .all(|(now, end)| (now - factor * end).abs() <= SAME * size.max(now.abs()));
-        fits.then_some(factor).ok_or(step)
-    };
-    (0..count).map(factor).collect()
+    let mut found = Ok(());
+    values(&mut |step, place, value| {
+        if found.is_ok() {
+            found = close(&now, step);
+        }
+        now[place] = value;
+    });
+    found?;
+    close(&now, count)?;
+    Ok(factors)
 }
 
 /// The factors of indentations and of tangential displacements at the end of each step; `None` if the contacts do not

@@ -20,7 +20,7 @@ pub(super) const MOST_NAMES: usize = 1 << 16;
 pub(super) const MOST_CONSTANTS: usize = 10;
 
 /// A node or element, a range of them, or a set: a member of a set, or what a load acts on.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Eq, Ord, PartialEq, PartialOrd)]
 pub(super) enum Target {
     Label(u64),
     /// A range of numbers: first, last, step; boxed, since single numbers are many and ranges few.
