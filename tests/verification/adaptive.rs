@@ -209,6 +209,59 @@ fn adaptive_refinement_stops_at_any_question() {
     }
 }
 
+/// Allows meshes that need no more than some memory.
+struct WithMemory {
+    most: u64,
+    /// The memory of each mesh that was asked about.
+    asked: Vec<u64>,
+}
+
+impl solver::observer::Observer for WithMemory {
+    fn event(&mut self, _: Progress<'_>) {}
+
+    fn stop(&mut self) -> bool {
+        false
+    }
+
+    fn may_use(&mut self, bytes: u64) -> bool {
+        self.asked.push(bytes);
+        bytes <= self.most
+    }
+}
+
+/// Elements are divided several times for the next mesh. Where that mesh needs too much memory, they are divided once.
+#[test]
+fn a_mesh_that_is_too_large_is_tried_with_fewer_divisions() {
+    let problem = to(0.0005, example("cylinder"));
+    let solve = |most: u64| {
+        let mut observer = WithMemory {
+            most,
+            asked: Vec::new(),
+        };
+        let solution = solver::solve(&problem, &mut observer).unwrap();
+        (solution.summary.refinements, observer.asked)
+    };
+    let (free, asked) = solve(u64::MAX);
+    assert!(free.len() > 2, "{free:#?}");
+    let refused = *asked.iter().max().unwrap();
+    let place = asked.iter().position(|bytes| *bytes == refused).unwrap();
+    let (bounded, again) = solve(refused - 1);
+    assert_eq!(
+        again[..=place],
+        asked[..=place],
+        "the same meshes up to the one that is refused"
+    );
+    assert!(again[place + 1] < refused, "{again:?}");
+    let [.., before, last] = &free[..] else {
+        panic!()
+    };
+    let next = &bounded[free.len() - 1];
+    assert!(
+        (before.elements + 1..last.elements).contains(&next.elements),
+        "{bounded:#?}"
+    );
+}
+
 /// The obstacle ends inside an edge: the first mesh has a node there, and so have all others.
 #[test]
 fn an_edge_that_the_obstacle_ends_in_is_divided_there() {

@@ -129,12 +129,18 @@ fn a_mesh_for_which_there_is_no_room_leaves_the_one_before() {
     });
     assert_eq!(estimates.len(), count - 1);
     for (before, estimate) in estimates.iter().enumerate() {
-        let seen = solve(&cylinder(), |_, bytes| bytes < *estimate);
+        let enough = estimates[..before].last().copied().unwrap_or(0);
+        let seen = solve(&cylinder(), |_, bytes| bytes <= enough);
         assert_is_the_mesh(before + 1, &seen, &whole);
         assert_eq!(seen.meshes.len(), before + 1, "the next one is not begun");
+        // the next mesh, and the one with fewer divisions in its place
+        let [.., refused, smaller] = seen.asked[..] else {
+            panic!("{:?}", seen.asked)
+        };
+        assert!(refused == *estimate && (enough + 1..=refused).contains(&smaller));
         let needed = format!(
             " unknowns, would need {} MiB, more than this job has left",
-            estimate.div_ceil(1 << 20)
+            smaller.div_ceil(1 << 20)
         );
         assert!(
             reason(&seen.solution).contains(&needed),
@@ -149,7 +155,7 @@ fn a_mesh_for_which_there_is_no_room_leaves_the_one_before() {
 fn room_that_is_refused_on_the_way_leaves_the_mesh_before_too() {
     let whole = solve(&cylinder(), |_, _| true);
     for refused in (0..whole.asked.len()).step_by(3) {
-        let seen = solve(&cylinder(), |question, _| question != refused);
+        let seen = solve(&cylinder(), |question, _| question < refused);
         let count = seen.solution.summary.refinements.len();
         assert!(count < whole.solution.summary.refinements.len());
         assert_is_the_mesh(count, &seen, &whole);

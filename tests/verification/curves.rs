@@ -135,6 +135,28 @@ fn facets_on_a_spline_have_no_corners() {
     close(peak(&solution).0, -62.36, 0.02);
 }
 
+/// The nodes of adaptive meshes lie on the spline too, however often elements are divided from one mesh to the next.
+#[test]
+fn adaptive_meshes_follow_a_spline() {
+    let spline = json!({"outer": {"kind": "spline"}});
+    let refine = json!({"tolerance": 0.002});
+    let mut sector = facets(60);
+    sector.across = 10;
+    let text = cylinder(sector, &[("curves", spline), ("refine", refine)]);
+    let solution = solve(&problem(&text.to_string()));
+    assert!(solution.summary.refinements.len() > 1);
+    assert_eq!(kinks(&solution), Vec::<&str>::new());
+    close(peak(&solution).0, -62.36, 0.15);
+    // on a circle, a spline through points every 2° differs from it by less than 1e-6 of the radius
+    let (fields, profile) = (&solution.fields, &solution.profiles["outer"]);
+    let on_arc = |i: usize| profile.x[i].hypot(profile.y[i]);
+    let off = (0..profile.x.len())
+        .map(|i| (on_arc(i) - 4.0).abs())
+        .fold(0.0, f64::max);
+    assert!(profile.x.len() > 2 * 60 + 1 && fields.x.len() > profile.x.len());
+    assert!(off < 4e-6, "{off:e}");
+}
+
 /// The smooth body itself has no corners: nothing is said, whatever its elements.
 #[test]
 fn a_curved_body_has_no_corners() {

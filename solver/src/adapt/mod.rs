@@ -2,10 +2,10 @@
 //! tolerance.
 //!
 //! Solves, divides the elements that hold most of the errors above the tolerance, as `accuracy` states them and
-//! `origins` places them, divides those of their parts again that are expected to hold most of what is left, and repeats.
-//! Edges under a peak of σ_t that are wider than a part of ρ are divided in any
-//! case, since an estimate does not see what the mesh does not resolve at all. So are edges inside which the obstacle
-//! ends, until the part that is left out of the contact is negligible.
+//! `origins` places them, divides those of their parts again that are expected to hold most of what is left, and
+//! repeats. Edges under a peak of σ_t that are wider than a part of ρ are divided in any case, since an estimate does
+//! not see what the mesh does not resolve at all. So are edges inside which the obstacle ends, until the part that is
+//! left out of the contact is negligible.
 
 mod mesh_results;
 mod stopping;
@@ -60,12 +60,11 @@ pub fn run(
     solve: &Solve<'_>,
     observer: &mut dyn Observer,
 ) -> Result<(Solution, Mesh), SolveError> {
-    // what the mesh itself was warned of is told again with each
-    let of_mesh = |warning: &&Warning| warning.pointer.starts_with("/mesh");
-    let notes: Vec<Warning> = first.warnings.iter().filter(of_mesh).cloned().collect();
-    let most_at_contacts: Vec<usize> = first.contacts.iter().map(most_elements).collect();
-    let mut graded = GradedMesh::new(&first.mesh);
-    let mut parts: Vec<u32> = (0..first.mesh.elements.len() as u32).collect();
+    let limits = Limits::new(&first);
+    let mut divided = Divided {
+        graded: GradedMesh::new(&first.mesh),
+        parts: (0..first.mesh.elements.len() as u32).collect(),
+    };
     let mut model = first;
     let mut sequence: Vec<Refinement> = Vec::new();
     let mut before: Option<Solved> = None;
@@ -107,29 +106,18 @@ pub fn run(
         };
         sequence.push(results.row(change, error));
 
-        let mut next = None;
-        let reason = if on_mesh.stopped || solution.summary.outcome == Outcome::Canceled {
-            None
+        let next = if on_mesh.stopped || solution.summary.outcome == Outcome::Canceled {
+            Err(None)
         } else if let Some(why) = unsolved {
-            Some(StopReason::First(why))
+            Err(Some(StopReason::First(why)))
         } else if error <= goal.tolerance {
-            Some(StopReason::Nothing)
+            Err(Some(StopReason::Nothing))
         } else if let Some(reason) = given_up(&sequence, goal.tolerance) {
-            Some(reason)
+            Err(Some(reason))
         } else {
             let marked = marks(&contacts, &solution, &origins, &truncation.elements);
-            let of_parts = &origins.elements;
-            match finer(problem, &mut graded, &mesh, &mut parts, (&marked, of_parts)) {
-                Ok(mesh) => {
-                    let warnings = notes.clone();
-                    let given = ExternalMesh { mesh, warnings };
-                    let model = Model::on_mesh(problem, given).map_err(SolveError::Invalid)?;
-                    let too_large = too_large(&model, &most_at_contacts, observer)?;
-                    next = too_large.is_none().then_some(model);
-                    too_large
-                }
-                Err(reason) => Some(reason),
-            }
+            let errors = (&marked[..], &origins.elements[..]);
+            next_model(problem, &limits, &mut divided, (&mesh, errors), observer)?.map_err(Some)
         };
         let here = Solved {
             solution,
@@ -138,8 +126,8 @@ pub fn run(
             truncation: truncation.error,
         };
         match next {
-            Some(finer) => (model, before) = (finer, Some(here)),
-            None => return Ok(here.ended(problem, goal, sequence, reason, observer)),
+            Ok(finer) => (model, before) = (finer, Some(here)),
+            Err(reason) => return Ok(here.ended(problem, goal, sequence, reason, observer)),
         }
     }
 }
@@ -257,58 +245,142 @@ fn unsolved(outcome: Outcome) -> Option<&'static str> {
     }
 }
 
-/// Why a mesh is not solved: too many elements at a contact, or too much memory.
-fn too_large(
-    model: &Model,
-    most_at_contacts: &[usize],
-    observer: &mut dyn Observer,
-) -> Result<Option<StopReason>, SolveError> {
-    let at_contacts = model.contacts.iter().zip(most_at_contacts);
-    let too_many = at_contacts
-        .map(|(contact, most)| (contact.boundary.edge_count(), *most))
-        .find(|(count, most)| count > most);
-    if let Some((count, most)) = too_many {
-        return Ok(Some(StopReason::ContactElements(count, most)));
-    }
-    let estimate = model.estimate_of_mesh();
-    let (unknowns, bytes) = (estimate.dofs, estimate.memory_bytes);
-    match observer.may_use(bytes) {
-        true => Ok(None),
-        false if observer.stop() => Err(SolveError::Stopped),
-        false => Ok(Some(StopReason::Memory { unknowns, bytes })),
-    }
+/// What the first mesh says of all others.
+struct Limits {
+    /// What the mesh itself was warned of, which is told again with each.
+    notes: Vec<Warning>,
+    /// The largest number of elements at each contact, as the estimate of the memory assumes.
+    most_at_contacts: Vec<usize>,
 }
 
-/// The largest number of elements at a contact, as the estimate of the memory assumes.
-fn most_elements(contact: &ContactModel) -> usize {
-    MOST_ADAPTIVE_CONTACT_ELEMENTS.max(contact.boundary.edge_count())
-}
-
-/// Makes the next mesh. `parts`: for each element of the mesh, the element of `graded` that contains it.
-fn finer(
-    problem: &Problem,
-    graded: &mut GradedMesh,
-    mesh: &Mesh,
-    parts: &mut Vec<u32>,
-    (marked, contributions): (&[bool], &[f64]),
-) -> Result<Mesh, StopReason> {
-    // closures have triangles, which the thesis's own iteration does not know
-    let finer = if problem.solver.algorithm == Algorithm::Thesis {
-        mesh::refine(mesh)
-    } else {
-        if !marked.contains(&true) {
-            return Err(StopReason::Stalled);
+impl Limits {
+    fn new(first: &Model) -> Self {
+        let of_mesh = |warning: &&Warning| warning.pointer.starts_with("/mesh");
+        let most = |contact: &ContactModel| {
+            contact
+                .boundary
+                .edge_count()
+                .max(MOST_ADAPTIVE_CONTACT_ELEMENTS)
+        };
+        Limits {
+            notes: first.warnings.iter().filter(of_mesh).cloned().collect(),
+            most_at_contacts: first.contacts.iter().map(most).collect(),
         }
+    }
+
+    /// Why a mesh is not solved: too many elements at a contact, or too much memory.
+    fn refusal(
+        &self,
+        model: &Model,
+        observer: &mut dyn Observer,
+    ) -> Result<Option<StopReason>, SolveError> {
+        let at_contacts = model.contacts.iter().zip(&self.most_at_contacts);
+        let too_many = at_contacts
+            .map(|(contact, most)| (contact.boundary.edge_count(), *most))
+            .find(|(count, most)| count > most);
+        if let Some((count, most)) = too_many {
+            return Ok(Some(StopReason::ContactElements(count, most)));
+        }
+        let estimate = model.estimate_of_mesh();
+        let (unknowns, bytes) = (estimate.dofs, estimate.memory_bytes);
+        match observer.may_use(bytes) {
+            true => Ok(None),
+            false if observer.stop() => Err(SolveError::Stopped),
+            false => Ok(Some(StopReason::Memory { unknowns, bytes })),
+        }
+    }
+}
+
+/// The elements as they are divided so far, of which each mesh is made.
+#[derive(Clone)]
+struct Divided {
+    graded: GradedMesh,
+    /// For each element of the last mesh, the element of `graded` that contains it.
+    parts: Vec<u32>,
+}
+
+/// The model on the next mesh, or why there is none. Where a mesh with several divisions is refused, which may be for its
+/// size, one with a single division is tried. `errors`: the elements to be divided, and what each contributes to the
+/// errors.
+fn next_model(
+    problem: &Problem,
+    limits: &Limits,
+    divided: &mut Divided,
+    (mesh, errors): (&Mesh, (&[bool], &[f64])),
+    observer: &mut dyn Observer,
+) -> Result<Result<Model, StopReason>, SolveError> {
+    let mut attempt = |divisions: usize| {
+        let mut finer = divided.clone();
+        let mesh = match finer.next(problem, mesh, errors, divisions) {
+            Ok(mesh) => mesh,
+            Err(reason) => return Ok(Err(reason)),
+        };
+        let warnings = limits.notes.clone();
+        let model = Model::on_mesh(problem, ExternalMesh { mesh, warnings });
+        let model = model.map_err(SolveError::Invalid)?;
+        let refusal = limits.refusal(&model, observer)?;
+        if refusal.is_none() {
+            *divided = finer;
+        }
+        Ok(refusal.map_or(Ok(model), Err))
+    };
+    match attempt(MOST_DIVISIONS)? {
+        Err(_) => attempt(1),
+        model => Ok(model),
+    }
+}
+
+impl Divided {
+    /// Divides elements up to `divisions` times, and returns the mesh.
+    fn next(
+        &mut self,
+        problem: &Problem,
+        mesh: &Mesh,
+        (marked, contributions): (&[bool], &[f64]),
+        divisions: usize,
+    ) -> Result<Mesh, StopReason> {
+        // closures have triangles, which the thesis's own iteration does not know
+        let finer = if problem.solver.algorithm == Algorithm::Thesis {
+            mesh::refine(mesh)
+        } else {
+            if !marked.contains(&true) {
+                return Err(StopReason::Stalled);
+            }
+            self.divide(problem, marked, contributions, divisions);
+            let (finer, parts) = self.graded.closed();
+            self.parts = parts;
+            finer
+        };
+        let elements = finer.elements.len();
+        if elements > MOST_ADAPTIVE_ELEMENTS {
+            return Err(StopReason::Elements(elements));
+        }
+        if !finer.inverted_elements(false).is_empty() {
+            return Err(StopReason::Inverted);
+        }
+        Ok(finer)
+    }
+
+    /// Divides the marked elements and, up to `divisions` times in all, those of their parts that are expected to hold most
+    /// of the errors that are left.
+    fn divide(
+        &mut self,
+        problem: &Problem,
+        marked: &[bool],
+        contributions: &[f64],
+        divisions: usize,
+    ) {
+        let graded = &mut self.graded;
         let before = graded.elements();
         let mut divided = vec![false; before];
         let mut known = vec![0.0; before];
-        for ((part, marked), contribution) in parts.iter().zip(marked).zip(contributions) {
+        for ((part, marked), contribution) in self.parts.iter().zip(marked).zip(contributions) {
             divided[*part as usize] |= marked;
             known[*part as usize] += contribution;
         }
         graded.set_contributions(&known);
         refine_on_curves(problem, graded, &divided);
-        for _ in 1..MOST_DIVISIONS {
+        for _ in 1..divisions {
             let expected = graded.contributions();
             let enough = expected.iter().sum::<f64>() <= ENOUGH;
             if enough || graded.elements() as f64 > GROWTH * before as f64 {
@@ -321,18 +393,7 @@ fn finer(
             }
             refine_on_curves(problem, graded, &divided);
         }
-        let (finer, of) = graded.closed();
-        *parts = of;
-        finer
-    };
-    let elements = finer.elements.len();
-    if elements > MOST_ADAPTIVE_ELEMENTS {
-        return Err(StopReason::Elements(elements));
     }
-    if !finer.inverted_elements(false).is_empty() {
-        return Err(StopReason::Inverted);
-    }
-    Ok(finer)
 }
 
 /// Divides the marked elements, and moves the new nodes of boundaries onto their curves: nodes of divisions to come are made

@@ -8,14 +8,14 @@ use crate::solution::{
     WarningCode,
 };
 
-/// The largest number of meshes. Each about halves the smallest element.
+/// The largest number of meshes.
 const MOST_MESHES: usize = 30;
 
 /// The number of meshes by which the decrease of errors is judged. At a kink of the obstacle, for example, errors do
 /// not decrease.
-const PATIENCE: usize = 8;
+const PATIENCE: usize = 5;
 /// The number of meshes before refinement stops because errors decrease too slowly.
-const FEWEST_MESHES: usize = 12;
+const FEWEST_MESHES: usize = 8;
 
 /// The largest number of meshes in a row without a known error. Errors are unknown while the obstacle between the nodes
 /// is not resolved; each mesh halves the distance of the nodes where this is so.

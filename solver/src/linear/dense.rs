@@ -213,7 +213,8 @@ impl General {
         &mut self.values[j * self.size..(j + 1) * self.size]
     }
 
-    /// Adds the product of a matrix `left`, by columns, and a matrix `right`, by rows.
+    /// Adds the product of a matrix `left`, by columns, and a matrix `right`, by rows. Rows of `left` before the first and after
+    /// the last that are not zero cost nothing.
     pub fn add_product(
         &mut self,
         left: &[f64],
@@ -222,17 +223,20 @@ impl General {
     ) -> Result<(), Stopped> {
         let n = self.size;
         let inner = left.len().checked_div(n).unwrap_or(0);
-        let left = MatRef::from_column_major_slice(left, n, inner);
+        let zero = |row: &usize| (0..inner).all(|k| left[k * n + row] == 0.0);
+        let low = (0..n).take_while(zero).count();
+        let rows = n - low - (low..n).rev().take_while(zero).count();
+        let left = MatRef::from_column_major_slice(left, n, inner).subrows(low, rows);
         let right = MatRef::from_row_major_slice(right, inner, n);
         // so few columns at once that whoever asks to stop does not wait for long
-        let work = (n * inner).max(1);
+        let work = (rows * inner).max(1);
         let columns = (PORTION as usize / work).max(1);
         for first in (0..n).step_by(columns) {
             let count = columns.min(n - first);
             let part = &mut self.values[first * n..(first + count) * n];
             let part = MatMut::from_column_major_slice_mut(part, n, count);
             matmul(
-                part,
+                part.subrows_mut(low, rows),
                 Accum::Add,
                 left,
                 right.subcols(first, count),

@@ -291,32 +291,34 @@ impl PatchView<'_> {
             return edges;
         }
         let at_nodes = self.averaged_and_bound_at_nodes();
-        let (mut largest_at_node, mut bounds) = (0.0f64, Vec::with_capacity(edges.len()));
-        for &edge in &edges {
-            let nodes = edge_nodes(edge).map(|i| at_nodes[i]);
-            let slips = [-1.0, 1.0, 0.0].map(|xi| self.slip_at(edge, xi));
-            let stresses = nodes
-                .iter()
-                .zip(slips)
-                .map(|((_, bound), slip)| bound * law.phi(slip));
-            largest_at_node = stresses.fold(largest_at_node, |most, stress| stress.abs().max(most));
-            let [start, end, middle] = self.patch.contact.boundary.edge_arc(edge);
+        let largest_at_node = |edge: &usize| {
+            let bounds = edge_nodes(*edge).map(|i| at_nodes[i].1);
+            let stresses = bounds.iter().zip(self.slips_at_nodes(*edge));
+            stresses.fold(0.0, |most: f64, (bound, slip)| {
+                most.max((bound * law.phi(slip)).abs())
+            })
+        };
+        let enough = part * edges.iter().map(largest_at_node).fold(0.0, f64::max);
+        edges.retain(|edge| {
+            let [start, end, middle] = self.patch.contact.boundary.edge_arc(*edge);
             let spacing = (middle - start).max(end - middle);
-            let averaged = nodes.iter().fold(0.0, |most: f64, node| node.0.max(most))
-                + 0.125 * curvature * spacing * spacing;
+            let at_nodes = edge_nodes(*edge).map(|i| at_nodes[i].0);
+            let averaged =
+                at_nodes.into_iter().fold(0.0, f64::max) + 0.125 * curvature * spacing * spacing;
             let slip = BETWEEN
-                * slips
-                    .iter()
-                    .fold(0.0, |most: f64, slip| slip.abs().max(most));
-            bounds.push(law.bound.of_average(averaged, self.largest) * law.phi(slip));
-        }
-        let mut bounds = bounds.into_iter();
-        edges.retain(|_| {
-            bounds
-                .next()
-                .is_none_or(|bound| bound >= part * largest_at_node)
+                * self
+                    .slips_at_nodes(*edge)
+                    .map(f64::abs)
+                    .into_iter()
+                    .fold(0.0, f64::max);
+            law.bound.of_average(averaged, self.largest) * law.phi(slip) >= enough
         });
         edges
+    }
+
+    /// The slips at the start, the end and the middle of an edge.
+    fn slips_at_nodes(&self, edge: usize) -> [f64; 3] {
+        [-1.0, 1.0, 0.0].map(|xi| self.slip_at(edge, xi))
     }
 }
 
