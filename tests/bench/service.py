@@ -3,8 +3,10 @@
     service.py [JOBS]
     service.py --isolation
     service.py --bodies
+    service.py --processor
 
-With --isolation only the table of threads and processes, with --bodies only that of bodies that are kept. JOBS (1,000,000
+With --isolation only the table of threads and processes, with --bodies only that of bodies that are kept, with --processor
+only that of the service's own processor time. JOBS (1,000,000
 when absent) is how many jobs the lists are read from; what they show is compared with plain SQL over the same rows.
 `cargo build --release` comes first: requests are sent by `target/release/load`.
 """
@@ -31,7 +33,7 @@ import problem as block
 
 from outside import TERMINAL, TOP, Server, check, cpu_s, equal, example, percentile, submission, talkative
 
-ONLY = sys.argv[1] if sys.argv[1:] in (["--isolation"], ["--bodies"]) else None
+ONLY = sys.argv[1] if sys.argv[1:] in (["--isolation"], ["--bodies"], ["--processor"]) else None
 JOBS = int(sys.argv[1]) if len(sys.argv) > 1 and not ONLY else 1_000_000
 # every job factors its body
 NO_BODIES = ("--body-cache-bytes", "0")
@@ -149,6 +151,47 @@ def bodies():
                      kept["bytes"] / 2**20))
     table("Processor time of the service for a job on a body that is kept, s (median of 6, in turns; the result stored)",
           ("unknowns", "factored anew", "kept", "ratio (least–most)", "the body, MiB"), rows)
+
+
+def processor():
+    """What the service takes of the processors, with the solution where a job is solved, without the clients."""
+    rows = []
+
+    def spent(what, count, work):
+        """Six turns, of which the first warms up; milliseconds per answer."""
+        spans = []
+        for _ in range(6):
+            before = cpu_s(server.process.pid)
+            work()
+            spans.append(1e3 * (cpu_s(server.process.pid) - before) / count)
+        spans = sorted(spans[1:])
+        rows.append((what, spans[2], "%.2f–%.2f" % (spans[0], spans[-1])))
+
+    job = lambda **envelope: request("POST", "/v1/jobs", submission(example(), **envelope), prefer="wait=30")
+    with Server(*NO_BODIES) as server:
+        spent("a job of 56 elements, one after the other", 300, lambda: load(server, 1, 300, job(cache="off"), 201))
+        spent("the same, of 32 clients", 1000, lambda: load(server, 32, 1000, job(cache="off"), 201))
+        server.finished(server.submit(example(), cache="refresh"))
+        spent("an answer from the cache, of 32 clients", 1000, lambda: load(server, 32, 1000, job(cache="use"), 201))
+
+        def swept():
+            made = server.call("POST", "/v1/sweeps", {"base": example(), "axes": [
+                {"path": "/contacts/0/indentation", "linspace": {"start": 0.01, "stop": 0.02, "count": 1000}}]})
+            equal(made.status, 202, "a sweep, %r" % made)
+            place = "/v1/sweeps/%s" % made.json()["id"]
+            while server.json(place + "?wait=10")["status"] not in TERMINAL:
+                pass
+            equal(server.json(place)["status"], "succeeded", "a sweep")
+
+        spent("a member of a sweep of 1,000", 1000, swept)
+        watched = server.submit(talkative(500), cache="off")
+        server.finished(watched)
+        spent("a watcher of the events of 500 steps, from the first on", 10, lambda: [server.events(watched) for _ in range(10)])
+    with Server(*MANY) as server:
+        equal(server.call("POST", "/v1/queue/pause").status, 200, "pausing the queue")
+        sent = request("POST", "/v1/jobs", submission(example(), cache="off"))
+        spent("a submit, of 32 clients", 2000, lambda: load(server, 32, 2000, sent, 202))
+    table("Processor time of the service, ms (median of 5, least to most)", ("", "ms", "least–most"), rows)
 
 
 def submits():
@@ -341,12 +384,15 @@ def main():
     check(LOAD.exists(), "%s is missing: cargo build --release" % LOAD)
     if ONLY == "--isolation":
         return isolation()
+    if ONLY == "--processor":
+        return processor()
     with tempfile.TemporaryDirectory() as folder:
         commits(folder)
     with Server(*NO_BODIES) as server:
         waited(server)
     isolation()
     bodies()
+    processor()
     submits()
     lists()
 

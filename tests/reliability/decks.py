@@ -107,6 +107,10 @@ def decks():
         step % ("*BOUNDARY, OP=NEW\n%s,1,2\n99999999,1,6\n" % "NM"[k % 2]) for k in range(999))
     yield "motions of a rigid body, and many steps", lambda: SQUARE + TOUCHED + fill(
         lambda k: "99999999,1,1,%d" % k, size=half) + step % "" * 999
+    body = "*RIGID BODY, NSET=R%d, REF NODE=1"
+    yield "many rigid bodies in many steps", lambda: "*PART, NAME=P\n*NODE\n1,0,0\n" + "\n".join(
+        body % k for k in range(1000)) + "\n*END PART\n" + "".join(
+        "*INSTANCE, NAME=I%d, PART=P\n*END INSTANCE\n" % k for k in range(200)) + step % "" * 999
     yield "steps without end", lambda: SQUARE + TOUCHED + fill(lambda _: step % "", joint="", size=half)
     yield "a name of a whole line at every node", lambda: SQUARE + "*NODE, NSET=" + "N" * 500_000 + "\n" + fill(
         lambda k: "%d,0,0" % (k + 10), size=half)

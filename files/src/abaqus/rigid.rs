@@ -41,12 +41,13 @@ pub(super) struct Body {
     pub(super) attached: bool,
 }
 
+/// The reference and rotation nodes in a row: for each the number of its rigid body, and whether it is the rotation node.
+type BodyNodes = Arc<[(usize, bool)]>;
+
 /// A row of `*BOUNDARY` for reference nodes.
 pub(super) struct Moving {
     pub(super) row: Held,
-    /// For each reference or rotation node in the row: the number of its rigid body, and whether it is the rotation
-    /// node.
-    pub(super) on: Arc<[(usize, bool)]>,
+    pub(super) on: BodyNodes,
     /// Whether the row holds no other nodes than reference nodes.
     pub(super) alone: bool,
 }
@@ -294,14 +295,14 @@ impl Search<'_> {
         }
         held.sort_by_key(|(_, row)| row.line);
         // many rows may name the same large set
-        let mut known: BTreeMap<(usize, Target), (Arc<[(usize, bool)]>, bool)> = BTreeMap::new();
+        let mut known: BTreeMap<(usize, Target), (BodyNodes, bool)> = BTreeMap::new();
         let mut rows = Vec::new();
         for (scope, row) in held {
             let of_target = known.entry((scope, row.target.clone()));
             let (on, alone) = of_target.or_insert_with_key(|(scope, target)| {
                 let nodes = self.nodes_of(*scope, target);
                 let on = nodes.iter().filter_map(|node| single.get(node).copied());
-                let on: Arc<[(usize, bool)]> = on.collect();
+                let on: BodyNodes = on.collect();
                 let alone = on.len() == nodes.len();
                 (on, alone)
             });

@@ -26,8 +26,11 @@ const MOST_STEPS: usize = 1000;
 /// each of 1,000 steps. More would take seconds.
 const MOST_DISPLACEMENTS: usize = 1 << 27;
 
-/// The largest number of motions of rigid bodies, likewise: of 1,000 bodies in each of 1,000 steps.
+/// The largest number of motions of rigid bodies, likewise: of 300 bodies with three components in each of 1,000 steps.
 const MOST_MOTIONS: usize = 1 << 20;
+
+/// The largest number of rigid bodies, each counted in every step.
+const MOST_ENDS: usize = 1 << 16;
 
 impl Built {
     /// Removes the rows of reference nodes from the prescribed displacements; returns the motion of each rigid body, or
@@ -121,16 +124,29 @@ impl Built {
         })
     }
 
-    /// What a deck has too much of to be followed through its steps: the steps, or the nodes that all rows of `*BOUNDARY`
-    /// name.
+    /// What a deck has too much of to be followed through its steps: steps, rigid bodies, or nodes that all rows of
+    /// `*BOUNDARY` name.
     pub(super) fn too_long(&self) -> Option<Violation> {
-        if let Some((line, _)) = self.deck.contact.steps.get(MOST_STEPS) {
+        let (steps, bodies) = (&self.deck.contact.steps, &self.tools.bodies);
+        let beyond_most = steps.get(MOST_STEPS).filter(|_| !self.pairs.is_empty());
+        if let Some((line, _)) = beyond_most {
             return Some(on_line(
                 *line,
                 Reason::TooMany,
-                format!("{} steps", self.deck.steps),
+                format!("{} steps", steps.len()),
                 &format!("at most {MOST_STEPS}"),
-                "Divide the deck: each part begins with a step that has all supports and loads.",
+                "Use fewer steps: those that move a body on in one direction can be one step.",
+            ));
+        }
+        if let Some(last) = bodies.last()
+            && bodies.len() * steps.len() > MOST_ENDS
+        {
+            return Some(on_line(
+                last.line,
+                Reason::TooMany,
+                format!("{} rigid bodies in {} steps", bodies.len(), steps.len()),
+                &format!("at most {MOST_ENDS} rigid bodies, each counted in every step"),
+                "Use fewer steps, or leave out the rigid bodies that nothing touches.",
             ));
         }
         let of_nodes = self.prescribed.iter().map(|Row { row, name }| {

@@ -24,6 +24,47 @@ pub struct Event {
     pub payload: Payload,
 }
 
+/// An [`Event`] as it is stored: its payload is JSON, which is passed on as it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StoredEvent {
+    /// The number of the event.
+    pub seq: i64,
+    /// The attempt that the event belongs to; 0 before the first attempt.
+    pub attempt: i32,
+    /// The time of the event.
+    pub t: Time,
+    /// The word for the kind of event, [`Payload::kind`].
+    pub kind: String,
+    /// The payload as a JSON object, which is not empty.
+    pub payload: String,
+}
+
+impl StoredEvent {
+    /// Whether this is the last event of its job.
+    pub fn is_done(&self) -> bool {
+        self.kind == "done"
+    }
+
+    /// The event as JSON, as an [`Event`] is written.
+    pub fn json(&self) -> String {
+        let StoredEvent {
+            seq, attempt, t, ..
+        } = self;
+        let members = self.payload.strip_prefix('{').unwrap_or_default();
+        format!(r#"{{"seq":{seq},"attempt":{attempt},"t":"{t}",{members}"#)
+    }
+
+    /// The event with its payload read; an error if the payload is none of this version.
+    pub fn read(&self) -> serde_json::Result<Event> {
+        Ok(Event {
+            seq: self.seq,
+            attempt: self.attempt,
+            t: self.t,
+            payload: serde_json::from_str(&self.payload)?,
+        })
+    }
+}
+
 /// The content of an event.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema, IntoStaticStr)]
 #[serde(tag = "type", rename_all = "snake_case")]
@@ -111,10 +152,12 @@ pub enum Requeue {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use solver::solution::WarningCode;
 
     #[test]
-    fn the_kind_of_an_event_is_its_type_in_json() {
+    fn the_kind_of_an_event_is_its_type_in_json_and_a_stored_event_is_written_alike() {
         for payload in [
+            Payload::status(Status::Running),
             Payload::requeued(Requeue::Drain),
             Payload::Stage {
                 stage: Phase::Factor,
@@ -128,9 +171,32 @@ mod tests {
                 row: fake::iteration(1),
                 wall_s: 0.5,
             }),
+            Payload::Warning(Warning {
+                code: WarningCode::KinkInContact,
+                pointer: "/contacts/0".to_owned(),
+                message: "a \"kink\" {at} ρ\n".to_owned(),
+            }),
         ] {
             let json = serde_json::to_value(&payload).unwrap_or_default();
             assert_eq!(json["type"], payload.kind());
+            let event = Event {
+                seq: 7,
+                attempt: 2,
+                t: Time::from_micros(1_700_000_000_000_001),
+                payload,
+            };
+            let stored = StoredEvent {
+                seq: 7,
+                attempt: 2,
+                t: event.t,
+                kind: event.payload.kind().to_owned(),
+                payload: serde_json::to_string(&event.payload).unwrap_or_default(),
+            };
+            assert_eq!(
+                stored.json(),
+                serde_json::to_string(&event).unwrap_or_default()
+            );
+            assert_eq!(stored.read().ok(), Some(event));
         }
     }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use base::{
-    event::{Event, Payload},
+    event::{Payload, StoredEvent},
     job::Progress,
     time::Time,
 };
@@ -54,7 +54,7 @@ impl Store {
         key: i64,
         after: i64,
         limit: i64,
-    ) -> Result<Vec<Event>> {
+    ) -> Result<Vec<StoredEvent>> {
         self.read(move |_, connection| read(connection, key, after, limit))
             .await
     }
@@ -76,7 +76,7 @@ pub(super) fn read(
     key: i64,
     after: i64,
     limit: i64,
-) -> Result<Vec<Event>> {
+) -> Result<Vec<StoredEvent>> {
     // one statement sees one state: the events, and after them the number of the last one
     let rows = connection.rows(
         "select * from (select seq, attempt, t, type, body, checksum from event
@@ -90,7 +90,7 @@ pub(super) fn read(
     let Some((last, _)) = rows.pop() else {
         return Ok(vec![]); // the job was deleted
     };
-    let events: Vec<Event> = rows
+    let events: Vec<StoredEvent> = rows
         .into_iter()
         .map(|(_, event)| event)
         .collect::<Result<_>>()?;
@@ -107,14 +107,22 @@ pub(super) fn read(
 }
 
 /// The event of a row, if the checksum matches.
-fn event(key: i64, row: &Row<'_>) -> Result<Event> {
+fn event(key: i64, row: &Row<'_>) -> Result<StoredEvent> {
     let (seq, body) = checked(key, row)?;
-    Ok(Event {
+    let mut event = StoredEvent {
         seq,
         attempt: row.get("attempt")?,
         t: Time::from_micros(row.get("t")?),
-        payload: serde_json::from_str(body).map_err(|error| record(key, seq).damaged(error))?,
-    })
+        kind: text(row, "type")?.to_owned(),
+        payload: body.to_owned(),
+    };
+    // written anew: a job, as this version describes jobs; and what no checksum says to be as it was written
+    if event.is_done() || row.get::<_, Option<i64>>("checksum")?.is_none() {
+        let read = serde_json::from_str::<Payload>(body);
+        let written = read.and_then(|payload| serde_json::to_string(&payload));
+        event.payload = written.map_err(|error| record(key, seq).damaged(error))?;
+    }
+    Ok(event)
 }
 
 /// The time of an event (µs), if the checksum of its row matches.
@@ -140,7 +148,7 @@ fn checksum(key: i64, seq: i64, attempt: i32, t: i64, kind: &str, body: &str) ->
     row.int(t).text(kind).text(body)
 }
 
-fn record(key: i64, seq: i64) -> Record {
+pub(super) fn record(key: i64, seq: i64) -> Record {
     Record::of_job(key, format!("event {seq}"))
 }
 

@@ -5,10 +5,7 @@
 
 use std::{collections::BTreeSet, path::Path};
 
-use base::{
-    event::Payload,
-    job::{Job, ResultAvailable},
-};
+use base::job::{Job, ResultAvailable};
 use rusqlite::{Connection, Row};
 
 use super::{
@@ -366,7 +363,11 @@ fn check_parts(source: &Connection, job: &Job) -> Result<()> {
     loop {
         let events = events::read(source, job.key, after, EVENTS_PER_READ)?;
         let Some(last) = events.last() else { break };
-        ended = matches!(last.payload, Payload::Done { .. });
+        for event in &events {
+            let readable = event.read().map(|_| ());
+            readable.map_err(|error| events::record(job.key, event.seq).damaged(error))?;
+        }
+        ended = last.is_done();
         after = last.seq;
     }
     if ended != job.status.is_terminal() {

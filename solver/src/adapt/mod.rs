@@ -245,7 +245,7 @@ fn unsolved(outcome: Outcome) -> Option<&'static str> {
     }
 }
 
-/// What the first mesh says of all others.
+/// Limits and warnings that hold for all meshes, taken from the first.
 struct Limits {
     /// What the mesh itself was warned of, which is told again with each.
     notes: Vec<Warning>,
@@ -309,67 +309,73 @@ fn next_model(
     (mesh, errors): (&Mesh, (&[bool], &[f64])),
     observer: &mut dyn Observer,
 ) -> Result<Result<Model, StopReason>, SolveError> {
-    let mut attempt = |divisions: usize| {
+    let mut most = MOST_DIVISIONS;
+    loop {
         let mut finer = divided.clone();
-        let mesh = match finer.next(problem, mesh, errors, divisions) {
-            Ok(mesh) => mesh,
-            Err(reason) => return Ok(Err(reason)),
+        let (mesh, divisions) = finer.next(problem, mesh, errors, most);
+        let refused = match mesh {
+            Ok(mesh) => {
+                let warnings = limits.notes.clone();
+                let model = Model::on_mesh(problem, ExternalMesh { mesh, warnings });
+                let model = model.map_err(SolveError::Invalid)?;
+                match limits.refusal(&model, observer)? {
+                    None => {
+                        *divided = finer;
+                        return Ok(Ok(model));
+                    }
+                    Some(reason) => reason,
+                }
+            }
+            Err(reason) => reason,
         };
-        let warnings = limits.notes.clone();
-        let model = Model::on_mesh(problem, ExternalMesh { mesh, warnings });
-        let model = model.map_err(SolveError::Invalid)?;
-        let refusal = limits.refusal(&model, observer)?;
-        if refusal.is_none() {
-            *divided = finer;
+        if divisions <= 1 {
+            return Ok(Err(refused));
         }
-        Ok(refusal.map_or(Ok(model), Err))
-    };
-    match attempt(MOST_DIVISIONS)? {
-        Err(_) => attempt(1),
-        model => Ok(model),
+        most = 1;
     }
 }
 
 impl Divided {
-    /// Divides elements up to `divisions` times, and returns the mesh.
+    /// Divides elements up to `most` times; returns the mesh, or why there is none, and how often it was.
     fn next(
         &mut self,
         problem: &Problem,
         mesh: &Mesh,
         (marked, contributions): (&[bool], &[f64]),
-        divisions: usize,
-    ) -> Result<Mesh, StopReason> {
+        most: usize,
+    ) -> (Result<Mesh, StopReason>, usize) {
         // closures have triangles, which the thesis's own iteration does not know
-        let finer = if problem.solver.algorithm == Algorithm::Thesis {
-            mesh::refine(mesh)
+        let (finer, divisions) = if problem.solver.algorithm == Algorithm::Thesis {
+            (mesh::refine(mesh), 1)
         } else {
             if !marked.contains(&true) {
-                return Err(StopReason::Stalled);
+                return (Err(StopReason::Stalled), 0);
             }
-            self.divide(problem, marked, contributions, divisions);
+            let divisions = self.divide(problem, marked, contributions, most);
             let (finer, parts) = self.graded.closed();
             self.parts = parts;
-            finer
+            (finer, divisions)
         };
         let elements = finer.elements.len();
-        if elements > MOST_ADAPTIVE_ELEMENTS {
-            return Err(StopReason::Elements(elements));
-        }
-        if !finer.inverted_elements(false).is_empty() {
-            return Err(StopReason::Inverted);
-        }
-        Ok(finer)
+        let finer = if elements > MOST_ADAPTIVE_ELEMENTS {
+            Err(StopReason::Elements(elements))
+        } else if !finer.inverted_elements(false).is_empty() {
+            Err(StopReason::Inverted)
+        } else {
+            Ok(finer)
+        };
+        (finer, divisions)
     }
 
-    /// Divides the marked elements and, up to `divisions` times in all, those of their parts that are expected to hold most
-    /// of the errors that are left.
+    /// Divides the marked elements and, up to `most` times in all, those of their parts that are expected to hold most of
+    /// the errors that are left; returns how often.
     fn divide(
         &mut self,
         problem: &Problem,
         marked: &[bool],
         contributions: &[f64],
-        divisions: usize,
-    ) {
+        most: usize,
+    ) -> usize {
         let graded = &mut self.graded;
         let before = graded.elements();
         let mut divided = vec![false; before];
@@ -380,19 +386,20 @@ impl Divided {
         }
         graded.set_contributions(&known);
         refine_on_curves(problem, graded, &divided);
-        for _ in 1..divisions {
+        for divisions in 1..most {
             let expected = graded.contributions();
             let enough = expected.iter().sum::<f64>() <= ENOUGH;
             if enough || graded.elements() as f64 > GROWTH * before as f64 {
-                break;
+                return divisions;
             }
             let divided = bulk(&expected);
             let more = 3 * divided.iter().filter(|divided| **divided).count();
             if graded.elements() + more > MOST_ADAPTIVE_ELEMENTS {
-                break;
+                return divisions;
             }
             refine_on_curves(problem, graded, &divided);
         }
+        most
     }
 }
 

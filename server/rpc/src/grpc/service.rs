@@ -4,7 +4,7 @@ use std::{pin::Pin, sync::Arc};
 
 use base::{
     caller::Caller,
-    event::Event,
+    event::StoredEvent,
     job::{Job, ResultAvailable},
 };
 use futures_util::{Stream, StreamExt};
@@ -653,12 +653,14 @@ fn marked<T>(answer: T, available: ResultAvailable) -> Response<T> {
 
 /// Converts events to messages; `None` becomes a stream that has ended.
 fn messages(
-    events: Option<impl Stream<Item = Result<Event, ApiError>> + Send + 'static>,
+    events: Option<impl Stream<Item = Result<Arc<StoredEvent>, ApiError>> + Send + 'static>,
 ) -> EventStream {
+    let message = |event: Result<Arc<StoredEvent>, ApiError>| {
+        let event = event?.read().map_err(ApiError::internal)?;
+        Ok(event.into())
+    };
     let events = futures_util::stream::iter(events).flatten();
-    events
-        .map(|event| event.map(Into::into).map_err(Into::into))
-        .boxed()
+    events.map(message).boxed()
 }
 
 impl Grpc {

@@ -5,7 +5,7 @@
 
 use std::{collections::VecDeque, sync::Arc};
 
-use base::event::Event;
+use base::event::StoredEvent;
 use store::Store;
 use tokio::sync::Mutex;
 
@@ -16,7 +16,7 @@ const MOST: i64 = 256;
 #[derive(Debug)]
 pub struct News {
     /// The next events in order, up to a limit.
-    pub events: Vec<Arc<Event>>,
+    pub events: Vec<Arc<StoredEvent>>,
     /// Whether the job had ended before these events were read; `None`: the job is deleted.
     pub ended: Option<bool>,
 }
@@ -31,7 +31,7 @@ pub(super) struct Feed {
 #[derive(Debug, Default)]
 struct Latest {
     /// The latest consecutive events; the last of them has number `last`.
-    events: VecDeque<Arc<Event>>,
+    events: VecDeque<Arc<StoredEvent>>,
     last: i64,
     /// The number of announcements before the last reading of the store; `None`: the store was never read, or has more
     /// events than were read.
@@ -122,15 +122,16 @@ impl Latest {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use base::{event::Payload, job::Status, time::Time};
+    use base::time::Time;
 
     fn news(seq: std::ops::RangeInclusive<i64>) -> News {
         let event = |seq| {
-            Arc::new(Event {
+            Arc::new(StoredEvent {
                 seq,
                 attempt: 1,
                 t: Time::from_micros(0),
-                payload: Payload::status(Status::Running),
+                kind: "status".to_owned(),
+                payload: r#"{"type":"status","status":"running"}"#.to_owned(),
             })
         };
         News {

@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use async_stream::try_stream;
 use base::{
     caller::Caller,
-    event::{Event, Payload},
+    event::StoredEvent,
     job::{Job, JobId},
     values::{Integers, Seconds, Words},
 };
@@ -103,7 +103,8 @@ pub async fn watch(
     caller: &Caller,
     id: JobId,
     after: i64,
-) -> Result<Option<impl Stream<Item = Result<Event, ApiError>> + Send + use<>>, ApiError> {
+) -> Result<Option<impl Stream<Item = Result<Arc<StoredEvent>, ApiError>> + Send + use<>>, ApiError>
+{
     let job = jobs::get(service, caller, id).await?;
     // read before the answer begins, which then is an error if they are damaged
     let first = service.store.events_after(job.key, after, FIRST_EVENTS);
@@ -121,14 +122,14 @@ fn follow(
     service: Arc<Service>,
     (id, key): (JobId, i64),
     after: i64,
-    first: Vec<Event>,
-) -> impl Stream<Item = Result<Event, ApiError>> + Send {
+    first: Vec<StoredEvent>,
+) -> impl Stream<Item = Result<Arc<StoredEvent>, ApiError>> + Send {
     try_stream! {
         let mut cursor = after;
         for event in first {
             cursor = event.seq;
-            let done = matches!(event.payload, Payload::Done { .. });
-            yield event;
+            let done = event.is_done();
+            yield Arc::new(event);
             if done {
                 return;
             }
@@ -139,8 +140,8 @@ fn follow(
             let (read, idle) = (Instant::now(), events.is_empty());
             for event in events {
                 cursor = event.seq;
-                let done = matches!(event.payload, Payload::Done { .. });
-                yield Arc::unwrap_or_clone(event);
+                let done = event.is_done();
+                yield event;
                 if done {
                     return;
                 }

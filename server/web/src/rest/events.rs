@@ -1,24 +1,22 @@
 //! The operation `/v1/jobs/{id}/events`: past events, then live ones, as server-sent events or as JSON Lines.
 
-use std::{cmp::Ordering, time::Duration};
+use std::{cmp::Ordering, convert::Infallible, pin::pin, sync::Arc, time::Duration};
 
+use async_stream::stream;
 use axum::{
     body::Body,
     http::{HeaderMap, StatusCode, header},
-    response::{
-        IntoResponse, Response,
-        sse::{self, KeepAlive, Sse},
-    },
+    response::{IntoResponse, Response},
 };
-use base::{event::Event, job::JobId, sweep::SweepEvent, values::Integers};
-use futures_util::{Stream, StreamExt, TryStreamExt};
-use serde::Serialize;
+use base::{event::StoredEvent, job::JobId, sweep::SweepEvent, values::Integers};
+use futures_util::{Stream, StreamExt};
 use service::{
     error::ApiError,
     parameters::Parameter,
     verbs::watch::{AFTER_SEQ, watch},
     violations,
 };
+use tokio::time::timeout;
 
 use super::{
     accept::{accepted, prefers, weight},
@@ -27,6 +25,8 @@ use super::{
 
 /// The interval of the comments that keep a connection open through proxies and clients.
 const PING: Duration = Duration::from_secs(15);
+/// The most events that are sent together: each watcher holds the text of so many in memory.
+const AT_ONCE: usize = 16;
 /// The media type of server-sent events.
 const SSE: &str = "text/event-stream";
 /// The media types of JSON Lines, a JSON object on each line.
@@ -82,20 +82,26 @@ fn chosen(headers: &HeaderMap) -> Result<Encoding, ApiError> {
 }
 
 /// An event with a number and a type.
-pub(super) trait Numbered: Serialize + Send + 'static {
+pub(super) trait Numbered: Send + 'static {
     /// The event's number.
     fn seq(&self) -> i64;
     /// The event's type.
-    fn kind(&self) -> &'static str;
+    fn kind(&self) -> &str;
+    /// The event as JSON.
+    fn json(&self) -> serde_json::Result<String>;
 }
 
-impl Numbered for Event {
+impl Numbered for Arc<StoredEvent> {
     fn seq(&self) -> i64 {
         self.seq
     }
 
-    fn kind(&self) -> &'static str {
-        self.payload.kind()
+    fn kind(&self) -> &str {
+        &self.kind
+    }
+
+    fn json(&self) -> serde_json::Result<String> {
+        Ok(StoredEvent::json(self))
     }
 }
 
@@ -104,8 +110,12 @@ impl Numbered for SweepEvent {
         self.seq
     }
 
-    fn kind(&self) -> &'static str {
+    fn kind(&self) -> &str {
         (&self.payload).into()
+    }
+
+    fn json(&self) -> serde_json::Result<String> {
+        serde_json::to_string(self)
     }
 }
 
@@ -129,45 +139,63 @@ pub(super) fn preferred(headers: &HeaderMap) -> Option<Encoding> {
 /// A header for nginx, which as a proxy would otherwise hold back events until they have four kilobytes.
 const UNBUFFERED: [(&str, &str); 1] = [("x-accel-buffering", "no")];
 
-/// Answers with a stream of events. An error ends the stream without `done`, so that the client knows that it is
-/// incomplete.
+/// Answers with a stream of events.
 pub(super) fn write<E: Numbered>(
     events: impl Stream<Item = Result<E, ApiError>> + Send + 'static,
     encoding: Encoding,
 ) -> Response {
-    let events = events.inspect_err(|error| tracing::debug!(%error, "event stream ended: {error}"));
-    match encoding {
-        Encoding::Stream => {
-            let events = events.map(|event| event.and_then(|event| message(&event)));
-            let events = events.take_while(|event| std::future::ready(event.is_ok()));
-            let keep_alive = KeepAlive::new().interval(PING).text("ping");
-            let stream = Sse::new(events).keep_alive(keep_alive);
-            (UNBUFFERED, stream).into_response()
-        }
-        Encoding::Lines => {
-            let lines = events.map(|event| event.and_then(|event| line(&event)));
-            let lines = lines.take_while(|line| std::future::ready(line.is_ok()));
-            let headers = [
-                (header::CONTENT_TYPE, LINES[0]),
-                (header::CACHE_CONTROL, "no-cache"),
-            ];
-            (UNBUFFERED, headers, Body::from_stream(lines)).into_response()
+    let media = match encoding {
+        Encoding::Stream => SSE,
+        Encoding::Lines => LINES[0],
+    };
+    let headers = [
+        (header::CONTENT_TYPE, media),
+        (header::CACHE_CONTROL, "no-cache"),
+    ];
+    let pieces = pieces(events, encoding).map(Ok::<_, Infallible>);
+    (UNBUFFERED, headers, Body::from_stream(pieces)).into_response()
+}
+
+/// The events as text: those that are there already together, and between server-sent events a comment after each pause.
+/// An error ends the text without `done`, so that the client knows that it is incomplete.
+fn pieces<E: Numbered>(
+    events: impl Stream<Item = Result<E, ApiError>> + Send + 'static,
+    encoding: Encoding,
+) -> impl Stream<Item = String> + Send {
+    stream! {
+        let mut events = pin!(events.ready_chunks(AT_ONCE));
+        loop {
+            let next = match encoding {
+                Encoding::Stream => timeout(PING, events.next()).await,
+                Encoding::Lines => Ok(events.next().await),
+            };
+            let Ok(next) = next else {
+                yield ": ping\n\n".to_owned();
+                continue;
+            };
+            let Some(chunk) = next else { return };
+            let mut piece = String::new();
+            let added = chunk.into_iter().try_for_each(|event| add(&event?, encoding, &mut piece));
+            if !piece.is_empty() {
+                yield piece;
+            }
+            if let Err(error) = added {
+                tracing::debug!(%error, "event stream ended: {error}");
+                return;
+            }
         }
     }
 }
 
-fn message(event: &impl Numbered) -> Result<sse::Event, ApiError> {
-    let data = serde_json::to_string(event).map_err(ApiError::internal)?;
-    Ok(sse::Event::default()
-        .id(event.seq().to_string())
-        .event(event.kind())
-        .data(data))
-}
-
-fn line(event: &impl Numbered) -> Result<Vec<u8>, ApiError> {
-    let mut line = serde_json::to_vec(event).map_err(ApiError::internal)?;
-    line.push(b'\n');
-    Ok(line)
+/// Adds an event to a text in the format `encoding`. JSON has no line breaks.
+fn add(event: &impl Numbered, encoding: Encoding, text: &mut String) -> Result<(), ApiError> {
+    let (seq, kind) = (event.seq(), event.kind());
+    let json = event.json().map_err(ApiError::internal)?;
+    text.push_str(&match encoding {
+        Encoding::Stream => format!("id: {seq}\nevent: {kind}\ndata: {json}\n\n"),
+        Encoding::Lines => format!("{json}\n"),
+    });
+    Ok(())
 }
 
 #[cfg(test)]

@@ -270,7 +270,7 @@ async fn a_pulse_is_answered_and_not_recorded() {
     assert!(start.elapsed() < CANCEL_GRACE, "{:?}", start.elapsed());
     assert_eq!((done.status, done.progress), (Status::Canceled, None));
     let events = rig.store.events_after(job.key, 0, 100).await.unwrap();
-    let kinds: Vec<_> = events.iter().map(|event| event.payload.kind()).collect();
+    let kinds: Vec<_> = events.iter().map(|event| &event.kind[..]).collect();
     assert_eq!(kinds, ["status", "status", "done"]);
 }
 

@@ -14,7 +14,7 @@ async fn an_earlier_result_answers_at_once_and_outlives_its_job() {
         (Status::Succeeded, Some(primary.id), 1)
     );
     let events = rig.store.events_after(cached.key, 0, 100).await.unwrap();
-    let kinds: Vec<_> = events.iter().map(|event| event.payload.kind()).collect();
+    let kinds: Vec<_> = events.iter().map(|event| &event.kind[..]).collect();
     assert_eq!(kinds, ["status", "status", "done"]);
     let part = |key| rig.store.json_of(key, "fields");
     let bytes = part(primary.key).await.unwrap().unwrap();

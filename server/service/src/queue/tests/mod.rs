@@ -136,6 +136,7 @@ impl Rig {
         let mut subscription = self.queue.subscribe(job.key);
         loop {
             let events = self.store.events_after(job.key, 0, 100_000).await.unwrap();
+            let events: Vec<Event> = events.iter().map(|event| event.read().unwrap()).collect();
             if events.iter().any(&done) {
                 return events;
             }

@@ -162,6 +162,7 @@ impl World {
             .events_after(job.key, after, 100_000)
             .await
             .unwrap();
+        let read: Vec<Event> = read.iter().map(|event| event.read().unwrap()).collect();
         let (old, new) = read.split_at(usize::try_from(seen - after).unwrap().min(read.len()));
         if thorough {
             assert_eq!(
@@ -210,13 +211,18 @@ impl World {
                 .events_after(job.key, after, limit)
                 .await
                 .unwrap();
+            let piece = piece.iter().map(|event| event.read().unwrap());
             let known = &self.jobs[&job.key];
             let expected = known
                 .events
                 .iter()
                 .skip(after as usize)
                 .take(limit as usize);
-            assert!(piece.iter().eq(expected), "{} events after {after}", limit);
+            assert!(
+                piece.eq(expected.cloned()),
+                "{} events after {after}",
+                limit
+            );
         }
     }
 
