@@ -124,7 +124,10 @@ impl Report {
                 }
                 self.inspect(&source, target)?;
             }
-            Err(error) => self.finding("database", &error),
+            Err(error) => {
+                self.finding("database", &error);
+                lock_out(target)?;
+            }
         }
         Ok(self)
     }
@@ -144,12 +147,24 @@ impl Report {
 
     /// Checks one table after the other; an error only if the new store cannot be written.
     fn inspect(&mut self, source: &Connection, target: Option<&Writer<'_>>) -> Result<()> {
-        let tables = source.rows("select name from sqlite_schema", (), |_| Ok(()));
-        if let Err(error) = tables {
-            // every table would tell the same
+        let differing = match migrations::differing(source) {
+            Ok(differing) => differing,
+            Err(error) => {
+                // every table would tell the same
+                self.incomplete = true;
+                self.finding("database", &error);
+                return lock_out(target);
+            }
+        };
+        let definitions = differing.iter();
+        self.findings.extend(
+            definitions.map(|name| format!("database: {name} is missing, or defined differently")),
+        );
+        // what reads jobs relies on the names of columns, and on indexes
+        let of_jobs = |name: &&String| TABLES.iter().all(|(table, _)| table != name);
+        if differing.iter().any(|name| of_jobs(&name)) {
             self.incomplete = true;
-            self.finding("database", &error);
-            return Ok(());
+            return lock_out(target);
         }
         self.check_pages(source);
         let mut last = last_key(source);
@@ -180,19 +195,16 @@ impl Report {
         }
         let mut lost = BTreeSet::new();
         for (table, check) in TABLES {
-            if !self.check_table(source, target, table, check)? {
+            let differs = differing.iter().any(|name| name == table);
+            if differs || !self.check_table(source, target, table, check)? {
                 lost.insert(table);
             }
         }
-        if let Some(target) = target
-            && lost
-                .iter()
-                .any(|table| matches!(*table, "token" | "setting"))
+        if lost
+            .iter()
+            .any(|table| matches!(*table, "token" | "setting"))
         {
-            // it may have been the last one: the new store lets nobody in without a token
-            let tx = target.begin()?;
-            tokens::require_tokens(&tx)?;
-            tx.commit()?;
+            lock_out(target)?;
         }
         match target {
             Some(target) => copy_the_rest(source, target, last),
@@ -283,6 +295,14 @@ impl Report {
         }
         Ok(whole)
     }
+}
+
+/// Lets nobody into the new store without a token: the one that was lost may have been the last.
+fn lock_out(target: Option<&Writer<'_>>) -> Result<()> {
+    let Some(target) = target else { return Ok(()) };
+    let tx = target.begin()?;
+    tokens::require_tokens(&tx)?;
+    tx.commit()
 }
 
 /// A function that returns an error if a row is damaged.

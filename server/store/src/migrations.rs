@@ -130,18 +130,22 @@ pub(super) fn run(database: &Connection, folder: &Path) -> Result<()> {
         old_content::move_all(database)?;
     }
     run_to(database, last_step())?;
+    match differing(database)?.first() {
+        Some(name) => Err(StoreError::Schema(format!(
+            "the store does not belong to this program, or is damaged: {name} is missing or different"
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// The names of tables and indexes of this version that a database does not have, or that it defines in another way.
+pub(super) fn differing(database: &Connection) -> Result<Vec<String>> {
     let found = schema(database)?;
     let empty = Connection::open_in_memory()?;
     run_to(&empty, last_step())?;
-    let expected = schema(&empty)?;
-    for (name, sql) in &expected {
-        if found.get(name) != Some(sql) {
-            return Err(StoreError::Schema(format!(
-                "the store does not belong to this program, or is damaged: {name} is missing or different"
-            )));
-        }
-    }
-    Ok(())
+    let mut expected = schema(&empty)?;
+    expected.retain(|name, sql| found.get(name) != Some(sql));
+    Ok(expected.into_keys().collect())
 }
 
 /// An error if the tables are of a later version, or of another program. Nothing is written.
@@ -196,9 +200,10 @@ pub(super) fn are_current(connection: &Connection) -> Result<()> {
     }
 }
 
-/// The statements that made the tables and indexes, by the name of the table or index.
-fn schema(connection: &Connection) -> Result<BTreeMap<String, Option<String>>> {
-    let all = "select name, sql from sqlite_schema
+/// The statements that made the tables and indexes, by the name of the table or index. They are bytes, since damaged ones may
+/// be no text.
+fn schema(connection: &Connection) -> Result<BTreeMap<String, Option<Vec<u8>>>> {
+    let all = "select name, cast(sql as blob) from sqlite_schema
                where name not like 'sqlite_stat%' and name not like '%_sqlx_migrations%'";
     let all = connection.rows(all, (), |row| Ok(row.try_into()?))?;
     Ok(all.into_iter().collect())

@@ -552,6 +552,57 @@ async fn what_is_intact_is_saved_and_the_rest_is_named() {
     assert_eq!((report.jobs, report.intact), (3, 3));
 }
 
+/// A changed byte in the definition of a table changes the name of a column, and what it names then is no text at all: the
+/// service does not start on it, and the doctor tells of it, and saves what does not depend on this table.
+#[tokio::test]
+async fn a_damaged_definition_of_a_table_is_told() {
+    for (table, column, kept) in [
+        ("token", "scopes", 3),
+        ("sweep", "paths", 3),
+        ("event", "body", 0),
+    ] {
+        for byte in ["'_'", "cast(x'ff' as text)"] {
+            let (folder, new_folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+            let store = Store::open(folder.path()).await.unwrap();
+            submit_three(&store).await;
+            store.close().await;
+            drop(store);
+            let database = rusqlite::Connection::open(folder.path().join("signorini.db")).unwrap();
+            let changed = format!(
+                "pragma writable_schema = on; update sqlite_schema \
+                 set sql = replace(sql, '{column}', {byte} || substr('{column}', 2)) where name = '{table}'"
+            );
+            database.execute_batch(&changed).unwrap();
+            drop(database);
+            assert!(Store::open(folder.path()).await.is_err(), "{table} {byte}");
+            let report = inspect(folder.path(), Some(new_folder.path()))
+                .await
+                .unwrap();
+            let told = report.findings.join("\n");
+            assert!(
+                told.contains(&format!(
+                    "database: {table} is missing, or defined differently"
+                )),
+                "{told}"
+            );
+            assert_eq!(
+                (report.intact, report.incomplete),
+                (kept, kept == 0),
+                "{told}"
+            );
+            let saved = Store::open(new_folder.path()).await.unwrap();
+            // a token that was lost may have been the last
+            let closed = table != "sweep";
+            assert_eq!(
+                saved.any_tokens.load(std::sync::atomic::Ordering::Relaxed),
+                closed,
+                "{table}"
+            );
+            saved.close().await;
+        }
+    }
+}
+
 #[tokio::test]
 async fn nothing_is_written_to_a_damaged_database() {
     let folder = tempfile::tempdir().unwrap();
