@@ -20,7 +20,7 @@
 //! | editing a job | `edit` |
 //! | deleting a job | `delete` |
 //! | the life of a job: claimed, ended, requeued | `claim`, `end`, `requeue` |
-//! | the row of a job; how it may change, and what follows | `rows`, `rules` |
+//! | the row of a job; how it may change, and what follows | `rows`, `rules`, `change` |
 //! | the end of one job, with all that belongs to it | `end_job` |
 //! | a transaction of the writer and what follows its commit: the log line of a job's end, the jobs whose watchers the caller wakes | `change` |
 //! | whose turn it is | `turns`, `claim`, `migrations/0019_turns.sql` |
