@@ -5,7 +5,7 @@ use std::{fmt, path::Path, sync::Arc, time::Duration};
 
 use base::tasks;
 use futures_util::future::BoxFuture;
-use rusqlite::{Connection, OpenFlags, config::DbConfig};
+use rusqlite::{Connection, OpenFlags};
 use tokio::{
     sync::{OwnedSemaphorePermit, Semaphore},
     time::timeout,
@@ -42,8 +42,6 @@ pub(super) fn open(file: &Path, mode: Mode) -> Result<Connection> {
     connection.busy_timeout(Duration::from_secs(5))?;
     connection.set_prepared_statement_cache_capacity(MOST_STATEMENTS);
     connection.execute_batch("pragma foreign_keys = on")?;
-    // otherwise statements that partial indexes could serve are prepared anew for each use, in case a value helps
-    connection.set_db_config(DbConfig::SQLITE_DBCONFIG_ENABLE_QPSG, true)?;
     Ok(connection)
 }
 
