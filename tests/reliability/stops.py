@@ -43,32 +43,37 @@ class Load:
     def __init__(self, server):
         self.server, self.acknowledged, self.sent, self.over = server, {}, 0, False
         self.refused = self.cut_sse = self.cut_grpc = self.events = 0
-        self.stopping_until = 0
+        # of the server: odd from a signal on until its successor runs
+        self.turns = 0
         self.failure, self.grpc_jobs = None, {}
         self.known = Client(server.address)
 
-    def stopping(self):
-        """Whether a broken stream has its reason."""
-        return self.server.process.poll() is not None or time.monotonic() < self.stopping_until
+    def stopping(self, since):
+        """Whether what began when `turns` was `since` was broken off by a stop: the server stops, or did meanwhile."""
+        return self.turns > since or self.turns % 2 == 1
 
     async def submit(self, _):
         connection = Connection(self.server)
-        problem = example()
+        problem, since = example(), self.turns
         while not self.over:
             self.sent += 1
             name, began = "job %d" % self.sent, time.monotonic()
             try:
+                asked = self.turns
                 answer = await connection.call("POST", "/v1/jobs", submission(problem, name=name))
                 if answer.status == 503:
                     equal(answer.json()["code"], "draining", "a refusal while stopping")
-                    check(self.stopping(), "draining, and nobody had asked for it")
+                    check(self.stopping(since), "draining, and nobody had asked for it")
                     self.refused += 1
                 else:
                     equal(answer.status, 202, "submit, %r" % answer)
                     self.acknowledged[answer.json()["id"]] = name
+                # the connection was still that of this server
+                since = asked
             except Lost:
-                check(self.stopping(), "a submit was cut off by a server that runs")
+                check(self.stopping(since), "a submit was cut off by a server that runs")
                 connection.close()
+                since = self.turns
             await asyncio.sleep(max(0, began + SUBMITTERS / PER_S - time.monotonic()))
         connection.close()
 
@@ -76,6 +81,7 @@ class Load:
         """Server-sent events from stop to stop, with the number of the last one, until `done`."""
         seen = 0
         while True:
+            since = self.turns
             try:
                 host, port = self.server.address.split(":")
                 reader, writer = await asyncio.open_connection(host, int(port), limit=1 << 20)
@@ -101,11 +107,11 @@ class Load:
                     elif line == b"0\r\n":
                         # the end of a chunked body: in good order, though the job has not ended
                         self.cut_sse += seen > before
-                        check(self.stopping(), "a stream ended without done, and the server runs")
+                        check(self.stopping(since), "a stream ended without done, and the server runs")
                         break
                 await asyncio.sleep(0.01)
             except (OSError, EOFError):
-                check(self.stopping(), "a stream was cut off by a server that runs")
+                check(self.stopping(since), "a stream was cut off by a server that runs")
                 await asyncio.sleep(0.01)
             finally:
                 writer.close()
@@ -115,7 +121,7 @@ class Load:
         try:
             seen, done = 0, False
             while not done and not self.failure:
-                before = seen
+                before, since = seen, self.turns
                 try:
                     with Client(self.server.address, known=self.known) as client:
                         for event in client.WatchJob(id=job, after_seq=seen):
@@ -126,7 +132,7 @@ class Load:
                     check(done, "WatchJob of %s ended in good order before done" % job)
                 except grpc.RpcError as error:
                     equal(error.code().name, "UNAVAILABLE", "the end of WatchJob when the server stops")
-                    check(self.stopping(), "UNAVAILABLE from a server that runs: %s" % error.details())
+                    check(self.stopping(since), "UNAVAILABLE from a server that runs: %s" % error.details())
                     self.cut_grpc += seen > before
                 time.sleep(0.02)
         except BaseException as error:
@@ -145,7 +151,7 @@ def send(server, number, workers):
 def stop(server, load, dice, workers):
     """Seconds until it had ended."""
     began = time.monotonic()
-    load.stopping_until = began + GRACE_S + 10
+    load.turns += 1
     kind = dice.choice(("once", "once", "twice", "at once twice", "hangup"))
     if kind == "hangup":
         send(server, signal.SIGHUP, workers)
@@ -179,7 +185,7 @@ async def stop_under_load(server, dice, stops, workers):
         times.append(await loop.run_in_executor(None, stop, server, load, dice, workers))
         check_database(server)
         await loop.run_in_executor(None, server.start)
-        load.stopping_until = time.monotonic() + 0.3  # whoever asked the old one hears of it a little later
+        load.turns += 1
     load.over = True
     await asyncio.wait_for(asyncio.gather(*clients), 300)
     await loop.run_in_executor(None, lambda: [thread.join(60) for thread in threads])

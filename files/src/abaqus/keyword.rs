@@ -586,7 +586,7 @@ impl Deck {
         }
         self.here.incomplete = Incomplete::ALL;
         let got = format!(
-            "{} instances with {} nodes, elements and members of sets",
+            "{} instances with {} nodes, elements, members of sets and rows",
             self.instances.len() + 1,
             self.instantiated
         );

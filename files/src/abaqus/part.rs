@@ -104,12 +104,18 @@ impl Found {
 }
 
 impl Part {
+    /// How much an instance of the part repeats: nodes, elements, sets with their members, and rows.
     pub(super) fn size(&self) -> u64 {
         let sets = self.node_sets.values().chain(self.element_sets.values());
         let members: usize = sets.map(Set::written).sum();
         let sides: usize = self.surfaces.values().map(|s| s.sides.len()).sum();
         let names = self.node_sets.len() + self.element_sets.len() + self.surfaces.len();
-        (self.nodes.len() + self.numbered.len() + members + sides + names) as u64
+        let pieces: usize = self.analytical.values().map(|s| 1 + s.pieces.len()).sum();
+        let loads = self.pressures.len() + self.forces.len();
+        let rows = self.sections.len() + self.prescribed.len() + self.held.len() + loads;
+        let rigid = self.rigid_bodies.len() + self.rigid_lines.len() + pieces;
+        let mesh = self.nodes.len() + self.numbered.len() + members + sides + names;
+        (mesh + rows + rigid) as u64
     }
 
     /// Moves the part, then turns it by an angle (radians) about a point of the plane.
