@@ -1,8 +1,7 @@
 //! One transaction of the single writer, and its effects once it is committed.
 //!
 //! A job is changed by [`Change::update`] and in no other way (but for the number of its last event, which follows from
-//! appending): the caller gives a function that changes its row, and
-//! everything else follows from the row. The row is written whole, with its checksum, before the next statement of the
+//! appending): the caller gives a function that changes its row, and everything else follows from the row. The row is written whole, with its checksum, before the next statement of the
 //! transaction or its commit; its version is counted, its events are appended, its line in the log is kept for after
 //! the commit, and its key, if the status has changed, is returned by the commit for those who wake its watchers.
 
