@@ -29,9 +29,9 @@ CASES = {
     "all of 150 elements touch": long_contact(150),
     "all of 500 elements touch": long_contact(500),
     "all of 1,000 elements touch": long_contact(1000),
-    "even grid of 20,000 unknowns": block.problem(*block.lines("2e4"), 0.3),
-    "even grid of 200,000 unknowns": block.problem(*block.lines("2e5"), 0.3),
-    "even grid of 1,000,000 unknowns": block.problem(*block.lines("1e6"), 0.3),
+    "even grid of 20,000 unknowns": block.problem(block.mesh("2e4"), 0.3),
+    "even grid of 200,000 unknowns": block.problem(block.mesh("2e5"), 0.3),
+    "even grid of 1,000,000 unknowns": block.problem(block.mesh("1e6"), 0.3),
 }
 
 

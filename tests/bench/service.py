@@ -131,7 +131,7 @@ def bodies():
         with Server() as keeping, Server(*NO_BODIES) as without:
             spans = {keeping: [], without: []}
             for turn in range(7):
-                problem = block.problem(*block.lines(size), 0.2 + 0.02 * turn)
+                problem = block.problem(block.mesh(size), 0.2 + 0.02 * turn)
                 digests = set()
                 for server, taken in spans.items():
                     before = cpu_s(server.process.pid)

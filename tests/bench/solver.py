@@ -3,18 +3,22 @@ tables of docs/performance.md, "Against other programs".
 
     solver.py [--runs N] [--only NAME,...] [--against BINARY] [--members] [--large]
 
-All tables but the last take some three minutes. Runs (5 when absent) of what is compared take turns, so that a machine
-that slows down for a while slows both. Ratios are formed within a turn; each row has the least, the median and the
-most of them. Seconds are processor time, so that other work on the machine does not count, except where it says clock.
+All tables without `--large` take some fifteen minutes, most of them `free`. Runs (5 when absent) of what is compared
+take turns, so that a machine that slows down for a while slows both. Ratios are formed within a turn; each row has the
+least, the median and the most of them. Seconds are processor time, so that other work on the machine does not count,
+except where it says clock.
 
---only     of whole, growth, cholmod, pair, threads, iterations, increments, nonlocal, sweeps, fill, peers
---against  another binary, such as an older build, in the turns of `whole` and `nonlocal`
+--only     of whole, growth, cholmod, pair, threads, iterations, increments, nonlocal, sweeps, fill, peers, free,
+           free-peers
+--against  another binary, such as an older build, in the turns of `whole`, `cholmod`, `threads`, `nonlocal` and `free`
 --members  in `sweeps` also each of 1,000 members in a process of its own, some three minutes
---large    also `peers`: GetFEM and CalculiX at 2e5 degrees of freedom, twice each, some ten minutes
+--large    also `peers` and `free-peers`: GetFEM and CalculiX at 2e5 degrees of freedom on a grid and on a free mesh,
+           twice each, some twenty minutes
 
 Solutions take one thread, except where two are measured. `cargo build --release --workspace` comes first, or
-SIGNORINI_BINARY; `reference`, of the same build, says what a factor has and what a dense one takes. `cholmod` and `fill`
-need the environment of tests/peers, `fill` also Gmsh (Debian's package gmsh), `--large` the programs of tests/peers.
+SIGNORINI_BINARY; `reference`, of the same build and beside it, says what a factor has and what a dense one takes;
+`free` needs that of the other binary too. `cholmod`, `fill` and `free` need the environment of tests/peers, `fill`,
+`free` and `free-peers` Gmsh (Debian's package gmsh), `--large` the programs of tests/peers.
 """
 
 import argparse
@@ -49,6 +53,8 @@ CONTACTS = {
                          "obstacle": {"kind": "circle", "radius": 8, "center": 1}}]}
     for name, held, contact in (("fillet", "bottom", "top"), ("sheet", "right", "bottom"), ("hertz", "base", "contact"))
 }
+# Free meshes of tests/data/gmsh/block.geo, by the nodes of an element and the unknowns: the size of all elements.
+FREE = {(6, "2e5"): 0.0363, (8, "2e5"): 0.0327, (6, "6e5"): 0.021, (8, "6e5"): 0.01887}
 HALF_CONTACT = 0.68  # of the problem of tests/peers
 GOALS = {  # of issues 14 and 33
     "nonlocal": "≤ 1.15", "adaptive nonlocal": "≤ 1.5", "unknowns": "≤ 2",
@@ -56,24 +62,26 @@ GOALS = {  # of issues 14 and 33
     "growth": "≤ 1.35", "iterations/whole": "≤ 0.25", "pair": "≥ 1.7", "increments": "≤ 1.5",
     "iterations/dense": "≤ 1", "user 2e5": "≤ 0.6", "user 1e6": "≤ 4", "peak 1e6": "≤ 1,434", "peak": "≤ 1.3",
     "threads": "≥ 1.5", "sweep/job": "≤ 2", "10,000 members": "≤ 5", "member": "≤ 1e-9",
+    "free user": "≤ 1", "free": "≤ 0.8", "graded": "≤ 0.6", "free threads": "≥ 1.6", "free GetFEM": "≥ 30",
+    "free CalculiX": "≥ 80",
 }
 
 
 def p1(mesh, normal="body"):
-    return problem.problem(*problem.lines(mesh), problem.COEFFICIENT, normal)
+    return problem.problem(problem.mesh(mesh), problem.COEFFICIENT, normal)
 
 
 def long_contact(radius):
     """A block with 500 elements along the contact: about 2,000 unknowns there."""
-    x, y = problem.lines("500")
-    made = problem.problem(x, [-problem.HEIGHT * (1 - j / 66) for j in range(67)], problem.COEFFICIENT, "body")
+    made = p1("500")
+    made["mesh"]["grid"]["y"] = [-problem.HEIGHT * (1 - j / 66) for j in range(67)]
     made["contacts"][0]["obstacle"]["radius"] = radius
     return made
 
 
 def averaged(lines, part, tolerance=None):
-    """P1 on the named lines, with friction averaged over a part of the half contact; adaptive if there is a tolerance."""
-    made = problem.problem(*problem.lines(lines), problem.COEFFICIENT, "body")
+    """P1 on the named lines, friction averaged over a part of the half contact; adaptive if there is a tolerance."""
+    made = p1(lines)
     made["contacts"][0]["friction"]["nonlocal_radius"] = part * HALF_CONTACT
     if tolerance:
         made["mesh"]["refine"] = {"tolerance": tolerance}
@@ -143,13 +151,34 @@ def reference(*arguments):
     return subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
 
 
-def factor_bytes(file):
-    """The bytes of a problem's factor and of its condensed stiffness."""
-    command = [REFERENCE, "factor", str(file)]
+def factor_bytes(file, binary=BINARY):
+    """The bytes of a problem's factor and of its condensed stiffness, in the build of a binary."""
+    command = [binary.parent / REFERENCE.name, "factor", str(file)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         _, entries = process.stdout.readline().split()
         process.kill()
     return 8 * int(entries)
+
+
+def gmsh(folder, geometry, family, size, **numbers):
+    """The file of a mesh that Gmsh makes from a geometry of tests/data/gmsh with some of its numbers set, all elements
+    `size` times as large."""
+    file = folder.path / ("%s-%d-%g.msh" % (geometry, family, size))
+    if not file.exists():
+        chosen = [word for pair in {"family": family, **numbers}.items() for word in ("-setnumber", *map(str, pair))]
+        subprocess.run(["gmsh", str(TESTS / "data/gmsh" / (geometry + ".geo")), "-2", "-v", "2", "-format", "msh41",
+                        *chosen, "-clscale", str(size), "-o", str(file)], check=True, stdout=subprocess.DEVNULL)
+    return str(file)
+
+
+def free_mesh(folder, nodes, unknowns):
+    """The block of P1 in free elements of so many nodes, which grow away from the contact."""
+    return gmsh(folder, "block", nodes, FREE[nodes, unknowns], width=problem.WIDTH, height=problem.HEIGHT)
+
+
+def binaries(options):
+    """The binaries that take turns, by their names in tables."""
+    return {"Signorini": BINARY, **({"the other binary": options.against} if options.against else {})}
 
 
 def one_thread(binary):
@@ -287,17 +316,51 @@ def growth(folder, options, done):
 
 
 def cholmod(folder, options):
-    """A whole `signorini solve` against analyse, factor and solve of the same matrix."""
-    file = folder.file("2e5", p1("2e5"))
-    pairs = [(solve(folder, file), programs.solve("CHOLMOD", "2e5")) for _ in range(options.runs)]
-    table("Against CHOLMOD's analyse, factor and solve of the stiffness matrix alone, 2e5 degrees of freedom (%d runs)"
-          % options.runs, [
-              ("Signorini as a whole, user CPU, s", [a["user"] for a, _ in pairs], ""),
-              ("CHOLMOD's three calls, user CPU, s", [b["user_s"] for _, b in pairs], ""),
-              ("user CPU, Signorini/CHOLMOD", [a["user"] / b["user_s"] for a, b in pairs], GOALS["cholmod"]),
-              ("user and system CPU, Signorini/CHOLMOD", [a["cpu"] / programs.cpu(b) for a, b in pairs],
-               GOALS["cholmod"]),
-          ])
+    """The grid of equidistant lines, of which equal fronts are computed once."""
+    against_cholmod(folder, options, "A grid", "2e5", ratio=GOALS["cholmod"])
+
+
+def free(folder, options):
+    """Meshes on which no two fronts are equal; memory, and two threads."""
+    six, large = free_mesh(folder, 6, "2e5"), free_mesh(folder, 6, "6e5")
+    against_cholmod(folder, options, "Free six-node triangles", six, user=GOALS["free user"], ratio=GOALS["free"])
+    for unknowns in ("2e5", "6e5"):
+        against_cholmod(folder, options, "Free eight-node quadrilaterals", free_mesh(folder, 8, unknowns),
+                        ratio=GOALS["free"])
+    against_cholmod(folder, options, "A graded grid", "geometric:129", ratio=GOALS["graded"])
+    against_cholmod(folder, options, "Free six-node triangles", large, peak=GOALS["peak"])
+    two_threads(folder, options, "6e5 degrees of freedom on free six-node triangles", large, GOALS["free threads"])
+
+
+def against_cholmod(folder, options, kind, mesh, user="", ratio="", peak=""):
+    """A whole `signorini solve` against analyse, factor and solve of the stiffness matrix alone; with its memory, if
+    there is a goal for that."""
+    file, compared = folder.file("cholmod", p1(mesh)), binaries(options)
+    turns = [([solve(folder, file, binary) for binary in compared.values()], programs.solve("CHOLMOD", mesh))
+             for _ in range(options.runs)]
+    theirs = [run for _, run in turns]
+    if not max(run["error"] for run in theirs) <= programs.UNIAXIAL:
+        sys.exit("CHOLMOD's solution of a uniform pressure is wrong")
+    rows = [("CHOLMOD's three calls, user CPU, s", [run["user_s"] for run in theirs], "")]
+    for k, (name, binary) in enumerate(compared.items()):
+        ours = [runs[k] for runs, _ in turns]
+        pairs = list(zip(ours, theirs))
+        rows += [
+            ("%s as a whole, user CPU, s" % name, [a["user"] for a in ours], user),
+            ("user CPU, %s/CHOLMOD" % name, [a["user"] / b["user_s"] for a, b in pairs], ratio),
+            ("user and system CPU, %s/CHOLMOD" % name, [a["cpu"] / programs.cpu(b) for a, b in pairs], ratio),
+        ]
+        if peak:
+            held = factor_bytes(file, binary)
+            rows += [
+                ("%s, peak memory, MiB" % name, [a["peak"] / MIB for a in ours], ""),
+                ("%s, peak memory/bytes of the factor" % name, [a["peak"] / held for a in ours], peak),
+            ]
+    if options.against:
+        rows.append(("user CPU, this/other binary", [a["user"] / b["user"] for (a, b), _ in turns], ""))
+    title = ("%s, %s degrees of freedom, against CHOLMOD's analyse, factor and solve of the stiffness matrix alone "
+             "(%d runs)")
+    table(title % (kind, "{:,}".format(turns[0][0][0]["summary"]["dofs"]), options.runs), rows)
 
 
 def pair(folder, options):
@@ -326,24 +389,36 @@ def pair(folder, options):
 
 
 def threads(folder, options):
+    two_threads(folder, options, "1e6 degrees of freedom", "1e6", GOALS["threads"])
+
+
+def two_threads(folder, options, what, mesh, goal):
     """One solution on two threads against one, by the clock; the results have the same digest."""
-    file = folder.file("1e6", p1("1e6"))
+    file = folder.file("threads", p1(mesh))
+    compared = {name: binary for name, binary in binaries(options).items() if one_thread(binary)}
 
-    def clock(count):
+    def clock(binary, count):
         began = time.monotonic()
-        subprocess.run([BINARY, "solve", file, "-o", folder.result(), "--threads", str(count)], check=True,
+        subprocess.run([binary, "solve", file, "-o", folder.result(), "--threads", str(count)], check=True,
                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        took = time.monotonic() - began
-        return took, summary(folder.result())["digest"]
+        return time.monotonic() - began, summary(folder.result())["digest"]
 
-    quiet, busy = quiet_turns(options.runs, lambda: (clock(1), clock(2)))
-    if any(one[1] != two[1] for one, two in quiet):
-        sys.exit("one thread and two find different results")
-    title = "A solution of 1e6 degrees of freedom alone, by the clock (%d runs, without %d that others disturbed)"
-    table(title % (len(quiet), busy), [
-        ("one thread, s", [one[0] for one, _ in quiet], ""), ("two threads, s", [two[0] for _, two in quiet], ""),
-        ("one thread/two threads", [one[0] / two[0] for one, two in quiet], GOALS["threads"]),
-    ])
+    def turn():
+        return [(clock(binary, 1), clock(binary, 2)) for binary in compared.values()]
+
+    quiet, busy = quiet_turns(options.runs, turn)
+    rows = []
+    for k, name in enumerate(compared):
+        pairs = [pairs[k] for pairs in quiet]
+        if any(one != two for (_, one), (_, two) in pairs):
+            sys.exit("one thread and two find different results: " + name)
+        rows += [
+            ("%s, one thread, s" % name, [one for (one, _), _ in pairs], ""),
+            ("%s, two threads, s" % name, [two for _, (two, _) in pairs], ""),
+            ("%s, one thread/two threads" % name, [one / two for (one, _), (two, _) in pairs], goal),
+        ]
+    table("A solution of %s alone, by the clock (%d runs, without %d that others disturbed)" % (what, len(quiet), busy),
+          rows)
 
 
 def quiet_turns(runs, turn):
@@ -363,12 +438,9 @@ def fill(folder, options):
     """Entries of the factor on three meshes of Gmsh, against other orderings of the same matrix."""
     rows = []
     for name, (family, size) in GMSH.items():
-        mesh = folder.path / (name + ".msh")
-        subprocess.run(["gmsh", str(TESTS / "data/gmsh" / (name + ".geo")), "-2", "-v", "2", "-format", "msh41",
-                        "-setnumber", "family", str(family), "-clscale", str(size), "-o", str(mesh)],
-                       check=True, stdout=subprocess.DEVNULL)
+        mesh = gmsh(folder, name, family, size)
         made = {
-            "analysis": {"kind": "plane_strain"}, "mesh": {"gmsh": mesh.read_text(encoding="utf-8")},
+            "analysis": {"kind": "plane_strain"}, "mesh": problem.mesh(mesh),
             "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}], **CONTACTS[name],
         }
         pattern = reference("factor", folder.file(name, made))
@@ -506,45 +578,68 @@ def differences(row, own):
         yield abs(row[name + "_width"] - own_width) / width
 
 
-def peers(options):
-    """GetFEM and CalculiX on the same problem at 2e5 degrees of freedom."""
-    limits = programs.limits()
-    runs = min(options.runs, PEER_RUNS)
+def peers(folder, options):
+    """GetFEM and CalculiX on the grid of 2e5 degrees of freedom."""
     found = []
     for coefficient in (0.0, problem.COEFFICIENT):
-        done = {program: [] for program in ("Signorini", "GetFEM", "CalculiX")}
-        for _ in range(runs):
-            for program, results in done.items():
-                results.append(programs.solve(program, "2e5", coefficient))
-        rows = []
-        for program in ("GetFEM", "CalculiX"):
-            pairs = list(zip(done[program], done["Signorini"]))
-            rows += [
-                ("%s, user and system CPU, s" % program, [programs.cpu(a) for a, _ in pairs], ""),
-                ("%s/Signorini, user CPU" % program, [a["user_s"] / b["user_s"] for a, b in pairs], GOALS[program]),
-                ("%s/Signorini, user and system CPU" % program,
-                 [programs.cpu(a) / programs.cpu(b) for a, b in pairs], GOALS[program]),
-                ("%s/Signorini, peak memory" % program, [a["peak_bytes"] / b["peak_bytes"] for a, b in pairs], ""),
-            ]
-        table("Against GetFEM and CalculiX, 2e5 degrees of freedom, μ = %g (%d runs)" % (coefficient, runs), rows)
-        found += [(coefficient, results[0]) for results in done.values()]
-    print("\n**What they find, of the half model**\n")
+        found += side_by_side(options, "a grid", "2e5", coefficient, GOALS["GetFEM"], GOALS["CalculiX"])
+    findings("of the half model on a grid", found, "graded:2")
+
+
+def free_peers(folder, options):
+    """The same on the free mesh of six-node triangles, with friction."""
+    mesh = free_mesh(folder, 6, "2e5")
+    found = side_by_side(options, "free six-node triangles", mesh, problem.COEFFICIENT, GOALS["free GetFEM"],
+                         GOALS["free CalculiX"])
+    # GetFEM does not reach its tolerance on "graded:4", in nine minutes
+    findings("of the half model on free six-node triangles", found, "graded:3")
+
+
+def side_by_side(options, kind, mesh, coefficient, *goals):
+    """Prints what GetFEM and CalculiX take, and returns the coefficient and a result of each program."""
+    done = {program: [] for program in ("Signorini", "GetFEM", "CalculiX")}
+    runs = min(options.runs, PEER_RUNS)
+    for _ in range(runs):
+        for program, results in done.items():
+            results.append(programs.solve(program, mesh, coefficient))
+    rows = [("Signorini, user CPU, s", [run["user_s"] for run in done["Signorini"]], "")]
+    for program, goal in zip(("GetFEM", "CalculiX"), goals):
+        pairs = list(zip(done[program], done["Signorini"]))
+        rows += [
+            ("%s, user and system CPU, s" % program, [programs.cpu(a) for a, _ in pairs], ""),
+            ("%s/Signorini, user CPU" % program, [a["user_s"] / b["user_s"] for a, b in pairs], goal),
+            ("%s/Signorini, user and system CPU" % program,
+             [programs.cpu(a) / programs.cpu(b) for a, b in pairs], goal),
+            ("%s/Signorini, peak memory" % program, [a["peak_bytes"] / b["peak_bytes"] for a, b in pairs], ""),
+        ]
+    table("Against GetFEM and CalculiX, %s of 2e5 degrees of freedom, μ = %g (%d runs)" % (kind, coefficient, runs),
+          rows)
+    return [(coefficient, results[0]) for results in done.values()]
+
+
+def findings(where, found, fine):
+    """Prints what programs find, and the distance of each from its limit, by a fine mesh."""
+    limits = {coefficient: programs.limits(fine, coefficient) for coefficient, _ in found}
+    print("\n**What they find, %s**\n" % where)
     print("| μ | program | degrees of freedom | iterations | peak MiB | force down | across | peak pressure "
-          "| error of the force | error of the peak | peak/Hertz's of that force |")
-    print("|" + "---|" * 11)
+          "| error of the force down | across | of the peak | peak/Hertz's of that force |")
+    print("|" + "---|" * 12)
     for coefficient, result in found:
-        errors = ["", "", ""]
-        if not coefficient:
-            limit = limits[result["program"]]
-            errors = ["%.1e" % programs.error(result, limit, key) for key in ("vertical_force", "peak_pressure")]
-            errors.append("%.4f" % (result["peak_pressure"] / problem.hertz(result["vertical_force"])))
-        print("| %g | %s | {:,} | %d | {:,.0f} | %.4f | %.4f | %.4f | %s |".format(
+        errors = []
+        for key in programs.QUANTITIES:
+            stated = result.get("stated", {}).get(key)
+            errors.append("%.1e" % programs.error(result, limits[coefficient][result["program"]], key)
+                          + (" (stated: %.1e)" % stated if stated else ""))
+        hertz = "" if coefficient else "%.4f" % (result["peak_pressure"] / problem.hertz(result["vertical_force"]))
+        print("| %g | %s | {:,} | %d | {:,.0f} | %s | %s | %s |".format(
             result["dofs"], result["peak_bytes"] / MIB) % (
-                coefficient, result["program"], result["iterations"], result["vertical_force"],
-                result["horizontal_force"], result["peak_pressure"], " | ".join(errors)))
-    print("\nLimits of refinement without friction: force %s, peak pressure %s."
-          % tuple(", ".join("%s %.4f" % (program, limit[key]) for program, limit in limits.items())
-                  for key in ("vertical_force", "peak_pressure")))
+                coefficient, result["program"], result["iterations"],
+                " | ".join("%.4f" % result[key] for key in programs.QUANTITIES), " | ".join(errors), hertz))
+    for coefficient, each in limits.items():
+        print("\nLimits (%s), μ = %g: %s." % (fine, coefficient, "; ".join(
+            "%s %s" % (program, ", ".join("%.4f" % limit[key] for key in programs.QUANTITIES))
+            for program, limit in each.items())))
+    sys.stdout.flush()
 
 
 def main():
@@ -555,12 +650,20 @@ def main():
     parser.add_argument("--members", action="store_true")
     parser.add_argument("--large", action="store_true")
     options = parser.parse_args()
-    every = ["whole", "growth", "cholmod", "pair", "threads", "iterations", "increments", "nonlocal", "sweeps", "fill"]
-    chosen = options.only or every + ["peers"] * options.large
-    unknown = set(chosen) - {*every, "peers"}
+    tables = {
+        "cholmod": cholmod, "pair": pair, "threads": threads, "iterations": iterations, "increments": eighty_increments,
+        "nonlocal": nonlocal_law, "sweeps": sweeps, "fill": fill, "peers": peers, "free": free,
+        "free-peers": free_peers,
+    }
+    every = {"whole", "growth", *tables}
+    chosen = options.only or every - (set() if options.large else {"peers", "free-peers"})
+    unknown = set(chosen) - every
     if unknown or options.runs < 1:
         parser.error("unknown: " + ", ".join(sorted(unknown)) if unknown else "--runs is at least 1")
-    for binary in filter(None, (BINARY, REFERENCE, options.against)):
+    needed = [BINARY, REFERENCE, options.against]
+    if options.against and "free" in chosen:
+        needed.append(options.against.parent / REFERENCE.name)
+    for binary in filter(None, needed):
         if not os.access(binary, os.X_OK):
             parser.error("%s is not a program; `cargo build --release` makes it" % binary)
     os.environ.update(ONE_THREAD)
@@ -569,13 +672,10 @@ def main():
         done = whole(folder, options) if "whole" in chosen else None
         if "growth" in chosen:
             growth(folder, options, done)
-        for name, bench in (("cholmod", cholmod), ("pair", pair), ("threads", threads),
-                            ("iterations", iterations), ("increments", eighty_increments),
-                            ("nonlocal", nonlocal_law), ("sweeps", sweeps), ("fill", fill)):
+        # large meshes come last: the memory of this process is counted as that of the programs after it
+        for name, bench in tables.items():
             if name in chosen:
                 bench(folder, options)
-        if "peers" in chosen:
-            peers(options)
 
 
 main()

@@ -12,10 +12,10 @@ import json
 import math
 import pathlib
 import re
-import subprocess
 import sys
 import tempfile
 
+import body
 import problem
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
@@ -34,48 +34,29 @@ ARC, PIECES = 1.6, 16
 REACH = 1.2
 
 
-def deck(x, y, coefficient):
-    """The input of CalculiX as text, and the number of nodes of the body. Node 1 is at the lower left."""
-    nodes, body, top = [], {}, []
-    for j, b in enumerate(problem.nodes(y)):
-        for i, a in enumerate(problem.nodes(x)):
-            if i % 2 == 0 or j % 2 == 0:
-                nodes.append((a, b))
-                body[i, j] = len(nodes)
-    count = len(nodes)
-    cylinder = {}
-    for i in range(2 * PIECES + 1):
-        # it begins half a piece beyond the axis: a slave point on the axis has a face on both sides
-        angle = (i - 1) * ARC / (2 * PIECES) / problem.RADIUS
-        for j in range(3):
-            if i % 2 == 0 or j != 1:
-                radius = problem.RADIUS - 0.05 * j
-                nodes.append((radius * math.sin(angle), problem.RADIUS - radius * math.cos(angle)))
-                cylinder[i, j] = len(nodes)
+def deck(made, coefficient):
+    """The input of CalculiX as text for a body, whose nodes have their numbers there plus one."""
+    cylinder, arc = cylinder_after(len(made.nodes))
+    kind, count = "CPE%d" % len(made.elements[0]), len(made.elements)
+    top = [(element, side) for element, side, ends in made.top_sides()
+           if min(made.nodes[end][0] for end in ends) < REACH]
 
-    elements = []
-    for j in range(len(y) - 1):
-        for i in range(len(x) - 1):
-            elements.append(_element(body, i, j))
-            if j == len(y) - 2 and x[i] < REACH:
-                top.append(len(elements))
-    first_of_cylinder = len(elements) + 1
-    elements += [_element(cylinder, i, 0) for i in range(PIECES)]
-    numbered = ["%d, %s" % (n, e) for n, e in enumerate(elements, 1)]
+    def numbered(first, elements):
+        return ["%d, %s" % (n, ", ".join(str(node + 1) for node in nodes)) for n, nodes in enumerate(elements, first)]
 
     friction = []
     if coefficient:
         slope = STICK * NORMAL_STIFFNESS * problem.YOUNGS_MODULUS
         friction = ["*FRICTION", "%r, %r" % (coefficient, slope)]
     return "\n".join([
-        "*NODE", *("%d, %r, %r" % (n, a, b) for n, (a, b) in enumerate(nodes, 1)),
-        "*ELEMENT, TYPE=CPE8, ELSET=BODY", *numbered[:first_of_cylinder - 1],
-        "*ELEMENT, TYPE=CPE8, ELSET=CYLINDER", *numbered[first_of_cylinder - 1:],
-        "*NSET, NSET=LEFT", *(str(n) for (i, _), n in body.items() if i == 0),
-        "*NSET, NSET=BOTTOM", *(str(n) for (_, j), n in body.items() if j == 0),
-        "*NSET, NSET=MOVED", *(str(n) for n in cylinder.values()),
-        "*SURFACE, NAME=TOP", *("%d, S3" % e for e in top),
-        "*SURFACE, NAME=ARC", *("%d, S1" % e for e in range(first_of_cylinder, len(elements) + 1)),
+        "*NODE", *("%d, %r, %r" % (n, a, b) for n, (a, b) in enumerate(made.nodes + cylinder, 1)),
+        "*ELEMENT, TYPE=%s, ELSET=BODY" % kind, *numbered(1, made.elements),
+        "*ELEMENT, TYPE=CPE8, ELSET=CYLINDER", *numbered(count + 1, arc),
+        "*NSET, NSET=LEFT", *(str(node + 1) for node in made.left()),
+        "*NSET, NSET=BOTTOM", *(str(node + 1) for node in made.bottom()),
+        "*NSET, NSET=MOVED", *(str(len(made.nodes) + n) for n in range(1, len(cylinder) + 1)),
+        "*SURFACE, NAME=TOP", *("%d, S%d" % (element + 1, side + 1) for element, side in top),
+        "*SURFACE, NAME=ARC", *("%d, S1" % (count + n) for n in range(1, len(arc) + 1)),
         "*MATERIAL, NAME=ELASTIC",
         "*ELASTIC", "%r, %r" % (problem.YOUNGS_MODULUS, problem.POISSONS_RATIO),
         "*SOLID SECTION, ELSET=BODY, MATERIAL=ELASTIC", "1.",
@@ -91,13 +72,23 @@ def deck(x, y, coefficient):
         "*NODE PRINT, NSET=LEFT, TOTALS=ONLY", "RF",
         "*CONTACT FILE", "CSTR",
         "*END STEP", "",
-    ]), body[0, 2 * (len(y) - 1)], count
+    ])
 
 
-def _element(number, i, j):
-    """Corners first, counter-clockwise from the lower left, then the nodes between them."""
+def cylinder_after(count):
+    """The nodes of the cylinder, and its elements, of which side 1 is on the arc; their nodes are counted on from those
+    of the body."""
+    nodes, number = [], {}
+    for i in range(2 * PIECES + 1):
+        # it begins half a piece beyond the axis: a slave point on the axis has a face on both sides
+        angle = (i - 1) * ARC / (2 * PIECES) / problem.RADIUS
+        for j in range(3):
+            if i % 2 == 0 or j != 1:
+                radius = problem.RADIUS - 0.05 * j
+                number[i, j] = count + len(nodes)
+                nodes.append((radius * math.sin(angle), problem.RADIUS - radius * math.cos(angle)))
     places = ((0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1))
-    return ", ".join(str(number[2 * i + a, 2 * j + b]) for a, b in places)
+    return nodes, [[number[2 * i + a, b] for a, b in places] for i in range(PIECES)]
 
 
 def total(table, name):
@@ -114,7 +105,8 @@ def pressure(results, node):
 
 
 def main(mesh, coefficient):
-    text, axis, count = deck(*problem.lines(mesh), coefficient)
+    made = body.read(mesh)
+    text, axis = deck(made, coefficient), made.nodes.index((0, 0)) + 1
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         (folder / "p1.inp").write_text(text)
@@ -127,7 +119,7 @@ def main(mesh, coefficient):
     iterations = sum(int(row.split()[3]) for row in rows if re.match(r"\s+\d", row))
     print(json.dumps({
         "program": "CalculiX",
-        "dofs": 2 * count,
+        "dofs": 2 * len(made.nodes),
         "iterations": iterations,
         "user_s": run.user_s,
         "system_s": run.system_s,

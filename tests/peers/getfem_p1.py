@@ -2,7 +2,7 @@
 
 Usage: /usr/bin/python3 getfem_p1.py MESH COEFFICIENT
 
-Debian's python3-getfem belongs to Debian's Python and NumPy. As GetFEM's documentation advises: eight-node
+Debian's python3-getfem belongs to Debian's Python and NumPy. As GetFEM's documentation advises: quadratic
 elements, contact as an integral over the boundary with a multiplier (linear there, which satisfies the inf-sup
 condition and needs fewer iterations than a quadratic one), semi-smooth Newton, MUMPS. Without friction the symmetric
 variant is taken, which MUMPS factors as such. The CPU time is that of the whole process.
@@ -11,10 +11,12 @@ variant is taken, which MUMPS factors as such. The CPU time is that of the whole
 import json
 import resource
 import sys
+import typing
 
 import getfem
 import numpy
 
+import body
 import problem
 
 LEFT, BOTTOM, TOP = 1, 2, 3
@@ -23,9 +25,37 @@ UNSYMMETRIC, SYMMETRIC = 1, 2
 PENALTY = 1e9
 
 
+class Kind(typing.NamedTuple):
+    """What GetFEM calls the shape of a kind of elements, with its corners in GetFEM's order; the displacements, linear
+    and complete quadratic functions on it; and an integration that is exact to the fourth degree."""
+
+    shape: str
+    corners: list
+    displacements: str
+    linear: str
+    quadratic: str
+    integration: str
+
+
+KINDS = {
+    6: Kind("GT_PK(2,1)", [0, 1, 2], "FEM_PK(2,2)", "FEM_PK(2,1)", "FEM_PK(2,2)", "IM_TRIANGLE(4)"),
+    8: Kind("GT_QK(2,1)", [0, 1, 3, 2], "FEM_Q2_INCOMPLETE(2)", "FEM_QK(2,1)", "FEM_QK(2,2)",
+            "IM_GAUSS_PARALLELEPIPED(2,4)"),
+}
+
+
+def read(mesh_name):
+    """The mesh with straight sides, as all of them are, and the kind of its elements."""
+    made = body.read(mesh_name)
+    kind = KINDS[len(made.elements[0])]
+    corners = numpy.array(made.elements)[:, kind.corners]
+    mesh = getfem.Mesh("empty", 2)
+    mesh.add_convex(getfem.GeoTrans(kind.shape), numpy.array(made.nodes)[corners].transpose(2, 1, 0))
+    return mesh, kind
+
+
 def main(mesh_name, coefficient):
-    x, y = problem.lines(mesh_name)
-    mesh = getfem.Mesh("cartesian Q1", numpy.array(x), numpy.array(y))
+    mesh, kind = read(mesh_name)
     outer = mesh.outer_faces()
     normal = mesh.normal_of_faces(outer)
     mesh.set_region(LEFT, outer[:, normal[0] < -0.5])
@@ -33,11 +63,11 @@ def main(mesh_name, coefficient):
     mesh.set_region(TOP, outer[:, normal[1] > 0.5])
 
     displacements, multipliers = getfem.MeshFem(mesh, 2), getfem.MeshFem(mesh, 2 if coefficient else 1)
-    displacements.set_fem(getfem.Fem("FEM_Q2_INCOMPLETE(2)"))
-    multipliers.set_fem(getfem.Fem("FEM_QK(2,1)"))
+    displacements.set_fem(getfem.Fem(kind.displacements))
+    multipliers.set_fem(getfem.Fem(kind.linear))
     distances = getfem.MeshFem(mesh, 1)
-    distances.set_fem(getfem.Fem("FEM_QK(2,2)"))
-    gauss = getfem.MeshIm(mesh, getfem.Integ("IM_GAUSS_PARALLELEPIPED(2,4)"))
+    distances.set_fem(getfem.Fem(kind.quadratic))
+    gauss = getfem.MeshIm(mesh, getfem.Integ(kind.integration))
 
     model = getfem.Model("real")
     model.add_fem_variable("u", displacements)

@@ -3,8 +3,8 @@
           cylinder, R = 8, pushed down by 0.1
     y = 0   ┌────────────┐
             │            │   plane strain, E = 1000, ν = 0.3
-    u_x = 0 │            │   nx by 2 nx squares of eight nodes
-            │            │
+    u_x = 0 │            │   nx by 2 nx squares of eight nodes,
+            │            │   or a mesh of Gmsh
     y = −8  └────────────┘   u_y = 0, u_x free
            x = 0        x = 4
 
@@ -17,6 +17,7 @@ Standard library only: every script here runs in the Python of the program that 
 """
 
 import math
+import pathlib
 
 WIDTH, HEIGHT = 4.0, 8.0
 YOUNGS_MODULUS, POISSONS_RATIO = 1000.0, 0.3
@@ -26,18 +27,30 @@ COEFFICIENT, NONLOCAL_RADIUS, ELASTIC_SLIP = 0.3, 0.02, 1e-4
 SIZES = {"2e4": 41, "2e5": 129, "1e6": 288}
 
 
-def lines(mesh):
-    """The lines x and y of a grid: of equal squares for a number of elements along the top ("41"), or, for
-    "graded:k", equal up to 0.8 from the axis (elements of 0.02/k) and growing beyond, for limits."""
-    if mesh.startswith("graded:"):
-        k = int(mesh.removeprefix("graded:"))
+def mesh(name):
+    """The mesh by its name, as Signorini is given it: the file of a mesh of Gmsh ("….msh"), or a grid."""
+    if name.endswith(".msh"):
+        return {"gmsh": pathlib.Path(name).read_text(encoding="utf-8")}
+    x, y = lines(name)
+    return {"grid": {"x": x, "y": y}}
+
+
+def lines(grid):
+    """The lines x and y of a grid: of equal squares for a number of elements along the top ("41"); for "graded:k" equal
+    up to 0.8 from the axis (elements of 0.02/k) and growing beyond, for limits; for "geometric:n", with n elements
+    along the top, growing all the way, so that no element is like another."""
+    if grid.startswith("geometric:"):
+        n = int(grid.removeprefix("geometric:"))
+        return _geometric(WIDTH, n, 10), [-y for y in reversed(_geometric(HEIGHT, 2 * n, 30))]
+    if grid.startswith("graded:"):
+        k = int(grid.removeprefix("graded:"))
         return _graded(40 * k, 20 * k, 0.8, WIDTH), [-y for y in reversed(_graded(40 * k, 30 * k, 0.8, HEIGHT))]
-    n = int(SIZES.get(mesh, mesh))
+    n = int(SIZES.get(grid, grid))
     return _even(0.0, WIDTH, n), _even(-HEIGHT, 0.0, 2 * n)
 
 
-def problem(x, y, coefficient, normal="obstacle"):
-    """The problem for Signorini; frictionless if `coefficient` is 0."""
+def problem(mesh, coefficient, normal="obstacle"):
+    """The problem for Signorini on a mesh as `mesh` makes it; frictionless if `coefficient` is 0."""
     contact = {
         "boundary": "top", "normal": normal, "indentation": INDENTATION,
         "obstacle": {"kind": "circle", "radius": RADIUS},
@@ -49,7 +62,7 @@ def problem(x, y, coefficient, normal="obstacle"):
     return {
         "title": "Half of a block under a rigid cylinder",
         "analysis": {"kind": "plane_strain"},
-        "mesh": {"grid": {"x": x, "y": y}},
+        "mesh": mesh,
         "materials": [{"youngs_modulus": YOUNGS_MODULUS, "poissons_ratio": POISSONS_RATIO}],
         "supports": [{"boundary": "left", "ux": 0}, {"boundary": "bottom", "uy": 0}],
         "contacts": [contact],
@@ -66,14 +79,14 @@ def hertz(half_force):
     return math.sqrt(2 * half_force * modulus / (math.pi * RADIUS))
 
 
-def nodes(lines):
-    """The coordinates of the nodes along an axis: the lines and the points halfway between them."""
-    halfway = [(a + b) / 2 for a, b in zip(lines, lines[1:])]
-    return [c for pair in zip(lines, halfway) for c in pair] + [lines[-1]]
-
-
 def _even(start, end, steps):
     return [start + (end - start) * i / steps for i in range(steps + 1)]
+
+
+def _geometric(end, steps, ratio):
+    """From 0 to `end` in steps that grow by one factor; the last is `ratio` times the first."""
+    factor = ratio ** (1 / (steps - 1))
+    return [end * (factor**i - 1) / (factor**steps - 1) for i in range(steps)] + [end]
 
 
 def _graded(even, growing, core, end):

@@ -16,6 +16,10 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 from measured import measured
 from outside import BINARY
 
+STATED = {
+    "vertical_force": "normal_force", "horizontal_force": "tangential_force", "peak_pressure": "peak_normal_stress",
+}
+
 
 def simpson(x, values):
     """The integral along edges of three nodes."""
@@ -44,11 +48,12 @@ def forces(profile, contact):
 def main(mesh, coefficient):
     with tempfile.TemporaryDirectory() as name:
         given, *results = [pathlib.Path(name) / file for file in ("problem.json", "summary.json", "profile.json")]
-        given.write_text(json.dumps(problem.problem(*problem.lines(mesh), coefficient)))
+        given.write_text(json.dumps(problem.problem(problem.mesh(mesh), coefficient)))
         # what its peers are asked for too: forces and stresses along the contact, no fields
         run = measured([BINARY, "solve", given, "-o", results[0], "-o", results[1]])
         summary, profile = [json.loads(result.read_text()) for result in results]
     across, down = forces(profile, summary["contacts"]["top"])
+    relative = {row["quantity"]: row["relative"] for row in summary["accuracy"]["quantities"]}
     print(json.dumps({
         "program": "Signorini",
         "dofs": summary["dofs"],
@@ -59,6 +64,8 @@ def main(mesh, coefficient):
         "vertical_force": abs(down),
         "horizontal_force": abs(across),
         "peak_pressure": abs(profile["normal_stress"][0]),
+        # the errors that it states of the forces along the normal and the tangent, and of the peak, relative
+        "stated": {key: relative.get(name) for key, name in STATED.items()},
     }))
 
 
