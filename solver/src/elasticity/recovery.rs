@@ -1,7 +1,7 @@
 //! From displacements to stresses, nodal forces and energy.
 
 use crate::elasticity::Section;
-use crate::elasticity::geometry::{Elements, MeshStations, Stations};
+use crate::elasticity::geometry::{Elements, MeshStations, Points, Station};
 use crate::elasticity::material::{COMPONENTS, Moduli, stress};
 use crate::elasticity::mixed::{Inside, Mixed, OfNodes, dilatation, position};
 use crate::element::{AtNodes, Element, Family, Mapped};
@@ -88,18 +88,19 @@ pub fn recover(
                     at_nodes.push(own);
                     continue;
                 }
-                let stations = stations.of(e);
                 let (ux, uy) = (u.map(|u| u[0]), u.map(|u| u[1]));
                 let moduli = &section.materials()[material];
-                found.add(mesh, (element, stations), moduli, (&ux, &uy));
+                let rule = stations.of(e, Points::Rule);
+                found.add(mesh, (element, rule), moduli, (&ux, &uy));
                 if section.has_split() {
                     found.dilatation_gap.resize(found.points[0].len(), 0.0);
                 }
                 let mut stresses = [[0.0; COMPONENTS]; 4];
-                for (own, station) in stresses.iter_mut().zip(&stations.stress) {
+                for (own, station) in stresses.iter_mut().zip(stations.of(e, Points::Stress)) {
                     *own = stress(moduli, &station.strain(&ux, &uy));
                 }
-                at_nodes.push(stations.carried_to_nodes(&stresses));
+                let to_nodes = elements.tables.masters.to_nodes(element.family());
+                at_nodes.push(carried(to_nodes, &stresses));
             }
         });
         interrupt.worked((WORK_OF_AN_ELEMENT * some.len()) as f64)?;
@@ -114,13 +115,13 @@ impl Recovered {
     fn add(
         &mut self,
         mesh: &Mesh,
-        (element, stations): (&Element, &Stations),
+        (element, rule): (&Element, &[Station]),
         moduli: &Moduli,
         (ux, uy): (&AtNodes<f64>, &AtNodes<f64>),
     ) {
         let nodes = mesh.element_nodes(element);
         let (mut fx, mut fy) = ([0.0; 8], [0.0; 8]);
-        for station in &stations.rule {
+        for station in rule {
             let strain = station.strain(ux, uy);
             let stress = stress(moduli, &strain);
             let density: f64 = (0..COMPONENTS).map(|c| stress[c] * strain[c]).sum();
@@ -234,7 +235,11 @@ pub(super) fn recover_nodal_stresses<const FIELDS: usize>(
     fields: &[[[f64; FIELDS]; 2]],
     interrupt: &mut Interrupt<'_>,
 ) -> Result<Vec<Stresses<FIELDS>>, Stopped> {
-    let Elements { mesh, section, .. } = elements;
+    let Elements {
+        mesh,
+        section,
+        tables,
+    } = elements;
     let mut sums = vec![[[0.0; FIELDS]; COMPONENTS]; mesh.nodes.len()];
     let mut count = vec![0u32; mesh.nodes.len()];
     let moduli = &section.materials()[material];
@@ -254,7 +259,11 @@ pub(super) fn recover_nodal_stresses<const FIELDS: usize>(
                         let body = OfNodes::new(&Mixed::new(section, split, family, &nodes));
                         mixed_stresses_at_nodes(section, &body, (element, &nodes), fields)
                     }
-                    None => stations.of(e).stresses_at_nodes(moduli, element, fields),
+                    None => {
+                        let own = stations.of(e, Points::Stress);
+                        let to_nodes = tables.masters.to_nodes(element.family());
+                        stresses_at_nodes(own, to_nodes, moduli, element, fields)
+                    }
                 };
                 for (&node, own) in element.iter().zip(&own) {
                     for (sum, own) in sums[node as usize].iter_mut().zip(own) {
@@ -302,55 +311,57 @@ fn mixed_stresses_at_nodes<const FIELDS: usize>(
     at_nodes
 }
 
-impl Stations {
-    /// The stresses of several fields at the nodes of an element.
-    #[inline(always)]
-    fn stresses_at_nodes<const FIELDS: usize>(
-        &self,
-        moduli: &Moduli,
-        element: &Element,
-        fields: &[[[f64; FIELDS]; 2]],
-    ) -> [Stresses<FIELDS>; 8] {
-        let mut at_nodes = [[[0.0; FIELDS]; COMPONENTS]; 8];
-        for (point, station) in self.stress.iter().enumerate() {
-            let mut strain = [[0.0; FIELDS]; COMPONENTS];
-            for (i, &node) in element.iter().enumerate() {
-                let [ux, uy] = &fields[node as usize];
-                let (dx, dy, hoop) = (station.dx[i], station.dy[i], station.hoop[i]);
-                for k in 0..FIELDS {
-                    strain[0][k] += dx * ux[k];
-                    strain[1][k] += dy * uy[k];
-                    strain[2][k] += dy * ux[k] + dx * uy[k];
-                    strain[3][k] += hoop * ux[k];
-                }
-            }
-            let mut stress = [[0.0; FIELDS]; COMPONENTS];
-            for (stress, row) in stress.iter_mut().zip(moduli) {
-                for (strain, d) in strain.iter().zip(row) {
-                    (0..FIELDS).for_each(|k| stress[k] += d * strain[k]);
-                }
-            }
-            for (at_node, weights) in at_nodes.iter_mut().zip(&self.to_nodes) {
-                let weight = weights[point];
-                for (all, own) in at_node.iter_mut().zip(&stress) {
-                    (0..FIELDS).for_each(|k| all[k] += weight * own[k]);
-                }
+/// The stresses of several fields at the nodes of an element.
+#[inline(always)]
+fn stresses_at_nodes<const FIELDS: usize>(
+    stations: &[Station],
+    to_nodes: &AtNodes<[f64; 4]>,
+    moduli: &Moduli,
+    element: &Element,
+    fields: &[[[f64; FIELDS]; 2]],
+) -> [Stresses<FIELDS>; 8] {
+    let mut at_nodes = [[[0.0; FIELDS]; COMPONENTS]; 8];
+    for (point, station) in stations.iter().enumerate() {
+        let mut strain = [[0.0; FIELDS]; COMPONENTS];
+        for (i, &node) in element.iter().enumerate() {
+            let [ux, uy] = &fields[node as usize];
+            let (dx, dy, hoop) = (station.dx[i], station.dy[i], station.hoop[i]);
+            for k in 0..FIELDS {
+                strain[0][k] += dx * ux[k];
+                strain[1][k] += dy * uy[k];
+                strain[2][k] += dy * ux[k] + dx * uy[k];
+                strain[3][k] += hoop * ux[k];
             }
         }
-        at_nodes
+        let mut stress = [[0.0; FIELDS]; COMPONENTS];
+        for (stress, row) in stress.iter_mut().zip(moduli) {
+            for (strain, d) in strain.iter().zip(row) {
+                (0..FIELDS).for_each(|k| stress[k] += d * strain[k]);
+            }
+        }
+        for (at_node, weights) in at_nodes.iter_mut().zip(to_nodes) {
+            let weight = weights[point];
+            for (all, own) in at_node.iter_mut().zip(&stress) {
+                (0..FIELDS).for_each(|k| all[k] += weight * own[k]);
+            }
+        }
     }
+    at_nodes
+}
 
-    /// Extrapolates the stresses from the superconvergent points to the nodes.
-    #[inline(always)]
-    fn carried_to_nodes(&self, points: &[[f64; COMPONENTS]; 4]) -> [[f64; COMPONENTS]; 8] {
-        let mut at_nodes = [[0.0; COMPONENTS]; 8];
-        for (at_node, weights) in at_nodes.iter_mut().zip(&self.to_nodes) {
-            for (weight, point) in weights.iter().zip(points) {
-                (0..COMPONENTS).for_each(|c| at_node[c] += weight * point[c]);
-            }
+/// Extrapolates the stresses from the superconvergent points to the nodes.
+#[inline(always)]
+fn carried(
+    to_nodes: &AtNodes<[f64; 4]>,
+    points: &[[f64; COMPONENTS]; 4],
+) -> AtNodes<[f64; COMPONENTS]> {
+    let mut at_nodes = [[0.0; COMPONENTS]; 8];
+    for (at_node, weights) in at_nodes.iter_mut().zip(to_nodes) {
+        for (weight, point) in weights.iter().zip(points) {
+            (0..COMPONENTS).for_each(|c| at_node[c] += weight * point[c]);
         }
-        at_nodes
     }
+    at_nodes
 }
 
 /// An element with the displacements of its nodes.

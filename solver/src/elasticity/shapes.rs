@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::elasticity::Section;
-use crate::element::{AtNodes, Family};
+use crate::element::{AtNodes, Family, Jacobian};
 use crate::mesh::Mesh;
 
 /// The shape of an element with its material: elements with equal shapes are shifted copies with the same integrals.
@@ -14,6 +14,8 @@ pub(super) struct Shape {
     pub(super) material: u16,
     /// Positions of the nodes relative to the first one; in axisymmetry relative along the axis only.
     pub(super) nodes: AtNodes<[f64; 2]>,
+    /// The error of the positions after a few rounded operations.
+    rounding: f64,
 }
 
 impl Shape {
@@ -32,6 +34,7 @@ impl Shape {
         material: usize,
     ) -> Self {
         let mut nodes = *nodes;
+        let largest = nodes.iter().flatten().fold(0.0f64, |m, c| m.max(c.abs()));
         let [x, y] = nodes[0];
         let x = if section.axisymmetric() { 0.0 } else { x };
         let own = nodes.iter_mut().take(family.nodes());
@@ -40,7 +43,25 @@ impl Shape {
             family,
             material: material as u16,
             nodes,
+            rounding: ROUNDING * f64::EPSILON * largest,
         }
+    }
+
+    /// The derivatives of the element's map if they are the same everywhere: for a triangle with straight sides or a
+    /// parallelogram, with midside nodes in the middle up to rounding. The nodes are then taken to lie exactly there.
+    pub(super) fn affine(&self) -> Option<Jacobian> {
+        let (places, last) = (self.family.places(), self.family.corners() - 1);
+        let [first, along, up] = [0, 1, last].map(|i| self.nodes[i]);
+        let size = places[1][0] - places[0][0]; // of the master element
+        let sides = [along, up].map(|end| [0, 1].map(|b| (end[b] - first[b]) / size));
+        let tolerance = self.rounding.min(OF_THICKNESS * self.thickness());
+        let is_there = |(node, place): (&[f64; 2], &[f64; 2])| {
+            let [xi, eta] = [0, 1].map(|a| place[a] - places[0][a]);
+            let apart = [0, 1].map(|b| node[b] - first[b] - xi * sides[0][b] - eta * sides[1][b]);
+            apart.iter().all(|apart| apart.abs() <= tolerance)
+        };
+        let mut nodes = self.nodes.iter().zip(places);
+        nodes.all(is_there).then(|| Jacobian::new(sides))
     }
 
     /// The element's area divided by the longest distance between its corners, a measure of how thin the element is.

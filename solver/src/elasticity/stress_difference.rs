@@ -4,7 +4,7 @@
 //!
 //!   ‖e‖² = ∫ (σ* − σ) : C⁻¹ (σ* − σ),   σ* = Σ h_i σ_i with the recovered nodal stresses σ_i
 
-use crate::elasticity::geometry::{Elements, Stations};
+use crate::elasticity::geometry::{Elements, Points, Station};
 use crate::elasticity::material::{COMPONENTS, Moduli, inverse, stress};
 use crate::elasticity::mixed::{Mixed, OfNodes, dilatation};
 use crate::elasticity::recovery::{
@@ -115,7 +115,8 @@ impl StressDifference {
                         let in_common = match split {
                             None => {
                                 let own = &self.stress[own];
-                                InCommon::new(stations.of(e), own, &weights.compliance)
+                                let rule = stations.of(e, Points::Rule);
+                                InCommon::new(rule, own, &weights.compliance)
                             }
                             Some(split) => {
                                 let nodes = mesh.element_nodes(element);
@@ -170,9 +171,9 @@ struct InCommon {
 
 impl InCommon {
     #[inline(always)]
-    fn new(stations: &Stations, own: &[[f64; COMPONENTS]], compliance: &Moduli) -> Self {
+    fn new(rule: &[Station], own: &[[f64; COMPONENTS]], compliance: &Moduli) -> Self {
         let mut found = InCommon::default();
-        for (station, own) in stations.rule.iter().zip(own) {
+        for (station, own) in rule.iter().zip(own) {
             let strain = stress(compliance, own).map(|strain| station.weight * strain);
             found.add_smooth(&station.shape, &strain);
             let InCommon { by_ux, by_uy, .. } = &mut found;
@@ -249,7 +250,7 @@ fn integrate(
         let weights = &weights[section.material_of(e)];
         interrupt.worked(WORK_OF_AN_ELEMENT as f64)?;
         let mut sum = 0.0;
-        for (station, (own, other)) in stations.of(e).rule.iter().zip(&mut pairs) {
+        for (station, (own, other)) in stations.of(e, Points::Rule).iter().zip(&mut pairs) {
             sum += station.weight * weights.density(&own, &other);
         }
         Ok(sum)

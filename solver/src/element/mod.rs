@@ -303,8 +303,30 @@ pub struct Tabulated {
     derivative: AtNodes<[f64; 2]>,
 }
 
+/// The derivatives of an element's map T_e at a place.
+#[derive(Clone, Copy, Debug)]
+pub struct Jacobian {
+    /// The determinant of dx_b/dξ_a; ≤ 0 where the element is inverted.
+    pub det: f64,
+    /// The derivatives of the master coordinates, dξ_a/dx_b.
+    pub inverse: [[f64; 2]; 2],
+}
+
+impl Jacobian {
+    /// The derivatives of the map, from dx_b/dξ_a.
+    #[inline(always)]
+    pub fn new([[j00, j01], [j10, j11]]: [[f64; 2]; 2]) -> Self {
+        let det = j00 * j11 - j01 * j10;
+        Jacobian {
+            det,
+            inverse: [[j11 / det, -j10 / det], [-j01 / det, j00 / det]],
+        }
+    }
+}
+
 impl Tabulated {
     /// Maps the place to an element with node positions `nodes`.
+    #[inline(always)]
     pub fn map(&self, nodes: &AtNodes<[f64; 2]>) -> Mapped {
         let mut jacobian = [[0.0; 2]; 2]; // jacobian[a][b] = dx_b / dξ_a
         for i in 0..self.nodes {
@@ -314,18 +336,28 @@ impl Tabulated {
                 }
             }
         }
-        let [[j00, j01], [j10, j11]] = jacobian;
-        let det = j00 * j11 - j01 * j10;
+        self.map_with(&Jacobian::new(jacobian), nodes)
+    }
+
+    /// Maps the place to an element with node positions `nodes`, whose map has these derivatives there.
+    #[inline(always)]
+    pub fn map_with(&self, jacobian: &Jacobian, nodes: &AtNodes<[f64; 2]>) -> Mapped {
+        let [xi, eta] = jacobian.inverse;
         let gradient = self
             .derivative
-            .map(|[p, q]| [(j11 * p - j01 * q) / det, (j00 * q - j10 * p) / det]);
+            .map(|[p, q]| [xi[0] * p + eta[0] * q, xi[1] * p + eta[1] * q]);
         let x = (0..self.nodes).map(|i| self.shape[i] * nodes[i][0]).sum();
         Mapped {
             shape: self.shape,
             gradient,
-            det,
+            det: jacobian.det,
             x,
         }
+    }
+
+    /// The derivatives dh_i/dξ and dh_i/dη.
+    pub fn derivative(&self) -> &AtNodes<[f64; 2]> {
+        &self.derivative
     }
 }
 
