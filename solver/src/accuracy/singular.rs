@@ -40,19 +40,25 @@ impl Surroundings {
                 .for_each(|&node| stars[node as usize].push(e));
         }
         let lines = lines_of_symmetry(model);
+        // by element and images, the last node of which it was found to be part or around
+        let mut met = vec![[u32::MAX; 4]; mesh.elements.len()];
         // of what meets at a node with its images, one of each is enough: all are there as often
         let ring = |(node, star): (usize, &Vec<u32>)| {
+            let mut is_new = |(e, images): Imaged| {
+                let met = &mut met[e as usize][usize::from(images)];
+                std::mem::replace(met, node as u32) != node as u32
+            };
+            star.iter().for_each(|e| _ = is_new((*e, 0)));
             let mut ring: Vec<Imaged> = Vec::new();
             for corner in star.iter().flat_map(|e| corners(*e)) {
                 let own = lines[*corner as usize];
                 for images in (0..=own).filter(|images| images & !own == 0) {
                     let around = stars[*corner as usize].iter();
-                    ring.extend(around.map(|e| (*e, images & !lines[node])));
+                    let around = around.map(|e| (*e, images & !lines[node]));
+                    ring.extend(around.filter(|imaged| is_new(*imaged)));
                 }
             }
             ring.sort_unstable();
-            ring.dedup();
-            ring.retain(|(e, images)| *images != 0 || !star.contains(e));
             ring.into_iter().map(|(e, _)| e).collect()
         };
         let rings = stars.iter().enumerate().map(ring).collect();
