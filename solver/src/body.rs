@@ -106,7 +106,7 @@ impl ElasticBody {
         notify(observer, Progress::Phase(Phase::Order))?;
         let tables = ElementTables::new(&model.mesh, &model.section, model.quadrature);
         let elements = tables.elements(&model.mesh, &model.section);
-        let (map, fronts) = number(model, elements)?;
+        let (map, fronts) = number(model, elements, observer.threads())?;
         let mut of_loads = on_unknowns(&map, &condensed);
 
         notify(observer, Progress::Phase(Phase::Factor))?;
@@ -307,7 +307,11 @@ fn axis_ends(model: &Model, contact_dofs: &[[Dof; 2]]) -> Vec<[usize; 2]> {
 
 /// Numbers the unknowns in the order of their elimination, and plans the elimination. The unknowns of contact nodes
 /// come last, turned to (n, t) and in the order of the contacts.
-fn number(model: &Model, elements: Elements<'_>) -> Result<(DofMap, Fronts), SolveError> {
+fn number(
+    model: &Model,
+    elements: Elements<'_>,
+    threads: usize,
+) -> Result<(DofMap, Fronts), SolveError> {
     let count = model.mesh.nodes.len();
     let mut axes = vec![None; count];
     // the axes of a node that is held along an oblique direction lie along it
@@ -358,7 +362,7 @@ fn number(model: &Model, elements: Elements<'_>) -> Result<(DofMap, Fronts), Sol
         positions: &model.mesh.nodes,
         unknown: &unknown,
     };
-    let dissection = Dissection::new(&cells, &contact_nodes);
+    let dissection = Dissection::new(&cells, &contact_nodes, threads);
     let mut map = DofMap {
         dofs: values
             .iter()

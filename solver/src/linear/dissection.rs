@@ -8,6 +8,9 @@
 //! it shares with the rest of the body, and those that are never eliminated.
 
 use std::ops::Deref;
+use std::panic::resume_unwind;
+use std::sync::Arc;
+use std::thread;
 
 use super::bisection::Bisection;
 
@@ -18,6 +21,9 @@ const LARGEST_LEAF: usize = 6;
 /// The smaller half of a part has at least this share of the part's elements, so that the depth of the tree is of the
 /// order of the logarithm of the number of elements.
 const SMALLEST_SHARE: f64 = 0.25;
+
+/// The smallest number of elements of a part whose halves are divided at the same time: that takes some milliseconds.
+const SMALLEST_SHARED: usize = 1 << 12;
 
 /// Centres whose distance is below this fraction of the extent lie on the same grid line.
 const SAME_LINE: f64 = 1e-10;
@@ -69,12 +75,16 @@ pub struct Part {
 }
 
 impl Dissection {
-    /// Dissects a mesh. The nodes `kept`, each listed once, come last in their order; nodes without an element are left
-    /// out.
-    pub fn new<E: Deref<Target = [u32]>>(cells: &Cells<'_, E>, kept: &[u32]) -> Self {
+    /// Dissects a mesh on one thread or two. The nodes `kept`, each listed once, come last in their order; nodes without
+    /// an element are left out.
+    pub fn new<E: Deref<Target = [u32]> + Sync>(
+        cells: &Cells<'_, E>,
+        kept: &[u32],
+        threads: usize,
+    ) -> Self {
         let mut state = Halving::new(cells, kept);
         let mut elements: Vec<u32> = (0..cells.elements.len() as u32).collect();
-        state.divide(&mut elements, 0, 0);
+        state.divide(&mut elements, 0, 0, threads);
         let mut dissection = Dissection {
             parts: state.parts,
             elements,
@@ -143,7 +153,7 @@ fn merge(a: &[u32], b: &[u32], into: &mut Vec<u32>) {
 /// The state while parts are halved.
 struct Halving<'a, E> {
     cells: &'a Cells<'a, E>,
-    centres: Vec<[f64; 2]>,
+    centres: Arc<[[f64; 2]]>,
     /// Whether a node is owned by no part yet and will be eliminated.
     free: Vec<bool>,
     /// By node: the stamp of the half in which the node was seen last.
@@ -177,7 +187,7 @@ fn along(direction: usize, [x, y]: [f64; 2]) -> f64 {
     a * x + b * y
 }
 
-impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
+impl<'a, E: Deref<Target = [u32]> + Sync> Halving<'a, E> {
     fn new(cells: &'a Cells<'a, E>, kept: &[u32]) -> Self {
         let centre = |element: &E| {
             let scale = 1.0 / element.len().max(1) as f64;
@@ -187,9 +197,13 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
         };
         let mut free = cells.unknown.to_vec();
         kept.iter().for_each(|node| free[*node as usize] = false);
+        Halving::with(cells, cells.elements.iter().map(centre).collect(), free)
+    }
+
+    fn with(cells: &'a Cells<'a, E>, centres: Arc<[[f64; 2]]>, free: Vec<bool>) -> Self {
         Halving {
             cells,
-            centres: cells.elements.iter().map(centre).collect(),
+            centres,
             free,
             seen: vec![0; cells.positions.len()],
             stamp: 0,
@@ -201,7 +215,7 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
     }
 
     /// Divides the part with `elements`, which begin at `first` among all elements, and returns the part's number.
-    fn divide(&mut self, elements: &mut [u32], first: usize, depth: u32) -> usize {
+    fn divide(&mut self, elements: &mut [u32], first: usize, depth: u32, threads: usize) -> usize {
         let mut part = Part {
             depth,
             elements: [first, first + elements.len()],
@@ -238,17 +252,49 @@ impl<'a, E: Deref<Target = [u32]>> Halving<'a, E> {
             let other = cut.map_or(1, |cut| cut.direction ^ 1);
             let position = |node: &u32| along(other, self.cells.positions[*node as usize]);
             own.sort_unstable_by(|a, b| position(a).total_cmp(&position(b)).then(a.cmp(b)));
-            let halves = [
-                self.divide(low, first, depth + 1),
-                self.divide(high, first + middle, depth + 1),
-            ];
-            part.halves = Some(halves);
+            let places = [first, first + middle];
+            part.halves = Some(self.divide_halves([low, high], places, depth + 1, threads));
         }
         part.own[0] = self.nodes.len();
         self.nodes.append(&mut own);
         part.own[1] = self.nodes.len();
         self.parts.push(part);
         self.parts.len() - 1
+    }
+
+    /// Divides two halves, which begin at `places`, and returns their numbers. They have no free node in common, so that
+    /// the parts of each are the same if two threads divide them at the same time.
+    fn divide_halves(
+        &mut self,
+        [low, high]: [&mut [u32]; 2],
+        places: [usize; 2],
+        depth: u32,
+        threads: usize,
+    ) -> [usize; 2] {
+        if threads < 2 || low.len() + high.len() < SMALLEST_SHARED {
+            return [
+                self.divide(low, places[0], depth, 1),
+                self.divide(high, places[1], depth, 1),
+            ];
+        }
+        let mut other = Halving::with(self.cells, self.centres.clone(), self.free.clone());
+        let mut divide = || other.divide(high, places[1], depth, 1);
+        let (number, divided) = thread::scope(|scope| {
+            let thread = thread::Builder::new().spawn_scoped(scope, &mut divide);
+            let number = self.divide(low, places[0], depth, 1);
+            let divided = thread.map(|thread| thread.join().unwrap_or_else(|p| resume_unwind(p)));
+            (number, divided)
+        });
+        // where the system has no more threads
+        let of_other = divided.unwrap_or_else(|_| divide());
+        let (nodes, parts) = (self.nodes.len(), self.parts.len());
+        self.nodes.append(&mut other.nodes);
+        self.parts.extend(other.parts.into_iter().map(|part| Part {
+            halves: part.halves.map(|halves| halves.map(|half| half + parts)),
+            own: part.own.map(|place| place + nodes),
+            ..part
+        }));
+        [number, of_other + parts]
     }
 
     /// The cut that the fewest nodes lie on; `None` if all centres coincide.
@@ -414,7 +460,7 @@ pub(super) mod tests {
             positions: &positions,
             unknown: &unknown,
         };
-        (Dissection::new(&cells, kept), elements)
+        (Dissection::new(&cells, kept, 1), elements)
     }
 
     #[test]
@@ -496,7 +542,7 @@ pub(super) mod tests {
                 positions,
                 unknown,
             };
-            let found = Dissection::new(&cells, &[]);
+            let found = Dissection::new(&cells, &[], 1);
             let entries = found.parts.iter().enumerate().map(|(number, part)| {
                 let own = part.own[1] - part.own[0];
                 own * (own + 1) / 2 + own * found.boundary(number).len()
@@ -515,6 +561,29 @@ pub(super) mod tests {
         }
         let moved = cost(&positions);
         assert!(4 * moved < 5 * on_lines, "{moved} {on_lines}");
+    }
+
+    /// A grid, and a free mesh, are dissected equally on one thread and on two.
+    #[test]
+    fn two_threads_find_the_parts_of_one() {
+        let (elements, mut positions) = grid(&lines(80), &lines(70));
+        assert!(elements.len() > SMALLEST_SHARED);
+        let unknown = vec![true; positions.len()];
+        for bend in [0.0, 0.03] {
+            for (k, [x, _]) in positions.iter_mut().enumerate() {
+                *x += bend * (k as f64 * 1.7).sin();
+            }
+            let cells = Cells {
+                elements: &elements,
+                positions: &positions,
+                unknown: &unknown,
+            };
+            let [one, two] = [1, 2].map(|threads| Dissection::new(&cells, &[7, 3], threads));
+            assert_eq!(one.parts, two.parts);
+            assert_eq!(one.elements, two.elements);
+            assert_eq!(one.nodes, two.nodes);
+            assert_eq!(one.boundaries, two.boundaries);
+        }
     }
 
     #[test]
@@ -539,7 +608,7 @@ pub(super) mod tests {
             positions: &positions,
             unknown: &[true; 1001],
         };
-        let found = Dissection::new(&cells, &[]);
+        let found = Dissection::new(&cells, &[], 1);
         assert_eq!(found.nodes.len(), 1001);
         assert_eq!(found.nodes.last(), Some(&1000));
         assert!(found.parts.iter().all(|part| part.depth <= 8));
@@ -556,7 +625,7 @@ pub(super) mod tests {
             positions: &positions,
             unknown: &unknown,
         };
-        let found = Dissection::new(&cells, &[6, 7]);
+        let found = Dissection::new(&cells, &[6, 7], 1);
         assert_eq!(found.nodes.len(), 24);
         assert_eq!(found.nodes.last(), Some(&7));
         let nothing = Cells::<Vec<u32>> {
@@ -564,6 +633,6 @@ pub(super) mod tests {
             positions: &[],
             unknown: &[],
         };
-        assert_eq!(Dissection::new(&nothing, &[]).parts.len(), 1);
+        assert_eq!(Dissection::new(&nothing, &[], 1).parts.len(), 1);
     }
 }

@@ -438,7 +438,7 @@ mod tests {
                 positions,
                 unknown: &unknown,
             };
-            let dissection = Dissection::new(&cells, kept);
+            let dissection = Dissection::new(&cells, kept, 1);
             let (mut unknowns, mut next) = (vec![(0, 0); positions.len()], 0);
             for &node in &dissection.nodes {
                 unknowns[node as usize] = (next, count(node));
