@@ -379,10 +379,15 @@ impl Change<'_> {
     /// Sets a savepoint. There is one at a time: it must be released or rolled back to before the next is set.
     pub(super) fn savepoint(&mut self) -> Result<Savepoint> {
         self.sql()?.run("savepoint submission", ())?;
-        Ok(Savepoint {
+        Ok(self.position())
+    }
+
+    /// What this transaction has done so far.
+    pub(super) fn position(&self) -> Savepoint {
+        Savepoint {
             changed: self.changed.len(),
             log_lines: self.log_lines.len(),
-        })
+        }
     }
 
     /// Keeps the changes since the savepoint.

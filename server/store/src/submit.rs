@@ -1,8 +1,8 @@
 //! Accepts jobs: one commit for many clients.
 //!
 //! A commit costs a flush of the disk, whatever it contains. Submissions that arrive during a commit therefore wait
-//! together and share the next one, each with a savepoint of its own, so that a refused submission does not affect the
-//! others.
+//! together and share the next one, each with a savepoint of its own if there are several, so that a refused submission
+//! does not affect the others.
 
 use std::{
     panic::AssertUnwindSafe,
@@ -84,8 +84,14 @@ impl Store {
                 }
             }
             Err(cause) => {
+                // if there is one only, this is why it was refused
+                let mut replies = replies.into_iter();
+                let first = replies.next();
                 for reply in replies {
                     let _ = reply.send(Err(cause.for_another()));
+                }
+                if let Some(first) = first {
+                    let _ = first.send(Err(cause));
                 }
             }
         }
@@ -99,17 +105,26 @@ fn accept_together(
 ) -> Result<Vec<Result<Answer>>> {
     let mut change = writer.change()?;
     let mut answers = vec![];
+    // SQLite copies each page that is changed after a savepoint: a submission alone does without
+    let alone = submissions.len() == 1;
     for (submission, claim, checked) in submissions {
         if !checked && coalescing::has_result_to_check(writer, &submission.jobs) {
             answers.push(Ok(Answer::ToCheck(Box::new(submission))));
             continue;
         }
-        let savepoint = change.savepoint()?;
+        let savepoint = if alone {
+            change.position()
+        } else {
+            change.savepoint()?
+        };
         match accept(&mut change, savepoint, submission, claim) {
             Ok(accepted) => {
-                change.release()?;
+                if !alone {
+                    change.release()?;
+                }
                 answers.push(Ok(Answer::Accepted(Box::new(accepted))));
             }
+            Err(cause) if alone => return Err(cause),
             Err(cause) => match change.roll_back_to(savepoint) {
                 Ok(()) => answers.push(Err(cause)),
                 // a full disk has made the database roll back everything: report that as the cause
