@@ -13,7 +13,8 @@ use crate::elasticity::{
 };
 use crate::error::SolveError;
 use crate::linear::{
-    Cells, Dense, Dissection, ElementMatrix, Factor, FactorError, Fronts, Interrupt, Stopped,
+    Cells, Dense, Dissection, ElementMatrix, Factor, FactorError, Fronts, Interrupt,
+    SMALLEST_SHARED, Stopped,
 };
 use crate::mesh::Mesh;
 use crate::model::{Alone, Held, Level, Model};
@@ -106,7 +107,11 @@ impl ElasticBody {
         notify(observer, Progress::Phase(Phase::Order))?;
         let tables = ElementTables::new(&model.mesh, &model.section, model.quadrature);
         let elements = tables.elements(&model.mesh, &model.section);
-        let (map, fronts) = number(model, elements, observer.threads())?;
+        let threads = match model.mesh.elements.len() >= SMALLEST_SHARED {
+            true => observer.threads(),
+            false => 1,
+        };
+        let (map, fronts) = number(model, elements, threads)?;
         let mut of_loads = on_unknowns(&map, &condensed);
 
         notify(observer, Progress::Phase(Phase::Factor))?;

@@ -8,11 +8,11 @@
 //! it shares with the rest of the body, and those that are never eliminated.
 
 use std::ops::Deref;
-use std::panic::resume_unwind;
 use std::sync::Arc;
-use std::thread;
 
 use super::bisection::Bisection;
+use super::interrupt::{Interrupt, Stopped};
+use super::parallel::for_each;
 
 /// The largest number of elements of a part that is not divided: smaller parts cost more in overhead than they save in
 /// arithmetic.
@@ -22,8 +22,9 @@ const LARGEST_LEAF: usize = 6;
 /// order of the logarithm of the number of elements.
 const SMALLEST_SHARE: f64 = 0.25;
 
-/// The smallest number of elements of a part whose halves are divided at the same time: that takes some milliseconds.
-const SMALLEST_SHARED: usize = 1 << 12;
+/// The smallest number of elements of a part whose halves two threads divide at the same time. One thread divides so many
+/// in some milliseconds.
+pub const SMALLEST_SHARED: usize = 1 << 12;
 
 /// Centres whose distance is below this fraction of the extent lie on the same grid line.
 const SAME_LINE: f64 = 1e-10;
@@ -75,7 +76,7 @@ pub struct Part {
 }
 
 impl Dissection {
-    /// Dissects a mesh on one thread or two. The nodes `kept`, each listed once, come last in their order; nodes without
+    /// Dissects a mesh on one thread, or on two if there are more. The nodes `kept`, each listed once, come last in their order; nodes without
     /// an element are left out.
     pub fn new<E: Deref<Target = [u32]> + Sync>(
         cells: &Cells<'_, E>,
@@ -238,10 +239,14 @@ impl<'a, E: Deref<Target = [u32]> + Sync> Halving<'a, E> {
             let mut middle = self.part_by(elements, cut);
             let is_exact = cut.is_some_and(|cut| cut.between_lines);
             if !is_exact && elements.len() >= SMALLEST_IMPROVED {
-                let mesh = self.cells;
-                let make = || Bisection::new(mesh.elements, mesh.positions.len());
-                let bisection = self.bisection.get_or_insert_with(make);
-                middle = bisection.improve(elements, middle, &self.free);
+                let bisection = match self.bisection.take() {
+                    Some(bisection) => bisection,
+                    None => self.new_bisection(),
+                };
+                middle = self
+                    .bisection
+                    .insert(bisection)
+                    .improve(elements, middle, &self.free);
             }
             let (low, high) = elements.split_at_mut(middle);
             // before the halves take what is theirs
@@ -262,8 +267,8 @@ impl<'a, E: Deref<Target = [u32]> + Sync> Halving<'a, E> {
         self.parts.len() - 1
     }
 
-    /// Divides two halves, which begin at `places`, and returns their numbers. They have no free node in common, so that
-    /// the parts of each are the same if two threads divide them at the same time.
+    /// Divides two halves, which begin at `places`, and returns their numbers. They have no free node in common: if two
+    /// threads divide them at the same time, the parts are those that one thread finds.
     fn divide_halves(
         &mut self,
         [low, high]: [&mut [u32]; 2],
@@ -278,15 +283,26 @@ impl<'a, E: Deref<Target = [u32]> + Sync> Halving<'a, E> {
             ];
         }
         let mut other = Halving::with(self.cells, self.centres.clone(), self.free.clone());
-        let mut divide = || other.divide(high, places[1], depth, 1);
-        let (number, divided) = thread::scope(|scope| {
-            let thread = thread::Builder::new().spawn_scoped(scope, &mut divide);
-            let number = self.divide(low, places[0], depth, 1);
-            let divided = thread.map(|thread| thread.join().unwrap_or_else(|p| resume_unwind(p)));
-            (number, divided)
-        });
-        // where the system has no more threads
-        let of_other = divided.unwrap_or_else(|_| divide());
+        // all memory is taken by this thread, which has to answer for it
+        self.reserve(low.len());
+        other.reserve(high.len());
+        if self.bisection.is_some() {
+            other.bisection = Some(self.new_bisection());
+        }
+        let mut numbers = [0; 2];
+        let halves = [(&mut *self, low), (&mut other, high)];
+        let divided = for_each(
+            halves.into_iter().zip(places).zip(&mut numbers),
+            &mut [(); 2],
+            |(), (((state, half), first), number), _| {
+                *number = state.divide(half, first, depth, 1);
+                Ok(())
+            },
+            &mut Interrupt::new(&mut || false),
+        );
+        if let Err(Stopped) = divided {
+            unreachable!("nothing stops it");
+        }
         let (nodes, parts) = (self.nodes.len(), self.parts.len());
         self.nodes.append(&mut other.nodes);
         self.parts.extend(other.parts.into_iter().map(|part| Part {
@@ -294,7 +310,18 @@ impl<'a, E: Deref<Target = [u32]> + Sync> Halving<'a, E> {
             own: part.own.map(|place| place + nodes),
             ..part
         }));
-        [number, of_other + parts]
+        [numbers[0], numbers[1] + parts]
+    }
+
+    /// Takes the memory for dividing so many elements.
+    fn reserve(&mut self, elements: usize) {
+        self.keys.reserve(elements);
+        self.nodes.reserve(self.cells.positions.len());
+        self.parts.reserve(elements / 2);
+    }
+
+    fn new_bisection(&self) -> Bisection<'a, E> {
+        Bisection::new(self.cells.elements, self.cells.positions.len())
     }
 
     /// The cut that the fewest nodes lie on; `None` if all centres coincide.
@@ -563,7 +590,7 @@ pub(super) mod tests {
         assert!(4 * moved < 5 * on_lines, "{moved} {on_lines}");
     }
 
-    /// A grid, and a free mesh, are dissected equally on one thread and on two.
+    /// A grid, and a bent one, whose halves are improved, are dissected equally on one thread and on two.
     #[test]
     fn two_threads_find_the_parts_of_one() {
         let (elements, mut positions) = grid(&lines(80), &lines(70));

@@ -33,7 +33,7 @@ mod spectrum;
 mod substitution;
 
 pub use dense::{Cholesky, Dense, General, Unsolved, least_squares, solve_positive_definite};
-pub use dissection::{Cells, Dissection};
+pub use dissection::{Cells, Dissection, SMALLEST_SHARED};
 pub use eliminated::Eliminated;
 pub use fronts::Fronts;
 pub use interrupt::{Interrupt, Stopped};
