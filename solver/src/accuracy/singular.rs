@@ -40,7 +40,7 @@ impl Surroundings {
                 .for_each(|&node| stars[node as usize].push(e));
         }
         let lines = lines_of_symmetry(model);
-        // by element and images, the last node of which it was found to be part or around
+        // by element and images: the last node in whose star or ring it was put
         let mut met = vec![[u32::MAX; 4]; mesh.elements.len()];
         // of what meets at a node with its images, one of each is enough: all are there as often
         let ring = |(node, star): (usize, &Vec<u32>)| {

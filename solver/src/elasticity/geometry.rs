@@ -132,8 +132,10 @@ impl Master {
         }
     }
 
-    /// Adds the stiffness of an element in the plane with an affine map: with B_i = Σ_p ∂h_i/∂ξ_p ∇ξ_p in each term
-    /// of det J ∫ B_iᵀ D B_j, what depends on the element comes before the sums over its nodes.
+    /// Adds the stiffness of an element in the plane with an affine map, for displacements of node i along x_a and of
+    /// node j along x_c:
+    ///
+    ///   k_ij^ac = det J × depth × Σ_pq (Σ_bd ∂ξ_p/∂x_b D_ab,cd ∂ξ_q/∂x_d) Σ w ∂h_i/∂ξ_p ∂h_j/∂ξ_q
     #[inline(always)]
     fn add_affine(&self, jacobian: &Jacobian, depth: f64, moduli: &Moduli, k: &mut Stiffness) {
         // the component of the strain that a displacement along a, differentiated by b, is part of
@@ -202,15 +204,14 @@ impl Masters {
         let moduli = &section.materials()[usize::from(shape.material)];
         let master = self.of(shape.family);
         let mut k = [[[[0.0; 8]; 2]; 2]; 8];
-        let in_plane = !section.axisymmetric();
-        let affine = shape.affine().filter(|_| in_plane);
-        pulp::Arch::new().dispatch(|| match affine {
-            Some(jacobian) => {
-                master.add_affine(&jacobian, section.depth(0.0), moduli, &mut k);
+        let affine = shape.affine();
+        pulp::Arch::new().dispatch(|| match &affine {
+            Some(jacobian) if !section.axisymmetric() => {
+                master.add_affine(jacobian, section.depth(0.0), moduli, &mut k);
             }
-            None => {
+            affine => {
                 for place in &master.points[Points::Rule as usize] {
-                    let station = Station::new(section, place, &shape.nodes, None);
+                    let station = Station::new(section, place, &shape.nodes, affine.as_ref());
                     add_stiffness(&station, moduli, &mut k);
                 }
             }
@@ -380,7 +381,12 @@ mod tests {
             Analysis::Axisymmetric {},
         ];
         for (analysis, quadrature) in analyses.iter().flat_map(|a| [(a, 2), (a, 3)]) {
-            let section = Section::uniform(*analysis, isotropic(analysis, 1000.0, 0.3));
+            let mut moduli = isotropic(analysis, 1000.0, 0.3);
+            // as of a turned orthotropic material
+            for (a, b, coupling) in [(0, 2, 37.0), (1, 2, -21.0)] {
+                (moduli[a][b], moduli[b][a]) = (coupling, coupling);
+            }
+            let section = Section::uniform(*analysis, moduli);
             let masters = Masters::new(quadrature);
             for family in [Family::Quad, Family::Triangle] {
                 let shape = Shape::new(family, &affine(family), &section, 0);

@@ -7,7 +7,7 @@ use crate::element::{AtNodes, Family, Jacobian};
 use crate::mesh::Mesh;
 
 /// The shape of an element with its material: elements with equal shapes are shifted copies with the same integrals.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Shape {
     pub(super) family: Family,
     /// The number of the element's material.
@@ -34,7 +34,8 @@ impl Shape {
         material: usize,
     ) -> Self {
         let mut nodes = *nodes;
-        let largest = nodes.iter().flatten().fold(0.0f64, |m, c| m.max(c.abs()));
+        let own = nodes[..family.nodes()].iter().flatten();
+        let largest = own.fold(0.0f64, |largest, c| largest.max(c.abs()));
         let [x, y] = nodes[0];
         let x = if section.axisymmetric() { 0.0 } else { x };
         let own = nodes.iter_mut().take(family.nodes());
@@ -116,10 +117,11 @@ pub(super) struct Shapes {
     pub(super) shared: Vec<Shape>,
 }
 
-/// The distance up to which nodes of equal shapes may differ, in roundings of the largest coordinate.
+/// The distance up to which nodes of equal shapes, or of an affine element from their places, may differ, in roundings of
+/// the largest coordinate.
 const ROUNDING: f64 = 16.0;
 
-/// The distance up to which nodes of equal shapes may differ, as a part of the element's thickness.
+/// The same distance, as a part of the element's thickness.
 const OF_THICKNESS: f64 = 1e-10;
 
 /// The number of shape hashes that are looked up: the most frequent ones.
