@@ -368,26 +368,23 @@ impl Change<'_> {
         self.store.now()
     }
 
-    /// The keys of the jobs whose status has changed since a savepoint.
-    pub(super) fn changed_since(&self, savepoint: Savepoint) -> Vec<i64> {
-        self.changed
-            .get(savepoint.changed..)
-            .unwrap_or_default()
-            .to_vec()
+    /// How often the status of a job has changed so far.
+    pub(super) fn changes(&self) -> usize {
+        self.changed.len()
+    }
+
+    /// The keys of the jobs whose status has changed since there were so many changes.
+    pub(super) fn changed_since(&self, changes: usize) -> Vec<i64> {
+        self.changed.get(changes..).unwrap_or_default().to_vec()
     }
 
     /// Sets a savepoint. There is one at a time: it must be released or rolled back to before the next is set.
     pub(super) fn savepoint(&mut self) -> Result<Savepoint> {
         self.sql()?.run("savepoint submission", ())?;
-        Ok(self.position())
-    }
-
-    /// What this transaction has done so far.
-    pub(super) fn position(&self) -> Savepoint {
-        Savepoint {
+        Ok(Savepoint {
             changed: self.changed.len(),
             log_lines: self.log_lines.len(),
-        }
+        })
     }
 
     /// Keeps the changes since the savepoint.

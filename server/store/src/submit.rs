@@ -17,7 +17,7 @@ use futures_util::FutureExt;
 use tokio::sync::{mpsc, oneshot};
 
 use super::{
-    change::{Change, Savepoint},
+    change::Change,
     claim, coalescing,
     connections::closed,
     content::{self, Holder, NewContent, name},
@@ -83,17 +83,14 @@ impl Store {
                     let _ = reply.send(answer); // the client may have disconnected
                 }
             }
-            Err(cause) => {
-                // if there is one only, this is why it was refused
-                let mut replies = replies.into_iter();
-                let first = replies.next();
-                for reply in replies {
-                    let _ = reply.send(Err(cause.for_another()));
+            Err(cause) => match <[_; 1]>::try_from(replies) {
+                Ok([reply]) => _ = reply.send(Err(cause)),
+                Err(replies) => {
+                    for reply in replies {
+                        let _ = reply.send(Err(cause.for_another()));
+                    }
                 }
-                if let Some(first) = first {
-                    let _ = first.send(Err(cause));
-                }
-            }
+            },
         }
     }
 }
@@ -113,20 +110,20 @@ fn accept_together(
             continue;
         }
         let savepoint = if alone {
-            change.position()
+            None
         } else {
-            change.savepoint()?
+            Some(change.savepoint()?)
         };
-        match accept(&mut change, savepoint, submission, claim) {
-            Ok(accepted) => {
-                if !alone {
+        match (accept(&mut change, submission, claim), savepoint) {
+            (Ok(accepted), savepoint) => {
+                if savepoint.is_some() {
                     change.release()?;
                 }
                 answers.push(Ok(Answer::Accepted(Box::new(accepted))));
             }
-            Err(cause) if alone => return Err(cause),
-            Err(cause) => match change.roll_back_to(savepoint) {
-                Ok(()) => answers.push(Err(cause)),
+            (Err(cause), None) => return Err(cause),
+            (Err(cause), Some(savepoint)) => match change.roll_back_to(savepoint) {
+                Ok(()) => answers.push(writer.store.damages.noting(Err(cause))),
                 // a full disk has made the database roll back everything: report that as the cause
                 Err(_) => return Err(cause),
             },
@@ -146,12 +143,8 @@ fn accept_together(
 }
 
 /// Accepts one submission within the transaction.
-fn accept(
-    change: &mut Change<'_>,
-    savepoint: Savepoint,
-    submission: Submission,
-    claim: bool,
-) -> Result<Accepted> {
+fn accept(change: &mut Change<'_>, submission: Submission, claim: bool) -> Result<Accepted> {
+    let changes = change.changes();
     let Submission {
         owner,
         jobs,
@@ -204,7 +197,7 @@ fn accept(
         jobs: accepted,
         replayed: false,
         claim,
-        changed: change.changed_since(savepoint),
+        changed: change.changed_since(changes),
     })
 }
 
