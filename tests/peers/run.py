@@ -20,7 +20,8 @@ VERTICAL = {"GetFEM": 2e-3, "CalculiX": 6e-3}
 # The horizontal force, most of it friction: with elastic slip of 1e-4 the stuck middle carries 1 % less than in GetFEM,
 # which has none; the penalty of CalculiX takes as much.
 HORIZONTAL = {"GetFEM": 0.02, "CalculiX": 0.03}
-# Triangles of a third of the contact's length, in half of a block of 6 by 4: the same tolerances, times this.
+# Triangles of a third of the contact's length, in a half that is 6 wide and 4 high. The differences are larger than on
+# the grid, by less than this factor.
 FREE, COARSE = TOP / "tests/data/gmsh/block-half-tri6.msh", 2
 
 
