@@ -199,7 +199,9 @@ fn the_help_lists_every_exit_code() {
     }
     let warning = help(&["explain", "no-contact"]);
     assert!(
-        warning.contains("never touches") && warning.contains("no_contact, a warning"),
+        warning.contains("never touches")
+            && warning.contains("no_contact; severity: serious")
+            && warning.contains("What to do. "),
         "{warning}"
     );
     assert!(help(&["explain"]).contains("mesh_too_coarse_for_radius"));

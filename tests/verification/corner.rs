@@ -67,9 +67,8 @@ fn a_block_in_a_corner_has_the_uniform_pressure_of_its_load() {
                 }
             }
             assert!(solution.summary.residuals.equilibrium < 1e-9);
-            let sharp = |w: &solver::solution::Warning| {
-                w.code == solver::solution::WarningCode::ContactReachesObstacleEnd
-            };
+            let sharp =
+                |w: &solver::solution::Warning| w.code == solver::solution::WarningCode::SharpEdge;
             // at the free ends of the walls, and not in the corner
             assert_eq!(
                 solution

@@ -70,7 +70,7 @@ fn a_contact_that_never_touches_changes_nothing() {
     };
     for angles in [[90.0, 90.0], [60.0, 90.0], [75.0, 120.0]] {
         let alone = solved(&trapezoid(angles, vec![top(0.02)]));
-        assert!(warns(&alone, WarningCode::ContactReachesObstacleEnd));
+        assert!(warns(&alone, WarningCode::SharpEdge));
         for contacts in [
             vec![top(0.02), away("right", false)],
             vec![away("right", true), top(0.02)],
@@ -99,8 +99,7 @@ fn a_contact_that_never_touches_changes_nothing() {
             }
             let ends = |s: &Solution| {
                 let all = s.summary.warnings.iter();
-                all.filter(|w| w.code == WarningCode::ContactReachesObstacleEnd)
-                    .count()
+                all.filter(|w| w.code == WarningCode::SharpEdge).count()
             };
             assert_eq!(ends(&other), ends(&alone));
             let numbers = |s: &Solution| s.history.iter().map(|row| row.k).collect::<Vec<_>>();

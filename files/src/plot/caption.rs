@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use solver::problem::{Contact, Problem};
-use solver::solution::{Outcome, Summary, Verdict};
+use solver::solution::{Outcome, Severity, Summary, Verdict};
 
 use super::numbers::number;
 
@@ -16,7 +16,7 @@ pub struct Caption {
     pub parameters: Vec<String>,
     /// The verdict or state of the result.
     pub mark: Option<Mark>,
-    /// The kinds of warnings of the result, in words.
+    /// The kinds of warnings of the result that are more than notes, in words.
     pub warnings: Vec<String>,
 }
 
@@ -79,10 +79,10 @@ impl Caption {
             Outcome::Converged => verdict.map(Mark::Verdict),
         };
         let mut seen = BTreeSet::new();
-        let codes = summary
-            .warnings
-            .iter()
-            .map(|warning| <&str>::from(warning.code));
+        // a note is a property of the problem, which the figure shows itself
+        let codes = summary.warnings.iter().map(|warning| warning.code);
+        let codes = codes.filter(|code| code.severity() < Severity::Note);
+        let codes = codes.map(<&str>::from);
         let codes = codes.filter(|code| seen.insert(*code));
         Caption {
             mark,

@@ -8,7 +8,7 @@
 //! |---|---|
 //! | the solution of one problem, with its times | `run` |
 //! | sweeps: solving the members | `run/members.rs` |
-//! | kinds of errors, with status, gRPC code and explanation | `catalog.rs` |
+//! | kinds of errors, with status, gRPC code and explanation | `catalog/mod.rs` |
 //! | callers, owners and scopes | `caller.rs` |
 //! | tokens | `token.rs`, `server/service/src/verbs/tokens.rs`, `server/store/src/tokens.rs`, `server/cli/src/token.rs` |
 //! | the memory budget | `memory.rs` |

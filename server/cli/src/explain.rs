@@ -28,12 +28,19 @@ pub(super) fn run(Arguments { code }: &Arguments) -> anyhow::Result<Exit> {
         };
         let errors: String = Code::VARIANTS.iter().map(line).collect();
         let line = |code: &WarningCode| {
-            let WarningKind { code, title, .. } = warning(*code);
-            format!("{code:<WIDTH$} {title}\n")
+            let WarningKind {
+                code,
+                title,
+                severity,
+                ..
+            } = warning(*code);
+            let severity: &str = severity.into();
+            format!("{code:<WIDTH$} {severity:<8} {title}\n")
         };
         let warnings: String = WarningCode::VARIANTS.iter().map(line).collect();
         output::print(&format!(
-            "{errors}\nCodes of warnings: the result is available, but read the warning first.\n\n{warnings}"
+            "{errors}\nCodes of warnings, with their severity. serious: the result is not that of the intended problem; warning: some \
+             numbers are not, or may not be; note: a property of the problem.\n\n{warnings}"
         ))?;
         return Ok(Exit::Ok);
     };
@@ -48,10 +55,17 @@ pub(super) fn run(Arguments { code }: &Arguments) -> anyhow::Result<Exit> {
         };
         let WarningKind {
             code,
+            severity,
             title,
-            explanation,
+            why,
+            advice,
+            picture,
         } = warning(found);
-        output::print(&format!("{title} ({code}, a warning)\n\n{explanation}\n"))?;
+        let severity: &str = severity.into();
+        let picture = picture.map_or(String::new(), |drawn| format!("{drawn}\n\n"));
+        output::print(&format!(
+            "{title} ({code}; severity: {severity})\n\n{picture}Why it matters. {why}\n\nWhat to do. {advice}\n"
+        ))?;
         return Ok(Exit::Ok);
     };
     let kind = found.kind();
@@ -77,7 +91,10 @@ mod tests {
     #[test]
     fn every_warning_has_a_meaning() {
         let all = WarningCode::VARIANTS.iter().map(|code| warning(*code));
-        let without: Vec<_> = all.filter(|kind| kind.title.len() < 10).collect();
+        let short = |text: &str| text.len() < 10;
+        let without: Vec<_> = all
+            .filter(|kind| short(&kind.title) || short(kind.why) || short(kind.advice))
+            .collect();
         assert!(without.is_empty(), "{without:?}");
         let known = WarningCode::VARIANTS.iter().map(|code| code.as_str().len());
         let errors = Code::VARIANTS.iter().map(|code| code.kind().code.len());

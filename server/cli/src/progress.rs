@@ -104,8 +104,10 @@ impl View {
 
     pub(super) fn warning(&self, warning: &Warning) -> std::io::Result<()> {
         self.line(&format!(
-            "warning: {}: {}",
-            warning.pointer, warning.message
+            "{}: {}: {}",
+            <&str>::from(warning.code.severity()),
+            warning.pointer,
+            warning.message
         ))
     }
 

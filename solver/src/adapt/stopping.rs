@@ -4,8 +4,7 @@ use super::mesh_results::relative_error;
 use crate::model::estimate::MOST_ADAPTIVE_ELEMENTS;
 use crate::problem::{AdaptiveRefine, Problem};
 use crate::solution::{
-    ErrorMethod, EstimatedQuantity, QuantityName, Refinement, Solution, Summary, Warning,
-    WarningCode,
+    EstimatedQuantity, QuantityName, Refinement, Solution, Summary, Warning, WarningCode,
 };
 
 /// The largest number of meshes.
@@ -101,8 +100,8 @@ pub(super) fn given_up(sequence: &[Refinement], tolerance: f64) -> Option<StopRe
     (errors.len() >= FEWEST_MESHES && before.is_finite() && hopeless).then_some(StopReason::Stalled)
 }
 
-/// The warning that says why the tolerance is not met, or which quantity grows without bound as the mesh is refined;
-/// `None` if there is nothing to warn of.
+/// The warning that says why the tolerance is not met; `None` if it is. A quantity that grows without bound has no
+/// tolerance to meet: the reasons of the verdict name it.
 pub(super) fn unfinished(
     problem: &Problem,
     goal: &AdaptiveRefine,
@@ -138,13 +137,6 @@ pub(super) fn unfinished(
             "Nothing is in contact at the end of the last load step, and errors are estimated only there. The mesh was not refined for the earlier steps. End with the step that matters."
                 .to_owned(),
         );
-    }
-    let mut quantities = accuracy.quantities.iter();
-    if let Some(q) = quantities.find(|q| q.method == ErrorMethod::NoLimit) {
-        sentences.push(format!(
-            "{} is unbounded: it grows with every finer mesh at an edge, a tip or a kink of the obstacle, so the tolerance does not apply to it. Forces converge, and so does the averaged pressure.",
-            name(q)
-        ));
     }
     (!sentences.is_empty()).then(|| Warning {
         code: WarningCode::RefinementUnfinished,

@@ -16,7 +16,7 @@ use crate::elasticity::Section;
 use crate::error::{AllChecks, Checked, Reason};
 use crate::friction::{Average, FrictionLaw};
 use crate::mesh::{self, Edge, Mesh};
-use crate::problem::{Algorithm, Condition, Contact, NormalOf, Problem, Step};
+use crate::problem::{Algorithm, Condition, Contact, NormalOf, Obstacle, Problem, Step};
 use crate::solution::WarningCode;
 
 /// The friction law of a contact; `None` if the contact is frictionless.
@@ -136,6 +136,10 @@ impl Checks {
             tangential_displacement: contact.tangential_displacement,
             normal: contact.normal,
             condition: contact.condition,
+            by_points: matches!(
+                contact.obstacle,
+                Obstacle::Table { .. } | Obstacle::Polyline { .. }
+            ),
             power: contact.obstacle.power(),
             friction,
         })

@@ -25,6 +25,7 @@
 //! | problems that differ in numbers only | `variable` |
 //! | collecting violations and warnings | `checks` |
 //! | checks of single numbers | `numbers` |
+//! | units that belong together | `units` |
 //! | memory and time | `estimate` |
 
 mod axis;
@@ -44,6 +45,7 @@ mod nodes;
 mod numbers;
 mod sliding;
 mod supports;
+mod units;
 mod unmerged;
 mod variable;
 

@@ -1,6 +1,7 @@
 //! Checks that single numbers are finite and in their range.
 
 use super::checks::Checks;
+use super::units;
 use crate::element::{Element, Family};
 use crate::error::{AllChecks, Checked, MOST_LISTED, Reason, escape};
 use crate::finite::not_finite;
@@ -9,6 +10,7 @@ use crate::problem::{
     Algorithm, Analysis, Condition, Contact, Friction, FrictionPoints, History, Measure, NormalOf,
     Problem, Step, ThesisOptions, ThesisPressure, Units,
 };
+use crate::solution::WarningCode;
 
 /// What the thesis's own iteration does not support in a contact: the test for it, the field, what was found, what is
 /// supported, and the reason.
@@ -119,6 +121,17 @@ impl Checks {
                     "A unit is a label on axes, such as mm or MPa.",
                 ));
             }
+        }
+        if let (Some(length), Some(force), Some(stress)) = (length, force, stress)
+            && let Some(factor) = units::disagreement(length, force, stress)
+        {
+            self.warn(
+                WarningCode::UnitsDisagree,
+                "/units",
+                format!(
+                    "1 {force} on an area of 1 {length} by 1 {length} is {factor:.4e} {stress}, but must be 1 {stress}: all numbers of a problem have to be in units that belong together. Change a unit and the numbers that are given in it: mm, N and MPa belong together, as do m, N and Pa."
+                ),
+            );
         }
         all.finish(())
     }

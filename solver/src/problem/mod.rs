@@ -67,7 +67,8 @@ pub struct Problem {
 }
 
 /// Names of the client's units, as axes show them (each at most 20 characters): `{"length": "mm",
-/// "force": "N", "stress": "MPa"}`. Absent: no unit is shown.
+/// "force": "N", "stress": "MPa"}`. Absent: no unit is shown. Units change no number; a warning tells if common ones do
+/// not belong together.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Units {

@@ -2,7 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use strum::IntoStaticStr;
+use strum::{EnumString, IntoStaticStr, VariantArray};
 
 /// The accuracy of a solution: the error of each number due to the mesh and to too few increments, and a verdict.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -32,6 +32,8 @@ pub struct Accuracy {
     Deserialize,
     JsonSchema,
     IntoStaticStr,
+    EnumString,
+    VariantArray,
 )]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
@@ -144,6 +146,16 @@ pub enum QuantityName {
     ContactEnd,
     /// An arc length between stick and slip.
     StickEnd,
+}
+
+impl QuantityName {
+    /// Whether the quantity is an end of contact or stick: a place, not a force or a stress.
+    pub fn is_extent(self) -> bool {
+        matches!(
+            self,
+            QuantityName::ContactStart | QuantityName::ContactEnd | QuantityName::StickEnd
+        )
+    }
 }
 
 /// How an error was found.

@@ -293,6 +293,8 @@ pub struct Warning {
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum WarningCode {
+    /// Units of length, force and stress that do not belong together.
+    UnitsDisagree,
     /// Lines of a mesh file that are not sides of the surface.
     LinesInside,
     /// Rows of a deck that prescribe different displacements of one node; the last one is used.
@@ -329,8 +331,10 @@ pub enum WarningCode {
     MeshTooCoarseForContact,
     /// A body that never touches the obstacle.
     NoContact,
-    /// Contact up to the end of the obstacle.
+    /// Contact up to the last point of an obstacle that is given by points.
     ContactReachesObstacleEnd,
+    /// Contact up to a sharp edge of the obstacle or of the body.
+    SharpEdge,
     /// An averaged pressure that reaches beyond an end of the contact boundary, so that friction is lost there.
     FrictionLostAtEnd,
     /// An obstacle that reaches into the body between two nodes, or recedes from it.
@@ -373,7 +377,7 @@ pub enum WarningCode {
     NotUnique,
     /// Twice the increments change the result.
     IncrementsMatter,
-    /// Adaptive refinement that ended before all errors were within its tolerance, or a quantity without a limit.
+    /// Adaptive refinement that ended before all errors were within its tolerance.
     RefinementUnfinished,
 }
 
@@ -382,6 +386,65 @@ impl WarningCode {
     pub fn as_str(self) -> &'static str {
         self.into()
     }
+
+    /// The severity of the warning, the same for all warnings of the kind.
+    pub fn severity(self) -> Severity {
+        use WarningCode::*;
+        match self {
+            NotConverged | FalseConvergence | ContactCycling | NoContact | SlidesAway
+            | OutOfBalance | NotUnique => Severity::Serious,
+            UnitsDisagree
+            | LargeStrain
+            | LargeDisplacement
+            | LargeSlip
+            | CoincidentNodes
+            | ContactReachesObstacleEnd
+            | FrictionLostAtEnd
+            | ObstacleBetweenNodes
+            | DirectionIsLinear
+            | SymmetricDrag
+            | RadialDrag
+            | BoundBeyondContact
+            | RefinementUnfinished
+            | IncrementsMatter
+            | UniquenessUnknown
+            | RoundingLimitsResidual
+            | SmoothingFlattens
+            | MeshTooCoarseForContact
+            | MeshTooCoarseForRadius => Severity::Warning,
+            LinesInside | SupportsOverlap | CentreNodesDropped | ElementsReversed
+            | RaisedToSecondOrder | RigidElementsLeftOut | DeckDiffers | StripCutsPolyline
+            | ObstacleCutsEdge | ContactTurns | KinkInContact | SharpEdge | MaterialJunction
+            | RadiusExceedsContact | CohesionJumps | OscillatingStick | SlowContraction => {
+                Severity::Note
+            }
+        }
+    }
+}
+
+/// How much a warning matters, the most severe first.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+    IntoStaticStr,
+)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum Severity {
+    /// The result is not that of the intended problem.
+    Serious,
+    /// Some numbers of the result are not those of the intended problem, or may not be.
+    Warning,
+    /// A property of the problem, or a remark on how it was read; the numbers are as accurate as stated.
+    Note,
 }
 
 /// The part of the method that an iteration belongs to.

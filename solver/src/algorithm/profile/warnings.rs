@@ -170,13 +170,21 @@ impl PatchView<'_> {
         let s = &contact.boundary.s;
         let sharp = |i: &usize| self.active(*i) && self.may_be_sharp(*i);
         for end in [0, self.count() - 1].into_iter().filter(sharp) {
-            warn(
-                WarningCode::ContactReachesObstacleEnd,
-                format!(
-                    "The body presses against the end of the obstacle, s = {:.4}. At a sharp edge the pressure grows without limit as the mesh is refined: forces converge, and σ_t does for nonlocal_radius > 0, but the peak of σ_n does not. If the obstacle continues there, extend it.",
-                    s[end]
-                ),
-            );
+            let limits = "the pressure grows without limit as the mesh is refined: forces converge, and σ_t does for nonlocal_radius > 0, but the peak of σ_n does not";
+            let at = s[end];
+            if contact.by_points {
+                warn(
+                    WarningCode::ContactReachesObstacleEnd,
+                    format!(
+                        "The body presses against the last point of the obstacle, s = {at:.4}. If the obstacle continues there, give more points; if it ends there, {limits}."
+                    ),
+                );
+            } else {
+                warn(
+                    WarningCode::SharpEdge,
+                    format!("The contact ends at a sharp edge, s = {at:.4}: there {limits}."),
+                );
+            }
         }
         let lost = self.lost_at_ends();
         if lost > MOST_LOST {

@@ -1,13 +1,16 @@
 //! All kinds of errors, of requests and of jobs: the only source of HTTP status and gRPC code, of the pages at
-//! `/v1/errors/{code}` and of `signorini explain`. Also the warnings of results.
+//! `/v1/errors/{code}` and of `signorini explain`. Also the warnings of results (`warnings`).
+
+mod warnings;
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use solver::solution::WarningCode;
 use strum::{EnumString, IntoStaticStr, VariantArray};
 use tonic::Code as Grpc;
 
 use crate::address::link;
+
+pub use warnings::{WarningKind, warning};
 
 /// The stable facts about a kind of error.
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
@@ -26,36 +29,6 @@ pub struct Kind {
     pub retry_after_s: Option<u64>,
     /// The meaning, and what to do.
     pub explanation: &'static str,
-}
-
-/// The stable facts about a warning.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct WarningKind {
-    /// The stable name of the warning.
-    pub code: &'static str,
-    /// The meaning: one line, the same for every warning of the kind.
-    pub title: String,
-    /// What to do about it.
-    pub explanation: &'static str,
-}
-
-/// The stable facts about this warning; its meaning is taken from the schema of results.
-pub fn warning(code: WarningCode) -> WarningKind {
-    let schema = schemars::schema_for!(WarningCode).to_value();
-    let code = code.as_str();
-    let variants = schema.get("oneOf").and_then(|all| all.as_array());
-    let meaning = variants
-        .into_iter()
-        .flatten()
-        .find(|variant| variant["const"] == code)
-        .and_then(|variant| variant["description"].as_str())
-        .unwrap_or_default();
-    WarningKind {
-        code,
-        title: meaning.replace('\n', " ").trim_end_matches('.').to_owned(),
-        explanation: "The result is available, but consider this before you rely on it. The `message` of the warning, in \
-                      `summary.warnings`, says where and how much, and what to do.",
-    }
 }
 
 /// The address where the service explains a kind of error.
