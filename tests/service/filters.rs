@@ -1,10 +1,11 @@
 //! Filters and orders of lists of jobs.
 
 use reqwest::StatusCode;
+use rpc::pb;
 use serde_json::{Value, json};
 use suite::{example_json, harness::Server};
 
-use crate::{SIGNORINI, server};
+use crate::{SIGNORINI, grpc::connect, server};
 
 async fn submit(server: &Server, name: &str, labels: Value) -> Value {
     let body =
@@ -94,6 +95,75 @@ async fn every_filter_finds_its_jobs_alone_and_combined() {
         found(&format!("finished_after={ended}&name=even")).await,
         [8, 6, 4, 2]
     );
+}
+
+/// One list tells which results are poor, and has their forces; so does the answer to a submission, and that over gRPC.
+///
+/// Operations: CreateJob, ListJobs, CountJobs
+#[tokio::test]
+async fn the_verdict_stands_in_rows_and_finds_jobs() {
+    let server = server().await;
+    let mut refined = example_json("rectangular_punch");
+    refined["mesh"]["refine"] = json!({ "tolerance": 0.005 });
+    let good = server.solve(&json!({ "problem": refined })).await;
+    let coarse = example_json("rectangular_punch");
+    let answer = server
+        .post("/v1/jobs")
+        .header("Prefer", "wait=30")
+        .json(&json!({ "problem": coarse }))
+        .send()
+        .await
+        .unwrap();
+    let poor: Value = answer.json().await.unwrap();
+    let again = server.solve(&json!({ "problem": coarse })).await;
+    assert_eq!(again["cached_from"], poor["id"]);
+    for (job, verdict) in [(&good, "good"), (&poor, "poor"), (&again, "poor")] {
+        assert_eq!(job["verdict"], verdict, "{job:#}");
+        let id = job["id"].as_str().unwrap();
+        let summary = server.json(&format!("/v1/jobs/{id}/result")).await["summary"].clone();
+        let all = summary["accuracy"]["quantities"].as_array().unwrap();
+        let expected: Vec<&Value> = all
+            .iter()
+            .filter(|q| {
+                !["contact_start", "contact_end", "stick_end"]
+                    .contains(&q["quantity"].as_str().unwrap())
+            })
+            .collect();
+        assert_eq!(expected.len(), 5, "{all:#?}");
+        assert_eq!(job["quantities"], json!(expected));
+        let row = server.json(&format!("/v1/jobs/{id}")).await;
+        assert_eq!(
+            (&row["verdict"], &row["quantities"]),
+            (&job["verdict"], &job["quantities"])
+        );
+    }
+    let ids = |jobs: &[&Value]| -> Vec<String> {
+        jobs.iter()
+            .map(|job| job["id"].as_str().unwrap().to_owned())
+            .collect()
+    };
+    assert_eq!(listed(&server, "verdict=poor").await, ids(&[&again, &poor]));
+    assert_eq!(listed(&server, "verdict=good").await, ids(&[&good]));
+    assert_eq!(listed(&server, "verdict=fair,good").await, ids(&[&good]));
+    assert_eq!(listed(&server, "verdict=fair").await, [""; 0]);
+    assert_eq!(server.json("/v1/jobs/count?verdict=poor").await["total"], 2);
+    let wrong = server.get("/v1/jobs?verdict=bad").send().await.unwrap();
+    assert_eq!(wrong.status(), StatusCode::BAD_REQUEST);
+
+    let filter = pb::JobFilter {
+        verdict: vec![pb::Verdict::Poor.into()],
+        ..Default::default()
+    };
+    let request = pb::ListJobsRequest {
+        filter: Some(filter),
+        ..Default::default()
+    };
+    let mut grpc = connect(&server).await;
+    let found = grpc.list_jobs(request).await.unwrap().into_inner().jobs;
+    let names: Vec<&str> = found.iter().map(|job| job.id.as_str()).collect();
+    assert_eq!(names, ids(&[&again, &poor]));
+    assert_eq!(found[0].verdict(), pb::Verdict::Poor);
+    assert_eq!(found[0].quantities[0].value, poor["quantities"][0]["value"]);
 }
 
 /// Operations: ListJobs

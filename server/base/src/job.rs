@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use solver::solution::{Outcome, Residuals, Warning};
+use solver::solution::{EstimatedQuantity, Outcome, Residuals, Verdict, Warning};
 use strum::{Display, EnumString, IntoStaticStr, VariantArray};
 
 pub use crate::id::{JobId, SweepId};
@@ -98,6 +98,14 @@ pub struct Job {
     /// that it shares with other jobs are counted for one of them.
     #[serde(default)]
     pub stored_bytes: Option<u64>,
+    /// The verdict on the result: whether it can be relied on. Absent until the job has a result with stated errors, and
+    /// for a job that ended under an earlier version, of which only the summary has it.
+    #[serde(default)]
+    pub verdict: Option<Verdict>,
+    /// Forces and peaks of the result with their errors, of the first contacts; the summary of the result has all of them,
+    /// with the ends of contact and stick.
+    #[serde(default)]
+    pub quantities: Vec<EstimatedQuantity>,
     /// Up to five warnings about the result, the worst first; the summary of the result has all of them. For a job that
     /// ended under an earlier version, only the summary has them.
     #[serde(default)]

@@ -2,6 +2,7 @@
 
 use std::fmt::{Display, Write};
 
+use base::job::Job;
 use base::run::{Document, Summary};
 use solver::solution::{
     Accuracy, ContactProfile, ContactSummary, ErrorMethod, EstimatedQuantity, Iteration, NodeState,
@@ -81,9 +82,28 @@ pub(super) fn trust(document: &Document) -> String {
     });
     let warnings = solution.warnings.iter().map(|warning| {
         let text = format!("{}: {}", warning.pointer, warning.message);
-        ("warning", text)
+        (warning.code.severity().into(), text)
     });
     lines(verdict.chain(warnings))
+}
+
+/// Writes what the row of a job says about its result, in one line: the verdict, and the forces with their errors.
+pub(super) fn headline(job: &Job) -> Option<String> {
+    let verdict: &str = job.verdict?.into();
+    let forces = job.quantities.iter().filter(|q| {
+        matches!(
+            q.quantity,
+            QuantityName::NormalForce | QuantityName::TangentialForce
+        )
+    });
+    // of the first contact: others are in the result
+    let forces = forces.take(2).map(|q| {
+        let name = <&str>::from(q.quantity).replace('_', " ");
+        let error = q.error.map_or(String::new(), |e| format!(" ± {e:.1e}"));
+        format!("{name} {}{error}", number(q.value))
+    });
+    let forces: Vec<String> = forces.collect();
+    Some(format!("{verdict}: {}", forces.join(", ")))
 }
 
 /// Writes the summary of a result and the summaries of its load steps, each after the name of its step.
@@ -133,7 +153,7 @@ pub(super) fn result<'a>(
     }
     for warning in &s.warnings {
         let text = format_args!("{}: {}", warning.pointer, warning.message);
-        lines.add("warning", text);
+        lines.add(warning.code.severity().into(), text);
     }
     lines.add("digest", &summary.digest);
     lines.0
@@ -316,13 +336,6 @@ fn stated(accuracy: Option<&Accuracy>, name: QuantityName, contact: Option<&str>
         Some(error) => format!(" ± {error:.1e}"),
         None => ", error unknown".to_owned(),
     }
-}
-
-/// Writes the lines about one contact.
-pub(super) fn contact(name: &str, contact: &ContactSummary, accuracy: Option<&Accuracy>) -> String {
-    let mut lines = Lines::default();
-    lines.add_contact(name, contact, accuracy);
-    lines.0
 }
 
 /// Writes the stresses along a contact boundary as a table.

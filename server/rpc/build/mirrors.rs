@@ -123,7 +123,7 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     fields("Summary", "solution::Summary").answer()
         .theirs(&["timings: BTreeMap::new()", "body_reused: None", "solver_version: String::new()", "input_hash: String::new()", "digest: String::new()"]),
     fields("Accuracy", "solution::Accuracy").answer(),
-    names("Verdict", "solution::Verdict").answer(),
+    names("Verdict", "solution::Verdict"),
     fields("EstimatedQuantity", "solution::EstimatedQuantity").answer(),
     names("QuantityName", "solution::QuantityName").answer(),
     names("ErrorMethod", "solution::ErrorMethod").answer(),

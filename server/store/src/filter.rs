@@ -9,6 +9,7 @@ use base::{
     values::{Text, Times, Values, Words},
 };
 use rusqlite::types::Value;
+use solver::solution::Verdict;
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
 /// All filters except the one by labels, whose name in requests depends on the label. Each line has the field of
@@ -23,6 +24,8 @@ macro_rules! job_filters {
                 "Only jobs with this status; several may be given";
             owner: Option<String>, owner, "owner" "=", Some("job_by_owner"), "Only jobs of this owner";
             name: Option<String>, name, "name" "=", Some("job_by_name"), "Only jobs with this name";
+            verdicts: Vec<Verdict>, verdict, "verdict" "=", Some("job_by_verdict"),
+                "Only jobs with this verdict on their result; several may be given";
             input_hash: Option<String>, input_hash, "input_hash" "=", Some("job_by_input"),
                 "Only jobs with this fingerprint of the problem";
             sweep: Option<SweepId>, sweep, "sweep" "=", Some("job_by_sweep"), "Only jobs of this sweep";
@@ -95,6 +98,16 @@ trait Asked: Sized {
 }
 
 impl Asked for Status {
+    fn allowed() -> impl Values<Value = Self> {
+        Words::all()
+    }
+
+    fn stored(&self) -> Value {
+        Value::Text(<&str>::from(*self).to_owned())
+    }
+}
+
+impl Asked for Verdict {
     fn allowed() -> impl Values<Value = Self> {
         Words::all()
     }
@@ -188,6 +201,8 @@ impl Filter {
         self.statuses
             .sort_unstable_by_key(|status| <&str>::from(*status));
         self.statuses.dedup();
+        self.verdicts.sort_unstable();
+        self.verdicts.dedup();
         self.labels.sort_unstable();
         self.labels.dedup();
         self

@@ -184,7 +184,7 @@ pub use self::{
     repeated_error::RepeatedError,
     restore::{Restored, restore},
     retention::{Retention, Retired, keep_within},
-    rules::Ending,
+    rules::{Ending, Overview},
     sizes::OwnerSize,
     snapshot::Snapshot,
     space::{Space, compact_folder},

@@ -23,7 +23,7 @@ const APPLIED: &str = "create table if not exists _sqlx_migrations (
 )";
 
 /// All steps, each with its version, name and text; a test compares the list with the folder `migrations`.
-const STEPS: [(i64, &str, &str); 19] = [
+const STEPS: [(i64, &str, &str); 20] = [
     (1, "jobs", include_str!("../../../migrations/0001_jobs.sql")),
     (
         2,
@@ -114,6 +114,11 @@ const STEPS: [(i64, &str, &str); 19] = [
         19,
         "turns",
         include_str!("../../../migrations/0019_turns.sql"),
+    ),
+    (
+        20,
+        "verdicts",
+        include_str!("../../../migrations/0020_verdicts.sql"),
     ),
 ];
 

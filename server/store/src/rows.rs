@@ -154,6 +154,8 @@ fn parse(row: &Row<'_>) -> Result<JobRow> {
     let memory_bytes: Option<i64> = row.get("memory_bytes")?;
     let failure = optional_text(row, "failure")?;
     let warnings = optional_text(row, "warnings")?;
+    let verdict = optional_text(row, "verdict")?;
+    let quantities = optional_text(row, "quantities")?;
     let other = |name: &str| -> Result<Option<JobId>> {
         let uuid = optional_text(row, name)?;
         let read = |text| {
@@ -198,6 +200,8 @@ fn parse(row: &Row<'_>) -> Result<JobRow> {
             ..failure
         }),
         result_available: word("result_available", text(row, "result_available")?)?,
+        verdict: verdict.map(|text| word("verdict", text)).transpose()?,
+        quantities: quantities.map_or(Ok(vec![]), serde_json::from_str)?,
         warnings: warnings.map_or(Ok(vec![]), serde_json::from_str)?,
         mesh: row.get("mesh")?,
         memory_bytes: memory_bytes.map(i64::unsigned_abs),
@@ -235,6 +239,7 @@ impl JobRow {
         let micros = |time: Option<Time>| Value::from(time.map(Time::micros));
         let memory_bytes = job.memory_bytes.map(|bytes| bytes as i64);
         let warnings = (!job.warnings.is_empty()).then_some(&job.warnings);
+        let quantities = (!job.quantities.is_empty()).then_some(&job.quantities);
         let columns = [
             ("id", job.key.into()),
             ("uuid", uuid(Some(job.id))),
@@ -271,6 +276,8 @@ impl JobRow {
             ("sweep", uuid(job.sweep.map(|id| id.0.into()))),
             ("warnings", json(warnings)?),
             ("mesh", job.mesh.clone().into()),
+            ("verdict", job.verdict.map(word_of).into()),
+            ("quantities", json(quantities)?),
         ];
         Ok(columns.into_iter().unzip())
     }

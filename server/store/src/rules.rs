@@ -7,7 +7,7 @@ use base::{
     time::Time,
 };
 use serde::{Deserialize, Serialize};
-use solver::solution::Warning;
+use solver::solution::{EstimatedQuantity, Verdict, Warning};
 
 use super::{
     error::{Damage, Result, StoreError},
@@ -29,9 +29,36 @@ pub struct Ending {
     pub failure: Option<Failure>,
     /// Whether the job has a result, partial or final.
     pub result: ResultAvailable,
-    /// The worst warnings about the result.
+    /// What the row of the job says about its result.
     #[serde(default)]
+    pub overview: Overview,
+}
+
+/// What the row of a job says about its result: whether it can be relied on, and why not.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Overview {
+    /// The verdict on the result.
+    pub verdict: Option<Verdict>,
+    /// Forces and peaks with their errors.
+    pub quantities: Vec<EstimatedQuantity>,
+    /// The worst warnings about the result.
     pub warnings: Vec<Warning>,
+}
+
+impl Overview {
+    fn of(job: &Job) -> Self {
+        Overview {
+            verdict: job.verdict,
+            quantities: job.quantities.clone(),
+            warnings: job.warnings.clone(),
+        }
+    }
+
+    fn write(self, job: &mut Job) {
+        job.verdict = self.verdict;
+        job.quantities = self.quantities;
+        job.warnings = self.warnings;
+    }
 }
 
 impl Ending {
@@ -43,7 +70,7 @@ impl Ending {
             reason,
             failure: None,
             result: ResultAvailable::None,
-            warnings: vec![],
+            overview: Overview::default(),
         }
     }
 
@@ -60,7 +87,7 @@ impl Ending {
             reason: Some(reason),
             failure,
             result: ResultAvailable::None,
-            warnings: vec![],
+            overview: Overview::default(),
         }
     }
 
@@ -71,7 +98,7 @@ impl Ending {
             reason: source.reason,
             failure: source.failure.clone(),
             result: source.result_available,
-            warnings: source.warnings.clone(),
+            overview: Overview::of(source),
         }
     }
 
@@ -81,7 +108,7 @@ impl Ending {
         match self.status {
             Status::Succeeded => Ending {
                 result: self.result.min(ResultAvailable::Partial),
-                warnings: self.warnings.clone(),
+                overview: self.overview.clone(),
                 ..Ending::canceled()
             },
             _ => self.clone(),
@@ -175,7 +202,7 @@ impl JobRow {
         job.started_at = Some(now.max(job.created_at));
         job.progress = None;
         job.result_available = ResultAvailable::None;
-        job.warnings = vec![];
+        Overview::default().write(job);
         Ok(())
     }
 
@@ -192,7 +219,7 @@ impl JobRow {
         let job = &mut self.job;
         job.reason = ending.reason;
         job.failure = ending.failure.clone();
-        job.warnings = ending.warnings.clone();
+        ending.overview.clone().write(job);
         // the results of finished load steps are kept, whatever the status
         job.result_available = ending.result.max(job.result_available);
         // lists rely on the fact that no job ends before it was accepted, even if the clock was set back
@@ -346,7 +373,7 @@ mod tests {
                 reason: None,
                 failure: None,
                 result: ResultAvailable::Final,
-                warnings: vec![],
+                overview: Overview::default(),
             },
             _ => Ending::canceled(),
         }

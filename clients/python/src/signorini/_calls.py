@@ -363,6 +363,7 @@ class Filters(TypedDict, total=False):
     name: str | None
     owner: str | None
     sweep: str | None
+    verdict: str | Sequence[str] | None
     input_hash: str | None
     created_after: datetime.date | str | None
     created_before: datetime.date | str | None
@@ -383,13 +384,14 @@ NAMES = frozenset(Listing.__annotations__) | {"group_by"}
 def filters(
     status: str | Sequence[str] | None = None,
     labels: Mapping[str, object] | None = None,
+    verdict: str | Sequence[str] | None = None,
     **others: str | datetime.date | int | None,
 ) -> Params:
     """The parameters of `GET /v1/jobs`."""
     unknown = others.keys() - NAMES
     if unknown:
         raise TypeError(f"no such filter: {', '.join(sorted(unknown))}; there are {', '.join(sorted(NAMES))}")
-    found = [("status", s) for s in ([status] if isinstance(status, str) else status or [])]
+    found = [("status", s) for s in _several(status)] + [("verdict", v) for v in _several(verdict)]
     found += [(f"label.{key}", str(value)) for key, value in (labels or {}).items()]
     for name, value in others.items():
         if isinstance(value, datetime.date) and not isinstance(value, datetime.datetime):
@@ -399,6 +401,10 @@ def filters(
         if value is not None:
             found.append((name, str(value).lower() if isinstance(value, bool) else str(value)))
     return tuple(found)
+
+
+def _several(values: str | Sequence[str] | None) -> Sequence[str]:
+    return [values] if isinstance(values, str) else values or []
 
 
 # Sweeps

@@ -102,7 +102,18 @@ class JobView:
         return self.document.get("run_s")
 
     @property
+    def verdict(self) -> str | None:
+        """`good`, `fair` or `poor`; None until there is a result with stated errors."""
+        return self.document.get("verdict")
+
+    @property
+    def quantities(self) -> list[Mapping[str, Any]]:
+        """Forces and peaks of the result: each with `quantity`, `contact`, `value`, `error` and `relative`."""
+        return list(self.document.get("quantities") or [])
+
+    @property
     def warnings(self) -> list[Warning]:
+        """Up to five, the worst first; the result has all of them."""
         return [Warning.from_json(w) for w in self.document.get("warnings") or []]
 
     def raise_for_status(self) -> None:

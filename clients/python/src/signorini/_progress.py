@@ -173,6 +173,8 @@ def job_line(title: str, job: Mapping[str, Any]) -> str:
         parts.append(f"eta {duration(progress['eta_s'])}")
     if job.get("run_s") is not None and job.get("finished_at"):
         parts.append("from the cache" if job.get("cached_from") else f"in {duration(job['run_s'])}")
+    if job.get("verdict"):
+        parts.append(str(job["verdict"]))
     return " · ".join(parts)
 
 

@@ -10,6 +10,7 @@ use base::{
 use clap::{Args, ValueEnum};
 use files::table::{Column, Table, Values};
 use serde_json::Value;
+use solver::solution::Severity;
 
 use super::super::{output, report, service::misunderstood, table::table};
 
@@ -73,7 +74,7 @@ impl Shown {
             (Format::Json, Found::Many(all)) => format!("{:#}\n", Value::from(all.clone())),
             (Format::Jsonl, _) => documents.iter().map(|one| format!("{one}\n")).collect(),
             (Format::Csv, _) => csv(documents)?,
-            (Format::Table, _) => lines(documents)?,
+            (Format::Table, _) => within(width(), lines(documents)?),
         };
         Ok(output::print(&text)?)
     }
@@ -114,14 +115,30 @@ fn text(document: &Value, key: &str) -> String {
     }
 }
 
+/// The width of the terminal; `None` if the output is no terminal.
+fn width() -> Option<usize> {
+    let (_, columns) = console::Term::stdout().size_checked()?;
+    Some(columns.into())
+}
+
+/// The lines of a table, cut where a terminal of this width would wrap them.
+fn within(width: Option<usize>, table: String) -> String {
+    let Some(width) = width else { return table };
+    let lines = table.lines();
+    let cut = |line| console::truncate_str(line, width, "…").into_owned() + "\n";
+    lines.map(cut).collect()
+}
+
 fn lines(documents: &[Value]) -> anyhow::Result<String> {
+    // the most important first: a narrow terminal shows no more
     let headings = [
         "ID",
         "STATUS",
+        "VERDICT",
         "NAME",
-        "OWNER",
-        "SUBMITTED (UTC)",
         "TIME",
+        "SUBMITTED (UTC)",
+        "OWNER",
         "NOTES",
     ];
     let mut rows = vec![];
@@ -136,11 +153,12 @@ fn lines(documents: &[Value]) -> anyhow::Result<String> {
         rows.push([
             text(document, "id"),
             text(document, "status"),
+            text(document, "verdict"),
             shortened(&text(document, "name"), 32),
-            text(document, "owner"),
+            time,
             // to the second
             submitted.get(..19).unwrap_or_default().replace('T', " "),
-            time,
+            text(document, "owner"),
             notes,
         ]);
     }
@@ -170,11 +188,9 @@ fn notes(job: &Job) -> String {
     if job.cached_from.is_some() {
         notes.push("from an earlier result".into());
     }
-    notes.extend(
-        job.warnings
-            .iter()
-            .map(|warning| warning.code.as_str().to_owned()),
-    );
+    let warnings = job.warnings.iter().map(|warning| warning.code);
+    let grave = warnings.filter(|code| code.severity() < Severity::Note);
+    notes.extend(grave.map(|code| code.as_str().to_owned()));
     // both ends of a contact may have the same
     let mut told = BTreeSet::new();
     notes.retain(|note| told.insert(note.clone()));
@@ -259,9 +275,10 @@ fn card(job: &Job) -> String {
         "result",
         Some(<&str>::from(job.result_available).to_owned()),
     ));
+    lines.push(("verdict", report::headline(job)));
     for warning in &job.warnings {
         lines.push((
-            "warning",
+            warning.code.severity().into(),
             Some(format!("{}: {}", warning.pointer, warning.message)),
         ));
     }
@@ -338,9 +355,45 @@ fn csv(documents: &[Value]) -> anyhow::Result<String> {
         let codes: Vec<&str> = all.filter_map(|warning| warning["code"].as_str()).collect();
         codes.join(" ")
     }));
+    columns.push(column("verdict", &|one| text(one, "verdict")));
+    columns.extend(quantities(documents));
     columns.push(column("labels", &|one| match one["labels"].as_object() {
         Some(labels) if !labels.is_empty() => one["labels"].to_string(),
         _ => String::new(),
     }));
     Table { columns }.csv().map_err(anyhow::Error::msg)
+}
+
+/// Columns of the forces and peaks of results with their errors. Where jobs have several contacts, a column has the name
+/// of its contact too: `normal_force.hub`.
+fn quantities(documents: &[Value]) -> Vec<Column> {
+    fn of(one: &Value) -> impl Iterator<Item = &Value> {
+        one["quantities"].as_array().into_iter().flatten()
+    }
+    fn name(q: &Value) -> [&str; 2] {
+        ["contact", "quantity"].map(|key| q[key].as_str().unwrap_or_default())
+    }
+    let mut names: Vec<[&str; 2]> = documents.iter().flat_map(of).map(name).collect();
+    let mut seen = BTreeSet::new();
+    names.retain(|name| seen.insert(*name));
+    let contacts: BTreeSet<&str> = names.iter().map(|[contact, _]| *contact).collect();
+    let mut columns = vec![];
+    for wanted in names {
+        let [contact, quantity] = wanted;
+        let of_contact = match contacts.len() {
+            1 => String::new(),
+            _ => format!(".{contact}"),
+        };
+        for (key, suffix) in [("value", ""), ("error", "_error")] {
+            let cell = |one| {
+                let found = of(one).find(|q| name(q) == wanted);
+                Cow::Owned(found.map_or(String::new(), |q| text(q, key)))
+            };
+            columns.push(Column {
+                name: format!("{quantity}{suffix}{of_contact}").into(),
+                values: Values::Text(documents.iter().map(cell).collect()),
+            });
+        }
+    }
+    columns
 }

@@ -128,11 +128,12 @@ impl Watched {
     fn end(&self, job: &Job) -> anyhow::Result<()> {
         let Job { id, run_s, .. } = job;
         let time = run_s.map_or(String::new(), |time| format!(" in {}", seconds(time)));
+        let result = report::headline(job).map_or(String::new(), |result| format!("; {result}"));
         let text = match (job.status, &job.failure) {
             (Status::Succeeded, _) if job.cached_from.is_some() => {
-                "succeeded: answered with an earlier result".into()
+                format!("succeeded: answered with an earlier result{result}")
             }
-            (Status::Succeeded, _) => format!("succeeded{time}"),
+            (Status::Succeeded, _) => format!("succeeded{time}{result}"),
             (Status::Canceled, _) => format!("canceled{time}"),
             (_, Some(failure)) => format!("failed{time}: {}: {}", failure.title, failure.detail),
             (_, None) => format!("failed{time}"),

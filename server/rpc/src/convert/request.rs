@@ -18,10 +18,10 @@ use service::{
         sweeps::{self, SweepRequest},
     },
 };
-use solver::{error::Reason, problem::Problem};
+use solver::{error::Reason, problem::Problem, solution::Verdict};
 use store::{Edit, Filter, job_filters};
 
-use super::{Reader, read};
+use super::{FromMessage, Reader, read};
 use crate::pb;
 
 /// Reads the request for a job. Pointers of violations begin at the request.
@@ -196,13 +196,13 @@ trait Criterion<T> {
     fn read(self, name: &'static str) -> Result<T, ApiError>;
 }
 
-impl Criterion<Vec<Status>> for Vec<i32> {
-    fn read(self, name: &'static str) -> Result<Vec<Status>, ApiError> {
-        let status = |number| {
+impl<T: FromMessage<i32>> Criterion<Vec<T>> for Vec<i32> {
+    fn read(self, name: &'static str) -> Result<Vec<T>, ApiError> {
+        let value = |number| {
             read(number)
                 .map_err(|_| invalid_field(name, number, "a value of the enum other than 0"))
         };
-        self.into_iter().map(status).collect()
+        self.into_iter().map(value).collect()
     }
 }
 

@@ -11,9 +11,9 @@ use base::{
 use serde::{Deserialize, Serialize};
 use solver::{
     error::{SolveError, shortened},
-    solution::{Outcome, Warning, WarningCode},
+    solution::{Outcome, Summary, Warning},
 };
-use store::{Ending, Parts};
+use store::{Ending, Overview, Parts};
 use tracing::{debug, error};
 use uuid::Uuid;
 
@@ -69,7 +69,7 @@ const LONGEST_WARNING: usize = 400;
 /// The most severe warnings of a result, the most severe first.
 fn worst(warnings: &[Warning]) -> Vec<Warning> {
     let mut found: Vec<&Warning> = warnings.iter().collect();
-    found.sort_by_key(|warning| gravity(warning.code)); // stable: else in their order
+    found.sort_by_key(|warning| warning.code.severity()); // stable: else in their order
     let short = |warning: &Warning| Warning {
         message: shortened(&warning.message, LONGEST_WARNING),
         pointer: shortened(&warning.pointer, LONGEST_WARNING),
@@ -78,35 +78,18 @@ fn worst(warnings: &[Warning]) -> Vec<Warning> {
     found.into_iter().take(MOST_WARNINGS).map(short).collect()
 }
 
-/// The severity of a warning. 0: the results are not those of the intended problem; 1: some results are not, or may not
-/// be; 2: the warning is only good to know.
-fn gravity(code: WarningCode) -> u8 {
-    use WarningCode::*;
-    match code {
-        NotConverged | FalseConvergence | ContactCycling | NoContact | SlidesAway
-        | OutOfBalance | NotUnique => 0,
-        LargeStrain
-        | LargeDisplacement
-        | LargeSlip
-        | CoincidentNodes
-        | ContactReachesObstacleEnd
-        | FrictionLostAtEnd
-        | ObstacleBetweenNodes
-        | DirectionIsLinear
-        | SymmetricDrag
-        | RadialDrag
-        | BoundBeyondContact
-        | RefinementUnfinished
-        | IncrementsMatter
-        | UniquenessUnknown
-        | RoundingLimitsResidual
-        | MeshTooCoarseForContact
-        | MeshTooCoarseForRadius => 1,
-        LinesInside | SupportsOverlap | CentreNodesDropped | ElementsReversed
-        | RaisedToSecondOrder | RigidElementsLeftOut | DeckDiffers | StripCutsPolyline
-        | ObstacleCutsEdge | SmoothingFlattens | ContactTurns | KinkInContact
-        | MaterialJunction | RadiusExceedsContact | CohesionJumps | OscillatingStick
-        | SlowContraction => 2,
+/// The largest number of quantities that are stored with a job.
+const MOST_QUANTITIES: usize = 10;
+
+/// What the row of a job says about this result.
+fn overview(summary: &Summary) -> Overview {
+    let accuracy = summary.accuracy.as_ref();
+    let quantities = accuracy.map_or(&[][..], |accuracy| &accuracy.quantities);
+    let shown = quantities.iter().filter(|q| !q.quantity.is_extent());
+    Overview {
+        verdict: accuracy.map(|accuracy| accuracy.verdict),
+        quantities: shown.take(MOST_QUANTITIES).cloned().collect(),
+        warnings: worst(&summary.warnings),
     }
 }
 
@@ -119,7 +102,7 @@ pub(super) fn ending_of_solution(document: &Document, outgrown: Option<Outgrown>
         let detail = format!("{detail}; the last state and the history are kept");
         Ending {
             result: partial,
-            warnings: worst(&summary.warnings),
+            overview: overview(summary),
             ..Ending::failed(reason, detail)
         }
     };
@@ -129,7 +112,7 @@ pub(super) fn ending_of_solution(document: &Document, outgrown: Option<Outgrown>
             reason: None,
             failure: None,
             result: ResultAvailable::Final,
-            warnings: worst(&summary.warnings),
+            overview: overview(summary),
         },
         Outcome::NotConverged => failed(Reason::NotConverged),
         Outcome::ContactCycling => failed(Reason::ContactCycling),

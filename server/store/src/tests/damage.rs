@@ -32,7 +32,7 @@ async fn solved(store: &Arc<Store>, new: NewJob) -> Job {
         reason: None,
         failure: None,
         result: ResultAvailable::Final,
-        warnings: vec![],
+        overview: Default::default(),
     };
     let parts = result_of(key);
     assert!(store.write_before_end(key, attempt, &parts).await.unwrap());
@@ -665,7 +665,7 @@ async fn a_page_of_one_job_that_cannot_be_read_disturbs_no_other() {
         reason: None,
         failure: None,
         result: ResultAvailable::Final,
-        warnings: vec![],
+        overview: Default::default(),
     };
     let large = format!("\"{}\"", "r".repeat(50_000)).into_bytes();
     let result = Parts::new(vec![

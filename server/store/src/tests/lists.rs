@@ -36,7 +36,7 @@ async fn many(store: &Arc<Store>, dice: &mut Rng) -> Vec<Job> {
             reason: None,
             failure: None,
             result: ResultAvailable::None,
-            warnings: vec![],
+            overview: Default::default(),
         };
         let last = FinalBatch::default();
         let finished = store.finish(job.key, job.attempt, &ending, last, None);

@@ -166,7 +166,7 @@ async fn a_job_that_another_answers_keeps_no_piece_of_its_interrupted_attempt() 
         reason: None,
         failure: None,
         result: ResultAvailable::Final,
-        warnings: vec![],
+        overview: Default::default(),
     };
     let (parts, last) = (Arc::new(Parts::of_a_summary()), FinalBatch::default());
     let finished = store
@@ -208,7 +208,7 @@ async fn what_answers_a_job_is_checked_before_and_by_what_is_stored() {
         reason: None,
         failure: None,
         result: ResultAvailable::Final,
-        warnings: vec![],
+        overview: Default::default(),
     };
     let last = FinalBatch::default();
     let parts = Arc::new(parts);

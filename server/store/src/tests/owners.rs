@@ -51,7 +51,7 @@ async fn run_all(store: &Arc<Store>) {
         reason: None,
         failure: None,
         result: base::job::ResultAvailable::Final,
-        warnings: vec![],
+        overview: Default::default(),
     };
     while let Some(Claim { job, .. }) = store.claim_next().await.unwrap().0 {
         let (last, parts) = (FinalBatch::default(), Arc::new(Parts::of_a_summary()));

@@ -33,7 +33,7 @@ async fn solve(store: &Arc<Store>, owner: &str, job: NewJob, bytes: usize) -> Jo
         reason: None,
         failure: None,
         result: ResultAvailable::Final,
-        warnings: vec![],
+        overview: Default::default(),
     };
     // no two jobs have the same
     let first = 1000 * claim.job.key as u64;

@@ -278,7 +278,7 @@ async fn a_canceled_job_does_not_succeed_even_if_the_cancel_could_not_be_stored(
             reason: None,
             failure: None,
             result: ResultAvailable::Final,
-            warnings: vec![],
+            overview: Default::default(),
         };
         let parts = Arc::new(Parts::new(vec![]));
         let last = FinalBatch::default();

@@ -55,6 +55,7 @@ mod tests {
             let name = filter.name.replace("{key}", "a");
             let found = [
                 "queued",
+                "poor",
                 "2026-01-31T12:00:00Z",
                 "sweep_01890a5d-ac96-774b-bcce-b302099a8057",
             ]

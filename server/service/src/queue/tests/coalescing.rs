@@ -168,7 +168,7 @@ async fn a_job_answered_in_the_commit_of_another_submission_is_reported_as_chang
         reason: None,
         failure: None,
         result: ResultAvailable::Final,
-        warnings: vec![],
+        overview: Default::default(),
     };
     let parts = Arc::new(Parts::of_a_summary());
     let finished = rig
@@ -276,7 +276,7 @@ async fn a_job_whose_turn_it_is_is_coalesced_into_one_that_runs_on_the_same_inpu
         reason: None,
         failure: None,
         result: ResultAvailable::Final,
-        warnings: vec![],
+        overview: Default::default(),
     };
     let last = FinalBatch::default();
     rig.store

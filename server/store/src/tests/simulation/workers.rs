@@ -178,7 +178,7 @@ impl World {
             reason: None,
             failure: None,
             result: ResultAvailable::Final,
-            warnings: vec![],
+            overview: Default::default(),
         };
         self.end(key, attempt, ending, Some(parts)).await
     }
