@@ -422,6 +422,27 @@ mod tests {
         assert_eq!(places, excluded.map(|place| (place, Reason::NotUsed)));
     }
 
+    /// As many clients write what they leave out.
+    #[test]
+    fn null_counts_as_absent() {
+        let isotropic = r#""youngs_modulus": 1000, "poissons_ratio": 0.3"#;
+        let wood = r#""orthotropic": {"e1": 1, "e2": 1, "nu12": 0.3, "g12": 1}"#;
+        let accepts = |from: &str, to: String| {
+            assert!(GOOD.contains(from), "{from}");
+            parse(&GOOD.replacen(from, &to, 1)).map(|_| ())
+        };
+        let nulls = format!(r#"{isotropic}, "orthotropic": null, "group": null"#);
+        assert_eq!(accepts(isotropic, nulls), Ok(()));
+        let nulls = format!(r#"{wood}, "youngs_modulus": null, "poissons_ratio": null"#);
+        assert_eq!(accepts(isotropic, nulls), Ok(()));
+        let load = r#"{"boundary": "top", "pressure": 1, "force": null, "nodes": null}"#;
+        let loads = format!(r#""loads": [{load}], "materials""#);
+        assert_eq!(accepts(r#""materials""#, loads), Ok(()));
+        // what is needed is missing if it is null
+        let missing = format!(r#"{isotropic}, "boundary": null"#).replace("1000", "null");
+        assert!(accepts(isotropic, missing).is_err());
+    }
+
     /// The schema and the types accept the same forms.
     #[test]
     fn the_schema_accepts_the_same_problems_as_the_types() {

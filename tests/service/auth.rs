@@ -44,6 +44,7 @@ const POLICY: &[(&str, &[&str])] = &[
             "GetOpenApi",
             "GetProto",
             "GetDocs",
+            "GetHome",
             "GetDocsFile",
             "GetMetrics",
         ],
@@ -679,6 +680,15 @@ async fn the_command_line_manages_tokens() {
     assert_eq!(me["scopes"], json!(["read", "submit", "cancel"]));
     let (_, list, _) = run(&["list"], &envs);
     assert_eq!(list.lines().count(), 3, "{list}");
+    let (_, list, _) = run(&["list", "-f", "json"], &envs);
+    let list: Value = serde_json::from_str(&list).unwrap();
+    assert_eq!(list[1]["owner"], "ada", "{list}");
+    // an empty variable counts as absent
+    let (code, _, told) = run(
+        &["list", "--data", folder],
+        &[("SIGNORINI_URL", ""), ("SIGNORINI_CA", "")],
+    );
+    assert!(code == Some(5) && told.contains("--url"), "{told}");
     // a folder that is named goes before an address of the environment
     let (code, _, told) = run(&["list", "--data", "/no/such/folder"], &envs);
     assert_eq!(code, Some(4), "{told}");

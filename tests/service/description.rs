@@ -23,7 +23,8 @@ fn references<'a>(value: &'a Value, found: &mut Vec<&'a str>) {
 #[tokio::test]
 async fn the_description_is_complete_and_explains_each_error() {
     let document = server().await.json("/openapi.json").await;
-    assert_eq!(document["openapi"], "3.1.0");
+    // the dialect that every generator of clients reads
+    assert_eq!(document["openapi"], "3.0.3");
     let mut found = vec![];
     references(&document, &mut found);
     assert!(found.len() > 100);
@@ -89,6 +90,38 @@ async fn every_described_route_exists_and_has_the_described_parameters() {
             assert_eq!(described, known, "{what}");
         }
     }
+}
+
+/// Operations: GetHome
+#[tokio::test]
+async fn a_browser_finds_a_page_with_the_last_jobs() {
+    let server = server().await;
+    let page = async || {
+        let answer = server.get("/").send().await.unwrap();
+        assert_eq!(answer.headers()["content-type"], "text/html; charset=utf-8");
+        answer.text().await.unwrap()
+    };
+    assert!(page().await.contains("There are none yet"));
+    let body =
+        serde_json::json!({ "problem": suite::example_json("sheet"), "name": "my sheet & co" });
+    let job = server.solve(&body).await;
+    let html = page().await;
+    let id = job["id"].as_str().unwrap();
+    assert!(
+        html.contains(&format!(
+            "<a href=v1/jobs/{id}>my sheet &amp; co</a>: succeeded, "
+        )),
+        "{html}"
+    );
+    let figure = html
+        .split("src=")
+        .nth(1)
+        .unwrap()
+        .split('>')
+        .next()
+        .unwrap();
+    let figure = server.get(&format!("/{figure}")).send().await.unwrap();
+    assert_eq!(figure.headers()["content-type"], "image/svg+xml");
 }
 
 /// Operations: GetDocs, GetDocsFile

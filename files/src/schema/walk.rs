@@ -280,6 +280,9 @@ impl<'de> DeserializeSeed<'de> for Value<'_, '_, 'de> {
     fn deserialize<D: Deserializer<'de>>(self, reader: D) -> Result<(), D::Error> {
         if self.shape.never {
             let value = <&RawValue>::deserialize(reader)?;
+            if value.get() == "null" {
+                return Ok(());
+            }
             let expected =
                 "this field to be absent, since it cannot be combined with the other fields";
             let hint = "Remove the field, or choose another form.";
@@ -428,8 +431,9 @@ impl<'de> Visitor<'de> for Value<'_, '_, 'de> {
                 }
                 (None, free) => {
                     count += usize::from(free.is_some());
-                    members.next_value::<IgnoredAny>()?;
-                    if asked {
+                    // null counts as absent, as many clients write it
+                    let value = members.next_value::<Option<IgnoredAny>>()?;
+                    if asked && value.is_some() {
                         seen.insert(name);
                     }
                     continue;

@@ -7,7 +7,8 @@ mod process;
 
 use std::{
     borrow::Cow,
-    fmt,
+    collections::HashMap,
+    fmt::{self, Write},
     sync::{LazyLock, atomic::AtomicU64},
     time::Duration,
 };
@@ -200,6 +201,44 @@ impl Metrics {
     }
 }
 
+/// Metrics in the older text format of Prometheus (0.0.4), made from their OpenMetrics text. The names of families differ
+/// in one point: the older format has the suffix `_total` in the name of a counter's family, and `_info` in that of an info.
+pub fn in_older_format(openmetrics: &str) -> String {
+    let mut suffix = "";
+    let mut family = String::new();
+    let mut text = String::with_capacity(openmetrics.len());
+    // the type of a family follows its description, which has to have the same name
+    let kinds = openmetrics
+        .lines()
+        .filter_map(|line| line.strip_prefix("# TYPE "))
+        .filter_map(|line| line.split_once(' '));
+    let kinds: HashMap<&str, &str> = kinds.collect();
+    for line in openmetrics.lines() {
+        let Some(comment) = line.strip_prefix("# ") else {
+            text.push_str(line);
+            text.push('\n');
+            continue;
+        };
+        let mut words = comment.splitn(3, ' ');
+        let (Some(keyword @ ("HELP" | "TYPE")), Some(name), Some(rest)) =
+            (words.next(), words.next(), words.next())
+        else {
+            continue; // a unit, or the end
+        };
+        if name != family {
+            name.clone_into(&mut family);
+            suffix = match kinds.get(name) {
+                Some(&"counter") => "_total",
+                Some(&"info") => "_info",
+                _ => "",
+            };
+        }
+        let rest = if rest == "info" { "gauge" } else { rest };
+        let _ = writeln!(text, "# {keyword} {name}{suffix} {rest}");
+    }
+    text
+}
+
 /// Metrics that other parts of the service measure at the moment of a request for them.
 #[derive(Debug, Default)]
 pub struct Snapshot(Registry);
@@ -264,6 +303,18 @@ mod tests {
             assert!(text.contains(line), "{line}{text}");
         }
         assert!(text.ends_with("# EOF\n"));
+        let older = in_older_format(&text);
+        for line in [
+            "# TYPE signorini_hits_total counter\n",
+            "# HELP signorini_hits_total Hits.\n",
+            "signorini_hits_total 3\n",
+            "# TYPE signorini_jobs gauge\n",
+            "# TYPE signorini_job_run_seconds histogram\n",
+            "# TYPE signorini_build_info gauge\n",
+        ] {
+            assert!(older.contains(line), "{line}{older}");
+        }
+        assert!(!older.contains("# EOF") && !older.contains("# UNIT"));
         let mut names: Vec<&str> = text
             .lines()
             .filter(|line| line.starts_with("# TYPE"))

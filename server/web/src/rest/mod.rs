@@ -6,7 +6,7 @@
 //! |---|---|
 //! | every operation: route, access, input, handler, rpc, answers, errors; which tests cover it | `operations`, a file for each subject |
 //! | made from that list: routes | `router` |
-//! | made from that list: `/openapi.json` | `openapi` |
+//! | made from that list: `/openapi.json` | `openapi`, in the dialect of `openapi_dialect` |
 //! | made from that list: docs/api.md | `reference` |
 //! | the input of a request: the order in which it is read and checked | `call` |
 //! | the input of a request: path, query and headers | `input`, `headers` |
@@ -36,6 +36,7 @@ mod coding;
 mod filters;
 mod forwarded;
 mod headers;
+mod home;
 mod input;
 mod limits;
 mod origin;
@@ -56,6 +57,7 @@ mod plots;
 
 // The list of operations, and what is made from it.
 mod openapi;
+mod openapi_dialect;
 mod operations;
 mod reference;
 mod router;

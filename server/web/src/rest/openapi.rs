@@ -16,7 +16,10 @@ use serde_json::{Map, Value, json};
 use service::parameters::{Description, Location};
 use solver::error::Violation;
 
-use super::operations::{self, Answer, Content, Operation};
+use super::{
+    openapi_dialect::simplify,
+    operations::{self, Answer, Content, Operation},
+};
 
 /// Returns the OpenAPI document, which does not change while the service runs.
 pub fn openapi() -> &'static Value {
@@ -36,14 +39,13 @@ fn document() -> Value {
         let path = paths.entry(operation.path).or_default();
         path.insert(operation.method.to_ascii_lowercase(), described);
     }
-    json!({
-        "openapi": "3.1.0",
+    let mut document = json!({
+        "openapi": "3.0.3",
         "info": {
             "title": "Signorini",
             "version": env!("CARGO_PKG_VERSION"),
-            "summary": "Frictional contact problems as jobs",
             "description": INTRODUCTION,
-            "license": { "name": "MIT OR Apache-2.0", "identifier": "MIT OR Apache-2.0" },
+            "license": { "name": "MIT OR Apache-2.0" },
         },
         "servers": [{ "url": link("/") }],
         "tags": operations::GROUPS.map(|(name, meaning, _)| json!({ "name": name, "description": meaning })),
@@ -54,7 +56,9 @@ fn document() -> Value {
                 "token": { "type": "http", "scheme": "bearer", "description": "A token, as `signorini token create` prints it" },
             },
         },
-    })
+    });
+    simplify(&mut document);
+    document
 }
 
 const INTRODUCTION: &str = "The same operations, names and numbers as over gRPC \
@@ -180,10 +184,12 @@ fn parameter(parameter: &Description) -> Value {
 fn content(generator: &mut SchemaGenerator, body: &Content, example: Option<&Value>) -> Value {
     let by_media = body.iter().map(|(media, schema)| {
         let schema = schema(generator).to_value();
-        let mut described = json!({});
-        if schema != json!({}) {
-            described["schema"] = schema;
-        }
+        // what is not described is a file
+        let mut described = if schema == json!({}) {
+            json!({ "schema": { "type": "string", "format": "binary" } })
+        } else {
+            json!({ "schema": schema })
+        };
         if let Some(example) = example {
             described["example"] = example.clone();
         }

@@ -57,16 +57,11 @@ pub(super) fn operations() -> Vec<Operation> {
 
 /// Stores the body as a mesh file, whatever its media type: its format is recognised from its first bytes.
 async fn upload_mesh(call: Call) -> Result<Response, ApiError> {
-    let limit_bytes = call.service.config.max_mesh_bytes;
+    let (declared, free) = (declared_length(&call.headers), coding::FREE_UPLOADED);
     let mut body = call.body.into_data_stream();
-    let found = if declared_length(&call.headers).is_some_and(|length| length > limit_bytes) {
-        Err(ApiError::PayloadTooLarge { limit_bytes })
-    } else {
-        let free = coding::FREE_UPLOADED;
-        match coding::decoded(&call.headers, &mut body, &call.received, free) {
-            Ok(pieces) => verbs::upload(&call.service, &call.caller, pieces).await,
-            Err(error) => Err(error),
-        }
+    let found = match coding::decoded(&call.headers, &mut body, &call.received, free) {
+        Ok(pieces) => verbs::upload(&call.service, &call.caller, declared, pieces).await,
+        Err(error) => Err(error),
     };
     if found.is_err() {
         tokio::spawn(discard(body));

@@ -113,6 +113,7 @@ mod tests {
         // plots, pages and documents, and what is asked by HTTP everywhere (probes, metrics), have no rpc
         let rest_only = [
             "/v1/jobs/{id}/plots/{plot}",
+            "/",
             "/docs",
             "/docs/{file}",
             "/openapi.json",

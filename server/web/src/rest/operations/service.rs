@@ -7,6 +7,7 @@ use axum::{
 };
 use base::{
     catalog::{self, Code, Kind, WarningKind},
+    metrics::in_older_format,
     values::Words,
 };
 use schemars::JsonSchema;
@@ -29,10 +30,11 @@ use super::{
     operation::{ADMIN, IDENTIFIED, OPEN, Operation, READ, SUBMIT, get, post, probe},
 };
 use crate::rest::{
-    accept::prefers,
+    accept::{accepted, prefers, weight},
     bodies::{self, BareProblem},
     call::Call,
     docs::{self, FILE},
+    home,
 };
 
 pub(super) fn operations() -> Vec<Operation> {
@@ -90,6 +92,10 @@ pub(super) fn operations() -> Vec<Operation> {
             .rest_only("GetProto")
             .summary("Returns the description of the API over gRPC")
             .answers(200, "The protocol buffers", bytes("text/plain")),
+        get(READ, "/", (), home::page)
+            .rest_only("GetHome")
+            .summary("Shows the last jobs with their verdicts and figures, to a person with a browser")
+            .answers(200, "The page", bytes("text/html")),
         get(READ, "/docs", (), docs::page)
             .rest_only("GetDocs")
             .summary("Shows a page with this description, on which requests can be tried out; it works offline")
@@ -101,7 +107,8 @@ pub(super) fn operations() -> Vec<Operation> {
         get(READ, "/metrics", (), get_metrics)
             .rest_only("GetMetrics")
             .summary("Returns metrics for Prometheus: queue, jobs, solver, store, requests, memory, process")
-            .answers(200, "The text format of OpenMetrics", bytes("application/openmetrics-text")),
+            .answers(200, "The text format of Prometheus or, if Accept asks for it, of OpenMetrics",
+                ["text/plain", "application/openmetrics-text"].map(bytes).concat()),
         probe("/livez", live)
             .rest_only("Live")
             .summary("Answers as long as the process is alive")
@@ -236,14 +243,29 @@ async fn get_proto(_: Call) -> Result<impl IntoResponse, ApiError> {
     Ok(([(header::CONTENT_TYPE, "text/plain; charset=utf-8")], TEXT))
 }
 
-/// Returns metrics in the text format of OpenMetrics, which Prometheus and others read whatever format they request.
+/// Returns metrics in the text format of OpenMetrics for a client that asks for it, and otherwise in the older one, which
+/// every program reads.
 async fn get_metrics(call: Call) -> Result<impl IntoResponse, ApiError> {
     let text = all_metrics(&call.service, &call.caller).await?;
-    Ok(([(header::CONTENT_TYPE, OPENMETRICS)], text))
+    let accepted = accepted(&call.headers);
+    let [open, older] = [OPENMETRICS, "text/plain"].map(|format| weight(&accepted, media(format)));
+    // Prometheus names both, the one that it prefers first; `*/*` is no wish for either
+    let (text, format) = if open.1 > 1 && open > older {
+        (text, OPENMETRICS)
+    } else {
+        (in_older_format(&text), PROMETHEUS_TEXT)
+    };
+    let headers = [(header::CONTENT_TYPE, format), (header::VARY, "Accept")];
+    Ok((headers, text))
 }
 
-/// The media type of metrics.
+fn media(format: &str) -> &str {
+    format.split(';').next().unwrap_or_default()
+}
+
+/// The media types of metrics.
 const OPENMETRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+const PROMETHEUS_TEXT: &str = "text/plain; version=0.0.4; charset=utf-8";
 
 /// Answers that the process is alive.
 async fn live(_: Call) -> Result<&'static str, ApiError> {
