@@ -197,8 +197,10 @@ pub fn solve_with_mesh(
 pub struct Checked {
     /// The warnings about the problem.
     pub warnings: Vec<Warning>,
-    /// The estimated cost of solving the problem.
+    /// The estimated cost of solving the problem; with adaptive refinement, of the largest mesh that it may come to.
     pub estimate: Estimate,
+    /// With adaptive refinement: the estimated cost of the first mesh.
+    pub first_mesh: Option<Estimate>,
 }
 
 /// Checks a problem without solving it: returns its warnings and the cost of solving it.
@@ -208,8 +210,10 @@ pub struct Checked {
 /// All violations of the problem, each with its place, what was found, what was expected and what to do.
 pub fn check(problem: &Problem, external: Option<External>) -> Result<Checked, Vec<Violation>> {
     let model = Model::new(problem, external)?;
+    let adaptive = matches!(problem.mesh.refine, problem::Refine::Adaptive(_));
     Ok(Checked {
         estimate: model.estimate(problem),
+        first_mesh: adaptive.then(|| model.estimate_of_mesh()),
         warnings: model.warnings,
     })
 }

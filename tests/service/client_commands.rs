@@ -24,6 +24,67 @@ fn command(url: &str, arguments: &[&str]) -> Command {
     command
 }
 
+/// What a command with this folder of settings and this standard input prints, and its exit code.
+async fn with_input(
+    url: &str,
+    folder: &Path,
+    arguments: &[&str],
+    input: &str,
+) -> (Option<i32>, String) {
+    let file = write(folder, "input", input);
+    let mut command = command(url, arguments);
+    command.env("XDG_CONFIG_HOME", folder);
+    command.stdin(std::fs::File::open(file).unwrap());
+    let output = soon(&arguments.join(" "), command.output()).await.unwrap();
+    let told = [output.stdout, output.stderr].concat();
+    (output.status.code(), String::from_utf8(told).unwrap())
+}
+
+/// Operations: GetCaller
+#[tokio::test]
+async fn a_token_is_kept_in_a_file_that_only_its_owner_can_read() {
+    use std::os::unix::fs::PermissionsExt;
+    let server = server().await;
+    let body = json!({"name": "test", "owner": "root", "scopes": ["admin"]});
+    let (_, admin) = crate::auth::create(&server, None, body).await;
+    let (url, home) = (&server.url, tempfile::tempdir().unwrap());
+    let folder = home.path();
+    let file = folder.join("signorini/tokens.json");
+    let (code, told) = with_input(url, folder, &["ls"], "").await;
+    assert_eq!(code, Some(7), "{told}");
+    let (code, told) = with_input(url, folder, &["login"], "sgn_nobodys\n").await;
+    assert!(code == Some(7) && !file.exists(), "{told}");
+    let (code, told) = with_input(url, folder, &["login"], "\n").await;
+    assert!(
+        code == Some(1) && told.contains("there is no token"),
+        "{told}"
+    );
+
+    let (code, told) = with_input(url, folder, &["login"], &format!("{admin}\n")).await;
+    assert!(
+        code == Some(0) && told.contains("root") && !told.contains(&admin),
+        "{told}"
+    );
+    let mode = |path: &Path| std::fs::metadata(path).unwrap().permissions().mode() & 0o777;
+    assert_eq!((mode(&file), mode(file.parent().unwrap())), (0o600, 0o700));
+    let (code, told) = with_input(url, folder, &["ls"], "").await;
+    assert_eq!(code, Some(0), "{told}");
+    // of this service only
+    let other = crate::server().await;
+    let (code, told) = with_input(&other.url, folder, &["logout"], "").await;
+    assert_eq!(code, Some(6), "{told}");
+
+    let open = std::fs::Permissions::from_mode(0o644);
+    std::fs::set_permissions(&file, open).unwrap();
+    let (code, told) = with_input(url, folder, &["ls"], "").await;
+    assert!(code == Some(1) && told.contains("chmod 600"), "{told}");
+    std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o600)).unwrap();
+    let (code, told) = with_input(url, folder, &["logout"], "").await;
+    assert_eq!(code, Some(0), "{told}");
+    let (code, told) = with_input(url, folder, &["ls"], "").await;
+    assert_eq!(code, Some(7), "{told}");
+}
+
 async fn run(url: &str, arguments: &[&str]) -> Output {
     let output = command(url, arguments).output();
     soon(&arguments.join(" "), output).await.unwrap()

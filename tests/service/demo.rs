@@ -5,7 +5,7 @@ use std::process::Command;
 use crate::SIGNORINI;
 
 #[test]
-fn the_demo_solves_five_examples_over_both_protocols_and_prints_a_profile() {
+fn the_demo_solves_five_examples_over_both_protocols_and_draws_one() {
     // a proxy at an address without a listener: the demo must connect to itself directly
     let output = Command::new(SIGNORINI)
         .arg("demo")
@@ -20,23 +20,17 @@ fn the_demo_solves_five_examples_over_both_protocols_and_prints_a_profile() {
         "{text}\n{}",
         String::from_utf8_lossy(&output.stderr)
     );
-    assert_eq!(
-        text.lines()
-            .filter(|line| line.contains("converged after"))
-            .count(),
-        10,
-        "{text}"
-    );
-    assert_eq!(
-        text.lines()
-            .filter(|line| line.contains("same bits"))
-            .count(),
-        5,
-        "{text}"
-    );
-    assert!(text.contains("σ_n") && text.contains("slip"), "{text}");
-    let verdicts = text.lines().filter(|line| line.contains("accuracy good"));
+    let verdicts = text
+        .lines()
+        .filter(|line| line.contains(" good: normal force "));
     assert_eq!(verdicts.count(), 5, "{text}");
+    assert!(
+        text.contains("Both protocols gave the same bits") && text.contains("σ_n"),
+        "{text}"
+    );
+    assert!(text.contains("signorini serve"), "{text}");
+    // it is read from beginning to end
+    assert!(text.lines().count() < 50, "{text}");
     assert!(
         !text.contains('\x1b'),
         "plain lines where there is no terminal"

@@ -67,7 +67,12 @@ fn every_field_of_an_answer_is_written_as_its_json() {
 fn answer<T: DeserializeOwned + Into<M>, M: Message>(name: &str) {
     for round in 0..rounds() {
         let filled = Filler { round, count: 0 }.message(&descriptor(name));
-        let ours: T = serde_json::from_value(with_links(read(&filled))).unwrap();
+        let json = with_links(read(&filled));
+        // it is sent, but never stored
+        if json["type"] == "keep_alive" {
+            continue;
+        }
+        let ours: T = serde_json::from_value(json).unwrap();
         let message = dynamic(name, &ours.into());
         assert_same(
             &read(&message),

@@ -10,6 +10,7 @@ use suite::{
     example_json,
     harness::{Server, soon},
 };
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tonic::{Code, Request};
 use tonic_types::StatusExt;
 
@@ -352,6 +353,23 @@ async fn a_mesh_that_is_there_can_be_uploaded_again_whatever_is_left() {
     assert!(kept.as_u64().unwrap() <= 30_000, "{kept}");
     let (status, again) = upload(file).await;
     assert_eq!((status, &again["hash"]), (StatusCode::OK, &first.1["hash"]));
+}
+
+/// A file for which an owner has no room is refused by the length that its request declares: nothing of it is read.
+#[tokio::test]
+async fn a_mesh_over_the_share_is_refused_before_it_arrives() {
+    let server = shared(&["--max-bytes-per-owner", "30000"]).await;
+    let address = server.url.strip_prefix("http://").unwrap().to_owned();
+    let mut stream = tokio::net::TcpStream::connect(&address).await.unwrap();
+    let head = format!(
+        "POST /v1/meshes HTTP/1.1\r\nHost: {address}\r\nX-Remote-User: ada\r\nContent-Length: 30001\r\n\r\n"
+    );
+    stream.write_all(head.as_bytes()).await.unwrap();
+    let mut answer = vec![0; 12];
+    let read = stream.read_exact(&mut answer);
+    let read = tokio::time::timeout(std::time::Duration::from_secs(20), read).await;
+    read.expect("the server waits for the file").unwrap();
+    assert_eq!(String::from_utf8_lossy(&answer), "HTTP/1.1 429");
 }
 
 /// Operations: DeleteFields, ListOwners, GetCaller, GetServerInfo

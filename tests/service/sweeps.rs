@@ -279,6 +279,7 @@ async fn a_sweep_over_grpc_equals_the_one_over_rest() {
                 assert_eq!(row["parameters"][MU].as_f64(), Some(own));
             }
             pb::sweep_event::Payload::Done(done) => assert_eq!(done.id, id),
+            pb::sweep_event::Payload::KeepAlive(_) => {}
         }
     }
     assert_eq!(seqs, [3, 4, 5, 6, 7]);

@@ -24,6 +24,7 @@ async fn a_valid_problem_has_a_cost_estimate() {
         (&json!(true), &json!([]))
     );
     assert!(judgement["estimate"]["dofs"].as_u64().unwrap() > 0);
+    assert_eq!(judgement["first_mesh"], Value::Null);
     assert!(
         judgement["input_hash"]
             .as_str()
@@ -35,6 +36,30 @@ async fn a_valid_problem_has_a_cost_estimate() {
         json!([]),
         "nothing was stored"
     );
+}
+
+/// What adaptive refinement may come to says little of what it takes: the first mesh is told beside it.
+///
+/// Operations: ValidateProblem
+#[tokio::test]
+async fn an_adaptive_problem_has_the_cost_of_its_first_and_of_its_largest_mesh() {
+    let server = server().await;
+    let mut problem = example_json("cylinder");
+    problem["mesh"]["refine"] = json!({ "tolerance": 0.01 });
+    let answer = server
+        .post("/v1/problems/validate")
+        .json(&json!({ "problem": problem }))
+        .send()
+        .await
+        .unwrap();
+    let judgement: Value = answer.json().await.unwrap();
+    for number in ["dofs", "memory_bytes", "run_s"] {
+        let of = |mesh: &str| judgement[mesh][number].as_f64().unwrap();
+        assert!(
+            0.0 < of("first_mesh") && 10.0 * of("first_mesh") < of("estimate"),
+            "{judgement:#}"
+        );
+    }
 }
 
 /// As PowerShell and some editors write a text.

@@ -7,7 +7,7 @@ use base::text::size;
 use clap::Args;
 use reqwest::{Method, header};
 use serde_json::Value;
-use solver::error::Violation;
+use solver::{error::Violation, solution::WarningCode};
 
 use super::{
     super::{
@@ -62,21 +62,34 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         return Ok(Exit::Invalid);
     }
     if !arguments.json {
-        let estimate = &document["estimate"];
-        let memory = estimate["memory_bytes"].as_u64().unwrap_or_default();
+        // each number of the first mesh and of the largest one, or of the only one
+        let (most, first) = (&document["estimate"], &document["first_mesh"]);
+        let shown = |number: &dyn Fn(&Value) -> String| match first {
+            Value::Null => number(most),
+            first => format!(
+                "{} on the first mesh, at most {}",
+                number(first),
+                number(most)
+            ),
+        };
         let warnings = document["warnings"].as_array().into_iter().flatten();
         let warnings = warnings.map(|warning| {
             let text = |key: &str| warning[key].as_str().unwrap_or_default();
             let pointer = submitted.in_file(text("pointer"));
-            ("warning", format!("{pointer}: {}", text("message")))
+            let code: Option<WarningCode> = text("code").parse().ok();
+            let severity: &str = code.map_or("warning", |code| code.severity().into());
+            (severity, format!("{pointer}: {}", text("message")))
         });
         let lines = [
             ("valid", "yes".to_owned()),
-            ("unknowns", estimate["dofs"].to_string()),
-            ("memory", size(memory)),
+            ("unknowns", shown(&|of| of["dofs"].to_string())),
+            (
+                "memory",
+                shown(&|of| size(of["memory_bytes"].as_u64().unwrap_or_default())),
+            ),
             (
                 "time",
-                seconds(estimate["run_s"].as_f64().unwrap_or_default()),
+                shown(&|of| seconds(of["run_s"].as_f64().unwrap_or_default())),
             ),
         ];
         output::print(&report::lines(lines.into_iter().chain(warnings)))?;

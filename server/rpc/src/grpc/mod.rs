@@ -1,5 +1,6 @@
 //! gRPC: the same operations as over REST, with health and reflection.
 
+mod keep_alive;
 mod messages;
 mod router;
 mod service;

@@ -37,6 +37,7 @@ use sha2::{Digest, Sha256};
 use store::PIECE_BYTES;
 use tonic::{Request, Response, Status, Streaming, metadata::MetadataValue};
 
+use super::keep_alive::{Messages, kept_alive};
 use super::messages::{
     MAX_ROWS, caller_and_message, check_offset, key, messages_that_fit, noting_replay, one_message,
     paging, points, read_if_set,
@@ -490,7 +491,7 @@ impl JobService for Grpc {
         let broken =
             |status: Status| ApiError::MalformedJson(format!("the stream is incomplete: {status}"));
         let pieces = stream.map(|piece| piece.map(|piece| piece.data).map_err(broken));
-        let (mesh, new) = meshes::upload(&self.service, &caller, pieces).await?;
+        let (mesh, new) = meshes::upload(&self.service, &caller, None, pieces).await?;
         Ok(Response::new(pb::UploadMeshResponse {
             mesh: Some(mesh.into()),
             known: !new,
@@ -594,7 +595,7 @@ impl JobService for Grpc {
         }))
     }
 
-    type WatchSweepStream = Pin<Box<dyn Stream<Item = Result<pb::SweepEvent, Status>> + Send>>;
+    type WatchSweepStream = Messages<pb::SweepEvent>;
 
     async fn watch_sweep(
         &self,
@@ -608,7 +609,7 @@ impl JobService for Grpc {
         let events = sweeps::watch(&self.service, &caller, id, after).await?;
         let events = futures_util::stream::iter(events).flatten();
         let events = events.map(|event| event.map(Into::into).map_err(Into::into));
-        Ok(Response::new(events.boxed()))
+        Ok(Response::new(kept_alive(events)))
     }
 
     async fn cancel_sweep(&self, request: Request<pb::CancelSweepRequest>) -> Reply<pb::Sweep> {
@@ -640,7 +641,7 @@ impl JobService for Grpc {
     }
 }
 
-type EventStream = Pin<Box<dyn Stream<Item = Result<pb::Event, Status>> + Send>>;
+type EventStream = Messages<pb::Event>;
 
 /// Makes a response whose metadata say whether the answer is from a partial or a final result.
 fn marked<T>(answer: T, available: ResultAvailable) -> Response<T> {
@@ -660,7 +661,7 @@ fn messages(
         Ok(event.into())
     };
     let events = futures_util::stream::iter(events).flatten();
-    events.map(message).boxed()
+    kept_alive(events.map(message))
 }
 
 impl Grpc {

@@ -62,10 +62,12 @@ impl Values for Hashes {
 }
 
 /// Stores a mesh file that arrives in pieces; returns whether it is new. The file is streamed to the disk
-/// and from there through the reader: only the parsed mesh is held in memory.
+/// and from there through the reader: only the parsed mesh is held in memory. `declared`: the number of bytes that the
+/// client says it will send, by which a file that the owner has no room for is refused before it is read.
 pub async fn upload(
     service: &Arc<Service>,
     caller: &Caller,
+    declared: Option<usize>,
     mut pieces: impl Stream<Item = Result<impl AsRef<[u8]>, ApiError>> + Unpin,
 ) -> Result<(MeshInfo, bool), ApiError> {
     service.accepting()?;
@@ -75,6 +77,10 @@ pub async fn upload(
     room.holds(0)?;
     let mut upload = service.begin_upload(&owner)?;
     let limit_bytes = service.config.max_mesh_bytes;
+    if declared.is_some_and(|bytes| bytes > limit_bytes) {
+        return Err(ApiError::PayloadTooLarge { limit_bytes });
+    }
+    room.would_hold(declared.unwrap_or(0) as u64)?;
     // without a name: the system removes it when the process ends
     let file = tempfile::tempfile_in(&service.config.store.data).map_err(unwritten)?;
     let mut out = tokio::io::BufWriter::with_capacity(

@@ -33,7 +33,10 @@ pub struct Validation {
     /// The warnings to consider before relying on the problem's result.
     pub warnings: Vec<Warning>,
     /// The estimated cost of the problem, also of an invalid one; absent if the problem or its stored mesh cannot be read.
+    /// With adaptive refinement, the cost of the largest mesh that it may come to: most problems end far below.
     pub estimate: Option<Estimate>,
+    /// With adaptive refinement: the estimated cost of the first mesh, below which the problem cannot be solved.
+    pub first_mesh: Option<Estimate>,
     /// The fingerprint of the problem; absent if `estimate` is absent.
     pub input_hash: Option<String>,
 }
@@ -66,13 +69,14 @@ pub fn validate<'a>(
                 }
             };
             // told by the checked problem, which has all numbers; of an invalid one only by what comes before meshing
-            let mut estimate = None;
+            let (mut estimate, mut first_mesh) = (None, None);
             let checked = || {
                 let before = self::estimate(&problem, stored.as_ref()).map_err(|v| vec![v])?;
                 estimate = Some(before);
                 within(before)?;
                 let checked = check(&problem, stored)?;
                 estimate = Some(checked.estimate);
+                first_mesh = checked.first_mesh;
                 within(checked.estimate)?;
                 Ok(checked.warnings)
             };
@@ -89,6 +93,7 @@ pub fn validate<'a>(
                 violations,
                 warnings: warnings.into_iter().map(at).collect(),
                 estimate,
+                first_mesh,
                 input_hash: digest::input_hash(&problem).ok(),
             }
         };
@@ -103,6 +108,7 @@ impl Validation {
             violations,
             warnings: vec![],
             estimate: None,
+            first_mesh: None,
             input_hash: None,
         }
     }

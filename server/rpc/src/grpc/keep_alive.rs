@@ -1,0 +1,99 @@
+//! Events that keep a silent stream open through proxies, as the comments of server-sent events do.
+
+use std::{pin::Pin, time::Duration};
+
+use futures_util::{Stream, StreamExt, stream::unfold};
+use tokio::time::timeout;
+use tonic::Status;
+
+use crate::pb::{
+    Event, KeepAliveEvent, SweepEvent, event::Payload as OfJob, sweep_event::Payload as OfSweep,
+};
+
+/// The longest silence of a stream: many proxies cut a connection after a minute.
+const PAUSE: Duration = Duration::from_secs(15);
+
+/// A stream of messages to a client.
+pub(super) type Messages<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
+
+/// A message with the number by which a client resumes its stream.
+pub(super) trait Numbered: Sized {
+    fn seq(&self) -> i64;
+
+    /// The message that only keeps the stream open, with the number of the message before.
+    fn keep_alive(seq: i64) -> Self;
+}
+
+impl Numbered for Event {
+    fn seq(&self) -> i64 {
+        self.seq
+    }
+
+    fn keep_alive(seq: i64) -> Self {
+        Event {
+            seq,
+            payload: Some(OfJob::KeepAlive(KeepAliveEvent {})),
+            ..Event::default()
+        }
+    }
+}
+
+impl Numbered for SweepEvent {
+    fn seq(&self) -> i64 {
+        self.seq
+    }
+
+    fn keep_alive(seq: i64) -> Self {
+        SweepEvent {
+            seq,
+            payload: Some(OfSweep::KeepAlive(KeepAliveEvent {})),
+            ..SweepEvent::default()
+        }
+    }
+}
+
+/// The stream with a message after each pause.
+pub(super) fn kept_alive<T: Numbered + Send + 'static>(
+    messages: impl Stream<Item = Result<T, Status>> + Send + 'static,
+) -> Messages<T> {
+    let begin = (messages.boxed(), 0);
+    unfold(begin, |(mut messages, seq)| async move {
+        let next = match timeout(PAUSE, messages.next()).await {
+            Ok(next) => next?,
+            Err(_) => Ok(T::keep_alive(seq)),
+        };
+        let seq = next.as_ref().map_or(seq, T::seq);
+        Some((next, (messages, seq)))
+    })
+    .boxed()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use futures_util::stream;
+
+    #[tokio::test(start_paused = true)]
+    async fn a_silent_stream_repeats_its_last_number_every_fifteen_seconds() {
+        let first = Event {
+            seq: 7,
+            ..Event::default()
+        };
+        let begun = tokio::time::Instant::now();
+        let mut messages = kept_alive(stream::iter([Ok(first)]).chain(stream::pending()));
+        let mut seen = vec![];
+        for _ in 0..3 {
+            let message: Event = messages.next().await.unwrap().unwrap();
+            seen.push((begun.elapsed().as_secs(), message.seq, message.payload));
+        }
+        let alive = || Some(OfJob::KeepAlive(KeepAliveEvent {}));
+        assert_eq!(seen, [(0, 7, None), (15, 7, alive()), (30, 7, alive())]);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_stream_that_ends_ends() {
+        let messages = kept_alive(stream::iter([Ok(SweepEvent::default())]));
+        assert_eq!(messages.count().await, 1);
+    }
+}
