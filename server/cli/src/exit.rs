@@ -64,7 +64,7 @@ impl Exit {
         }
     }
 
-    /// The meaning of this end of a command, for `--help` and the README.
+    /// The meaning of this end of a command, for `--help` and `docs/cli.md`.
     fn meaning(self) -> &'static str {
         match self {
             Exit::Ok => {
@@ -162,12 +162,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_readme_has_every_exit_code_with_its_meaning() {
-        let readme = concat!(env!("CARGO_MANIFEST_DIR"), "/../../README.md");
-        let readme = std::fs::read_to_string(readme).unwrap();
+    fn the_page_of_commands_has_every_exit_code_with_its_meaning() {
+        let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/cli.md");
+        let page = std::fs::read_to_string(page).unwrap();
         for exit in Exit::VARIANTS {
             let line = format!("| {} | {} |", exit.code(), exit.meaning());
-            assert!(readme.contains(&line), "README.md lacks the line\n{line}");
+            assert!(page.contains(&line), "docs/cli.md lacks the line\n{line}");
         }
     }
 }

@@ -29,6 +29,7 @@ mod health;
 mod jobs;
 mod log;
 mod log_line;
+mod login;
 mod notify;
 mod output;
 mod pages;
@@ -88,6 +89,11 @@ enum Command {
     /// used, 5 a server uses it (give its address with --url), 2 an invalid option, 1 anything else; with --url the
     /// codes of client commands
     Token(token::Arguments),
+    /// Keep the token for a service in a file that only you can read; client commands and the client for Python use it.
+    /// Exit code: 0 kept, 5 no connection, 7 not a valid token, 1 anything else
+    Login(login::Arguments),
+    /// Forget the token for a service. Exit code: 0 done, 6 there is none, 1 anything else
+    Logout(login::Arguments),
     /// Solve one problem without a service. Exit code: 0 converged, 9 not converged (the result is written), 2 invalid
     /// or too large, 1 anything else, such as a file that cannot be read, or contacts that do not hold the body
     Solve(solve::Arguments),
@@ -100,7 +106,7 @@ enum Command {
     Schema,
     /// Explain an error code and what to do about it
     Explain(explain::Arguments),
-    /// Print the OpenAPI 3.1 description of the REST API
+    /// Print the OpenAPI 3.0 description of the REST API
     Openapi {
         /// Print the reference in Markdown instead, with the rpcs: docs/api.md
         #[arg(long)]
@@ -164,6 +170,11 @@ pub fn main() -> ExitCode {
             let (_, given) = settings::innermost(&all, &matches);
             with_runtime(token::run(arguments, token::names_folder(given)))
         }
+        Command::Login(arguments) => {
+            let _lines = log::start(LevelFilter::WARN);
+            with_runtime(login::login(arguments))
+        }
+        Command::Logout(arguments) => login::logout(arguments),
         Command::Solve(arguments) => {
             let _lines = log::start(LevelFilter::WARN);
             solve::run(&arguments)

@@ -16,7 +16,10 @@ use solver::error::Violation;
 use thiserror::Error;
 use uuid::Uuid;
 
-use super::client::{Proxy, Trust, Way};
+use super::{
+    client::{self, Proxy, Trust, Way},
+    login,
+};
 
 /// The header by which a repeated submission finds the job that the first submission created.
 const IDEMPOTENCY_KEY: &str = "Idempotency-Key";
@@ -40,9 +43,21 @@ pub(super) struct Connection {
 
 impl Connection {
     pub(super) fn open(&self) -> anyhow::Result<Service> {
+        Service::at(&self.url(), &self.trust)
+    }
+
+    /// Prepares calls with this token.
+    pub(super) fn open_with(&self, token: &str) -> anyhow::Result<Service> {
+        let token = Some(token.to_owned());
+        Service::with_token(&self.url(), &self.trust, token)
+    }
+
+    /// The address of the service, without a slash at its end.
+    pub(super) fn url(&self) -> String {
         // an empty variable counts as one that is not set
         let url = self.url.as_deref().filter(|url| !url.is_empty());
-        Service::at(url.unwrap_or("http://127.0.0.1:8080"), &self.trust)
+        let url = url.unwrap_or("http://127.0.0.1:8080");
+        url.trim_end_matches('/').to_owned()
     }
 }
 
@@ -114,16 +129,35 @@ impl Display for Refusal {
 impl std::error::Error for Refusal {}
 
 impl Service {
-    /// Prepares calls to the service at this address.
+    /// Prepares calls to the service at this address, with the token of the environment, or else the one that `login` has
+    /// kept.
     pub(super) fn at(url: &str, trust: &Trust) -> anyhow::Result<Service> {
+        let token = std::env::var("SIGNORINI_TOKEN").ok();
+        let token = match token.filter(|token| !token.is_empty()) {
+            Some(token) => Some(token),
+            None => login::token_for(url.trim_end_matches('/'))?,
+        };
+        Service::with_token(url, trust, token)
+    }
+
+    fn with_token(url: &str, trust: &Trust, token: Option<String>) -> anyhow::Result<Service> {
         let Way { client, proxy } = trust.client(url)?;
+        let url = url.trim_end_matches('/').to_owned();
         Ok(Service {
             client,
             proxy,
-            url: url.trim_end_matches('/').to_owned(),
-            token: std::env::var("SIGNORINI_TOKEN")
-                .ok()
-                .filter(|token| !token.is_empty()),
+            url,
+            token,
+        })
+    }
+
+    /// Prepares calls to a service of this process, without a token.
+    pub(super) fn local(url: &str) -> anyhow::Result<Service> {
+        Ok(Service {
+            client: client::local()?,
+            proxy: None,
+            url: url.to_owned(),
+            token: None,
         })
     }
 

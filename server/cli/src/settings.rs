@@ -96,6 +96,13 @@ pub(super) fn with_file(
     line: &[OsString],
 ) -> Result<(Command, Lines), Vec<Wrong>> {
     let settings = settings();
+    let command = change(command, &|arg| {
+        if is_empty_variable(&arg) {
+            arg.env(Resettable::Reset)
+        } else {
+            arg
+        }
+    });
     let is_setting = |arg: &Arg| {
         let variable = arg.get_env();
         variable.is_some() && settings.iter().any(|known| known.get_env() == variable)
@@ -130,16 +137,9 @@ pub(super) fn with_file(
     if !wrong.is_empty() {
         return Err(wrong);
     }
-    let command = change(command, &|arg| {
-        let arg = if is_setting(&arg) && is_empty_variable(&arg) {
-            arg.env(Resettable::Reset)
-        } else {
-            arg
-        };
-        match values.get(&key(&arg)) {
-            Some(Value { texts, .. }) if is_setting(&arg) => arg.default_values(texts),
-            _ => arg,
-        }
+    let command = change(command, &|arg| match values.get(&key(&arg)) {
+        Some(Value { texts, .. }) if is_setting(&arg) => arg.default_values(texts),
+        _ => arg,
     });
     let lines = values.into_iter().map(|(key, value)| (key, value.place));
     Ok((command, lines.collect()))

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, bail};
 use base::{caller::Caller, time::Time, token::Token};
-use clap::{ArgMatches, Args, Subcommand, parser::ValueSource};
+use clap::{ArgMatches, Args, Subcommand, ValueEnum, parser::ValueSource};
 use reqwest::Method;
 use serde_json::{Value, json};
 use service::verbs::tokens::{self, TokenRequest};
@@ -52,6 +52,9 @@ enum Command {
     },
     /// List all tokens, without their secrets
     List {
+        /// How to print: json is the list as the service answers it
+        #[arg(short, long, value_enum, default_value_t = Format::Table)]
+        format: Format,
         #[command(flatten)]
         at: TokenStore,
     },
@@ -69,6 +72,12 @@ enum Command {
         #[command(flatten)]
         at: TokenStore,
     },
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Format {
+    Table,
+    Json,
 }
 
 /// The options that say where the tokens are: in the folder of a store, or in a running service.
@@ -134,7 +143,7 @@ pub(super) async fn run(arguments: Arguments, folder: bool) -> anyhow::Result<Ex
             eprintln!("{}", told(&token));
             output::print(&format!("{secret}\n"))?;
         }
-        Command::List { at } => {
+        Command::List { format, at } => {
             let all = match at.open(false, folder).await? {
                 Target::Store(store) => {
                     let all = tokens::list(&store, &Caller::local());
@@ -146,7 +155,11 @@ pub(super) async fn run(arguments: Arguments, folder: bool) -> anyhow::Result<Ex
                     serde_json::from_value(answer["tokens"].take()).with_context(not_ours)?
                 }
             };
-            output::print(&listed(&all))?;
+            let text = match format {
+                Format::Table => listed(&all),
+                Format::Json => format!("{:#}\n", serde_json::to_value(&all)?),
+            };
+            output::print(&text)?;
         }
         Command::Revoke { id, at } => {
             let token = match at.open(false, folder).await? {

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ipaddress
+import json
 import os
+import pathlib
 import ssl
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,6 +25,19 @@ PING_S = 15.0
 """An event stream is never silent for longer: the service sends a comment."""
 
 
+def _kept_token(url: str) -> str:
+    """The token that `signorini login` has kept for a service; empty if there is none. ValueError: others can read it."""
+    folder = os.environ.get("XDG_CONFIG_HOME") or os.path.join(os.path.expanduser("~"), ".config")
+    path = pathlib.Path(folder, "signorini", "tokens.json")
+    try:
+        if path.stat().st_mode & 0o077:
+            raise ValueError(f"others can read {path}, which has tokens: chmod 600 {path}, and rotate them")
+        kept = json.loads(path.read_text(encoding="utf-8"))
+    except OSError:
+        return ""
+    return str(kept.get(url, "")) if isinstance(kept, dict) else ""
+
+
 @dataclass(frozen=True)
 class Connection:
     url: str
@@ -40,7 +55,7 @@ class Connection:
         if urlsplit(url).scheme not in ("http", "https"):
             raise ValueError(f"the address of the service begins with http:// or https://, not {url!r}")
         if token is None:
-            token = os.environ.get("SIGNORINI_TOKEN", "")
+            token = os.environ.get("SIGNORINI_TOKEN") or _kept_token(url.rstrip("/"))
         # read from a file, it ends with a line break; messages about an invalid token do not contain the token
         token = token.strip()
         if not (token.isascii() and token.isprintable()):

@@ -25,9 +25,42 @@ mod validate;
 mod wait;
 mod watch;
 
+use anyhow::{Context, ensure};
+use base::job::{Job, JobId, Status};
 use clap::Subcommand;
+use serde_json::Value;
 
-use super::exit::Exit;
+use super::{
+    exit::Exit,
+    service::{Service, misunderstood},
+};
+
+/// Waits for the end of a job; returns it. An error if it has not succeeded.
+pub(super) async fn ended(service: &Service, id: JobId) -> anyhow::Result<Job> {
+    let document = match follow::wait(service, id::Id::Job(id), None).await? {
+        follow::Waited::Ended(document) => document,
+        follow::Waited::TimedOut(last) => last.unwrap_or_default(),
+    };
+    let job: Job = serde_json::from_value(document).with_context(|| misunderstood("the job"))?;
+    let failure = job.failure.as_ref().map(|failure| failure.detail.as_str());
+    ensure!(
+        job.status == Status::Succeeded,
+        "the job failed: {}",
+        failure.unwrap_or_default()
+    );
+    Ok(job)
+}
+
+/// Draws the stresses along each contact boundary of a job for a terminal, as `plot` does. `result`: its result.
+pub(super) async fn profile_charts(
+    service: &Service,
+    id: JobId,
+    result: Value,
+) -> anyhow::Result<String> {
+    Ok(plot::draw_all(
+        &plot::profiles(service, id, result, None).await?,
+    ))
+}
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {

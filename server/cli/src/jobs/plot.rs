@@ -151,6 +151,12 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     if arguments.plot != Some(Plot::Profile) {
         figures.push(convergence(&service, id, step).await?);
     }
+    output::print(&draw_all(&figures))?;
+    Ok(Exit::Ok)
+}
+
+/// Draws figures below each other, as wide as the terminal.
+pub(super) fn draw_all(figures: &[Chart]) -> String {
     let in_colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
     let width = console::Term::stdout()
         .size_checked()
@@ -159,8 +165,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         .iter()
         .map(|figure| figure.draw(width, SIZE.1, in_colour))
         .collect();
-    output::print(&text.join("\n"))?;
-    Ok(Exit::Ok)
+    text.join("\n")
 }
 
 /// The number of a load step that is given by its name or its number; `None` if there is no such step. A problem
@@ -193,7 +198,7 @@ fn names_of_steps(result: &Value) -> Vec<&str> {
 
 /// Makes charts of the stresses along each contact boundary at the end of load step `step`, or of the last step, with
 /// the range that figures have.
-async fn profiles(
+pub(super) async fn profiles(
     service: &Service,
     id: JobId,
     mut result: Value,
