@@ -23,6 +23,9 @@ TOP = pathlib.Path(__file__).resolve().parent.parent
 BASE, BUILDER, IMAGE = "localhost/signorini-base", "localhost/signorini-builder", "localhost/signorini:test"
 PATH = "/usr/local/cargo/bin:/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
 MOST_ON_TOP = 60 << 20
+# the user as a number, without which Kubernetes cannot tell that it is not root
+USER = "999:999"
+VERSION = "0.0.1-image-test"
 
 
 class Buildah:
@@ -88,17 +91,20 @@ def builder(buildah, folder, binary):
         shutil.rmtree(kept, ignore_errors=True)
         shutil.copytree(sysroot, kept, symlinks=True, ignore=shutil.ignore_patterns("doc", "man"))
         buildah("add", "-q", container, kept, "/usr/local/rust")
-        buildah("add", "-q", container, home / "registry", "/usr/local/cargo/registry")
+        # not where the Dockerfile mounts a cache, which would hide it
+        buildah("add", "-q", container, home / "registry", "/opt/cargo/registry")
         buildah("run", "--isolation", "chroot", container, "--", "sh", "-c",
                 "apt-get update -q && apt-get install -y -q --no-install-recommends gcc libc6-dev binutils")
-        buildah("config", "--env", "CARGO_HOME=/usr/local/cargo", "--env", "PATH=/usr/local/rust/bin:" + PATH, container)
+        buildah("config", "--env", "CARGO_HOME=/opt/cargo", "--env", "PATH=/usr/local/rust/bin:" + PATH, container)
     buildah("commit", "-q", "--rm", container, BUILDER)
 
 
 def run(buildah):
     """Starts the service as the image says; seconds until it answers, and whether its health check agrees."""
     found = json.loads(buildah("inspect", "--type", "image", IMAGE))["Docker"]["config"]
-    assert found["User"] == "signorini", found
+    assert found["User"] == USER, found
+    labels = {name.removeprefix("org.opencontainers.image."): text for name, text in found["Labels"].items()}
+    assert labels["title"] == "Signorini" and labels["version"] == VERSION and labels["licenses"] == "MIT OR Apache-2.0", labels
     assert found["Healthcheck"]["Test"] == ["CMD", "signorini", "health"], found
     container = buildah("from", "--pull-never", IMAGE)
     with socket.socket() as free:
@@ -151,7 +157,7 @@ def main():
     builder(buildah, folder, binary)
     began = time.monotonic()
     buildah("bud", "--isolation", "chroot", "--pull-never", "--format", "docker", "--build-arg", "BUILDER=" + BUILDER,
-            "--build-arg", "BASE=" + BASE, "-t", IMAGE, str(TOP))
+            "--build-arg", "BASE=" + BASE, "--build-arg", "VERSION=" + VERSION, "-t", IMAGE, str(TOP))
     took = time.monotonic() - began
     on_top = buildah.size(IMAGE) - buildah.size(BASE)
     ready = run(buildah)

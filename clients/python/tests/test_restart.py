@@ -113,3 +113,25 @@ def test_a_service_that_does_not_start_says_why(tmp_path_factory: pytest.TempPat
         sg.LocalServer(options=["--bogus"]).start()
     with pytest.raises(sg.SignoriniError, match="there is no program '/no/such/program'"):
         sg.LocalServer(binary="/no/such/program")
+
+
+def test_the_program_of_the_environment_comes_before_that_in_path(
+    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    programs = {name: tmp_path / name / "signorini" for name in ("environment", "path", "named")}
+    for program in programs.values():
+        program.parent.mkdir()
+        program.write_text("#!/bin/sh\n")
+        program.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path / "path"))
+    monkeypatch.setattr("sysconfig.get_path", lambda _: str(tmp_path / "environment"))
+    # this one wins over all that are found
+    monkeypatch.setenv("SIGNORINI_BINARY", str(programs["named"]))
+    assert sg.LocalServer().binary == str(programs["named"])
+    monkeypatch.delenv("SIGNORINI_BINARY")
+    assert sg.LocalServer().binary == str(programs["environment"])
+    programs["environment"].unlink()
+    assert sg.LocalServer().binary == str(programs["path"])
+    programs["path"].unlink()
+    with pytest.raises(sg.SignoriniError, match="the client alone. Install the wheel that has both"):
+        sg.LocalServer()

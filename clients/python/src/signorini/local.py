@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import importlib.metadata
 import os
 import pathlib
 import shutil
 import signal
 import subprocess
+import sysconfig
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from .errors import SignoriniError
 
@@ -105,11 +107,29 @@ class LocalServer:
 
 
 def find_binary(given: str | os.PathLike[str] | None = None) -> str:
-    """The program: what is given, the environment variable SIGNORINI_BINARY, or `signorini` in PATH."""
-    wanted = os.fspath(given) if given is not None else os.environ.get("SIGNORINI_BINARY") or "signorini"
-    found = shutil.which(wanted)
-    if found is None:
+    """The program, the first of: what is given, SIGNORINI_BINARY, the `signorini` that was installed with this package
+    or is beside this Python (whether or not the environment is activated), `signorini` in PATH."""
+    wanted = os.fspath(given) if given is not None else os.environ.get("SIGNORINI_BINARY")
+    for candidate in [wanted] if wanted else [*_of_environment(), "signorini"]:
+        if found := shutil.which(candidate):
+            return found
+    if wanted:
         raise SignoriniError(
             f"there is no program {wanted!r}: set SIGNORINI_BINARY to the binary of signorini, or put it in PATH"
         )
-    return found
+    raise SignoriniError(
+        "there is no program 'signorini': this installation has the client alone. Install the wheel that has both "
+        "(with manylinux in its name, not none-any), set SIGNORINI_BINARY to the binary of signorini, put it in PATH, "
+        'or use a service that runs elsewhere: Client("http://…")'
+    )
+
+
+def _of_environment() -> Iterator[str]:
+    """Where pip put the program of this package: as it has noted, or, after `--target`, beside it; then where it puts
+    programs."""
+    with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+        for file in importlib.metadata.files("signorini") or []:
+            if file.name == "signorini" and file.parent.name == "bin":
+                yield os.path.normpath(file.locate())
+    yield str(pathlib.Path(__file__).parents[1] / "bin/signorini")
+    yield os.path.join(sysconfig.get_path("scripts"), "signorini")

@@ -1297,7 +1297,8 @@ class Support(Part):
 @dataclass(kw_only=True, repr=False)
 class Units(Part):
     """Names of the client's units, as axes show them (each at most 20 characters): `{"length": "mm", "force": "N",
-    "stress": "MPa"}`. Absent: no unit is shown.
+    "stress": "MPa"}`. Absent: no unit is shown. Units change no number; a warning tells if common ones do not
+    belong together.
 
     force: Unit of total forces.
     length: Unit of coordinates, displacements and radii.
