@@ -54,7 +54,7 @@ Under the title stand the parameters μ, ρ, ε by which the figures of a study 
   all else is cut off with a mark and its value.
 - **convergence**: each residual against the tolerance; nodes in contact and friction points in slip and stick.
 
-The examples name no units. A problem with `\"units\": {\"length\": \"mm\", \"force\": \"N\", \"stress\": \"MPa\"}` has
+Parameters of the thesis, dimensions ours: compare shapes, not numbers. The examples name no units. A problem with `\"units\": {\"length\": \"mm\", \"force\": \"N\", \"stress\": \"MPa\"}` has
 them on its axes. The meshes are refined by `\"refine\": {\"tolerance\": 0.002}`; [verification.md](verification.md) has those
 of the thesis's size.
 ";
