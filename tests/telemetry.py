@@ -51,9 +51,9 @@ def scraped(server, accept=PROMETHEUS, kind="application/openmetrics-text; versi
 
 def in_the_older_format(server, families):
     """By default the text of Prometheus 0.0.4, with the same families, types and labels."""
-    found = {}
-    for accept in ("*/*", "text/plain", "text/plain;version=0.0.4;q=0.9,application/openmetrics-text;q=0.1"):
-        found = {family.name: family for family in classically(scraped(server, accept, "text/plain; version=0.0.4; charset=utf-8"))}
+    kind = "text/plain; version=0.0.4; charset=utf-8"
+    for accept in ("*/*", "text/plain", "application/openmetrics-text;q=0", "text/plain;q=0.9,application/openmetrics-text;q=0.1"):
+        found = {family.name: family for family in classically(scraped(server, accept, kind))}
     for family in families:
         older = found.get(family.name + ("_info" if family.type == "info" else ""))
         check(older is not None, "%s in the older format: %r" % (family.name, sorted(found)))

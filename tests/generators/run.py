@@ -31,11 +31,11 @@ COEFFICIENTS = (0.1, 0.2, 0.3)
 
 
 def run(*command, folder=FOLDER, **more):
-    """Runs a command; ends the program if it fails. Returns what it printed."""
+    """Runs a command; ends the program if it fails. Returns what it printed, on standard output and beside it."""
     done = subprocess.run([str(word) for word in command], cwd=folder, capture_output=True, text=True, **more)
     if done.returncode:
         sys.exit("%s: exit code %d\n%s%s" % (command, done.returncode, done.stdout[-3000:], done.stderr[-3000:]))
-    return done.stdout + done.stderr
+    return done.stdout, done.stderr
 
 
 def fresh(name):
@@ -61,7 +61,7 @@ def prepare():
 
 
 def openapi_python_client(description):
-    told = run(
+    _, told = run(
         python("openapi-python-client"), "generate", "--path", description, "--meta", "none", "--output-path", fresh("opc") / "client"
     )
     # it leaves out what it cannot read, and goes on
@@ -148,7 +148,7 @@ def main():
         expected = forces(server)
         for name in names:
             command, folder = GENERATORS[name](description)
-            told = run(*command, url, PROBLEM, *COEFFICIENTS, folder=folder, env={**os.environ, "PYTHONPATH": str(folder)})
+            told, _ = run(*command, url, PROBLEM, *COEFFICIENTS, folder=folder, env={**os.environ, "PYTHONPATH": str(folder)})
             found = [float(line) for line in told.split()]
             if found != expected:
                 sys.exit("%s: the client finds %s, not %s" % (name, found, expected))

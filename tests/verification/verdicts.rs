@@ -56,6 +56,47 @@ fn trapezoid(angles: [f64; 2], contacts: Vec<Value>) -> Value {
     })
 }
 
+/// A profile that was measured on a part of the surface only presses with its last point, where the surface may go on. One
+/// that is wider than the body ends at the body's edge, and so does a punch at its own.
+#[test]
+fn the_last_point_of_a_profile_is_told_apart_from_an_edge() {
+    let ends = |obstacle: Value| {
+        let contact = json!({"boundary": "top", "obstacle": obstacle, "indentation": 0.02});
+        let solution = solved(&trapezoid([90.0, 90.0], vec![contact]));
+        let count = |code| {
+            solution
+                .summary
+                .warnings
+                .iter()
+                .filter(|w| w.code == code)
+                .count()
+        };
+        [
+            WarningCode::ContactReachesObstacleEnd,
+            WarningCode::SharpEdge,
+        ]
+        .map(count)
+    };
+    let table =
+        |from: f64, to: f64| json!({"kind": "table", "x": [from, 0.1, to], "gap": [0, 0, 0]});
+    assert_eq!(ends(table(-0.5, 0.5)), [2, 0]);
+    assert_eq!(ends(table(-3.0, 0.5)), [1, 1]);
+    assert_eq!(ends(table(-0.5, 3.0)), [1, 1]);
+    assert_eq!(ends(table(-3.0, 3.0)), [0, 2]);
+    assert_eq!(
+        ends(json!({"kind": "polyline", "points": [[-0.5, 0], [0.5, 0]]})),
+        [2, 0]
+    );
+    assert_eq!(
+        ends(json!({"kind": "polyline", "points": [[-3, 0], [3, 0]]})),
+        [0, 2]
+    );
+    assert_eq!(
+        ends(json!({"kind": "flat", "from": -0.5, "to": 0.5})),
+        [0, 2]
+    );
+}
+
 /// Whatever the angle of the corner, the order of the contacts, and whether the other one has friction.
 #[test]
 fn a_contact_that_never_touches_changes_nothing() {

@@ -60,10 +60,10 @@ def test_the_summary(punch: sg.Result) -> None:
     assert contact.peak_normal_stress is not None and contact.peak_normal_stress.x == pytest.approx(0.5)
     assert punch.peak_normal_stress == contact.peak_normal_stress.value and punch.peak_normal_stress < 0
     assert punch.peak_normal_stress.why == "no_limit" and punch.peak_tangential_stress is not None
-    assert "contact_reaches_obstacle_end" in [warning.code for warning in punch.warnings]
+    assert "sharp_edge" in [warning.code for warning in punch.warnings]
     text = repr(punch)
     assert text.startswith("outcome           converged\nverdict ") and "normal force      9" in text
-    assert "warning: contact_reaches_obstacle_end: " in text
+    assert "warning: sharp_edge: " in text
     assert repr(punch.profile()).startswith("<Profile of 'top': ") and " rows; .s, .x, .y, " in repr(punch.profile())
     assert repr(punch.history).startswith("<History: ") and ".to_pandas()" in repr(punch.history)
     assert repr(punch.fields()).startswith("<Fields: ") and " nodes, " in repr(punch.fields())

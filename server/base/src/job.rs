@@ -99,7 +99,7 @@ pub struct Job {
     #[serde(default)]
     pub stored_bytes: Option<u64>,
     /// The verdict on the result: whether it can be relied on. Absent until the job has a result with stated errors, and
-    /// for a job that ended under an earlier version, of which only the summary has it.
+    /// for a job that ended under an earlier version, or is answered by one: only the summary has it then.
     #[serde(default)]
     pub verdict: Option<Verdict>,
     /// Forces and peaks of the result with their errors, of the first contacts; the summary of the result has all of them,

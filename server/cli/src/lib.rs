@@ -119,7 +119,7 @@ enum Command {
     /// Solve the tasks that the service sends over standard input, for `serve --isolation process`
     #[command(name = WORKER, hide = true)]
     Worker,
-    /// Start a temporary service, submit the five examples over REST and gRPC, and watch them converge
+    /// Start a temporary service, let it solve the five examples over REST and gRPC, and show their verdicts and a figure
     Demo,
 }
 

@@ -4,7 +4,7 @@
 use std::{
     collections::BTreeMap,
     env, fs,
-    io::{self, IsTerminal, Write},
+    io::{self, BufRead, IsTerminal, Read, Write},
     os::unix::fs::{DirBuilderExt, PermissionsExt},
     path::{Path, PathBuf},
 };
@@ -39,6 +39,9 @@ pub(super) async fn login(arguments: Arguments) -> anyhow::Result<Exit> {
     let owner = me["owner"].as_str().unwrap_or_default();
     let scopes = me["scopes"].as_array().into_iter().flatten();
     let scopes: Vec<&str> = scopes.filter_map(Value::as_str).collect();
+    if env::var_os("SIGNORINI_TOKEN").is_some_and(|token| !token.is_empty()) {
+        eprintln!("signorini: SIGNORINI_TOKEN is set, and goes before the token that is kept");
+    }
     eprintln!(
         "{url}: the token of {owner}, for {}, is kept in {}",
         scopes.join(","),
@@ -69,8 +72,14 @@ pub(super) fn logout(arguments: Arguments) -> anyhow::Result<Exit> {
 ///
 /// The file cannot be read, or others can read it.
 pub(super) fn token_for(url: &str) -> anyhow::Result<Option<String>> {
-    // without a home there is no file
+    // without a home, or with a file that cannot be read, there is none; a file that others can read is refused if it has it
     let Ok(path) = file() else { return Ok(None) };
+    let Ok(text) = fs::read_to_string(&path) else {
+        return Ok(None);
+    };
+    if !text.contains(&format!("{url:?}")) {
+        return Ok(None);
+    }
     Ok(kept(&path)?.remove(url))
 }
 
@@ -81,13 +90,14 @@ fn read() -> anyhow::Result<String> {
         eprint!("Token: ");
         text = console::Term::stderr().read_secure_line()?;
     } else {
-        io::stdin().read_line(&mut text)?;
+        let most = LONGEST as u64 + 2;
+        io::BufReader::new(io::stdin().take(most)).read_line(&mut text)?;
     }
     let token = text.trim();
     ensure!(!token.is_empty(), "there is no token on standard input");
     ensure!(
         token.len() <= LONGEST && token.bytes().all(|byte| byte.is_ascii_graphic()),
-        "the token has characters that no token has: was it copied whole, and nothing else?"
+        "this is no token: it is too long, or has characters that no token has; was it copied whole, and nothing else?"
     );
     Ok(token.to_owned())
 }
@@ -104,11 +114,15 @@ fn file() -> anyhow::Result<PathBuf> {
 }
 
 fn kept(path: &Path) -> anyhow::Result<BTreeMap<String, String>> {
-    let text = match fs::read_to_string(path) {
+    let mut file = match fs::File::open(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(BTreeMap::new()),
-        text => text.with_context(|| path.display().to_string())?,
+        file => file.with_context(|| path.display().to_string())?,
     };
-    let mode = fs::metadata(path)?.permissions().mode();
+    // of the file that is read, whatever takes its place meanwhile
+    let mode = file.metadata()?.permissions().mode();
+    let mut text = String::new();
+    file.read_to_string(&mut text)
+        .with_context(|| path.display().to_string())?;
     ensure!(
         mode & 0o077 == 0,
         "others can read {}, which has tokens: chmod 600 {0}, and rotate them (`signorini token rotate`)",

@@ -97,13 +97,18 @@ pub(super) fn headline(job: &Job) -> Option<String> {
         )
     });
     // of the first contact: others are in the result
-    let forces = forces.take(2).map(|q| {
+    let first = job.quantities.first().map(|q| q.contact.as_str());
+    let forces = forces.filter(|q| Some(q.contact.as_str()) == first);
+    let forces = forces.map(|q| {
         let name = <&str>::from(q.quantity).replace('_', " ");
         let error = q.error.map_or(String::new(), |e| format!(" ± {e:.1e}"));
         format!("{name} {}{error}", number(q.value))
     });
     let forces: Vec<String> = forces.collect();
-    Some(format!("{verdict}: {}", forces.join(", ")))
+    Some(match &forces[..] {
+        [] => verdict.to_owned(),
+        forces => format!("{verdict}: {}", forces.join(", ")),
+    })
 }
 
 /// Writes the summary of a result and the summaries of its load steps, each after the name of its step.

@@ -102,6 +102,7 @@ impl Checks {
             ));
         }
         obstacle?;
+        let corners: Vec<u32> = edges.iter().flat_map(|edge| [edge[0], edge[1]]).collect();
         let (run, cut) = self.facing_run(mesh, edges, held, contact, &pointer)?;
         let mut boundary =
             ContactBoundary::new(mesh, &run.chain, run.start, held, |x| section.depth(x));
@@ -116,6 +117,7 @@ impl Checks {
             Some(direction) => push_along(direction, &boundary),
             None => turned,
         };
+        let nodes = [boundary.nodes[0], boundary.nodes[boundary.nodes.len() - 1]];
         Ok(ContactModel {
             name: contact.boundary.clone(),
             pointer,
@@ -136,10 +138,7 @@ impl Checks {
             tangential_displacement: contact.tangential_displacement,
             normal: contact.normal,
             condition: contact.condition,
-            by_points: matches!(
-                contact.obstacle,
-                Obstacle::Table { .. } | Obstacle::Polyline { .. }
-            ),
+            last_points: ends_inside(&corners, &nodes, &contact.obstacle),
             power: contact.obstacle.power(),
             friction,
         })
@@ -632,4 +631,11 @@ fn push_along([x, y]: [f64; 2], boundary: &ContactBoundary) -> Vec<[f64; 2]> {
         ]
     };
     (0..boundary.nodes.len()).map(parts).collect()
+}
+/// Whether an obstacle that is given by points ends at these two nodes, which are the ends of a contact: the boundary goes
+/// on there. `corners`: the ends of all edges of the boundary.
+fn ends_inside(corners: &[u32], nodes: &[u32; 2], obstacle: &Obstacle) -> [bool; 2] {
+    let by_points = matches!(obstacle, Obstacle::Table { .. } | Obstacle::Polyline { .. });
+    let sides = |node: u32| corners.iter().filter(|corner| **corner == node).count();
+    nodes.map(|node| by_points && sides(node) > 1)
 }

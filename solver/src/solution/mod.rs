@@ -410,14 +410,18 @@ impl WarningCode {
             | UniquenessUnknown
             | RoundingLimitsResidual
             | SmoothingFlattens
+            | LinesInside
+            | SupportsOverlap
+            | DeckDiffers
+            | StripCutsPolyline
+            | ObstacleCutsEdge
+            | RadiusExceedsContact
+            | OscillatingStick
             | MeshTooCoarseForContact
             | MeshTooCoarseForRadius => Severity::Warning,
-            LinesInside | SupportsOverlap | CentreNodesDropped | ElementsReversed
-            | RaisedToSecondOrder | RigidElementsLeftOut | DeckDiffers | StripCutsPolyline
-            | ObstacleCutsEdge | ContactTurns | KinkInContact | SharpEdge | MaterialJunction
-            | RadiusExceedsContact | CohesionJumps | OscillatingStick | SlowContraction => {
-                Severity::Note
-            }
+            CentreNodesDropped | ElementsReversed | RaisedToSecondOrder | RigidElementsLeftOut
+            | ContactTurns | KinkInContact | SharpEdge | MaterialJunction | CohesionJumps
+            | SlowContraction => Severity::Note,
         }
     }
 }

@@ -30,11 +30,19 @@ def _kept_token(url: str) -> str:
     folder = os.environ.get("XDG_CONFIG_HOME") or os.path.join(os.path.expanduser("~"), ".config")
     path = pathlib.Path(folder, "signorini", "tokens.json")
     try:
-        if path.stat().st_mode & 0o077:
-            raise ValueError(f"others can read {path}, which has tokens: chmod 600 {path}, and rotate them")
-        kept = json.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        mode = path.stat().st_mode
     except OSError:
         return ""
+    # a file that has nothing for this service stops nobody
+    if json.dumps(url) not in text:
+        return ""
+    if mode & 0o077:
+        raise ValueError(f"others can read {path}, which has tokens: chmod 600 {path}, and rotate them")
+    try:
+        kept = json.loads(text)
+    except ValueError as error:
+        raise ValueError(f"{path} is not what `signorini login` wrote: {error}") from None
     return str(kept.get(url, "")) if isinstance(kept, dict) else ""
 
 

@@ -83,7 +83,8 @@ class Client:
         """A service of one's own, which starts now and stops with this client, or at the end of the program.
 
         data: folder of its store; absent: a temporary one, so that its jobs are gone with it
-        binary: the program; absent: the environment variable SIGNORINI_BINARY, or `signorini` in PATH
+        binary: the program; absent: the environment variable SIGNORINI_BINARY, the program that was installed with this
+            package, or `signorini` in PATH
         workers: how many jobs it solves at the same time
         options: further options of `signorini serve`
         """

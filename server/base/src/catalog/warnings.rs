@@ -109,7 +109,7 @@ const REASONS: &[(WarningCode, &str, &str)] = &[
         "The last point of the obstacle is pressed. If the real surface goes on there, it would press too: the force is too small, and the pressure has a peak that does not exist.",
         "Give more points, or push less. If the surface really ends there, the edge is sharp, and the peak of the pressure has no limit."),
     (WarningCode::SharpEdge,
-        "At a sharp edge of a rigid obstacle linear elasticity has no largest pressure: on each finer mesh its value is larger. Forces converge, and so does σ_t with nonlocal_radius > 0, since that averages the pressure.",
+        "At a sharp edge of a rigid obstacle, or of the body, linear elasticity has no largest pressure: on each finer mesh its value is larger. Forces converge, and so does σ_t with nonlocal_radius > 0, since that averages the pressure.",
         "Nothing: this belongs to the problem. Quote forces and σ_t, not the peak of σ_n. A real edge has a radius: `rounded_flat` models it."),
     (WarningCode::FrictionLostAtEnd,
         "Near an end of the contact boundary part of the averaged pressure lies beyond it, where nothing can carry friction. The total friction force is then less than μ times the normal force even where everything slides.",

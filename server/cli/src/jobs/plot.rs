@@ -157,7 +157,8 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
 
 /// Draws figures below each other, as wide as the terminal.
 pub(super) fn draw_all(figures: &[Chart]) -> String {
-    let in_colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+    let in_colour = std::io::stdout().is_terminal()
+        && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
     let width = console::Term::stdout()
         .size_checked()
         .map_or(SIZE.0, |(_, columns)| columns.clamp(40, 120));

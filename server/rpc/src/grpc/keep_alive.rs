@@ -52,11 +52,12 @@ impl Numbered for SweepEvent {
     }
 }
 
-/// The stream with a message after each pause.
+/// The stream with a message after each pause. `after`: the number after which the stream begins.
 pub(super) fn kept_alive<T: Numbered + Send + 'static>(
+    after: i64,
     messages: impl Stream<Item = Result<T, Status>> + Send + 'static,
 ) -> Messages<T> {
-    let begin = (messages.boxed(), 0);
+    let begin = (messages.boxed(), after);
     unfold(begin, |(mut messages, seq)| async move {
         let next = match timeout(PAUSE, messages.next()).await {
             Ok(next) => next?,
@@ -81,7 +82,7 @@ mod tests {
             ..Event::default()
         };
         let begun = tokio::time::Instant::now();
-        let mut messages = kept_alive(stream::iter([Ok(first)]).chain(stream::pending()));
+        let mut messages = kept_alive(3, stream::iter([Ok(first)]).chain(stream::pending()));
         let mut seen = vec![];
         for _ in 0..3 {
             let message: Event = messages.next().await.unwrap().unwrap();
@@ -89,11 +90,15 @@ mod tests {
         }
         let alive = || Some(OfJob::KeepAlive(KeepAliveEvent {}));
         assert_eq!(seen, [(0, 7, None), (15, 7, alive()), (30, 7, alive())]);
+        // a client that resumes and hears nothing keeps its place
+        let mut silent = kept_alive(7, stream::pending());
+        let message: Event = silent.next().await.unwrap().unwrap();
+        assert_eq!((message.seq, message.payload), (7, alive()));
     }
 
     #[tokio::test(start_paused = true)]
     async fn a_stream_that_ends_ends() {
-        let messages = kept_alive(stream::iter([Ok(SweepEvent::default())]));
+        let messages = kept_alive(0, stream::iter([Ok(SweepEvent::default())]));
         assert_eq!(messages.count().await, 1);
     }
 }

@@ -97,7 +97,7 @@ impl JobService for Grpc {
         let id = submitted.accepted.id;
         let events = watch::watch(&self.service, &caller, id, 0).await?;
         Ok(noting_replay(
-            Response::new(messages(events)),
+            Response::new(messages(0, events)),
             submitted.replayed,
         ))
     }
@@ -208,7 +208,7 @@ impl JobService for Grpc {
         let (caller, request) = caller_and_message(request)?;
         let (after, id) = (AFTER_SEQ.check(request.after_seq)?, ID.read(&request.id)?);
         let events = watch::watch(&self.service, &caller, id, after).await?;
-        Ok(Response::new(messages(events)))
+        Ok(Response::new(messages(after, events)))
     }
 
     async fn get_result(&self, request: Request<pb::GetResultRequest>) -> Reply<pb::Result> {
@@ -609,7 +609,7 @@ impl JobService for Grpc {
         let events = sweeps::watch(&self.service, &caller, id, after).await?;
         let events = futures_util::stream::iter(events).flatten();
         let events = events.map(|event| event.map(Into::into).map_err(Into::into));
-        Ok(Response::new(kept_alive(events)))
+        Ok(Response::new(kept_alive(after, events)))
     }
 
     async fn cancel_sweep(&self, request: Request<pb::CancelSweepRequest>) -> Reply<pb::Sweep> {
@@ -654,6 +654,7 @@ fn marked<T>(answer: T, available: ResultAvailable) -> Response<T> {
 
 /// Converts events to messages; `None` becomes a stream that has ended.
 fn messages(
+    after: i64,
     events: Option<impl Stream<Item = Result<Arc<StoredEvent>, ApiError>> + Send + 'static>,
 ) -> EventStream {
     let message = |event: Result<Arc<StoredEvent>, ApiError>| {
@@ -661,7 +662,7 @@ fn messages(
         Ok(event.into())
     };
     let events = futures_util::stream::iter(events).flatten();
-    kept_alive(events.map(message))
+    kept_alive(after, events.map(message))
 }
 
 impl Grpc {

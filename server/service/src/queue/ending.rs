@@ -11,7 +11,7 @@ use base::{
 use serde::{Deserialize, Serialize};
 use solver::{
     error::{SolveError, shortened},
-    solution::{Outcome, Summary, Warning},
+    solution::{EstimatedQuantity, Outcome, Summary, Warning},
 };
 use store::{Ending, Overview, Parts};
 use tracing::{debug, error};
@@ -78,17 +78,23 @@ fn worst(warnings: &[Warning]) -> Vec<Warning> {
     found.into_iter().take(MOST_WARNINGS).map(short).collect()
 }
 
-/// The largest number of quantities that are stored with a job.
+/// The largest number of quantities that are stored with a job, and of characters of a contact's name in them: jobs are
+/// read in lists of a thousand.
 const MOST_QUANTITIES: usize = 10;
+const LONGEST_NAME: usize = 100;
 
 /// What the row of a job says about this result.
 fn overview(summary: &Summary) -> Overview {
     let accuracy = summary.accuracy.as_ref();
     let quantities = accuracy.map_or(&[][..], |accuracy| &accuracy.quantities);
     let shown = quantities.iter().filter(|q| !q.quantity.is_extent());
+    let short = |q: &EstimatedQuantity| EstimatedQuantity {
+        contact: shortened(&q.contact, LONGEST_NAME),
+        ..q.clone()
+    };
     Overview {
         verdict: accuracy.map(|accuracy| accuracy.verdict),
-        quantities: shown.take(MOST_QUANTITIES).cloned().collect(),
+        quantities: shown.take(MOST_QUANTITIES).map(short).collect(),
         warnings: worst(&summary.warnings),
     }
 }
@@ -146,6 +152,7 @@ pub(super) fn ending_of_attempt(
                 },
                 Status::Succeeded if unfinished => Ending {
                     result: ResultAvailable::Partial,
+                    overview: ending.overview,
                     ..stopped_for(job, stopped)
                 },
                 _ => ending,

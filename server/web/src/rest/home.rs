@@ -1,6 +1,6 @@
 //! `/`: a page for a person who opens the address of the service in a browser: the last jobs with their verdicts and
 //! figures, and where to go on. It has no script, and refers to other resources by relative addresses, so that it works
-//! behind any path prefix.
+//! behind any path prefix that ends with a slash.
 
 use std::fmt::Write;
 
@@ -73,7 +73,7 @@ fn html(jobs: &[Job]) -> String {
             let _ = write!(
                 page,
                 "<a href=v1/jobs/{id}/plots/profile.svg><img loading=lazy alt=\"stresses along the contact of {name}\" \
-                 src=v1/jobs/{id}/plots/profile.svg?size=column></a>"
+                 src=\"v1/jobs/{id}/plots/profile.svg?size=column\"></a>"
             );
         }
         page.push_str("</li>");

@@ -2,6 +2,8 @@
 //! schema of a problem in full. Where the dialect cannot say something, such as which fields exclude each other, the
 //! description says it, and the service checks it.
 
+use std::collections::BTreeSet;
+
 use schemars::{
     Schema,
     transform::{
@@ -12,34 +14,53 @@ use serde_json::{Value, json};
 
 /// Brings every schema of an OpenAPI document to the dialect of OpenAPI 3.0.
 pub(super) fn simplify(document: &mut Value) {
-    let Value::Object(members) = document else {
-        if let Value::Array(items) = document {
-            items.iter_mut().for_each(simplify);
-        }
-        return;
+    let schemas = document["components"]["schemas"].as_object();
+    let are_words = |schema: &Value| {
+        let all = schema["oneOf"].as_array();
+        all.is_some_and(|all| all.iter().all(|one| one["const"].is_string()))
     };
-    for (name, value) in members {
-        match (name.as_str(), value) {
-            ("schema", schema) => schema_in_dialect(schema),
-            ("schemas", Value::Object(all)) => all.values_mut().for_each(schema_in_dialect),
-            // not schemas, whatever their names
-            ("example", _) => {}
-            (_, other) => simplify(other),
-        }
-    }
+    let of_words = schemas.into_iter().flatten();
+    let of_words = of_words.filter(|(_, schema)| are_words(schema));
+    let of_words = of_words.map(|(name, _)| format!("#/components/schemas/{name}"));
+    let mut dialect = Dialect {
+        of_words: of_words.collect(),
+    };
+    dialect.simplify(document);
 }
 
-fn schema_in_dialect(value: &mut Value) {
-    let Ok(mut schema) = Schema::try_from(value.take()) else {
-        return;
-    };
-    Dialect.transform(&mut schema);
-    AddNullable::default().transform(&mut schema);
-    ReplaceConstValue::default().transform(&mut schema);
-    let mut bools = ReplaceBoolSchemas::default();
-    bools.skip_additional_properties = true;
-    bools.transform(&mut schema);
-    *value = schema.to_value();
+impl Dialect {
+    fn simplify(&mut self, document: &mut Value) {
+        let Value::Object(members) = document else {
+            if let Value::Array(items) = document {
+                items.iter_mut().for_each(|item| self.simplify(item));
+            }
+            return;
+        };
+        for (name, value) in members {
+            match (name.as_str(), value) {
+                ("schema", schema) => self.schema(schema),
+                ("schemas", Value::Object(all)) => {
+                    all.values_mut().for_each(|one| self.schema(one))
+                }
+                // not schemas, whatever their names
+                ("example", _) => {}
+                (_, other) => self.simplify(other),
+            }
+        }
+    }
+
+    fn schema(&mut self, value: &mut Value) {
+        let Ok(mut schema) = Schema::try_from(value.take()) else {
+            return;
+        };
+        self.transform(&mut schema);
+        AddNullable::default().transform(&mut schema);
+        ReplaceConstValue::default().transform(&mut schema);
+        let mut bools = ReplaceBoolSchemas::default();
+        bools.skip_additional_properties = true;
+        bools.transform(&mut schema);
+        *value = schema.to_value();
+    }
 }
 
 /// Keywords that OpenAPI 3.0 does not have.
@@ -56,18 +77,34 @@ const UNKNOWN: [&str; 10] = [
     "examples",
 ];
 
-/// What the transforms of the library do not do.
-struct Dialect;
+/// The changes to a schema that are not among the library's transforms.
+struct Dialect {
+    /// References to schemas whose values are words.
+    of_words: BTreeSet<String>,
+}
 
 impl Transform for Dialect {
     fn transform(&mut self, schema: &mut Schema) {
         for name in UNKNOWN {
             schema.remove(name);
         }
-        // the same schema may follow a reference or stand beside it only in later versions
+        // Beside a reference nothing else may stand. A description and a default can, around it; generators read that
+        // where the other schema is an enum, and stumble where it is an object.
         if let Some(reference) = schema.remove("$ref") {
-            *schema = Schema::default();
-            schema.insert("$ref".into(), reference);
+            let beside = std::mem::take(schema);
+            let is_word = reference
+                .as_str()
+                .is_some_and(|name| self.of_words.contains(name));
+            if is_word
+                && beside
+                    .as_object()
+                    .is_some_and(|members| !members.is_empty())
+            {
+                *schema = beside;
+                schema.insert("allOf".into(), json!([{ "$ref": reference }]));
+            } else {
+                schema.insert("$ref".into(), reference);
+            }
             return;
         }
         words(schema);
@@ -186,6 +223,24 @@ mod tests {
         assert_eq!(
             simple(json!({"type": ["number", "null"], "exclusiveMinimum": 0})),
             json!({"type": "number", "nullable": true, "minimum": 0, "exclusiveMinimum": true})
+        );
+    }
+
+    #[test]
+    fn a_reference_keeps_its_description_where_it_is_to_words() {
+        let field = |name: &str| json!({"$ref": format!("#/components/schemas/{name}"), "description": "Which.", "default": "s"});
+        let mut document = json!({"components": {"schemas": {
+            "Size": {"oneOf": [{"const": "s", "type": "string"}]},
+            "Object": {"type": "object"},
+            "Fields": {"type": "object", "properties": {"size": field("Size"), "object": field("Object")}},
+        }}});
+        simplify(&mut document);
+        assert_eq!(
+            document["components"]["schemas"]["Fields"]["properties"],
+            json!({
+                "size": {"allOf": [{"$ref": "#/components/schemas/Size"}], "description": "Which.", "default": "s"},
+                "object": {"$ref": "#/components/schemas/Object"},
+            })
         );
     }
 

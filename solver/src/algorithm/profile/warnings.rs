@@ -172,7 +172,7 @@ impl PatchView<'_> {
         for end in [0, self.count() - 1].into_iter().filter(sharp) {
             let limits = "the pressure grows without limit as the mesh is refined: forces converge, and σ_t does for nonlocal_radius > 0, but the peak of σ_n does not";
             let at = s[end];
-            if contact.by_points {
+            if contact.last_points[usize::from(end > 0)] {
                 warn(
                     WarningCode::ContactReachesObstacleEnd,
                     format!(

@@ -250,7 +250,7 @@ async fn get_metrics(call: Call) -> Result<impl IntoResponse, ApiError> {
     let accepted = accepted(&call.headers);
     let [open, older] = [OPENMETRICS, "text/plain"].map(|format| weight(&accepted, media(format)));
     // Prometheus names both, the one that it prefers first; `*/*` is no wish for either
-    let (text, format) = if open.1 > 1 && open > older {
+    let (text, format) = if open.0 > 0.0 && open.1 > 1 && open > older {
         (text, OPENMETRICS)
     } else {
         (in_older_format(&text), PROMETHEUS_TEXT)
