@@ -113,13 +113,8 @@ async fn a_browser_finds_a_page_with_the_last_jobs() {
         )),
         "{html}"
     );
-    let figure = html
-        .split("src=")
-        .nth(1)
-        .unwrap()
-        .split('>')
-        .next()
-        .unwrap();
+    let figure = html.split("src=\"").nth(1).unwrap();
+    let figure = figure.split('"').next().unwrap();
     let figure = server.get(&format!("/{figure}")).send().await.unwrap();
     assert_eq!(figure.headers()["content-type"], "image/svg+xml");
 }
