@@ -7,6 +7,7 @@
 //! | commands of the service | `serve`, `token`, `backup`, `restore`, `doctor`, `health`, `config` |
 //! | settings of `serve` and their sources | `settings` |
 //! | commands without a service | `solve`, `sweep`, `demo`, `explain` |
+//! | tokens for services | `login`, `kept_tokens` |
 //! | commands for a running service | `jobs` |
 //! | calls of the service and its refusals | `service`, `client` |
 //! | certificates that client commands trust | `pinned` |
@@ -27,6 +28,7 @@ mod exit;
 mod explain;
 mod health;
 mod jobs;
+mod kept_tokens;
 mod log;
 mod log_line;
 mod login;

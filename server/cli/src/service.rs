@@ -18,7 +18,7 @@ use uuid::Uuid;
 
 use super::{
     client::{self, Proxy, Trust, Way},
-    login,
+    kept_tokens,
 };
 
 /// The header by which a repeated submission finds the job that the first submission created.
@@ -135,7 +135,7 @@ impl Service {
         let token = std::env::var("SIGNORINI_TOKEN").ok();
         let token = match token.filter(|token| !token.is_empty()) {
             Some(token) => Some(token),
-            None => login::token_for(url.trim_end_matches('/'))?,
+            None => kept_tokens::token_for(url.trim_end_matches('/'))?,
         };
         Service::with_token(url, trust, token)
     }
