@@ -26,7 +26,7 @@ PING_S = 15.0
 
 
 def _kept_token(url: str) -> str:
-    """The token that `signorini login` has kept for a service; empty if there is none. ValueError: others can read it."""
+    """The token that `signorini login` has kept for a service, or an empty text. ValueError: others can read it."""
     folder = os.environ.get("XDG_CONFIG_HOME") or os.path.join(os.path.expanduser("~"), ".config")
     path = pathlib.Path(folder, "signorini", "tokens.json")
     try:
