@@ -184,12 +184,13 @@ fn parameter(parameter: &Description) -> Value {
 fn content(generator: &mut SchemaGenerator, body: &Content, example: Option<&Value>) -> Value {
     let by_media = body.iter().map(|(media, schema)| {
         let schema = schema(generator).to_value();
-        // what is not described is a file
-        let mut described = if schema == json!({}) {
-            json!({ "schema": { "type": "string", "format": "binary" } })
-        } else {
-            json!({ "schema": schema })
+        // what has no schema is a document, or else a file
+        let schema = match (schema == json!({}), *media) {
+            (false, _) => schema,
+            (true, "application/json") => json!({ "type": "object" }),
+            (true, _) => json!({ "type": "string", "format": "binary" }),
         };
+        let mut described = json!({ "schema": schema });
         if let Some(example) = example {
             described["example"] = example.clone();
         }
