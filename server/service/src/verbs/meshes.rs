@@ -63,7 +63,7 @@ impl Values for Hashes {
 
 /// Stores a mesh file that arrives in pieces; returns whether it is new. The file is streamed to the disk
 /// and from there through the reader: only the parsed mesh is held in memory. `declared`: the number of bytes that the
-/// client says it will send, by which a file that the owner has no room for is refused before it is read.
+/// client says it will send (compressed, if the body is); a file larger than the owner's whole share is refused by it unread.
 pub async fn upload(
     service: &Arc<Service>,
     caller: &Caller,
