@@ -139,7 +139,7 @@ pub(super) fn remove(tx: &Connection, ids: &[i64]) -> Result<usize> {
 }
 
 /// Writes pieces of content, numbered from `first`; returns the content's id. Pieces that were written before, and that
-/// a disk has changed since, are written again.
+/// a disk has changed since, are written again, but not a piece of other content that a damaged index names.
 pub(super) fn write_pieces(
     tx: &Connection,
     content: &Fingerprint,
@@ -150,7 +150,8 @@ pub(super) fn write_pieces(
     for (number, piece) in (first as i64..).zip(pieces) {
         tx.run(
             "insert into content_piece (content, piece, body) values (?, ?, ?)
-             on conflict do update set body = excluded.body where body <> excluded.body",
+             on conflict do update set body = excluded.body
+                 where content = excluded.content and piece = excluded.piece and body <> excluded.body",
             params![id, number, piece.as_ref()],
         )?;
     }
@@ -365,15 +366,24 @@ impl Content {
         }
     }
 
-    /// The piece with this number, counted from 0. It is not verified: the hash is that of the whole content, which
-    /// `read` and `check` compare.
+    /// The piece with this number, counted from 0. Its body is not verified: the hash is that of the whole content, which
+    /// `read` and `check` compare. The index may be damaged, and name a piece of other content: what the row itself says is
+    /// compared, which is read by its number and without the index.
     pub(super) fn piece(&self, connection: &Connection, number: usize) -> Result<Vec<u8>> {
-        let body = "select body from content_piece where content = ? and piece = ?";
-        // a text, too: only its hash tells whether it is as it was written
-        let body = connection.row(body, (self.id, number as i64), |row| {
-            Ok(row.get_ref(0)?.as_bytes()?.to_vec())
+        let piece = "select body, content = ?1 and piece = ?2 from content_piece not indexed
+                     where rowid = (select rowid from content_piece where content = ?1 and piece = ?2)";
+        let piece = connection.row(piece, (self.id, number as i64), |row| {
+            // a text, too: only its hash tells whether it is as it was written
+            Ok((row.get_ref(0)?.as_bytes()?.to_vec(), row.get(1)?))
         })?;
-        body.ok_or_else(|| self.record.clone().damaged("a piece is missing"))
+        match piece {
+            Some((body, true)) => Ok(body),
+            Some((_, false)) => Err(self
+                .record
+                .clone()
+                .damaged("a piece belongs to other content")),
+            None => Err(self.record.clone().damaged("a piece is missing")),
+        }
     }
 }
 

@@ -5,7 +5,7 @@
 
 use std::{collections::BTreeSet, path::Path};
 
-use base::job::{Job, ResultAvailable};
+use base::job::Job;
 use rusqlite::{Connection, Row};
 
 use super::{
@@ -395,12 +395,6 @@ fn check_parts(source: &Connection, job: &Job) -> Result<()> {
             Record::of_job(job.key, "events").damaged("the last event is not the end of the job")
         );
     }
-    match job.result_available {
-        ResultAvailable::None => Ok(()),
-        ResultAvailable::Partial | ResultAvailable::Final => {
-            let missing = || Record::of_job(job.key, "result").damaged("it is missing");
-            let result = StoredResult::of(source, job.key)?;
-            result.ok_or_else(missing)?.check(source)
-        }
-    }
+    let result = StoredResult::of(source, job.key)?;
+    result.map_or(Ok(()), |result| result.check(source))
 }

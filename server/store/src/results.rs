@@ -15,6 +15,7 @@ use super::{
     parts::{Entry, HEADER_BYTES, Parts, index_bytes, read_index},
     rows::is_current,
     sizes,
+    sql::Sql,
 };
 
 impl Store {
@@ -84,13 +85,11 @@ impl Store {
     pub async fn part_memory(self: &Arc<Self>, key: i64, part: &str) -> Result<Option<usize>> {
         let part = part.to_owned();
         self.read(move |store, connection| {
-            let Some(found) = StoredResult::of(connection, key)? else {
+            let tx = connection.unchecked_transaction()?;
+            let Some(found) = StoredResult::of(&tx, key)? else {
                 return Ok(None);
             };
-            if part == name::FIELDS && found.fields().is_none() {
-                found.must_have_no_fields(connection)?;
-            }
-            found.memory_to_read(connection, &store.intact, &part)
+            found.memory_to_read(&tx, &store.intact, &part)
         })
         .await
     }
@@ -122,6 +121,11 @@ pub(super) fn remove(tx: &Connection, key: i64) -> Result<()> {
     content::detach(tx, Holder::Job(key), &name::OF_RESULT)
 }
 
+fn has_result(connection: &Connection, key: i64) -> Result<bool> {
+    let available = "select exists (select 1 from job where id = ? and result_available <> 'none')";
+    connection.value(available, [key])
+}
+
 /// The result of a job as it is stored: the index was read, the parts were not.
 pub(super) struct StoredResult {
     key: i64,
@@ -134,10 +138,16 @@ pub(super) struct StoredResult {
 }
 
 impl StoredResult {
-    /// The result of a job, if it has one.
+    /// The result of a job, if it has one; an error if its row says that it has one, and none is attached. The
+    /// connection is in a transaction, so that both are of one moment.
     pub(super) fn of(connection: &Connection, key: i64) -> Result<Option<StoredResult>> {
-        let read = StoredResult::read_index(connection, key);
-        read.map_err(|error| error.reading(|| Record::of_job(key, name::RESULT)))
+        let record = || Record::of_job(key, name::RESULT);
+        let found = StoredResult::read_index(connection, key);
+        let found = found.map_err(|error| error.reading(record))?;
+        if found.is_none() && has_result(connection, key)? {
+            return Err(record().damaged("it is missing"));
+        }
+        Ok(found)
     }
 
     fn read_index(connection: &Connection, key: i64) -> Result<Option<StoredResult>> {
@@ -184,13 +194,11 @@ impl StoredResult {
         Some((self.fields.as_ref()?.id, &entry.info))
     }
 
-    /// An error if the result had fields that were not deleted: they should be attached, and are missing.
-    pub(super) fn must_have_no_fields(&self, connection: &Connection) -> Result<()> {
-        let had_some = self.find(name::FIELDS).is_some();
-        if had_some && !sizes::lost_fields(connection, self.key)? {
-            Err(self.record(name::FIELDS).damaged("it is missing"))
-        } else {
-            Ok(())
+    /// An error if the fields, which the result had and which are not attached, were not deleted.
+    fn must_be_without_fields(&self, connection: &Connection) -> Result<()> {
+        match sizes::lost_fields(connection, self.key)? {
+            true => Ok(()),
+            false => Err(self.record(name::FIELDS).damaged("it is missing")),
         }
     }
 
@@ -220,7 +228,7 @@ impl StoredResult {
             return Ok(None);
         };
         let stored = match (part, &self.fields) {
-            (name::FIELDS, None) => return Ok(None),
+            (name::FIELDS, None) => return self.must_be_without_fields(connection).map(|()| None),
             (name::FIELDS, Some(fields)) => fields.read(connection),
             _ => self.bytes(connection, place, entry.bytes),
         };
@@ -268,7 +276,7 @@ impl StoredResult {
             return Ok(None);
         };
         let (first, stored) = match (part, &self.fields) {
-            (name::FIELDS, None) => return Ok(None),
+            (name::FIELDS, None) => return self.must_be_without_fields(connection).map(|()| None),
             (name::FIELDS, Some(fields)) => {
                 // how much they take is told by their first bytes
                 intact::check(connection, intact, fields)?;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use base::{
     caller::Owners,
-    job::{Job, JobId, ResultAvailable},
+    job::{Job, JobId},
 };
 use rusqlite::Connection;
 use solver::solution::Fields;
@@ -27,7 +27,8 @@ impl Store {
     /// The size and hash of the JSON of this job's fields, if the fields were read whole and found intact before.
     pub async fn fields_info(self: &Arc<Self>, key: i64) -> Result<Option<PartInfo>> {
         self.read(move |store, connection| {
-            let found = StoredResult::of(connection, key)?;
+            let tx = connection.unchecked_transaction()?;
+            let found = StoredResult::of(&tx, key)?;
             let fields = found.as_ref().and_then(StoredResult::fields);
             let intact = fields.filter(|(content, _)| store.intact.content.contains(content));
             Ok(intact.map(|(_, info)| info.clone()))
@@ -43,14 +44,11 @@ impl Store {
     /// The fields of this job, and the size and hash of their JSON.
     pub async fn fields(self: &Arc<Self>, key: i64) -> Result<Option<(PartInfo, Fields)>> {
         self.read(move |store, connection| {
-            let Some(found) = StoredResult::of(connection, key)? else {
+            let tx = connection.unchecked_transaction()?;
+            let Some(found) = StoredResult::of(&tx, key)? else {
                 return Ok(None);
             };
-            let Some((content, _)) = found.fields() else {
-                found.must_have_no_fields(connection)?;
-                return Ok(None);
-            };
-            let Some((info, decoded)) = found.read(connection, name::FIELDS)? else {
+            let Some((info, decoded)) = found.read(&tx, name::FIELDS)? else {
                 return Ok(None);
             };
             let fields = match decoded {
@@ -58,7 +56,9 @@ impl Store {
                 Decoded::Json(json) => serde_json::from_slice(&json)
                     .map_err(|error| Record::of_job(key, name::FIELDS).damaged(error))?,
             };
-            store.intact.content.insert(content);
+            if let Some((content, _)) = found.fields() {
+                store.intact.content.insert(content);
+            }
             Ok(Some((info, fields)))
         })
         .await
@@ -180,17 +180,14 @@ impl Snapshot {
         &mut self,
         query: impl FnOnce(&StoredResult, &Connection) -> Result<T> + Send + 'static,
     ) -> Result<Option<T>> {
-        let (key, available) = (self.job.key, self.job.result_available);
+        let key = self.job.key;
         self.read(move |stored| {
             let connection = stored.moment.connection()?;
             if stored.result.is_none() {
                 stored.result = StoredResult::of(connection, key)?;
             }
-            match &stored.result {
-                Some(result) => query(result, connection).map(Some),
-                None if available == ResultAvailable::None => Ok(None),
-                None => Err(Record::of_job(key, name::RESULT).damaged("it is missing")),
-            }
+            let result = stored.result.as_ref();
+            result.map(|result| query(result, connection)).transpose()
         })
         .await
     }
