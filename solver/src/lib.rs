@@ -58,6 +58,7 @@
 //! | summary, profiles and fields of a result: how they are computed | `algorithm/report.rs`, `algorithm/profile` |
 //! | stated errors by estimation, and the verdict | `accuracy` |
 //! | errors by a second solution on the refined mesh | `verify.rs` |
+//! | errors by the noise of measured obstacles | `measured.rs`, `accuracy/measurement.rs` |
 //! | adaptive refinement | `adapt`, `origins.rs` |
 //! | names of the first mesh on a refined one | `mesh/lineage.rs`, `mesh/first.rs`, `model/nodes.rs` |
 //! | many problems on one body, each solved from a neighbour | `family.rs`, `model/variable.rs`, `algorithm/neighbour.rs` |
@@ -108,6 +109,9 @@ pub mod origins;
 
 // Load steps, one after the other.
 pub mod steps;
+
+// The errors by the noise of a measured obstacle.
+pub mod measured;
 
 // The errors by solving on the mesh split in two.
 pub mod verify;
@@ -189,6 +193,7 @@ pub fn solve_with_mesh(
     if let Some(verification) = verification {
         verification.verify(problem, &mesh, &mut solution, observer);
     }
+    measured::add_error(problem, &mesh, &mut solution, observer);
     Ok((solution, mesh))
 }
 

@@ -38,7 +38,8 @@ pub enum Phase {
     Iterate,
     /// Back-substitution; computing stresses and profiles.
     Recover,
-    /// Solving once more on the refined mesh, with `"accuracy": "verify"` only.
+    /// Solving again to find errors: on the refined mesh with `"accuracy": "verify"`, for other profiles with a measured
+    /// obstacle.
     Verify,
 }
 

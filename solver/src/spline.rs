@@ -148,6 +148,39 @@ pub fn smoothed(x: &[f64], y: &[f64], deviation: f64) -> Vec<f64> {
     parabola.iter().zip(f).map(|(p, f)| p + f).collect()
 }
 
+/// The standard deviation of the noise of values `y` at the places `x`, whatever their smooth shape, by the distance of each
+/// value from the cubic through two neighbours on either side; and its own relative standard deviation. `None` of fewer
+/// than [`FEWEST_SCATTERED`] values.
+pub fn scatter(x: &[f64], y: &[f64]) -> Option<[f64; 2]> {
+    if x.len() < FEWEST_SCATTERED {
+        return None;
+    }
+    let square = |i: usize| {
+        let near = [i - 2, i - 1, i + 1, i + 2];
+        let weight = |j: usize| {
+            let others = near.iter().filter(|k| **k != j);
+            others
+                .map(|&k| (x[i] - x[k]) / (x[j] - x[k]))
+                .product::<f64>()
+        };
+        let (mut rest, mut variance) = (y[i], 1.0);
+        for j in near {
+            let weight = weight(j);
+            rest -= weight * y[j];
+            variance += weight * weight;
+        }
+        rest * rest / variance
+    };
+    let inner = 2..x.len() - 2;
+    let count = inner.len() as f64;
+    let variance = inner.map(square).sum::<f64>() / count;
+    // neighbouring distances are correlated: of even places by −0.8, 0.4, −0.11, 0.01, whose squares add up to 2.6
+    Some([variance.sqrt(), (2.6 / (2.0 * count)).sqrt()])
+}
+
+/// The fewest values of which the scatter is known well enough to be compared with anything.
+pub const FEWEST_SCATTERED: usize = 20;
+
 /// The bound of |log₂ √λ| for the weight λ of the penalty, in units of the mean spacing: far beyond the values at which
 /// 100,000 points are not smoothed at all, or to a parabola.
 const SMOOTHEST: f64 = 120.0;
@@ -352,5 +385,35 @@ mod tests {
             let f = smoothed(&x, &[0.0, 1.0, 0.0, 1.0, 0.0, 1.0], deviation);
             assert!(f.iter().all(|f| f.is_finite()), "{deviation}: {f:?}");
         }
+    }
+
+    #[test]
+    fn the_scatter_is_that_of_the_noise_whatever_the_shape() {
+        // a fixed sequence between -1 and 1, whose deviation is 1/√3
+        let mut bits = 7u64;
+        let mut noise = || {
+            bits = bits
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (bits >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        };
+        for count in [40, 400] {
+            let x: Vec<f64> = (0..count)
+                .map(|i| {
+                    let at = i as f64 / (count - 1) as f64;
+                    at + 0.3 * at * at
+                })
+                .collect();
+            let y: Vec<f64> = x
+                .iter()
+                .map(|x| 0.5 * x * x + (3.0 * x).sin() + 1e-3 * 3f64.sqrt() * noise())
+                .collect();
+            let [found, relative] = scatter(&x, &y).unwrap();
+            assert!(
+                (found / 1e-3 - 1.0).abs() < 4.0 * relative,
+                "{count}: {found}"
+            );
+        }
+        assert_eq!(scatter(&[0.0; 19], &[0.0; 19]), None);
     }
 }

@@ -39,10 +39,10 @@ fn factors(name: QuantityName) -> [f64; 2] {
 pub struct OnOtherMesh {
     name: QuantityName,
     contact: String,
-    value: f64,
+    pub(super) value: f64,
     estimable: Estimable,
     /// The number of equal parts of the contact, [`Quantity::images`].
-    images: f64,
+    pub(super) images: f64,
 }
 
 impl OnOtherMesh {
@@ -141,7 +141,7 @@ pub fn unverified(mut estimated: Accuracy, why: &str) -> Accuracy {
 }
 
 /// The quantities of one kind on another mesh, in order of arc length.
-fn of_kind<'a>(
+pub(super) fn of_kind<'a>(
     name: QuantityName,
     contact: &str,
     others: &'a [OnOtherMesh],
@@ -206,7 +206,11 @@ fn compare(
 /// Makes the error of a quantity unknown.
 fn forget_error(quantity: &mut EstimatedQuantity) {
     (quantity.error, quantity.relative) = (None, None);
-    (quantity.increments, quantity.direction) = (None, None);
+    (
+        quantity.increments,
+        quantity.direction,
+        quantity.measurement,
+    ) = (None, None, None);
 }
 
 /// Bounds an error by the difference to the refined mesh and by the estimate from the mesh of the solution.

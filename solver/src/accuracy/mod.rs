@@ -11,11 +11,13 @@
 
 mod halved;
 mod increments;
+mod measurement;
 mod singular;
 mod verdict;
 
 pub use halved::{OnOtherMesh, unverified, verified};
 pub use increments::Increments;
+pub use measurement::{add_measurement, without_measurement};
 pub use verdict::limit_by;
 
 use crate::algorithm::{
@@ -197,6 +199,7 @@ pub fn assess(
             error,
             increments: error.and(open),
             direction: error.and((linear > 0.0).then_some(linear)),
+            measurement: None,
             relative: error.and_then(|error| relative(error, scale)),
             method,
         });

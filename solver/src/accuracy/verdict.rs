@@ -38,12 +38,26 @@ pub(super) struct Unpaired {
 }
 
 /// The contribution of one quantity to the verdict.
-struct Finding {
+pub(super) struct Finding {
     /// The best verdict that the quantity permits.
-    verdict: Verdict,
+    pub(super) verdict: Verdict,
     /// The error of the quantity divided by the limit for `good`: the most serious reasons come first.
-    seriousness: f64,
-    reason: String,
+    pub(super) seriousness: f64,
+    pub(super) reason: String,
+}
+
+impl Finding {
+    /// A quantity that the noise of a measured obstacle makes or removes.
+    pub(super) fn of_noise(q: &EstimatedQuantity) -> Finding {
+        let (name, contact) = (<&str>::from(q.quantity), &q.contact);
+        Finding {
+            verdict: Verdict::Fair,
+            seriousness: 1.0,
+            reason: format!(
+                "`{name}` at contact `{contact}` has no error: profiles that could have been measured with the declared standard deviation have another number of such ends."
+            ),
+        }
+    }
 }
 
 /// The reference size, not negative, by which the error of a quantity is divided: for a force or a peak its own size;
@@ -143,7 +157,7 @@ pub fn limit_by(warnings: &[Warning], accuracy: &mut Accuracy) {
 }
 
 /// The contribution of a quantity to the verdict, by its error or because it has none; none if the error is `good`.
-fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<Finding> {
+pub(super) fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<Finding> {
     let (name, contact) = (<&str>::from(q.quantity), &q.contact);
     let [good, fair] = match q.quantity {
         QuantityName::NormalForce | QuantityName::TangentialForce | QuantityName::FrictionForce => {
@@ -225,6 +239,11 @@ fn uncertainty(q: &EstimatedQuantity, error: f64, relative: f64) -> String {
     if mostly(q.increments) {
         return of_load(
             "the load grows in too few increments: give `steps` more `increments` (without `steps` there is one), or a deck a smaller first number in the row of *STATIC",
+        );
+    }
+    if mostly(q.measurement) {
+        return of_load(
+            "the points of the obstacle are known only to their standard deviation: measure more points, or measure them more exactly",
         );
     }
     if mostly(q.direction) {

@@ -59,6 +59,8 @@ pub struct ContactModel {
     pub normal: NormalOf,
     /// The contact condition.
     pub condition: Condition,
+    /// Whether the obstacle was measured, with noise of a known standard deviation.
+    pub measured: bool,
     /// Whether each end of the contact is the last point of an obstacle that is given by points, which may go on there.
     pub last_points: [bool; 2],
     /// The exponent m if the obstacle's profile is a power |c|^m: the contact's width then grows like δ^(1/m).

@@ -138,6 +138,13 @@ impl Checks {
             tangential_displacement: contact.tangential_displacement,
             normal: contact.normal,
             condition: contact.condition,
+            measured: matches!(
+                contact.obstacle,
+                Obstacle::Table {
+                    smoothing: Some(_),
+                    ..
+                }
+            ),
             last_points: ends_inside(&corners, &nodes, &contact.obstacle),
             power: contact.obstacle.power(),
             friction,

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::{ContactModel, Model};
 use crate::error::{Reason, Violation};
-use crate::problem::{FrictionPoints, MeshSource, Problem, Refine};
+use crate::problem::{FrictionPoints, MeshSource, Problem, Refine, Smoothing};
 
 /// The cost of solving a problem on one core.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
@@ -217,6 +217,8 @@ impl Model {
         let again = u32::from(controls.check_uniqueness)
             + 2 * u32::from(controls.check_increments)
             + 2 * u32::from(self.depends_on_path());
+        let measured = self.contacts.iter().any(|contact| contact.measured);
+        let samples = u32::from(measured) * Smoothing::SAMPLES;
         let increments: f64 = self.steps.iter().map(|s| f64::from(s.increments)).sum();
         Size {
             nodes: if adaptive {
@@ -231,7 +233,7 @@ impl Model {
             contacts: self.contacts.len() as f64,
             steps: self.steps.len().max(1) as f64,
             increments: increments.max(1.0),
-            repeats: f64::from(1 + again),
+            repeats: f64::from(1 + again + samples),
         }
     }
 }

@@ -9,6 +9,7 @@ use crate::problem::{
     Obstacle, PrescribedBound, Smoothing, Transition,
 };
 use crate::solution::WarningCode;
+use crate::spline::scatter;
 
 /// The largest number of points of a table.
 const MOST_TABLE_POINTS: usize = 100_000;
@@ -21,6 +22,10 @@ const FEWEST_SMOOTHED: usize = 4;
 
 /// A standard deviation above this fraction of the range of all values can hardly be the error of a single value.
 const LARGE_DEVIATION: f64 = 0.1;
+
+/// By how many of its own standard deviations the scatter of points may differ from the declared deviation without a
+/// warning: enough for the roundness of a profile and for noise that is not quite normal.
+const MOST_SCATTER: f64 = 5.0;
 
 impl Checks {
     /// Checks the direction of a push, which must not be zero; a body of revolution is pushed along its axis.
@@ -98,7 +103,7 @@ impl Checks {
                 if let Some(smoothing) = smoothing {
                     all.check(self.smoothing(pointer, x, *interpolation, smoothing));
                     if sound.is_some() {
-                        self.warn_of_smoothing(pointer, gap, smoothing);
+                        self.warn_of_smoothing(pointer, x, gap, smoothing);
                     }
                 }
             }
@@ -200,8 +205,9 @@ impl Checks {
         all.finish(())
     }
 
-    /// Warns of a standard deviation that is probably in another unit, which would smooth any profile to a parabola.
-    fn warn_of_smoothing(&mut self, pointer: &str, gap: &[f64], smoothing: &Smoothing) {
+    /// Warns of a standard deviation that is probably in another unit, which would smooth any profile to a parabola, and of
+    /// one that differs from the scatter of the points.
+    fn warn_of_smoothing(&mut self, pointer: &str, x: &[f64], gap: &[f64], smoothing: &Smoothing) {
         let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
         let most = gap.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let (deviation, range) = (smoothing.standard_deviation, most - least);
@@ -211,7 +217,26 @@ impl Checks {
                 &format!("{pointer}/smoothing/standard_deviation"),
                 format!("The standard deviation {deviation:.3e} is more than {:.0} % of the range of all values, {range:.3e}: smoothing leaves little of the profile. It is the error of one point, in the unit of `gap`.", 100.0 * LARGE_DEVIATION),
             );
+            return;
         }
+        let Some([scatter, uncertainty]) = scatter(x, gap) else {
+            return;
+        };
+        let most = 1.0 + MOST_SCATTER * uncertainty;
+        let effect = if scatter > most * deviation {
+            "smoothing follows the noise, and the stated errors are too small. Give the deviation of the points, if the profile has no features as short as their distance"
+        } else if deviation > most * scatter {
+            "smoothing may remove parts of the profile, and the stated errors are too large, unless the errors of neighbouring points are alike. Give the deviation of the points"
+        } else {
+            return;
+        };
+        self.warn(
+            WarningCode::DeviationDiffers,
+            &format!("{pointer}/smoothing/standard_deviation"),
+            format!(
+                "The standard deviation is {deviation:.3e}, but the points scatter by {scatter:.3e} about the curve through their neighbours: {effect}."
+            ),
+        );
     }
 
     /// Checks a table: at least two strictly increasing places `x`, and one value of `y` for each.

@@ -53,7 +53,10 @@ pub enum Verdict {
 impl EstimatedQuantity {
     /// The parts of the error that a finer mesh does not reduce.
     pub fn beside_mesh(&self) -> f64 {
-        self.increments.unwrap_or(0.0) + self.direction.unwrap_or(0.0)
+        [self.increments, self.direction, self.measurement]
+            .into_iter()
+            .flatten()
+            .sum()
     }
 
     /// The part of the error due to the mesh.
@@ -97,7 +100,7 @@ pub struct EstimatedQuantity {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub order: Option<f64>,
     /// The error in the unit of the value: due to the mesh, under the incremental law also to the number of increments,
-    /// and to a `direction` of the indentation. Absent where the quantity has no limit, or the error is unknown.
+    /// to a `direction` of the indentation, and to the noise of a measured obstacle. Absent where the quantity has no limit, or the error is unknown.
     pub error: Option<f64>,
     /// The part of `error` due to the number of increments; absent where the result does not depend on increments.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -106,6 +109,9 @@ pub struct EstimatedQuantity {
     /// exact.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub direction: Option<f64>,
+    /// The part of `error` due to the standard deviation of the points of a measured obstacle; absent without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measurement: Option<f64>,
     /// The error relative to the value; for a tangential force relative to the friction force, for an extent relative
     /// to the length of the contact.
     pub relative: Option<f64>,

@@ -317,6 +317,8 @@ pub enum WarningCode {
     ObstacleCutsEdge,
     /// A standard deviation that smooths most of a measured profile away.
     SmoothingFlattens,
+    /// A standard deviation that differs from the scatter of the points of a measured profile.
+    DeviationDiffers,
     /// A contact boundary with a corner between two edges.
     ContactTurns,
     /// An obstacle that is dragged along a contact with a line of symmetry at its end.
@@ -410,6 +412,7 @@ impl WarningCode {
             | UniquenessUnknown
             | RoundingLimitsResidual
             | SmoothingFlattens
+            | DeviationDiffers
             | LinesInside
             | SupportsOverlap
             | DeckDiffers

@@ -136,7 +136,8 @@ fn solve_metered(
     let mut family = None;
     let solve = |observer: &mut dyn Observer| {
         let external = files::external_mesh(problem, mesh);
-        if is_alone(problem) || (members.is_none() && bodies.is_none()) {
+        let samples = members.is_none() && solver::measured::is_measured(problem);
+        if samples || is_alone(problem) || (members.is_none() && bodies.is_none()) {
             return solve(problem, external, observer);
         }
         let prepared = prepare(problem, external, bodies, meter, observer)?;
