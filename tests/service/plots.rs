@@ -76,6 +76,98 @@ async fn a_figure_is_also_png_and_pdf_and_is_sent_once() {
 
 /// Operations: GetPlot
 #[tokio::test]
+async fn a_bare_figure_has_nothing_around_it_and_a_slide_is_16_to_9() {
+    let server = server().await;
+    let mut problem = example_json("rectangular_punch");
+    problem["title"] = json!("A punch");
+    let id = server.submit(&problem).await;
+    server.until_done(&id).await;
+    for plot in PLOTS {
+        let drawn = async |query: &str| {
+            let path = format!("/v1/jobs/{id}/plots/{plot}.svg{query}");
+            let answer = server.get(&path).send().await.unwrap();
+            assert_eq!(answer.status(), StatusCode::OK, "{path}");
+            answer.text().await.unwrap()
+        };
+        let (full, bare) = (drawn("?style=full").await, drawn("?style=bare").await);
+        assert_eq!(full, drawn("").await);
+        for word in ["A punch", "μ = 0.3", "verdict", "Warnings", "finer meshes"] {
+            assert!(!bare.contains(word), "{plot}: {word}");
+        }
+        assert!(
+            full.contains("A punch") && bare.len() < full.len(),
+            "{plot}"
+        );
+        let slide = drawn("?size=slide").await;
+        assert!(
+            slide.starts_with(r#"<svg width="864" height="486""#),
+            "{plot}"
+        );
+    }
+}
+
+/// Operations: GetPlot
+#[tokio::test]
+async fn axes_have_the_limits_that_are_asked_for_or_all_faults_are_told() {
+    let server = server().await;
+    let id = server.submit(&example_json("rectangular_punch")).await;
+    server.until_done(&id).await;
+    let at = async |path: &str| {
+        let path = format!("/v1/jobs/{id}/plots/{path}");
+        let answer = server.get(&path).send().await.unwrap();
+        (answer.status(), answer.text().await.unwrap())
+    };
+    for path in [
+        "profile.svg?xlim=0.3,0.5&ylim=-700,10&ylim_below=-1,300",
+        "convergence.svg?xlim=1,5&ylim=1e-8,1&ylim_below=0,500",
+        "deformed.svg?xlim=0.3,0.7&ylim=-0.4,0.1",
+        "mesh.pdf?xlim=0,1&ylim=-1,0.1",
+    ] {
+        assert_eq!(at(path).await.0, StatusCode::OK, "{path}");
+    }
+    let (_, drawn) = at("profile.svg?xlim=0.3,0.5&ylim=-700,10").await;
+    assert!(
+        drawn.contains(">\n0.35\n<") && !drawn.contains(">\n0.1\n<"),
+        "{drawn}"
+    );
+    for (path, words) in [
+        (
+            "profile.svg?xlim=2,1&ylim=0,nan&ylim_below=a",
+            vec![
+                "xlim: expected two finite numbers",
+                "; ylim: ",
+                "; ylim_below: ",
+            ],
+        ),
+        (
+            "convergence.svg?xlim=1&ylim=-1,1",
+            vec!["xlim: ", "; ylim: the axis of residuals"],
+        ),
+        (
+            "mesh.svg?ylim_below=0,1",
+            vec!["ylim_below: it is for the lower panels"],
+        ),
+    ] {
+        let (status, text) = at(path).await;
+        assert_eq!(status, StatusCode::BAD_REQUEST, "{path}");
+        let error: Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(error["code"], "bad-parameter");
+        let detail = error["detail"].as_str().unwrap();
+        assert!(words.iter().all(|word| detail.contains(word)), "{detail}");
+    }
+    // what can be read and has nothing to show
+    for path in [
+        "profile.svg?xlim=70,80",
+        "deformed.svg?xlim=0,0.001&ylim=-4,0",
+    ] {
+        let (status, text) = at(path).await;
+        assert_eq!(status, StatusCode::NOT_FOUND, "{path}");
+        assert!(text.contains("xlim"), "{text}");
+    }
+}
+
+/// Operations: GetPlot
+#[tokio::test]
 async fn a_load_step_has_figures_of_its_own() {
     let server = server().await;
     let mut problem = example_json("rectangular_punch");

@@ -4,9 +4,10 @@ use plotters::prelude::*;
 use plotters::style::RGBColor;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::body::{Frame, Path};
+use super::body::Frame;
 use super::numbers::{number, round_up, rounded};
 use super::page::{self, Area, Fallible, px};
+use super::region::Region;
 use super::style::Style;
 use super::theme::{ColourMap, hex};
 use solver::element::{Element, Family};
@@ -121,23 +122,23 @@ impl Bands {
         place: &dyn Fn(u32) -> [f64; 2],
         value: &dyn Fn(u32) -> f64,
     ) -> String {
-        let mut paths = vec![Path::default(); self.count()];
+        let mut regions = vec![Region::default(); self.count()];
         for element in elements {
-            self.fill_element(&mut paths, frame, element, place, value);
+            self.fill_element(&mut regions, frame, element, place, value);
         }
-        let drawn = |(k, path): (usize, &Path)| {
+        let drawn = |(k, region): (usize, Region)| {
             let colour = hex(self.colour(k));
             // a line of one pixel closes the seam between neighbours
-            path.drawn(&format!(
+            region.path().drawn(&format!(
                 r#"fill="{colour}" stroke="{colour}" stroke-width="10""#
             ))
         };
-        paths.iter().enumerate().map(drawn).collect()
+        regions.into_iter().enumerate().map(drawn).collect()
     }
 
     fn fill_element(
         &self,
-        paths: &mut [Path],
+        regions: &mut [Region],
         frame: &Frame,
         element: &Element,
         place: &dyn Fn(u32) -> [f64; 2],
@@ -160,7 +161,7 @@ impl Bands {
         let family = element.family();
         if pixels < SPECK {
             let mean = values[..nodes].iter().sum::<f64>() / nodes as f64;
-            paths[self.band(mean)].polygon(&places[..family.corners()]);
+            regions[self.band(mean)].add(places[..family.corners()].iter().copied());
             return;
         }
         let cells = ((pixels / CELL).ceil() as usize).clamp(1, MOST_CELLS);
@@ -172,30 +173,17 @@ impl Bands {
                 value: sum(&|i| values[i]),
             }
         };
-        let cells = cut(family, cells, &at);
-        let first = self.band(cells[0][0].value);
-        let mut corners = cells.iter().flatten();
-        if corners.all(|corner| self.band(corner.value) == first) {
-            let sides: Vec<_> = family
-                .sides()
-                .iter()
-                .map(|s| s.map(|i| places[i]))
-                .collect();
-            paths[first].sides(&sides, true);
-            return;
-        }
-        for cell in &cells {
-            self.fill_cell(paths, cell);
+        for cell in cut(family, cells, &at) {
+            self.fill_cell(regions, &cell);
         }
     }
 
-    /// Adds a convex cell to the paths of the bands, divided at their limits.
-    fn fill_cell(&self, paths: &mut [Path], cell: &[Corner]) {
+    /// Adds a convex cell to the regions of the bands, divided at their limits.
+    fn fill_cell(&self, regions: &mut [Region], cell: &[Corner]) {
         let bands = cell.iter().map(|corner| self.band(corner.value));
         let (low, high) = bands.fold((usize::MAX, 0), |(l, h), b| (l.min(b), h.max(b)));
-        let places = |corners: &[Corner]| corners.iter().map(|c| c.place).collect::<Vec<_>>();
         if low == high {
-            paths[low].polygon(&places(cell));
+            regions[low].add(cell.iter().map(|corner| corner.place));
             return;
         }
         // the field is linear only in a triangle
@@ -210,7 +198,7 @@ impl Bands {
                     part = clipped(&part, self.edges[band + 1], -1.0);
                 }
                 if part.len() > 2 {
-                    paths[band].polygon(&places(&part));
+                    regions[band].add(part.iter().map(|corner| corner.place));
                 }
             }
         }

@@ -6,6 +6,7 @@ use std::fmt::Write;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
+use super::limits::AxisLimits;
 use super::numbers::tick;
 use super::page::{self, Area, Fallible, draw_text, px};
 use super::style::Style;
@@ -29,6 +30,10 @@ const CAPTION: i32 = 26;
 const NARROW: i32 = 640;
 /// The largest height of the axes (pixels): if windows are one above the other, and if they are side by side.
 const HIGHEST: [f64; 2] = [430.0, 420.0];
+/// The smallest height of the axes on a slide (pixels).
+const LOWEST: i32 = 100;
+/// The largest ratio of the sides of a window that a request sets.
+const LONGEST: f64 = 20.0;
 
 /// A rectangle of the plane of the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,6 +74,24 @@ impl Window {
 
     pub(super) fn holds(&self, point: [f64; 2]) -> bool {
         (0..2).all(|a| self.low[a] <= point[a] && point[a] <= self.high[a])
+    }
+
+    /// The window with the limits that a request sets.
+    pub(super) fn limited(&self, limits: AxisLimits) -> Result<Window, String> {
+        let mut window = *self;
+        for (a, limits) in [limits.x, limits.y].into_iter().enumerate() {
+            if let Some(limits) = limits {
+                (window.low[a], window.high[a]) = (limits.range().start, limits.range().end);
+            }
+        }
+        let [w, h] = window.size();
+        if w.max(h) <= LONGEST * w.min(h) {
+            Ok(window)
+        } else {
+            Err(format!(
+                "with xlim and ylim it would be {w:.3} long and {h:.3} high; one may be at most {LONGEST} times the other: set both"
+            ))
+        }
     }
 
     /// The window enlarged on all sides by `part` times its larger side.
@@ -125,18 +148,23 @@ impl Frame {
 }
 
 /// The frames for one or two windows, and their total height (pixels). Two frames are side by side, but one below the
-/// other if the first window is wide or the page narrow.
-pub(super) fn layout(style: Style, windows: &[Window]) -> (Vec<Frame>, i32) {
+/// other if the first window is wide or the page narrow. `room`: the height that there is on a slide, where two frames
+/// are always side by side.
+pub(super) fn layout(style: Style, windows: &[Window], room: Option<i32>) -> (Vec<Frame>, i32) {
     let wide = |w: &Window| w.size()[0] > 1.7 * w.size()[1];
-    let beside = windows.len() > 1 && !wide(&windows[0]) && style.width() >= NARROW;
+    let fits = room.is_some() || (!wide(&windows[0]) && style.width() >= NARROW);
+    let beside = windows.len() > 1 && fits;
     let columns = if beside { 2 } else { 1 };
+    let highest = room.map_or(HIGHEST[columns as usize - 1], |room| {
+        f64::from((room - CAPTION - BELOW - GAP).max(LOWEST))
+    });
     let column = style.width() / columns;
     let space = f64::from(column - LEFT - RIGHT);
     let sizes: Vec<[i32; 2]> = windows
         .iter()
         .map(|window| {
             let [w, h] = window.size();
-            let scale = (space / w).min(HIGHEST[(columns - 1) as usize] / h);
+            let scale = (space / w).min(highest / h);
             [w, h].map(|side| (scale * side * f64::from(page::FINE)).round() as i32)
         })
         .collect();
@@ -238,10 +266,13 @@ impl Path {
         // writing to a string does not fail
         let _ = write!(self.0, "M{} {}l", first[0], first[1]);
         for p in rest.iter().filter(|p| *p != first) {
-            let _ = write!(self.0, "{} {} ", p[0] - here[0], p[1] - here[1]);
+            for step in [p[0] - here[0], p[1] - here[1]] {
+                // a minus sign separates, too
+                let joined = step < 0 || self.0.ends_with('l');
+                let _ = write!(self.0, "{}{step}", if joined { "" } else { " " });
+            }
             here = *p;
         }
-        self.0.pop();
         self.0.push('z');
     }
 
@@ -342,7 +373,7 @@ mod tests {
             (vec![window(4.0, 4.0), window(1.0, 1.0)], true),
             (vec![window(5.0, 1.0), window(1.0, 1.0)], false),
         ] {
-            let (frames, height) = layout(Style::default(), &windows);
+            let (frames, height) = layout(Style::default(), &windows, None);
             assert_eq!(frames[0].corner[1] == frames[1].corner[1], beside);
             for frame in &frames {
                 let [w, h] = frame.window.size();

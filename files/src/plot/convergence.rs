@@ -30,12 +30,19 @@ pub fn convergence_svg(
             .filter_map(|row| Some((f64::from(row.k), value(row)?)))
             .collect(),
     };
+    let limits = style.limits;
     let panel = |y: &str, scale: Scale, marks: Vec<(f64, String)>, curves: Vec<Curve>| Panel {
         x: "iteration".to_owned(),
         y: y.to_owned(),
         scale,
         marks,
         curves,
+        across: limits.x,
+        up: if scale == Scale::Log {
+            limits.y
+        } else {
+            limits.y_below
+        },
         ..Panel::default()
     };
     // frictionless contact has no friction points, and often no node leaves
@@ -58,10 +65,10 @@ pub fn convergence_svg(
         curve("nodes in contact", LineStyle::Marked(0), &|row| {
             Some(f64::from(row.contact.active))
         }),
-        curve("entered", LineStyle::Line(3), &|row| {
+        curve("entered", LineStyle::Marked(3), &|row| {
             Some(f64::from(row.contact.entered))
         }),
-        curve("left", LineStyle::Line(2), &|row| {
+        curve("left", LineStyle::Marked(2), &|row| {
             Some(f64::from(row.contact.left))
         }),
         curve("points in slip", LineStyle::Marked(1), &|row| {

@@ -83,16 +83,28 @@ pub fn deformed_svg(
     let window = Window::around(moved)
         .ok_or("there are no nodes")?
         .grown(0.04);
-    let mut views = vec![(window, factor)];
     let surfaces = body.surfaces(problem, profiles);
-    let near = body.contact(&surfaces);
-    let touching = Window::around(near.iter().map(|&n| body.place(n, 0.0)));
-    if let Some(touching) = touching.filter(|w| w.largest() < SMALL * whole.largest()) {
-        views.push(body.near(&near, &touching, &whole));
-    }
+    let views = if (style.limits.x, style.limits.y) == (None, None) {
+        let near = body.contact(&surfaces);
+        let touching = Window::around(near.iter().map(|&n| body.place(n, 0.0)));
+        let small = touching.filter(|w| w.largest() < SMALL * whole.largest());
+        let near = small.map(|touching| body.near(&near, &touching, &whole));
+        [(window, factor)].into_iter().chain(near).collect()
+    } else {
+        let window = window.limited(style.limits)?;
+        let inside = all().filter(|&n| window.holds(body.place(n, 0.0)));
+        let largest = inside.map(|n| body.moved(n)).fold(0.0, f64::max);
+        // at least 1: what is looked for would else be elsewhere
+        vec![(
+            window,
+            visible(VISIBLE * window.largest(), largest).max(1.0),
+        )]
+    };
 
     let windows: Vec<Window> = views.iter().map(|view| view.0).collect();
-    let (frames, height) = body::layout(style, &windows);
+    let legend = if profiles.is_empty() { 0 } else { LEGEND };
+    let room = page::room(style, caption).map(|room| room - legend - BAR);
+    let (frames, height) = body::layout(style, &windows, room);
     let values: Vec<f64> = (0..nodes).map(|n| style.stress.at(fields, n)).collect();
     // the last panel is the one at the contact
     let areas = body.areas();
@@ -117,7 +129,6 @@ pub fn deformed_svg(
     let names = body::coordinates(&problem.analysis).map(|name| with_unit(name, unit));
     let stress = style.stress.name(&problem.analysis);
     let bar = with_unit(stress, page::stress(&problem.units));
-    let legend = if profiles.is_empty() { 0 } else { LEGEND };
     page::page(style, caption, height + legend + BAR, |area| {
         for (k, (frame, (_, factor))) in frames.iter().zip(&views).enumerate() {
             let scale = match *factor {

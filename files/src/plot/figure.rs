@@ -12,13 +12,19 @@ use super::axis::{
     within,
 };
 use super::caption::Caption;
+use super::limits::Limits;
+use super::lines::{between, dashed, thinned};
 use super::numbers::{number, rounded, tick};
 use super::page::{self, Area, Fallible, LETTERS, LegendPlace, draw_text, px};
-use super::style::Style;
+use super::style::{Style, Texts};
 use super::theme::Palette;
 
 /// The height of the axes of a panel, without names and legend (pixels).
 const PANEL: i32 = 198;
+/// The smallest height of the axes of a panel on a slide (pixels).
+const LOWEST: i32 = 90;
+/// The largest number of points of a curve at which each has a mark: more would cover each other.
+const MARKED: usize = 60;
 /// The height of one line of the legend above a panel (pixels).
 const LEGEND: i32 = 22;
 /// The space below a panel, and between its legend and its axes (pixels).
@@ -37,9 +43,10 @@ const RIGHT: i32 = 20;
 /// The style in which a curve is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LineStyle {
-    /// A line in one of six colours, given by its number from 0.
+    /// A solid line in one of six colours, given by its number from 0.
     Line(usize),
-    /// A line in one of six colours with a mark at every value: a circle or a square, alternating with the colour.
+    /// A line in one of six colours, each with dashes of its own and, if the values are few, a mark of its own at every
+    /// value: such curves differ without colours.
     Marked(usize),
     /// A thin grey line, for a reference.
     Reference,
@@ -143,27 +150,102 @@ pub struct Panel {
     pub shades: Vec<Shade>,
     /// A second horizontal axis, above the panel, for another coordinate along x.
     pub above: Option<Above>,
+    /// The limits of the horizontal axis; `None`: from the first to the last value.
+    pub across: Option<Limits>,
+    /// The limits of the vertical axis; `None`: by the values.
+    pub up: Option<Limits>,
     /// A remark about the largest peak, written after its value. If it is empty, only a peak that is cut off is named.
     pub of_peak: String,
 }
 
 impl Panel {
-    fn height(&self, style: Style) -> i32 {
-        let name = if self.x.is_empty() { 0 } else { NAME };
-        let legend = LEGEND * rows(style, self);
-        legend + self.room_above() + PANEL + NUMBERS + name + MARGIN
-    }
-
-    /// The space between legend and axes.
+    /// The space between legend and axes (pixels).
     fn room_above(&self) -> i32 {
         match self.above {
             Some(_) => NUMBERS + NAME + MARGIN,
             None => MARGIN,
         }
     }
+
+    /// The panel with what its horizontal axis and the page show of it.
+    fn shown(&self, style: Style) -> Panel {
+        let mut panel = self.clone();
+        if style.texts == Texts::Bare {
+            panel.of_peak.clear();
+        }
+        if let Some(limits) = self.across {
+            let across = limits.range();
+            for curve in &mut panel.curves {
+                let joined = !matches!(curve.style, LineStyle::Points(_));
+                curve.points = between(&curve.points, &across, joined);
+            }
+            panel.marks.retain(|(x, _)| across.contains(x));
+        }
+        panel
+    }
 }
 
-/// Draws panels below one another, with a caption.
+/// The places of panels on a page: in one column, on a slide in two.
+struct Grid {
+    columns: usize,
+    /// The width of a panel (pixels).
+    width: i32,
+    /// Each row of panels, from the top.
+    rows: Vec<Row>,
+}
+
+/// The heights of what is in a row of panels (pixels), whose axes stand side by side.
+#[derive(Clone, Copy)]
+struct Row {
+    /// The height of the legends.
+    legend: i32,
+    /// The space between the legends and the axes.
+    above: i32,
+    /// The height of the axes.
+    axes: i32,
+    /// The space below the axes.
+    below: i32,
+}
+
+impl Row {
+    fn height(&self) -> i32 {
+        self.legend + self.above + self.axes + self.below
+    }
+}
+
+impl Grid {
+    /// `room`: the height that there is for the figure, if it is given.
+    fn of(style: Style, panels: &[Panel], room: Option<i32>) -> Grid {
+        let columns = if room.is_some() {
+            panels.len().min(2)
+        } else {
+            1
+        };
+        let width = style.width() / columns as i32;
+        let most = |of: &[Panel], f: &dyn Fn(&Panel) -> i32| of.iter().map(f).max().unwrap_or(0);
+        let row = |of: &[Panel]| Row {
+            legend: most(of, &|panel| LEGEND * rows(width, panel)),
+            above: most(of, &Panel::room_above),
+            axes: PANEL,
+            below: most(of, &|panel| {
+                NUMBERS + MARGIN + if panel.x.is_empty() { 0 } else { NAME }
+            }),
+        };
+        let mut rows: Vec<Row> = panels.chunks(columns).map(row).collect();
+        if let Some(room) = room {
+            let taken: i32 = rows.iter().map(|row| row.height() - row.axes).sum();
+            let axes = (room - taken) / rows.len() as i32;
+            rows.iter_mut().for_each(|row| row.axes = axes.max(LOWEST));
+        }
+        Grid {
+            columns,
+            width,
+            rows,
+        }
+    }
+}
+
+/// Draws panels below one another, on a slide side by side, with a caption.
 ///
 /// # Errors
 ///
@@ -174,25 +256,49 @@ pub fn figure(
     panels: &[Panel],
 ) -> Result<String, String> {
     let style = style.into();
-    if panels
-        .iter()
-        .all(|panel| panel.curves.iter().all(|c| c.points.is_empty()))
-    {
+    let empty = |panels: &[Panel]| {
+        let mut curves = panels.iter().flat_map(|panel| &panel.curves);
+        curves.all(|curve| curve.points.is_empty())
+    };
+    if empty(panels) {
         return Err("there is nothing to draw".to_owned());
     }
-    let heights: Vec<i32> = panels.iter().map(|panel| panel.height(style)).collect();
-    page::page(style, caption, heights.iter().sum(), |area| {
+    let mut panels: Vec<Panel> = panels.iter().map(|panel| panel.shown(style)).collect();
+    if empty(&panels) {
+        return Err("there is nothing within xlim".to_owned());
+    }
+    let room = page::room(style, caption);
+    if room.is_some() {
+        // the panel with the name of a common axis is no longer below
+        for k in (1..panels.len()).rev() {
+            if panels[k - 1].x.is_empty() {
+                panels[k - 1].x = panels[k].x.clone();
+            }
+        }
+    }
+    let grid = Grid::of(style, &panels, room);
+    let height = grid.rows.iter().map(Row::height).sum();
+    page::page(style, caption, height, |area| {
         let mut rest = area.clone();
-        for (panel, height) in panels.iter().zip(&heights) {
-            let (place, below) = rest.split_vertically(px(*height));
+        for (panels, row) in panels.chunks(grid.columns).zip(&grid.rows) {
+            let (mut line, below) = rest.split_vertically(px(row.height()));
             rest = below;
-            draw_panel(&place, style, panel)?;
+            for panel in panels {
+                let (place, right) = line.split_horizontally(px(grid.width));
+                line = right;
+                draw_panel(&place, style, (grid.width, *row), panel)?;
+            }
         }
         Ok(String::new())
     })
 }
 
-fn draw_panel(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
+fn draw_panel(
+    area: &Area<'_>,
+    style: Style,
+    (width, row): (i32, Row),
+    panel: &Panel,
+) -> Fallible<()> {
     let curves: Vec<Vec<(f64, f64)>> = panel
         .curves
         .iter()
@@ -200,15 +306,15 @@ fn draw_panel(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
         .collect();
     let places = curves.iter().flatten().map(|p| p.0);
     let whole = panel.scale.is_whole();
-    let across = if whole {
+    let across = match panel.across {
+        Some(limits) => limits.range(),
         // the first and the last whole number stand clear of the ends
-        extent(places.flat_map(|x| [x - 0.5, x + 0.5]))
-    } else {
-        extent(places)
+        None if whole => extent(places.flat_map(|x| [x - 0.5, x + 0.5])),
+        None => extent(places),
     };
-    let (head, body) = area.split_vertically(px(LEGEND * rows(style, panel)));
-    let fit = ((style.width() - LEFT - RIGHT) / 66).clamp(4, 9) as usize;
-    let mut axes = Axes::draw(&body, style, panel, across, fit)?;
+    let (head, body) = area.split_vertically(px(row.legend));
+    let fit = ((width - LEFT - RIGHT) / 66).clamp(4, 9) as usize;
+    let mut axes = Axes::draw(&body, style, row, panel, across, fit)?;
     for shade in &panel.shades {
         axes.draw_shade(shade)?;
     }
@@ -217,7 +323,7 @@ fn draw_panel(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
     }
     axes.draw_marks(&panel.marks)?;
     for (curve, points) in panel.curves.iter().zip(&curves) {
-        axes.draw_curve(curve.style, points)?;
+        axes.draw_curve(curve, points)?;
     }
     if panel.scale == Scale::Peaked {
         axes.draw_cuts(panel)?;
@@ -225,7 +331,7 @@ fn draw_panel(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
     if let Some(above) = &panel.above {
         axes.draw_above(above, fit)?;
     }
-    legend(&head, style, panel)
+    legend(&head, style, width, panel)
 }
 
 /// The points of a curve that a vertical axis can show, as places on that axis.
@@ -259,19 +365,19 @@ impl<'a, 'b> Axes<'a, 'b> {
     fn draw(
         area: &'a Area<'b>,
         style: Style,
+        row: Row,
         panel: &Panel,
         across: Range<f64>,
         fit: usize,
     ) -> Fallible<Self> {
         let palette = style.palette();
         let up = up(panel);
-        let name = if panel.x.is_empty() { 0 } else { NAME };
         let mut chart = ChartBuilder::on(area)
-            .margin_top(px(panel.room_above()))
+            .margin_top(px(row.above))
             .margin_right(px(RIGHT))
             .margin_bottom(px(MARGIN))
             .margin_left(px(EDGE))
-            .x_label_area_size(px(NUMBERS + name))
+            .x_label_area_size(px(row.below - MARGIN))
             .y_label_area_size(px(LEFT - EDGE))
             .build_cartesian_2d(across.clone(), up.clone())?;
         let whole = panel.scale.is_whole();
@@ -329,7 +435,30 @@ impl<'a, 'b> Axes<'a, 'b> {
 
     fn x(&self, x: f64) -> i32 {
         let part = (x - self.across.start) / (self.across.end - self.across.start);
-        self.left + (part * f64::from(self.right - self.left)).round() as i32
+        place(part, self.left, self.right)
+    }
+
+    fn y(&self, y: f64) -> i32 {
+        let part = (y - self.up.start) / (self.up.end - self.up.start);
+        place(part, self.bottom, self.top)
+    }
+
+    /// Draws a line, dashed if its style is; a line that leaves the axes ends there.
+    fn draw_line(&self, points: &[(f64, f64)], style: LineStyle) -> Fallible<()> {
+        let line = stroke(&self.palette, style);
+        let pattern: Vec<f64> = dashes(style).iter().map(|d| f64::from(px(*d))).collect();
+        for part in within(points, &self.up) {
+            let on_page = |p: &(f64, f64)| (f64::from(self.x(p.0)), f64::from(self.y(p.1)));
+            let part: Vec<(f64, f64)> = part.iter().map(on_page).collect();
+            for dash in dashed(&part, &pattern) {
+                let dash: Vec<(i32, i32)> = dash
+                    .iter()
+                    .map(|p| (p.0.round() as i32, p.1.round() as i32))
+                    .collect();
+                self.area.draw(&PathElement::new(dash, line))?;
+            }
+        }
+        Ok(())
     }
 
     /// Draws a shaded part of the axis, hatched where the contact slips.
@@ -371,36 +500,34 @@ impl<'a, 'b> Axes<'a, 'b> {
         Ok(())
     }
 
-    fn draw_curve(&mut self, style: LineStyle, points: &[(f64, f64)]) -> Fallible<()> {
-        let line = stroke(&self.palette, style);
-        let (across, up, chart) = (&self.across, &self.up, &mut self.chart);
+    fn draw_curve(&self, curve: &Curve, points: &[(f64, f64)]) -> Fallible<()> {
+        let line = stroke(&self.palette, curve.style);
+        let columns = (self.right - self.left) / page::FINE;
+        let points = thinned(points, &self.across, columns);
         let inside = || {
             let points = points.iter().copied();
-            points.filter(|p| up.start <= p.1 && p.1 <= up.end)
+            points.filter(|p| self.up.start <= p.1 && p.1 <= self.up.end)
         };
-        match style {
+        match curve.style {
             LineStyle::Points(_) => {
-                chart.draw_series(inside().map(|p| Circle::new(p, px(3), line)))?;
+                for (x, y) in inside() {
+                    let place = (self.x(x), self.y(y));
+                    self.area.draw(&Circle::new(place, px(3), line))?;
+                }
             }
             LineStyle::Dashed => {
                 // from edge to edge: also one iteration has a limit
-                let first = inside().next().map(|p| (across.start, p.1));
-                let last = inside().next_back().map(|p| (across.end, p.1));
+                let first = inside().next().map(|p| (self.across.start, p.1));
+                let last = inside().next_back().map(|p| (self.across.end, p.1));
                 let points: Vec<_> = first.into_iter().chain(inside()).chain(last).collect();
-                chart.draw_series(DashedLineSeries::new(points, px(7), px(5), line))?;
+                self.draw_line(&points, curve.style)?;
             }
-            LineStyle::Bound => {
-                for part in within(points, up) {
-                    chart.draw_series(DashedLineSeries::new(part, px(4), px(3), line))?;
-                }
-            }
-            LineStyle::Line(_) | LineStyle::Reference | LineStyle::Marked(_) => {
-                for part in within(points, up) {
-                    chart.draw_series(LineSeries::new(part, line))?;
-                }
-                if let LineStyle::Marked(k) = style {
-                    let mark = |p| EmptyElement::at(p) + dot((0, 0), k, line);
-                    chart.draw_series(inside().map(mark))?;
+            LineStyle::Bound | LineStyle::Line(_) | LineStyle::Reference | LineStyle::Marked(_) => {
+                self.draw_line(&points, curve.style)?;
+                if let Some(k) = mark(curve) {
+                    for (x, y) in inside() {
+                        self.area.draw(&dot((self.x(x), self.y(y)), k, line))?;
+                    }
                 }
             }
         }
@@ -463,7 +590,10 @@ impl<'a, 'b> Axes<'a, 'b> {
             place_of(&above.places, c).filter(|s| self.across.contains(s) || *s == self.across.end)
         };
         let own = |s: f64| interpolated(above.places.iter().copied(), s);
-        let ends = [self.across.start, self.across.end].map(own);
+        let (Some(first), Some(last)) = (above.places.first(), above.places.last()) else {
+            return Ok(());
+        };
+        let ends = [self.across.start.max(first.0), self.across.end.min(last.0)].map(own);
         let [Some(a), Some(b)] = ends else {
             return Ok(());
         };
@@ -479,6 +609,38 @@ impl<'a, 'b> Axes<'a, 'b> {
         let place = (middle, top - px(NUMBERS));
         area.draw(&Text::new(above.name.clone(), place, text))?;
         Ok(())
+    }
+}
+
+/// The place of a part (0 … 1) of the way from one place to another, which may be far outside of it.
+fn place(part: f64, from: i32, to: i32) -> i32 {
+    let along = (part * f64::from(to - from)).clamp(-1e6, 1e6);
+    from + along.round() as i32
+}
+
+/// The lengths of dashes and gaps (pixels) of a line; none for a solid line.
+fn dashes(style: LineStyle) -> &'static [i32] {
+    const OF_CURVES: [&[i32]; 6] = [
+        &[],
+        &[8, 4],
+        &[10, 3, 2, 3],
+        &[2, 3],
+        &[16, 4],
+        &[10, 3, 2, 3, 2, 3],
+    ];
+    match style {
+        LineStyle::Marked(k) => OF_CURVES[k % OF_CURVES.len()],
+        LineStyle::Bound => &[4, 3],
+        LineStyle::Dashed => &[7, 5],
+        LineStyle::Line(_) | LineStyle::Reference | LineStyle::Points(_) => &[],
+    }
+}
+
+/// The number of the mark that each value of a curve has, if it has one.
+fn mark(curve: &Curve) -> Option<usize> {
+    match curve.style {
+        LineStyle::Marked(k) if curve.points.len() <= MARKED => Some(k),
+        _ => None,
     }
 }
 
@@ -533,6 +695,14 @@ fn deciding(panel: &Panel) -> Vec<&[(f64, f64)]> {
 
 /// The range of the vertical axis of a panel; for a logarithmic axis in exponents of ten.
 fn up(panel: &Panel) -> Range<f64> {
+    if let Some(limits) = panel.up {
+        let Range { start, end } = limits.range();
+        return match panel.scale {
+            // a limit that is not positive has no place on the axis: it ends far below all values
+            Scale::Log => start.max(1e-300).log10()..end.max(1e-299).log10(),
+            _ => start..end,
+        };
+    }
     let values = || {
         panel
             .curves
@@ -572,25 +742,25 @@ fn stroke(palette: &Palette, style: LineStyle) -> ShapeStyle {
     }
 }
 
-/// The mark of a value: a circle or a square, by the number `k` of the colour.
+/// The mark of a value by the number `k` of the colour: a circle, a square, a diamond, or a triangle that points up,
+/// down or to the right.
 fn dot((x, y): (i32, i32), k: usize, line: ShapeStyle) -> Polygon<(i32, i32)> {
-    let size = 2.7 * f64::from(px(1));
-    let corners: Vec<(i32, i32)> = match k % 2 {
-        0 => (0..16)
-            .map(|j| {
-                let angle = f64::from(j) * std::f64::consts::TAU / 16.0;
-                let [dx, dy] = [angle.cos(), angle.sin()].map(|part| (part * size).round() as i32);
-                (x + dx, y + dy)
-            })
-            .collect(),
-        _ => {
-            let half = size.round() as i32;
-            [(-1, -1), (1, -1), (1, 1), (-1, 1)]
-                .map(|(a, b)| (x + a * half, y + b * half))
-                .to_vec()
-        }
+    // corners on a circle, and the angle of the first, clockwise from the right
+    let (corners, first, size) = [
+        (16, 0.0, 2.7),
+        (4, 45.0, 3.8),
+        (4, 0.0, 3.8),
+        (3, -90.0, 4.0),
+        (3, 90.0, 4.0),
+        (3, 0.0, 4.0),
+    ][k % 6];
+    let size = size * f64::from(px(1));
+    let corner = |j: i32| {
+        let angle = f64::to_radians(first + 360.0 * f64::from(j) / f64::from(corners));
+        let [dx, dy] = [angle.cos(), angle.sin()].map(|part| (part * size).round() as i32);
+        (x + dx, y + dy)
     };
-    Polygon::new(corners, line.filled())
+    Polygon::new((0..corners).map(corner).collect::<Vec<_>>(), line.filled())
 }
 
 /// An entry of the legend.
@@ -622,21 +792,21 @@ fn entries(panel: &Panel) -> Vec<Entry<'_>> {
     entries
 }
 
-fn places(style: Style, entries: &[Entry<'_>]) -> Vec<LegendPlace> {
-    page::legend_places(style, LEFT, 14, entries.iter().map(Entry::words))
+fn places(width: i32, entries: &[Entry<'_>]) -> Vec<LegendPlace> {
+    page::legend_places(width, LEFT, 14, entries.iter().map(Entry::words))
 }
 
-/// The number of lines of the legend of a panel.
-fn rows(style: Style, panel: &Panel) -> i32 {
-    let places = places(style, &entries(panel));
+/// The number of lines of the legend of a panel of this width.
+fn rows(width: i32, panel: &Panel) -> i32 {
+    let places = places(width, &entries(panel));
     places.last().map_or(0, |place| place.row + 1)
 }
 
 /// Draws the legend: samples of the curves with their names, above the panel so that the legend covers no curve.
-fn legend(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
+fn legend(area: &Area<'_>, style: Style, width: i32, panel: &Panel) -> Fallible<()> {
     let palette = style.palette();
     let entries = entries(panel);
-    for (entry, LegendPlace { row, x }) in entries.iter().zip(places(style, &entries)) {
+    for (entry, LegendPlace { row, x }) in entries.iter().zip(places(width, &entries)) {
         let middle = LEGEND * row + LEGEND / 2;
         draw_text(area, style, entry.words(), (x + 28, middle))?;
         let curve = match entry {
@@ -650,26 +820,22 @@ fn legend(area: &Area<'_>, style: Style, panel: &Panel) -> Fallible<()> {
             Entry::Curve(curve) => curve,
         };
         let line = stroke(&palette, curve.style);
-        let part = |from: i32, to: i32| {
-            PathElement::new([(px(from), px(middle)), (px(to), px(middle))], line)
-        };
         let place = (px(x + 11), px(middle));
-        match curve.style {
-            LineStyle::Points(_) => area.draw(&Circle::new(place, px(3), line))?,
-            LineStyle::Marked(k) => {
-                area.draw(&part(x, x + 22))?;
-                area.draw(&dot(place, k, line))?;
-            }
-            LineStyle::Dashed => {
-                area.draw(&part(x, x + 8))?;
-                area.draw(&part(x + 14, x + 22))?;
-            }
-            LineStyle::Bound => {
-                for from in [x, x + 9, x + 18] {
-                    area.draw(&part(from, from + 5))?;
-                }
-            }
-            LineStyle::Line(_) | LineStyle::Reference => area.draw(&part(x, x + 22))?,
+        if let LineStyle::Points(_) = curve.style {
+            area.draw(&Circle::new(place, px(3), line))?;
+            continue;
+        }
+        let ends = [x, x + 22].map(|x| (f64::from(px(x)), f64::from(px(middle))));
+        let pattern: Vec<f64> = dashes(curve.style)
+            .iter()
+            .map(|d| f64::from(px(*d)))
+            .collect();
+        for dash in dashed(&ends, &pattern) {
+            let dash: Vec<(i32, i32)> = dash.iter().map(|p| (p.0 as i32, p.1 as i32)).collect();
+            area.draw(&PathElement::new(dash, line))?;
+        }
+        if let Some(k) = mark(curve) {
+            area.draw(&dot(place, k, line))?;
         }
     }
     Ok(())
@@ -698,10 +864,10 @@ mod tests {
             ..Panel::default()
         };
         let style = Style::default();
-        assert_eq!(rows(style, &panel), 1);
+        assert_eq!(rows(style.width(), &panel), 1);
         let label = "a rather long label of a curve";
         panel.curves.extend((0..6).map(|_| curve(label, &line)));
-        assert!(rows(style, &panel) > 1);
+        assert!(rows(style.width(), &panel) > 1);
         let caption = Caption {
             title: "Title".into(),
             ..Caption::default()
@@ -765,5 +931,104 @@ mod tests {
             assert!((up(&panel).end - end).abs() < 1e-9);
             panel.curves.pop();
         }
+    }
+
+    #[test]
+    fn curves_differ_without_colours() {
+        let few = |k| Curve {
+            style: LineStyle::Marked(k),
+            ..curve("", &[(0.0, 1.0), (1.0, 2.0)])
+        };
+        let line = ShapeStyle::from(&BLACK);
+        let shape = |k| format!("{:?}", dot((0, 0), k, line));
+        for k in 0..6 {
+            assert_eq!(mark(&few(k)), Some(k));
+            for other in 0..k {
+                let [a, b] = [k, other].map(LineStyle::Marked);
+                assert_ne!(dashes(a), dashes(b));
+                assert_ne!(shape(k), shape(other));
+            }
+        }
+        let many: Vec<(f64, f64)> = (0..100).map(|k| (f64::from(k), 1.0)).collect();
+        assert_eq!(
+            mark(&Curve {
+                points: many,
+                ..few(0)
+            }),
+            None
+        );
+    }
+
+    #[test]
+    fn a_curve_of_many_points_is_no_larger_than_what_can_be_seen() {
+        let noisy = |k: u32| f64::from(k.wrapping_mul(2_654_435_761) >> 8) + 1.0;
+        let panel = |points: u32| Panel {
+            scale: Scale::Log,
+            curves: vec![Curve {
+                style: LineStyle::Marked(0),
+                ..curve(
+                    "a",
+                    &(0..points)
+                        .map(|k| (f64::from(k), noisy(k)))
+                        .collect::<Vec<_>>(),
+                )
+            }],
+            ..Panel::default()
+        };
+        let size = |points| {
+            figure(Theme::Light, &Caption::default(), &[panel(points)])
+                .unwrap()
+                .len()
+        };
+        assert!(size(200_000) < 60_000, "{}", size(200_000));
+    }
+
+    #[test]
+    fn limits_are_those_of_the_axes_and_a_slide_has_its_format() {
+        let wave: Vec<(f64, f64)> = (0..=100)
+            .map(|k| f64::from(k) / 10.0)
+            .map(|x| (x, x.sin()))
+            .collect();
+        let mut panel = Panel {
+            x: "x".into(),
+            curves: vec![curve("", &wave)],
+            across: "2,3".parse().ok(),
+            up: "-4,4".parse().ok(),
+            of_peak: ", which grows on finer meshes".into(),
+            ..Panel::default()
+        };
+        let shown = panel.shown(Style::default());
+        assert_eq!(shown.curves[0].points.first().map(|p| p.0), Some(2.0));
+        assert_eq!(shown.curves[0].points.last().map(|p| p.0), Some(3.0));
+        assert_eq!(up(&shown), -4.0..4.0);
+        let bare = Style {
+            texts: Texts::Bare,
+            size: crate::plot::Size::Slide,
+            ..Style::default()
+        };
+        let caption = Caption {
+            title: "Title".into(),
+            warnings: vec!["bad".into()],
+            ..Caption::default()
+        };
+        let panels = [
+            Panel {
+                x: String::new(),
+                ..panel.clone()
+            },
+            panel.clone(),
+        ];
+        let svg = figure(bare, &caption, &panels).unwrap();
+        assert!(svg.starts_with(r#"<svg width="864" height="486""#));
+        assert!(!svg.contains("Title") && !svg.contains("bad") && !svg.contains("finer"));
+        assert!(
+            !svg.contains(">\n0\n<"),
+            "numbers of the axis from 2 to 3 only"
+        );
+        panel.across = "20,30".parse().ok();
+        assert_eq!(
+            figure(bare, &caption, &[panel]),
+            Err("there is nothing within xlim".into())
+        );
     }
 }

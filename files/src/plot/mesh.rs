@@ -82,9 +82,18 @@ pub fn mesh_svg(
         return Err("an element has a node that is not there".to_owned());
     }
     let faces: Vec<Face> = model.contacts.iter().map(Face::before).collect();
-    let windows = windows(&model, nodes, &faces).ok_or("there is no mesh to draw")?;
-    let (frames, height) = body::layout(style, &windows);
+    let mut windows = windows(&model, nodes, &faces).ok_or("there is no mesh to draw")?;
+    if (style.limits.x, style.limits.y) != (None, None) {
+        windows = vec![windows[0].limited(style.limits)?];
+    }
     let names = in_order(problem, mesh.boundaries.keys().cloned().collect());
+    let has_obstacle = faces.iter().any(|face| face.points.len() > 1);
+    let entries = entries(problem, &names, has_obstacle);
+    let labels = entries.iter().map(|(label, _)| &label[..]);
+    let places = page::legend_places(style.width(), LEFT, 20, labels);
+    let legend = LEGEND * places.last().map_or(1, |place| place.row + 1) + 6;
+    let room = page::room(style, caption).map(|room| room - legend);
+    let (frames, height) = body::layout(style, &windows, room);
     let drawing = Drawing::new(elements, nodes);
     // boundaries are those of the problem's own mesh
     let own = Sides::of(&mesh.elements, mesh.nodes.len());
@@ -96,11 +105,6 @@ pub fn mesh_svg(
     };
     let over: String = frames.iter().map(content).collect();
 
-    let has_obstacle = faces.iter().any(|face| face.points.len() > 1);
-    let entries = entries(problem, &names, has_obstacle);
-    let labels = entries.iter().map(|(label, _)| &label[..]);
-    let places = page::legend_places(style, LEFT, 20, labels);
-    let legend = LEGEND * places.last().map_or(1, |place| place.row + 1) + 6;
     let unit = page::length(&problem.units);
     let axes = body::coordinates(&problem.analysis).map(|name| with_unit(name, unit));
     let outline = if drawing.is_outline { " (outline)" } else { "" };

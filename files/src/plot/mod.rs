@@ -9,8 +9,9 @@
 //! | subject | where |
 //! |---|---|
 //! | the figures | `mesh`, `deformed`, `profile`, `convergence` |
-//! | pieces: panels with curves, a body, a field in colours, an obstacle, an axis | `figure`, `body`, `bands`, `obstacle`, `axis` |
-//! | the page, its texts, sizes, colours, numbers | `page`, `caption`, `style`, `theme`, `numbers` |
+//! | pieces: panels with curves, a curve, an axis | `figure`, `lines`, `axis` |
+//! | pieces: a body, a field in colours, the outline of a region, an obstacle | `body`, `bands`, `region`, `obstacle` |
+//! | the page, its texts, sizes, limits of axes, colours, numbers | `page`, `caption`, `style`, `limits`, `theme`, `numbers` |
 //! | PNG and PDF | `image` |
 
 mod axis;
@@ -21,11 +22,14 @@ mod convergence;
 mod deformed;
 mod figure;
 pub mod image;
+mod limits;
+mod lines;
 mod mesh;
 mod numbers;
 mod obstacle;
 mod page;
 mod profile;
+mod region;
 mod style;
 mod theme;
 
@@ -36,9 +40,10 @@ pub use caption::{Caption, Mark};
 pub use convergence::convergence_svg;
 pub use deformed::deformed_svg;
 pub use figure::{Above, Curve, LineStyle, Panel, Scale, Shade, ShadeKind, figure};
+pub use limits::{AxisLimits, Limits};
 pub use mesh::mesh_svg;
 pub use profile::{ProfileView, profile_svg};
-pub use style::{Size, Stress, Style};
+pub use style::{Size, Stress, Style, Texts};
 pub use theme::Theme;
 
 use solver::mesh::Mesh;
@@ -67,6 +72,23 @@ impl Plot {
     /// The name of the figure in paths and file names.
     pub fn as_str(self) -> &'static str {
         self.into()
+    }
+
+    /// What is wrong with limits of axes for this figure, each as the name of the limits and the reason.
+    pub fn refused(self, limits: &AxisLimits) -> Vec<(&'static str, &'static str)> {
+        let mut refused = Vec::new();
+        let positive = |limits: Limits| limits.range().start > 0.0;
+        if self == Plot::Convergence && limits.y.is_some_and(|limits| !positive(limits)) {
+            refused.push((
+                "ylim",
+                "the axis of residuals is logarithmic: limits are positive",
+            ));
+        }
+        if limits.y_below.is_some() && matches!(self, Plot::Mesh | Plot::Deformed) {
+            let reason = "it is for the lower panels of the figures profile and convergence";
+            refused.push(("ylim_below", reason));
+        }
+        refused
     }
 }
 
@@ -101,6 +123,9 @@ pub fn draw(
     parts: &Parts<'_>,
 ) -> Result<String, String> {
     let style = style.into();
+    if let Some((name, reason)) = plot.refused(&style.limits).first() {
+        return Err(format!("{name}: {reason}"));
+    }
     let default = match plot {
         Plot::Mesh => "Mesh",
         Plot::Deformed => "Deformed body",

@@ -5,7 +5,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::caption::{Caption, Mark};
-use super::style::Style;
+use super::style::{Style, Texts};
 use super::theme::hex;
 use solver::error::shortened;
 use solver::problem::Units;
@@ -41,6 +41,33 @@ pub(super) const fn px(pixels: i32) -> i32 {
     pixels * FINE
 }
 
+/// The height of the texts above the figure (pixels), and the lines below the title.
+fn head(style: Style, caption: &Caption) -> (i32, Vec<Line>) {
+    match style.texts {
+        Texts::Bare => (MARGIN, vec![]),
+        Texts::Full => {
+            let lines = above(style, caption);
+            (TITLE + LINE * lines.len() as i32, lines)
+        }
+    }
+}
+
+/// The height of the texts below the figure (pixels), and their lines.
+fn tail(style: Style, caption: &Caption) -> (i32, Vec<String>) {
+    let lines = match style.texts {
+        Texts::Bare => vec![],
+        Texts::Full => foot(style, caption),
+    };
+    let margin = if lines.is_empty() { 0 } else { MARGIN };
+    (FOOT * lines.len() as i32 + margin, lines)
+}
+
+/// The height that a page with a given height has for the figure (pixels).
+pub(super) fn room(style: Style, caption: &Caption) -> Option<i32> {
+    let texts = head(style, caption).0 + tail(style, caption).0;
+    style.height().map(|height| height - texts)
+}
+
 /// Draws a page: a figure `height` pixels high between the texts of its caption. `draw` draws the figure in the given
 /// area and returns SVG to be put on top, in the units of the drawing, from the area's upper left corner.
 pub(super) fn page(
@@ -50,22 +77,22 @@ pub(super) fn page(
     draw: impl FnOnce(&Area<'_>) -> Fallible<String>,
 ) -> Result<String, String> {
     let width = style.width();
-    let above = above(style, caption);
-    let head = TITLE + LINE * above.len() as i32;
-    let foot = foot(style, caption);
-    let below = if foot.is_empty() {
-        0
-    } else {
-        FOOT * foot.len() as i32 + MARGIN
-    };
-    let size = (width, head + height + below);
+    let (head, above) = head(style, caption);
+    let (below, foot) = tail(style, caption);
+    // on a page with a given height the figure is in the middle of what it leaves
+    let spare = (room(style, caption).unwrap_or(height) - height).max(0);
+    let (head, end) = (head + spare / 2, head + height + spare);
+    let size = (width, end + below);
     let mut svg = String::new();
     let drawn = || -> Fallible<String> {
         let fine = (px(size.0) as u32, px(size.1) as u32);
         let root = SVGBackend::with_string(&mut svg, fine).into_drawing_area();
         let palette = style.palette();
         root.fill(&palette.background)?;
-        let title = shortened(&caption.title, LONGEST);
+        let title = match style.texts {
+            Texts::Full => shortened(&caption.title, LONGEST),
+            Texts::Bare => String::new(),
+        };
         let fits = bold_letters(width);
         let letters = (LARGE as usize * fits / title.chars().count().max(fits)) as i32;
         let font = (FONT, plotters_size(letters), FontStyle::Bold).into_font();
@@ -86,7 +113,7 @@ pub(super) fn page(
             }
         }
         for (k, line) in (0..).zip(&foot) {
-            let middle = px(head + height + FOOT * k + FOOT / 2);
+            let middle = px(end + FOOT * k + FOOT / 2);
             let faint = text(style, SMALL).color(&palette.faint).pos(at(HPos::Left));
             root.draw(&Text::new(line.clone(), (px(MARGIN), middle), faint))?;
         }
@@ -230,10 +257,10 @@ pub(super) struct LegendPlace {
     pub(super) x: i32,
 }
 
-/// Places the entries of a legend in rows that begin at `left`. An entry is a sample of a line and words, followed by
+/// Places the entries of a legend in rows that begin at `left` and end before `end`. An entry is a sample of a line and words, followed by
 /// the space `gap` (pixels).
 pub(super) fn legend_places<'a>(
-    style: Style,
+    end: i32,
     left: i32,
     gap: i32,
     words: impl Iterator<Item = &'a str>,
@@ -241,7 +268,7 @@ pub(super) fn legend_places<'a>(
     let (mut x, mut row) = (left, 0);
     let placed = words.map(|words| {
         let width = 28 + width(words) + gap;
-        if x > left && x + width > style.width() {
+        if x > left && x + width > end {
             (x, row) = (left, row + 1);
         }
         let place = LegendPlace { row, x };

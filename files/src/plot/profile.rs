@@ -32,18 +32,23 @@ pub fn profile_svg(
     }
     let panels: Vec<Panel> = profiles
         .iter()
-        .flat_map(|(name, profile)| panels(problem, name, profile, summary))
+        .flat_map(|(name, profile)| panels(style, problem, name, profile, summary))
         .collect();
     figure(style, caption, &panels)
 }
 
 fn panels(
+    style: Style,
     problem: &Problem,
     name: &str,
     profile: &ContactProfile,
     summary: Option<&Summary>,
 ) -> Vec<Panel> {
-    let shown = stressed(profile);
+    let limits = style.limits;
+    let shown = match limits.x {
+        Some(_) => 0..profile.s.len(),
+        None => stressed(profile),
+    };
     let curve = |label: &str, style: LineStyle, values: &[f64]| Curve {
         label: label.to_owned(),
         style,
@@ -66,6 +71,8 @@ fn panels(
         curves: vec![curve("", LineStyle::Line(0), &profile.normal_stress)],
         shades: shades.clone(),
         above: position(profile, coordinates(&problem.analysis), unit, shown.clone()),
+        across: limits.x,
+        up: limits.y,
         of_peak: of_peak(name, summary).to_owned(),
         ..Panel::default()
     };
@@ -94,6 +101,8 @@ fn panels(
         scale: Scale::Linear,
         curves: bounds.chain([own]).collect(),
         shades,
+        across: limits.x,
+        up: limits.y_below,
         ..Panel::default()
     };
     vec![normal, tangential]

@@ -1,12 +1,13 @@
-//! The style of a figure: its colours, its width, and the stress that it shows.
+//! The style of a figure: its colours, its size, the texts around it, the limits of its axes, and the stress that it shows.
 
 use std::str::FromStr;
 
 use strum::{IntoStaticStr, VariantArray};
 
+use super::limits::AxisLimits;
 use super::theme::{Palette, Theme};
 
-/// What a figure is for, which determines its width in relation to its letters.
+/// What a figure is for, which determines its size in relation to its letters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, IntoStaticStr, VariantArray)]
 #[strum(serialize_all = "snake_case")]
 pub enum Size {
@@ -15,7 +16,8 @@ pub enum Size {
     /// A page, 160 mm: letters of 9 pt.
     #[default]
     Page,
-    /// A slide, 254 mm: letters of 15 pt.
+    /// A slide of 16:9, 254 mm × 142.9 mm: letters of 12.5 pt. Panels are side by side; a figure with too many of them is
+    /// higher.
     Slide,
 }
 
@@ -51,13 +53,47 @@ impl Size {
     }
 }
 
+/// The texts around a figure.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "snake_case")]
+pub enum Texts {
+    /// Title and parameters, verdict and warnings.
+    #[default]
+    Full,
+    /// None of these: a caption that somebody else writes says what the figure shows, and how reliable it is.
+    Bare,
+}
+
+impl FromStr for Texts {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut known = Texts::VARIANTS.iter();
+        let named = known.find(|texts| texts.as_str() == text);
+        named
+            .copied()
+            .ok_or_else(|| "expected full or bare".to_owned())
+    }
+}
+
+impl Texts {
+    /// The name of the style in queries.
+    pub fn as_str(self) -> &'static str {
+        self.into()
+    }
+}
+
 /// The style of a figure.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Style {
     /// The colours of the figure.
     pub theme: Theme,
-    /// The use of the figure, which determines its width.
+    /// The use of the figure, which determines its size.
     pub size: Size,
+    /// The texts around the figure.
+    pub texts: Texts,
+    /// The limits of the axes.
+    pub limits: AxisLimits,
     /// The stress that the contours of `deformed` show.
     pub stress: Stress,
 }
@@ -71,7 +107,16 @@ impl Style {
     pub(super) fn width(self) -> i32 {
         match self.size {
             Size::Column => 520,
-            Size::Page | Size::Slide => 720,
+            Size::Page => 720,
+            Size::Slide => 864,
+        }
+    }
+
+    /// The height of a figure in pixels, if it is given.
+    pub(super) fn height(self) -> Option<i32> {
+        match self.size {
+            Size::Column | Size::Page => None,
+            Size::Slide => Some(486),
         }
     }
 }

@@ -9,7 +9,7 @@ use std::{
 use anyhow::Context;
 use base::run::Document;
 use clap::Args;
-use files::plot::{self, Parts, Plot, Size, Style, Theme, image};
+use files::plot::{self, AxisLimits, Limits, Parts, Plot, Size, Style, Texts, Theme, image};
 use service::formats::{self, Format};
 use solver::{mesh::Mesh, problem::Problem, solution::Iteration};
 use strum::VariantArray;
@@ -36,9 +36,25 @@ pub(super) struct Look {
     #[arg(long, default_value = "light")]
     theme: Theme,
 
-    /// Use of a figure: a column of 88 mm, a page of 160 mm, or a slide of 254 mm
+    /// Use of a figure: a column of 88 mm, a page of 160 mm, or a slide of 16:9
     #[arg(long, default_value = "page", value_name = "column|page|slide")]
     size: Size,
+
+    /// Texts around a figure: full has title, parameters, verdict and warnings, bare has none of them
+    #[arg(long, default_value = "full", value_name = "full|bare")]
+    style: Texts,
+
+    /// Limits of a figure's horizontal axis: of arc length, of iterations, of x or r
+    #[arg(long, value_name = "A,B", allow_hyphen_values = true)]
+    xlim: Option<Limits>,
+
+    /// Limits of a figure's vertical axis: of the normal stress, of residuals, of y or z
+    #[arg(long, value_name = "A,B", allow_hyphen_values = true)]
+    ylim: Option<Limits>,
+
+    /// Limits of the vertical axis of the lower panels of the figures profile (tangential stress) and convergence (counts)
+    #[arg(long, value_name = "A,B", allow_hyphen_values = true)]
+    ylim_below: Option<Limits>,
 }
 
 impl Look {
@@ -46,17 +62,55 @@ impl Look {
         Style {
             theme: self.theme,
             size: self.size,
+            texts: self.style,
+            limits: self.limits(),
             ..Style::default()
+        }
+    }
+
+    fn limits(self) -> AxisLimits {
+        AxisLimits {
+            x: self.xlim,
+            y: self.ylim,
+            y_below: self.ylim_below,
+        }
+    }
+
+    /// Checks the limits of axes for the figures among these outputs, before anything is solved; the error names all
+    /// faults.
+    pub(super) fn check(self, outputs: &[Output]) -> Result<(), String> {
+        let mut faults: Vec<String> = Vec::new();
+        for output in outputs {
+            let Part::Plot(plot) = output.part else {
+                continue;
+            };
+            let refused = plot.refused(&self.limits()).into_iter();
+            faults.extend(refused.map(|(name, reason)| {
+                format!("{}: --{}: {reason}", plot.as_str(), name.replace('_', "-"))
+            }));
+        }
+        if faults.is_empty() {
+            Ok(())
+        } else {
+            Err(faults.join("; "))
         }
     }
 
     /// The options as parameters of a request for a figure.
     pub(super) fn query(self) -> String {
-        format!(
-            "theme={}&size={}",
-            <&str>::from(self.theme),
-            self.size.as_str()
-        )
+        let mut query = form_urlencoded::Serializer::new(String::new());
+        query.append_pair("theme", self.theme.into());
+        query.append_pair("size", self.size.as_str());
+        query.append_pair("style", self.style.as_str());
+        let limits = [
+            ("xlim", self.xlim),
+            ("ylim", self.ylim),
+            ("ylim_below", self.ylim_below),
+        ];
+        for (name, limits) in limits {
+            query.extend_pairs(limits.map(|limits| (name, limits.to_string())));
+        }
+        query.finish()
     }
 }
 

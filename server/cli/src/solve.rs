@@ -89,6 +89,7 @@ pub(super) fn run(
     let contacts: Vec<&str> = contacts.map(|contact| contact.boundary.as_str()).collect();
     let outputs = output.iter().map(|path| Output::parse(path, &contacts));
     let outputs = outputs.collect::<Result<Vec<_>, _>>().map_err(refuse)?;
+    look.check(&outputs).map_err(refuse)?;
     let stored = stored_mesh(&problem, file, mesh.as_deref())?;
     let (size, stored) = stored.map(|(info, mesh)| (info.size(), mesh)).unzip();
     let estimate = solver::estimate(&problem, size.as_ref());

@@ -48,6 +48,9 @@ pub enum ApiError {
         /// The value that was expected.
         expected: String,
     },
+    /// The limits of the axes of a figure are invalid: all faults, in words.
+    #[error("{}", .0.join("; "))]
+    BadLimits(Vec<String>),
     /// A page token does not belong to this list.
     #[error("the page token does not belong to this list; start again without one")]
     BadPageToken,
@@ -338,7 +341,7 @@ impl ApiError {
         match self {
             ApiError::MalformedJson(_) => Code::MalformedJson,
             ApiError::UnknownParameter { .. } => Code::UnknownParameter,
-            ApiError::BadParameter { .. } => Code::BadParameter,
+            ApiError::BadParameter { .. } | ApiError::BadLimits(_) => Code::BadParameter,
             ApiError::BadPageToken => Code::BadPageToken,
             ApiError::MissingFilter(_) => Code::MissingFilter,
             ApiError::BadRequest(_) => Code::BadRequest,

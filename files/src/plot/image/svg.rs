@@ -163,7 +163,8 @@ fn commands(path: &str, from: [f32; 2], to: &mut PathBuilder) -> Result<(), Stri
         .peekable();
     while let Some((place, command)) = commands.next() {
         let end = commands.peek().map_or(path.len(), |next| next.0);
-        let values = numbers(&path[place + 1..end])?;
+        // a minus sign separates numbers, too
+        let values = numbers(&path[place + 1..end].replace('-', " -"))?;
         match command {
             "M" | "L" => {
                 for point in values.chunks_exact(2) {
@@ -390,7 +391,7 @@ mod tests {
     fn shapes_stand_where_the_elements_around_them_put_them() {
         let said = drawn(
             r##"<g transform="translate(0 10)"><svg x="5" y="1" width="20" height="9" stroke-linejoin="round">
-            <path fill="#FF0080" fill-opacity="0.5" d="M1 1l2 0 0 3z"/>
+            <path fill="#FF0080" fill-opacity="0.5" d="M1 1l2 0-0 3z"/>
             <polyline fill="none" stroke="#000000" stroke-dasharray="5 4" points="0,0 1,1 "/></svg></g>"##,
         );
         assert_eq!(

@@ -38,12 +38,44 @@ pub(super) enum Scale {
     Logarithmic,
 }
 
-/// The colours of the first, second and third curve of a chart; they can be distinguished without red or green.
-const COLOURS: [(Color, &str); 3] = [
-    (Color::Cyan, "36"),
-    (Color::Yellow, "33"),
-    (Color::DarkGray, "90"),
+/// The looks of the first, second and third curve of a chart. They can be distinguished without red or green, and without
+/// any colour: a line, a line of larger dots, and single dots.
+const LOOKS: [Look; 3] = [
+    Look {
+        colour: Color::Cyan,
+        code: "36",
+        sample: '─',
+        marker: Marker::Braille,
+        is_dotted: false,
+    },
+    Look {
+        colour: Color::Yellow,
+        code: "33",
+        sample: '•',
+        marker: Marker::Dot,
+        is_dotted: false,
+    },
+    Look {
+        colour: Color::DarkGray,
+        code: "90",
+        sample: '·',
+        marker: Marker::Custom('·'),
+        is_dotted: true,
+    },
 ];
+
+/// How a curve is drawn.
+#[derive(Clone, Copy)]
+struct Look {
+    colour: Color,
+    /// The number of the colour in escape sequences.
+    code: &'static str,
+    /// The character that stands for the curve in the heading.
+    sample: char,
+    marker: Marker,
+    /// Whether only the character in every second column is drawn.
+    is_dotted: bool,
+}
 
 impl Chart {
     /// Draws the chart as `height` lines of `width` characters.
@@ -68,22 +100,30 @@ impl Chart {
             }
         };
         // a curve that leaves the axis and comes back is drawn as several
-        let parts: Vec<(Color, Vec<(f64, f64)>)> = visible
+        let parts: Vec<(Look, Vec<(f64, f64)>)> = visible
             .iter()
-            .zip(COLOURS)
-            .flat_map(|(points, (colour, _))| {
+            .zip(LOOKS)
+            .flat_map(|(points, look)| {
                 let parts = match &self.scale {
                     Scale::Within(up) => within(points, up),
                     Scale::Logarithmic => vec![points.clone()],
                 };
-                parts.into_iter().map(move |part| (colour, part))
+                let parts = parts.into_iter().map(move |part| match look.is_dotted {
+                    true => dotted(&part, across, width / 2),
+                    false => part,
+                });
+                parts.map(move |part| (look, part))
             })
             .collect();
-        let datasets = parts.iter().map(|(colour, points)| {
+        let datasets = parts.iter().map(|(look, points)| {
             Dataset::default()
-                .marker(Marker::Braille)
-                .graph_type(GraphType::Line)
-                .style(Style::new().fg(*colour))
+                .marker(look.marker)
+                .graph_type(if look.is_dotted {
+                    GraphType::Scatter
+                } else {
+                    GraphType::Line
+                })
+                .style(Style::new().fg(look.colour))
                 .data(points)
         });
         let label = |value: f64| match self.scale {
@@ -114,9 +154,13 @@ impl Chart {
 
     /// The lines above the chart: the title, and the names of the curves in their colours, with the note below them.
     fn heading(&self, in_colour: bool) -> String {
-        let names = self.curves.iter().zip(COLOURS);
-        let names =
-            names.map(|(curve, (_, code))| coloured(&format!("─ {}", curve.name), code, in_colour));
+        let names = self.curves.iter().zip(LOOKS).map(|(curve, look)| {
+            coloured(
+                &format!("{} {}", look.sample, curve.name),
+                look.code,
+                in_colour,
+            )
+        });
         let names: Vec<String> = names.collect();
         let note = self.note.iter().map(|note| format!("\n{note}"));
         let note: String = note.collect();
@@ -135,6 +179,27 @@ impl Chart {
             Scale::Within(_) => points.filter(finite).collect(),
         }
     }
+}
+
+/// Places along a curve, whose points are in order of x: evenly spaced, `count` along the whole axis.
+fn dotted(points: &[(f64, f64)], [low, high]: [f64; 2], count: u16) -> Vec<(f64, f64)> {
+    let mut places = Vec::new();
+    let mut pairs = points.windows(2).peekable();
+    for k in 0..=count {
+        let x = low + (high - low) * f64::from(k) / f64::from(count.max(1));
+        // on to the pair of points that has x between them
+        while pairs.next_if(|pair| pair[1].0 < x).is_some() {}
+        let Some(&[(x0, y0), (x1, y1)]) = pairs.peek() else {
+            break;
+        };
+        if x0 <= x && x1 > x0 {
+            places.push((x, y0 + (x - x0) / (x1 - x0) * (y1 - y0)));
+        }
+    }
+    if places.is_empty() {
+        places.extend(points.first());
+    }
+    places
 }
 
 /// The range from the smallest to the largest value, widened if both are equal.
@@ -180,9 +245,9 @@ fn text_of(buffer: &Buffer, in_colour: bool) -> String {
             let Some(cell) = buffer.cell((x, y)) else {
                 continue;
             };
-            let code = COLOURS.iter().find(|(colour, _)| *colour == cell.fg);
-            match code {
-                Some((_, code)) => line += &coloured(cell.symbol(), code, in_colour),
+            let look = LOOKS.iter().find(|look| look.colour == cell.fg);
+            match look {
+                Some(look) => line += &coloured(cell.symbol(), look.code, in_colour),
                 None => line += cell.symbol(),
             }
         }
@@ -222,6 +287,34 @@ mod tests {
             !drawn.contains('\x1b') && chart.draw(40, 10, true).contains("\x1b[36m"),
             "{drawn}"
         );
+    }
+
+    #[test]
+    fn curves_differ_without_colours() {
+        let level = |name, y| Curve {
+            name,
+            points: (0..=10).map(|k| (f64::from(k), y)).collect(),
+        };
+        let chart = Chart {
+            title: "Three".into(),
+            across: "s".into(),
+            curves: vec![level("a", 1.0), level("b", 2.0), level("c", 3.0)],
+            scale: Scale::Within(0.0..4.0),
+            note: None,
+        };
+        let drawn = chart.draw(60, 20, false);
+        let lines: Vec<&str> = drawn.lines().collect();
+        assert_eq!(lines[0], "Three   ─ a   • b   · c");
+        let count = |mark: &dyn Fn(char) -> bool| {
+            let rows = lines[1..]
+                .iter()
+                .map(|line| line.chars().filter(|c| mark(*c)).count());
+            rows.max().unwrap()
+        };
+        let braille = count(&|c| ('\u{2801}'..='\u{28ff}').contains(&c));
+        let (dots, single) = (count(&|c| c == '•'), count(&|c| c == '·'));
+        assert!(braille > 40 && dots > 40, "{drawn}");
+        assert!((20..=31).contains(&single), "{drawn}");
     }
 
     #[test]

@@ -5,9 +5,11 @@ use std::{collections::BTreeMap, sync::Arc};
 use base::{
     caller::Caller,
     job::{Job, JobId, ResultAvailable},
-    values::Words,
+    values::{Values, Words},
 };
-use files::plot::{self, Parts, Plot, Size, Stress, Style, Theme, image};
+use files::plot::{
+    self, AxisLimits, Limits, Parts, Plot, Size, Stress, Style, Texts, Theme, image,
+};
 use futures_util::future::BoxFuture;
 use solver::{
     mesh::Mesh,
@@ -63,7 +65,7 @@ pub const THEME: Parameter<Words<Theme>> = Parameter {
 /// The use of a figure, which determines its size.
 pub const SIZE: Parameter<Words<Size>> = Parameter {
     name: "size",
-    meaning: "Use of the figure, which sets its width and the size of its letters: a column of 88 mm, a page of 160 mm, a slide of 254 mm; default page",
+    meaning: "Use of the figure, which sets its size and that of its letters: a column of 88 mm, a page of 160 mm, a slide of 16:9 (254 mm × 142.9 mm); default page",
     values: Words(|| {
         vec![
             ("column", Size::Column),
@@ -72,6 +74,80 @@ pub const SIZE: Parameter<Words<Size>> = Parameter {
         ]
     }),
 };
+
+/// The texts around a figure.
+pub const STYLE: Parameter<Words<Texts>> = Parameter {
+    name: "style",
+    meaning: "Texts around the figure: full has title, parameters, verdict and warnings, bare has none of them; default full",
+    values: Words::all(),
+};
+
+/// The limits of the horizontal axis.
+pub const XLIM: Parameter<TwoNumbers> = Parameter {
+    name: "xlim",
+    meaning: "Limits of the horizontal axis, such as 0,0.5: of arc length, of iterations, of x or r",
+    values: TwoNumbers,
+};
+
+/// The limits of the vertical axis.
+pub const YLIM: Parameter<TwoNumbers> = Parameter {
+    name: "ylim",
+    meaning: "Limits of the vertical axis: of the normal stress, of residuals, of y or z",
+    values: TwoNumbers,
+};
+
+/// The limits of the vertical axis of the lower panels.
+pub const YLIM_BELOW: Parameter<TwoNumbers> = Parameter {
+    name: "ylim_below",
+    meaning: "Limits of the vertical axis of the lower panels, in the figures `profile` (tangential stress) and `convergence` (counts)",
+    values: TwoNumbers,
+};
+
+/// The limits of an axis as values of a parameter.
+#[derive(Clone, Copy, Debug)]
+pub struct TwoNumbers;
+
+impl Values for TwoNumbers {
+    type Value = Limits;
+
+    fn schema(&self) -> serde_json::Value {
+        serde_json::json!({ "type": "string", "pattern": "^[^,]+,[^,]+$" })
+    }
+
+    fn expected(&self) -> String {
+        Limits::EXPECTED.into()
+    }
+
+    fn read(&self, text: &str) -> Option<Limits> {
+        text.parse().ok()
+    }
+}
+
+/// Reads the limits of the axes of a figure from the texts of [`XLIM`], [`YLIM`] and [`YLIM_BELOW`]; the error has the
+/// faults of all of them.
+pub fn limits(plot: Plot, texts: [Option<&str>; 3]) -> Result<AxisLimits, ApiError> {
+    let mut faults = Vec::new();
+    let mut read = |parameter: Parameter<TwoNumbers>, text: Option<&str>| {
+        let found = text.map(|text| parameter.read(text)).transpose();
+        found.unwrap_or_else(|error| {
+            faults.push(error.to_string());
+            None
+        })
+    };
+    let [x, y, y_below] = texts;
+    let limits = AxisLimits {
+        x: read(XLIM, x),
+        y: read(YLIM, y),
+        y_below: read(YLIM_BELOW, y_below),
+    };
+    let refused = plot.refused(&limits).into_iter();
+    faults.extend(refused.map(|(name, reason)| format!("{name}: {reason}")));
+    if faults.is_empty() {
+        Ok(limits)
+    } else {
+        Err(ApiError::BadLimits(faults))
+    }
+}
 
 /// The stress shown on a deformed body.
 pub const STRESS: Parameter<Words<Stress>> = Parameter {

@@ -5,12 +5,13 @@ use axum::{
     response::Response,
 };
 use base::job::JobId;
-use files::plot::{Plot, Size, Stress, Style, Theme};
+use files::plot::{Plot, Size, Stress, Style, Texts, Theme};
 use service::{
     error::ApiError,
     formats::Format,
+    parameters::Description,
     verbs::{
-        plots::{self as verbs, Figure, SIZE, STRESS, THEME},
+        plots::{self as verbs, Figure, SIZE, STRESS, STYLE, THEME, XLIM, YLIM, YLIM_BELOW},
         profiles::STEP,
     },
 };
@@ -18,22 +19,57 @@ use service::{
 use super::{
     call::Call,
     data::{self, Part, marked},
+    input::{Input, RawInput},
 };
 
-#[expect(
-    clippy::too_many_arguments,
-    reason = "each is a parameter of the request"
-)]
+/// The input of how a figure looks; limits of axes are read with the figure, all of them at once.
+pub(super) const LOOK: Look = Look;
+
+/// An input that reads theme, size, style and stress, and takes the texts of limits.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Look;
+
+/// How a figure is to look.
+pub(super) struct Looks {
+    theme: Option<Theme>,
+    size: Option<Size>,
+    texts: Option<Texts>,
+    stress: Option<Stress>,
+    /// The texts of the limits of axes.
+    limits: [Option<String>; 3],
+}
+
+impl Input for Look {
+    type Value = Looks;
+
+    fn descriptions(&self) -> Vec<Description> {
+        let limits = [XLIM, YLIM, YLIM_BELOW].map(|limits| limits.describe());
+        let others = (THEME, SIZE, STYLE, STRESS).descriptions();
+        [others, limits.to_vec()].concat()
+    }
+
+    fn extract(&self, raw: &RawInput<'_>) -> Result<Looks, ApiError> {
+        let limits = [XLIM, YLIM, YLIM_BELOW];
+        let (theme, size, texts, stress) = (THEME, SIZE, STYLE, STRESS).extract(raw)?;
+        Ok(Looks {
+            theme,
+            size,
+            texts,
+            stress,
+            limits: limits.map(|limits| raw.one(limits.name).map(str::to_owned)),
+        })
+    }
+}
+
 pub(super) async fn plot(
     call: Call,
     id: JobId,
     (plot, format): (Plot, Format),
-    theme: Option<Theme>,
-    size: Option<Size>,
-    stress: Option<Stress>,
+    look: Looks,
     step: Option<String>,
     part: Part,
 ) -> Result<Response, ApiError> {
+    let stress = look.stress;
     // parameters that have no effect on this figure
     let vain = [
         (stress.is_some() && plot != Plot::Deformed, STRESS.name),
@@ -44,10 +80,10 @@ pub(super) async fn plot(
         ),
     ];
     if let Some((_, name)) = vain.into_iter().find(|(vain, _)| *vain) {
-        let mut known = vec![THEME.name, SIZE.name];
+        let mut known = vec![THEME.name, SIZE.name, STYLE.name, XLIM.name, YLIM.name];
         match plot {
             Plot::Deformed => known.push(STRESS.name),
-            Plot::Profile | Plot::Convergence => known.push(STEP.name),
+            Plot::Profile | Plot::Convergence => known.extend([YLIM_BELOW.name, STEP.name]),
             Plot::Mesh => {}
         }
         return Err(ApiError::UnknownParameter {
@@ -59,8 +95,10 @@ pub(super) async fn plot(
         plot,
         format,
         style: Style {
-            theme: theme.unwrap_or_default(),
-            size: size.unwrap_or_default(),
+            theme: look.theme.unwrap_or_default(),
+            size: look.size.unwrap_or_default(),
+            texts: look.texts.unwrap_or_default(),
+            limits: verbs::limits(plot, look.limits.each_ref().map(Option::as_deref))?,
             stress: stress.unwrap_or_default(),
         },
         step,

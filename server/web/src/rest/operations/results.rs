@@ -15,7 +15,7 @@ use service::{
         fields as stored,
         history::{self as rows, MAX_POINTS},
         jobs::{self, ID},
-        plots::{PLOT, SIZE, STRESS, THEME},
+        plots::PLOT,
         profiles::{self, BOUNDARY, POINTS, Points, STEP},
         results::{self, JobResult},
     },
@@ -82,7 +82,7 @@ pub(super) fn operations() -> Vec<Operation> {
         get(
             READ,
             "/v1/jobs/{id}/plots/{plot}",
-            (ID, PLOT, THEME, SIZE, STRESS, STEP, PART),
+            (ID, PLOT, plots::LOOK, STEP, PART),
             plots::plot,
         )
         .rest_only("GetPlot")
