@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import io
 import math
+import pathlib
+import pickle
 import re
 from typing import Any
 
@@ -16,7 +18,10 @@ import signorini as sg
 from signorini import _shapes as shapes
 from signorini import figures
 from signorini import problem as p
+from signorini._around import MOST_CURVES
 from signorini._html import job as job_card
+from signorini._style import CURVES
+from signorini.pointer import differences
 
 pytest.importorskip("matplotlib")
 
@@ -34,6 +39,19 @@ def test_a_figure_is_saved_in_the_formats_of_papers(punch: sg.Result) -> None:
         out = io.BytesIO()
         figure.savefig(out, format=kind, dpi=60)
         assert out.getvalue().startswith(begin)
+
+
+def test_letters_stay_letters_and_pixels_are_as_many_as_on_paper(punch: sg.Result) -> None:
+    figure = pickle.loads(pickle.dumps(punch.plot_profile(size="column")))
+    saved = {}
+    for kind in ("pdf", "svg", "png"):
+        out = io.BytesIO()
+        figure.savefig(out, format=kind)
+        saved[kind] = out.getvalue()
+    assert b"/Type3" not in saved["pdf"] and b"/CIDFontType2" in saved["pdf"], "Type 42"
+    assert b"arc length" in saved["svg"] and saved["svg"].count(b"<text") > 20
+    width = int.from_bytes(saved["png"][16:20], "big")
+    assert width == pytest.approx(88 / 25.4 * 300, abs=1)
 
 
 @pytest.mark.parametrize(("size", "theme"), [("column", "light"), ("page", "dark"), ("slide", "light")])
@@ -374,3 +392,191 @@ def test_a_study_over_words_and_obstacles(client: sg.Client) -> None:
     whole = client.sweep(sg.examples.sheet(refine=0), {"solver.max_iterations": range(150, 153)}).wait(60, False)
     ticks = whole.plot("normal_force").axes[0].get_xticks()
     assert np.array_equal(ticks, np.round(ticks))
+
+
+def test_a_bare_figure_has_nothing_around_it(punch: sg.Result, client: sg.Client) -> None:
+    fields, problem = punch.fields(), punch.job.problem()
+    study = client.sweep(sg.examples.sheet(refine=0), {"contacts.0.friction.coefficient": [0.1, 0.2]})
+    table = study.wait(60, progress=False).table()
+    for figure in (
+        punch.plot_profile(style="bare"),
+        punch.history.plot(style="bare"),
+        fields.plot(style="bare"),
+        problem.plot(style="bare"),
+        table.plot("normal_force", style="bare"),
+        figures.profiles([punch, punch], style="bare"),
+    ):
+        text = words(figure)
+        for word in ("Rectangular punch", "verdict", "Warnings", "warnings:", r"$\mu$ = 0.3", "finer meshes", study.id):
+            assert word not in text, word
+    assert "peak" in words(punch.plot_profile(style="bare")), "where the axis ends before the peak, its value stays"
+    with pytest.raises(ValueError, match="size is one of column, page, slide, not 'a'; style is one of full, bare"):
+        punch.plot_profile(size="a", style="b")
+
+
+def test_limits_of_axes(punch: sg.Result) -> None:
+    figure = punch.plot_profile(xlim=(0.3, 0.45), ylim=(-300, 10), ylim_below=[-5, 90])
+    assert [axes.get_xlim() for axes in figure.axes] == [(0.3, 0.45)] * 2
+    assert [axes.get_ylim() for axes in figure.axes] == [(-300, 10), (-5, 90)]
+    drawn = np.asarray(figure.axes[0].lines[0].get_xdata())
+    assert drawn[0] <= 0.3 <= drawn[1] and drawn[-2] <= 0.45 <= drawn[-1], "a node beyond at each end"
+    history = punch.history.plot(xlim=(1, 5), ylim=(1e-8, 1), ylim_below=(0, 50))
+    assert history.axes[0].get_ylim() == (1e-8, 1) and history.axes[1].get_ylim() == (0, 50)
+    (body, _) = punch.fields().plot(xlim=(0.2, 0.6), ylim=(-0.5, 0.1)).axes
+    assert (body.get_xlim(), body.get_ylim()) == ((0.2, 0.6), (-0.5, 0.1))
+    (mesh,) = punch.job.problem().plot(xlim=(0, 1), ylim=(-1, 0.2)).axes
+    assert (mesh.get_xlim(), mesh.get_ylim()) == ((0, 1), (-1, 0.2))
+    with pytest.raises(
+        ValueError, match=r"xlim is two finite numbers.* not \(2, 1\); ylim is two .* not 'a'; ylim_below is"
+    ):
+        punch.plot_profile(xlim=(2, 1), ylim="a", ylim_below=(0, math.inf))
+    with pytest.raises(ValueError, match="ylim: the axis of residuals is logarithmic"):
+        punch.history.plot(ylim=(0, 1))
+    with pytest.raises(ValueError, match=r"xlim: the contact lies between 0 and "):
+        punch.plot_profile(xlim=(50, 60))
+
+
+def test_a_profile_shows_the_contact_or_all_of_the_boundary(client: sg.Client) -> None:
+    found = client.submit(sg.examples.cylinder(refine=0)).wait(60, progress=False).profile()
+    loaded = found.s[found.normal_stress != 0]
+    left, right = found.plot().axes[0].get_xlim()
+    assert left == found.s[0] and loaded[-1] < right < found.s[-1]
+    assert found.plot(zoom=False).axes[0].get_xlim() == (found.s[0], found.s[-1])
+
+
+@pytest.mark.parametrize("name", ["profile", "history", "fields", "problem", "profiles", "study"])
+def test_a_slide_is_16_to_9(punch: sg.Result, client: sg.Client, name: str) -> None:
+    study = client.sweep(sg.examples.sheet(refine=0), {"contacts.0.friction.coefficient": [0.1, 0.2]})
+    drawn = {
+        "profile": lambda: punch.plot_profile(size="slide"),
+        "history": lambda: punch.history.plot(size="slide"),
+        "fields": lambda: punch.fields().plot(size="slide"),
+        "problem": lambda: punch.job.problem().plot(size="slide"),
+        "profiles": lambda: figures.profiles([punch, punch], size="slide"),
+        "study": lambda: study.wait(60, progress=False).plot("normal_force", size="slide"),
+    }[name]()
+    width, height = drawn.get_size_inches()
+    assert (width, height) == pytest.approx((254 / 25.4, 254 / 25.4 * 9 / 16))
+    assert not overlapping(drawn)
+
+
+def test_several_jobs_are_told_apart_by_what_differs(client: sg.Client) -> None:
+    base = sg.examples.rectangular_punch(refine=0)
+    base.units = p.Units(length="mm", force="N", stress="MPa")
+    values = [(0.01, 0.3), (0.02, 0.3), (0.02, 0.2)]
+    places = ("contacts.0.friction.nonlocal_radius", "contacts.0.friction.coefficient")
+    jobs = [client.submit(base.with_values(dict(zip(places, value, strict=True)))) for value in values]
+    results = [job.wait(60, progress=False) for job in jobs]
+    figure = figures.profiles(results)
+    handles, labels = figure.axes[1].get_legend_handles_labels()
+    assert labels == [rf"$\mu$ = {mu}, $\rho$ = {rho} mm" for rho, mu in values]
+    dashes: list[Any] = list(handles)
+    assert len({line.get_linestyle() for line in dashes}) == 3, "not by colour alone"
+    legend = figure.axes[1].get_legend()
+    assert legend is not None and len(legend.get_texts()) == 3
+    assert figure.axes[0].get_title(loc="left") == r"$\varepsilon$ = 0.0001", "what all have in common"
+    assert "(MPa)" in figure.axes[0].get_ylabel() and "verdict: " in words(figure)
+    assert not overlapping(figure)
+    # jobs and profiles will do, and labels of one's own
+    same = figures.profiles([jobs[0], results[1].profile()], labels=["a", "b"], xlim=(0.2, 0.5), ylim=(-900, 0))
+    assert same.axes[0].get_legend_handles_labels()[1] == ["a", "b"] and same.axes[0].get_ylim() == (-900, 0)
+    assert figures.profiles(results[:1] * 2).axes[0].get_legend_handles_labels()[1] == ["(no. 1)", "(no. 2)"]
+    for wrong, message in [
+        (([],), "1 to 12 curves, not 0"),
+        ((results * 5,), "1 to 12 curves, not 15"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            figures.profiles(*wrong)
+    with pytest.raises(ValueError, match="there are 1 labels for 3 jobs"):
+        figures.profiles(results, labels=["a"])
+    with pytest.raises(TypeError, match="expected jobs, results or profiles, not str"):
+        figures.profiles(["job_1"])
+
+
+def test_load_steps_of_a_job_and_other_meshes_are_told_apart(client: sg.Client) -> None:
+    problem = sg.examples.rectangular_punch(refine=0)
+    problem.steps = [p.Step(name="press"), p.Step(name="lift", indentation=0.5)]
+    result = client.submit(problem).wait(60, progress=False)
+    steps = figures.profiles([result.profile(step="press"), result.profile(step="lift"), result])
+    labels = steps.axes[0].get_legend_handles_labels()[1]
+    assert labels == ["load step press", "load step lift", "last load step"]
+    finer = client.submit(problem.with_values({"mesh.refine": 1})).wait(60, progress=False)
+    other = figures.profiles([result, finer]).axes[0].get_legend_handles_labels()[1]
+    assert other == ["refine = 0", "refine = 1"] or other == ["without refine", "refine = 1"]
+
+
+def test_differences_of_documents() -> None:
+    a = {"x": [1, 2, 3, 4], "y": {"k": 1, "l": "a"}, "z": [1]}
+    b = {"x": [1, 2, 3, 5], "y": {"k": 1}, "z": [1, 2]}
+    assert differences([a, b]) == {"/x/3": [4, 5], "/y/l": ["a", None], "/z": [[1], [1, 2]]}
+    assert differences([{"x": [1, 2, 3]}, {"x": [4, 5, 6]}]) == {"/x": [[1, 2, 3], [4, 5, 6]]}
+    assert differences([a, a, a]) == {}
+
+
+def test_axisymmetric_figures_have_r_and_z_and_units(client: sg.Client) -> None:
+    problem = sg.examples.annular_punch(refine=0)
+    problem.units = p.Units(length="mm", force="N", stress="MPa")
+    (drawn,) = problem.plot().axes
+    assert (drawn.get_xlabel(), drawn.get_ylabel()) == ("$r$  (mm)", "$z$  (mm)")
+    assert "prescribed $u_r$" in words(drawn.figure)
+    fields = client.submit(problem).wait(60, progress=False).fields()
+    axes = fields.plot(quantity="stress_zz").axes
+    assert (
+        axes[0].get_xlabel().startswith("$r$  (mm)")
+        and axes[-1].get_ylabel() == r"hoop stress  $\sigma_{\theta\theta}$  (MPa)"
+    )
+
+
+def test_axes_of_a_study_have_units_and_the_scale_of_their_values(client: sg.Client) -> None:
+    base = sg.examples.rectangular_punch(refine=0)
+    base.units = p.Units(length="mm", force="N", stress="MPa")
+    place = "contacts.0.indentation"
+    even = client.sweep(base, {place: [0.05, 0.1, 0.15, 0.2, 0.25, 0.3]}).wait(60, progress=False)
+    (axes,) = even.plot("normal_force").axes
+    assert (axes.get_xscale(), axes.get_xlabel(), axes.get_ylabel()) == (
+        "linear",
+        "indentation  (mm)",
+        "normal force  (N/mm)",
+    )
+    growing = client.sweep(base, {"materials.0.youngs_modulus": sg.logspace(10, 1000, 3)}).wait(60, progress=False)
+    (axes,) = growing.plot("peak_tangential_stress", xlim=(5, 2000)).axes
+    assert (axes.get_xscale(), axes.get_xlabel()) == ("log", "$E$  (MPa)") and axes.get_xlim() == (5, 2000)
+    assert axes.get_ylabel().endswith("(MPa)")
+    mu = client.sweep(base, {"contacts.0.friction.coefficient": [0.1, 0.2], place: [0.1, 0.2, 0.4]}).wait(
+        60, progress=False
+    )
+    labels = mu.plot("normal_force", x="coefficient").axes[0].get_legend_handles_labels()[1]
+    assert labels[:3] == ["indentation = 0.1 mm", "indentation = 0.2 mm", "indentation = 0.4 mm"]
+
+
+def test_a_long_history_is_no_longer_than_can_be_seen(punch: sg.Result) -> None:
+    rows = 20_000
+    entered = np.zeros(rows, int)
+    entered[777] = 55
+    long: dict[str, Any] = {name: np.resize(column, rows) for name, column in punch.history.columns().items()}
+    long |= {"k": np.arange(rows), "step": np.zeros(rows, int), "contact_entered": entered}
+    history = dataclasses.replace(punch.history, **long)
+    figure = history.plot()
+    bars: list[Any] = list(figure.axes[1].patches)
+    assert len(bars) <= 2 * figures.BARS and max(bar.get_height() for bar in bars) == 55, "no peak is lost"
+    out = io.BytesIO()
+    figure.savefig(out, format="svg")
+    assert len(out.getvalue()) < 2_500_000
+
+
+def test_looks_of_curves_differ_without_colours() -> None:
+    assert len({str(look) for look in CURVES}) == MOST_CURVES == len(CURVES)
+
+
+def test_the_service_draws_with_the_same_options(punch: sg.Result, tmp_path: pathlib.Path) -> None:
+    full, bare = (punch.job.svg("profile", style=style) for style in ("full", "bare"))
+    assert "verdict" in full and "verdict" not in bare
+    path = punch.job.save_figure(
+        tmp_path / "a.svg", "profile", size="slide", xlim=(0.3, 0.45), ylim=[-300, 0], ylim_below=(0, 50.5)
+    )
+    assert path.read_text(encoding="utf-8").startswith('<svg width="864" height="486"')
+    assert "σ" in punch.job.svg("deformed", stress="yy")
+    with pytest.raises(sg.SignoriniError, match="xlim: expected two finite numbers, .*; ylim: expected two finite"):
+        punch.job.svg("profile", xlim=(2, 1), ylim=(math.nan, 1))
+    with pytest.raises(TypeError, match="no such option: zlim; there are style, stress, xlim, ylim, ylim_below"):
+        punch.job.svg("profile", zlim=(0, 1))  # type: ignore[call-arg]

@@ -14,7 +14,7 @@ from conftest import long_problem
 import signorini as sg
 from signorini import _calls as calls
 from signorini._progress import Waiting, sweep_line
-from signorini._sweep import short_names
+from signorini.pointer import short_names
 
 BASE = sg.examples.rectangular_punch(refine=0)
 MU = "contacts.0.friction.coefficient"

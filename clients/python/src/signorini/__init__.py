@@ -25,7 +25,8 @@ Where to look in this package, for those who change it. Each module uses only th
 type checkers alone read (TYPE_CHECKING) may also name a type that comes later.
 
     errors, pointer, _extras          what can go wrong; places in a problem; packages that need not be installed
-    _style, _shapes, figures          the look of figures, and texts in them; where the parts of a problem lie; figures
+    _paper, _style, _around           how figures are saved; how they look; the texts around them, panels, legends
+    _shapes, _profiles, figures       where the parts of a problem lie; figures of profiles; all figures
     _data                             numbers with their errors, profiles, histories, fields
     _parts, _whole, problem           what is wrong with a value; what a problem can do; its types (generated)
     mesh, obstacle, examples          from which a problem is made

@@ -10,12 +10,15 @@ from ._style import parameters
 
 
 def about(result: Summary, problem: Mapping[str, Any], step: int | str | None = None) -> dict[str, Any]:
-    """Title, parameters of friction (μ, ρ, ε by contact), verdict, warnings, units, extents; at the end of a step."""
+    """Title, parameters of friction (μ, ρ, ε by contact), verdict, warnings, units, kind of
+    analysis, the problem itself, extents; at the end of a step."""
     contacts = {contact["boundary"]: contact for contact in problem.get("contacts") or []}
     said = {
         "title": problem.get("title") or "",
         "parameters": {name: parameters(contact) for name, contact in contacts.items()},
         "units": problem.get("units") or {},
+        "analysis": (problem.get("analysis") or {}).get("kind", ""),
+        "problem": problem,
     }
     if step is not None and problem.get("steps"):
         names = [document["name"] for document in result.steps]

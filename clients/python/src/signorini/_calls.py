@@ -243,6 +243,11 @@ def jobs(params: Params, page_token: str) -> Call[Document]:
     return _get("/v1/jobs", "jobs", params=params + _page(page_token))
 
 
+def jobs_of_sweep(id: str) -> Call[Document]:
+    """One of the jobs that solve a sweep."""
+    return jobs((("sweep", id), ("page_size", "1")), "")
+
+
 def count(params: Params) -> Call[Document]:
     return _get("/v1/jobs/count", "total", params=params)
 
@@ -327,10 +332,33 @@ def vtu(id: str) -> Call[bytes]:
     return _file(id, _job(id) + "/fields", FILES["vtu"], (("format", "vtu"),))
 
 
-def plot(id: str, name: str, ending: str, theme: str, size: str, step: int | str | None) -> Call[bytes]:
+class Look(TypedDict, total=False):
+    """How a figure that the service draws is to look, by the names of the query of `GET /v1/jobs/{id}/plots/{plot}`."""
+
+    style: str
+    """`full` (default), or `bare`: without title, parameters, verdict and warnings."""
+    stress: str
+    """Of `deformed`: `von_mises` (default), `xx`, `yy`, `zz`, `xy`."""
+    xlim: Sequence[float]
+    """Limits of an axis, two numbers."""
+    ylim: Sequence[float]
+    ylim_below: Sequence[float]
+    """Of the lower panels of `profile` and `convergence`."""
+
+
+def plot(
+    id: str, name: str, ending: str, theme: str, size: str, step: int | str | None, look: Mapping[str, Any]
+) -> Call[bytes]:
+    unknown = look.keys() - Look.__annotations__
+    if unknown:
+        raise TypeError(f"no such option: {', '.join(sorted(unknown))}; there are {', '.join(Look.__annotations__)}")
     params: Params = (("theme", theme), ("size", size))
     if step is not None:
         params += (("step", str(step)),)
+    for option, value in look.items():
+        if value is not None:
+            text = value if isinstance(value, str) else ",".join(repr(float(number)) for number in value)
+            params += ((option, text),)
     return _file(id, f"{_job(id)}/plots/{quote(name, safe='')}.{ending}", FILES[ending], params)
 
 

@@ -1,4 +1,4 @@
-"""How figures look: sizes, fonts, colours.
+"""How figures look: sizes, fonts, colours; which texts are around them, and the limits of their axes.
 
 The colours are those of Okabe and Ito, which people with any of the common kinds of colour blindness tell apart; what
 differs in colour differs in line style or in words besides. The figures that the service draws have the same.
@@ -7,7 +7,7 @@ differs in colour differs in line style or in words besides. The figures that th
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,8 +15,12 @@ import numpy as np
 
 from ._extras import load
 
-SIZES = {"column": (88 / 25.4, 7.0), "page": (160 / 25.4, 9.0), "slide": (254 / 25.4, 14.0)}
-"""Width in inches and size of letters in points: a column of a journal (88 mm), a page, a slide."""
+SIZES = {"column": (88 / 25.4, 7.0), "page": (160 / 25.4, 9.0), "slide": (254 / 25.4, 12.5)}
+"""Width in inches and size of letters in points: a column of a journal (88 mm), a page, a slide of 16:9."""
+SLIDE = 9 / 16
+"""The height of a slide, as a part of its width."""
+STYLES = ("full", "bare")
+"""With title, parameters, verdict and warnings, or with none of these."""
 
 
 @dataclass(frozen=True)
@@ -82,19 +86,50 @@ PARAMETERS = {
 }
 """The usual symbols of parameters that studies vary."""
 
+AXISYMMETRIC = {
+    "stress_xx": r"stress  $\sigma_{rr}$",
+    "stress_yy": r"stress  $\sigma_{zz}$",
+    "stress_zz": r"hoop stress  $\sigma_{\theta\theta}$",
+    "stress_xy": r"shear stress  $\sigma_{rz}$",
+}
+"""The names of quantities that are others in axisymmetry, where x is r and y is z."""
+
+UNITS = {
+    "length": (
+        "nonlocal_radius elastic_slip indentation tangential_displacement thickness radius half_width center "
+        "contact_width stick_width slip_width ux uy un ut"
+    ).split(),
+    "stress": (
+        "youngs_modulus pressure cohesion shear_cap normal_stress tangential_stress friction_bound von_mises "
+        "peak_normal_stress peak_tangential_stress"
+    ).split(),
+    "force": ["normal_force", "tangential_force", "friction_force"],
+}
+"""What of parameters and results has which unit."""
+
+CURVES: list[tuple[Any, str]] = [
+    ("-", "o"), ("--", "s"), ("-.", "D"), (":", "^"), ((0, (8, 2)), "v"), ((0, (5, 1, 1, 1, 1, 1)), "P"),
+    ("-", "X"), ("--", "<"), ("-.", ">"), (":", "p"), ((0, (8, 2)), "h"), ((0, (5, 1, 1, 1, 1, 1)), "*"),
+]  # fmt: skip
+"""Dashes and marker of each curve of a figure, so that they differ without colours; no two of the twelve are alike."""
+
 SYMBOLS = {"μ": r"$\mu$", "ρ": r"$\rho$", "ε": r"$\varepsilon$"}
 
 
 @contextlib.contextmanager
-def style(size: str, theme: str, ax: Any = None) -> Iterator[tuple[Any, float, Theme]]:
+def styled(size: str, theme: str, ax: Any = None, style: str = "full") -> Iterator[tuple[Any, float, Theme]]:
     """pyplot with our settings, the width of a figure in inches, and the theme. Raises ValueError for other names.
 
     ax: axes of the caller, whose own settings of letters and lines then hold
     """
-    if size not in SIZES:
-        raise ValueError(f"size is one of {', '.join(SIZES)}, not {size!r}")
-    if theme not in THEMES:
-        raise ValueError(f"theme is one of {', '.join(THEMES)}, not {theme!r}")
+    known: list[tuple[str, str, Iterable[str]]] = [
+        ("size", size, SIZES), ("theme", theme, THEMES), ("style", style, STYLES)
+    ]  # fmt: skip
+    wrong = [
+        f"{name} is one of {', '.join(names)}, not {given!r}" for name, given, names in known if given not in names
+    ]
+    if wrong:
+        raise ValueError("; ".join(wrong))
     pyplot = load("matplotlib.pyplot", "plot")
     width, points = SIZES[size]
     if ax is not None:
@@ -102,6 +137,34 @@ def style(size: str, theme: str, ax: Any = None) -> Iterator[tuple[Any, float, T
         return
     with pyplot.rc_context(settings(THEMES[theme], points)):
         yield pyplot, width, THEMES[theme]
+
+
+def new(plt: Any, rows: int, columns: int, size: tuple[float, float], **options: Any) -> tuple[Any, Any]:
+    """A new figure, and its axes as an array of rows and columns."""
+    from ._paper import PaperFigure
+
+    figure, axes = plt.subplots(rows, columns, figsize=size, FigureClass=PaperFigure, squeeze=False, **options)
+    return figure, axes
+
+
+Limits = tuple[float, float]
+
+
+def limits(**given: Any) -> list[Limits | None]:
+    """Limits of axes as they were given by name, or None. Raises ValueError that names all that are wrong."""
+    found: list[Limits | None] = []
+    wrong = []
+    for name, value in given.items():
+        try:
+            low, high = (float(number) for number in value) if value is not None else (0.0, 1.0)
+        except (TypeError, ValueError):
+            low, high = np.nan, np.nan
+        if not (np.isfinite(low) and np.isfinite(high) and low < high):
+            wrong.append(f"{name} is two finite numbers, the smaller first, not {value!r}")
+        found.append(None if value is None else (low, high))
+    if wrong:
+        raise ValueError("; ".join(wrong))
+    return found
 
 
 def panels(ax: Any, most: int = 2) -> list[Any]:
@@ -129,7 +192,6 @@ def settings(theme: Theme, points: float) -> dict[str, Any]:
         "axes.axisbelow": True,
         "figure.facecolor": theme.ground,
         "savefig.facecolor": theme.ground,
-        "savefig.dpi": 300,
         "text.color": theme.ink,
         "xtick.color": theme.ink,
         "ytick.color": theme.ink,
@@ -144,9 +206,6 @@ def settings(theme: Theme, points: float) -> dict[str, Any]:
         "grid.color": theme.faint,
         "grid.linewidth": 0.4 * thin,
         "grid.alpha": 0.4,
-        # letters stay letters in vector files, so that a journal's editor can search and change them
-        "svg.fonttype": "none",
-        "pdf.fonttype": 42,
     }
 
 
@@ -174,3 +233,26 @@ def unit(about: Mapping[str, Any], kind: str) -> str:
     """` (MPa)` where the problem names its units, else nothing."""
     name = (about.get("units") or {}).get(kind)
     return f"  ({name})" if name else ""
+
+
+def unit_of(about: Mapping[str, Any], name: str) -> str:
+    """The unit of a parameter or a result where the problem names its units, else nothing."""
+    last = name.rpartition(".")[2].rpartition("/")[2]
+    kind = next((kind for kind, names in UNITS.items() if last in names), "")
+    units = about.get("units") or {}
+    found = str(units.get(kind) or "")
+    if found and kind == "force" and about.get("analysis") == "plane_strain":
+        # of a unit of thickness
+        return f"{found}/{units['length']}" if units.get("length") else ""
+    return found
+
+
+def coordinates(about: Mapping[str, Any]) -> tuple[str, str]:
+    """The names of the coordinates."""
+    return ("r", "z") if about.get("analysis") == "axisymmetric" else ("x", "y")
+
+
+def quantity_name(about: Mapping[str, Any], name: str) -> str:
+    """The name of a quantity on an axis."""
+    own = AXISYMMETRIC if about.get("analysis") == "axisymmetric" else {}
+    return own.get(name) or QUANTITIES.get(name) or name.replace("_", " ")

@@ -30,12 +30,18 @@ SHOWN_COLUMNS = ("status", "normal_force", "tangential_force", "stick_width", "p
 """What it shows besides the parameters."""
 
 
+def about_table(problem: Mapping[str, Any]) -> dict[str, Any]:
+    """What figures of a table say besides its numbers."""
+    return {"units": problem.get("units") or {}, "analysis": (problem.get("analysis") or {}).get("kind", "")}
+
+
 class SweepView:
     """A sweep as the service last described it."""
 
     def __init__(self, document: Mapping[str, Any]) -> None:
         self.document = document
         self._told = False  # what to look at in its table
+        self._of_table: Mapping[str, Any] | None = None
 
     @property
     def id(self) -> str:
@@ -101,11 +107,13 @@ class SweepTable:
         where several end alike, or like the name of a result.
     parameters: the names of these columns
     title: the name of the sweep, which a figure has as its title
+    about: units and kind of analysis of its problem, for the axes of figures
     """
 
-    def __init__(self, found: Mapping[str, Array], title: str = "") -> None:
+    def __init__(self, found: Mapping[str, Array], title: str = "", about: Mapping[str, Any] | None = None) -> None:
+        self.about: Mapping[str, Any] = about or {}
         pointed = [name for name in found if name.startswith("/")]
-        short = short_names(pointed, [name for name in found if name not in pointed])
+        short = pointers.short_names(pointed, [name for name in found if name not in pointed])
         self.columns: dict[str, Array] = {
             short.get(name, name): _typed(name, column) if name in short else column for name, column in found.items()
         }
@@ -182,25 +190,6 @@ def counted(words: Iterable[str]) -> str:
 
 def _cell(value: Any) -> str:
     return f"{value:.5g}" if isinstance(value, float) else str(value)
-
-
-def short_names(found: Sequence[str], taken: Iterable[str] = ()) -> dict[str, str]:
-    """For each pointer a name that no other has, and none of those that are taken: the last part of it, or all of it
-    with dots or, where even that is not enough, as it is."""
-    names: dict[str, str] = {}
-    for name in (_last, _dotted, str):
-        rest = {pointer: name(pointer) for pointer in found if pointer not in names}
-        used = collections.Counter([*rest.values(), *names.values(), *taken])
-        names.update({pointer: name for pointer, name in rest.items() if used[name] == 1 and not name.isdigit()})
-    return {pointer: names.get(pointer, pointer) for pointer in found}
-
-
-def _last(pointer: str) -> str:
-    return pointers.names(pointer)[-1]
-
-
-def _dotted(pointer: str) -> str:
-    return pointer[1:].replace("/", ".")
 
 
 def _typed(pointer: str, column: Array) -> Array:

@@ -29,7 +29,7 @@ from ._pool import AsyncPool
 from ._progress import Waiting, goes_on
 from ._retry import BROKEN, LOG, Attempts
 from ._saved import AsyncSaved, key, packed, requests, write
-from ._sweep import TABLE_S, Member, SweepTable, SweepView
+from ._sweep import TABLE_S, Member, SweepTable, SweepView, about_table
 from .errors import NotFound, SignoriniError
 from .local import LocalServer
 from .problem import Problem
@@ -329,8 +329,16 @@ class AsyncJob(JobView):
         document = await self._client._send(calls.result(self.id, partial, self.input_hash))
         return AsyncResult(self._client, self, document)
 
-    async def svg(self, plot: str, theme: str = "light", *, size: str = "page", step: int | str | None = None) -> str:
-        found = await self._client._send(calls.plot(self.id, plot, "svg", theme, size, step))
+    async def svg(
+        self,
+        plot: str,
+        theme: str = "light",
+        *,
+        size: str = "page",
+        step: int | str | None = None,
+        **look: Unpack[calls.Look],
+    ) -> str:
+        found = await self._client._send(calls.plot(self.id, plot, "svg", theme, size, step, look))
         return found.decode()
 
     async def save_figure(
@@ -341,9 +349,10 @@ class AsyncJob(JobView):
         *,
         size: str = "page",
         step: int | str | None = None,
+        **look: Unpack[calls.Look],
     ) -> pathlib.Path:
         ending = calls.figure_ending(path)
-        return write(path, await self._client._send(calls.plot(self.id, plot, ending, theme, size, step)))
+        return write(path, await self._client._send(calls.plot(self.id, plot, ending, theme, size, step, look)))
 
 
 class AsyncResult(Summary):
@@ -441,7 +450,14 @@ class AsyncSweep(SweepView):
         return self
 
     async def table(self) -> SweepTable:
-        return await self._table()
+        table = await self._table()
+        if self._of_table is None:
+            with contextlib.suppress(SignoriniError):
+                page = await self._client._send(calls.jobs_of_sweep(self.id))
+                for job in page["jobs"]:
+                    self._of_table = about_table(await self._client._send(calls.problem(job["id"])))
+        table.about = self._of_table or {}
+        return table
 
     async def _table(self, deadline: float | None = None) -> SweepTable:
         return SweepTable(await self._client._send(calls.sweep_table(self.id), deadline), self.title)

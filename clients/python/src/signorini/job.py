@@ -19,6 +19,7 @@ from .problem import Problem
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from typing_extensions import Unpack
 
     from .client import Client
 
@@ -112,13 +113,23 @@ class Job(JobView):
             self.raise_for_status()
         return Result(self._client, self, self._client._send(calls.result(self.id, partial, self.input_hash)))
 
-    def svg(self, plot: str, theme: str = "light", *, size: str = "page", step: int | str | None = None) -> str:
+    def svg(
+        self,
+        plot: str,
+        theme: str = "light",
+        *,
+        size: str = "page",
+        step: int | str | None = None,
+        **look: Unpack[calls.Look],
+    ) -> str:
         """A figure that the service draws: `profile`, `convergence`, `deformed` or `mesh`.
 
         size: what it is for: `column`, `page` or `slide`
         step: the load step at whose end it is, by name or number; of `profile` and `convergence`
+        look: `style="bare"` without title, parameters, verdict and warnings; `stress` of `deformed`; `xlim`, `ylim`,
+            `ylim_below` are limits of axes, two numbers each
         """
-        return self._client._send(calls.plot(self.id, plot, "svg", theme, size, step)).decode()
+        return self._client._send(calls.plot(self.id, plot, "svg", theme, size, step, look)).decode()
 
     def save_figure(
         self,
@@ -128,10 +139,11 @@ class Job(JobView):
         *,
         size: str = "page",
         step: int | str | None = None,
+        **look: Unpack[calls.Look],
     ) -> pathlib.Path:
         """The same as a file, of the kind that its name ends with: .svg, .png (300 dots to an inch) or .pdf."""
         ending = calls.figure_ending(path)
-        return write(path, self._client._send(calls.plot(self.id, plot, ending, theme, size, step)))
+        return write(path, self._client._send(calls.plot(self.id, plot, ending, theme, size, step, look)))
 
 
 class Result(Summary):

@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+import collections
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 
@@ -41,3 +43,45 @@ def put(document: Any, path: str, value: Any) -> None:
         place[last] = value
     else:
         raise KeyError(f"{path}: there is no {last!r}")
+
+
+def differences(documents: Sequence[Any], pointer: str = "") -> dict[str, list[Any]]:
+    """Where documents differ: the pointer of each place, with its value in each of them; None where it is absent.
+
+    Lists of different lengths, and lists that differ in most of their numbers, such as the coordinates of a mesh,
+    differ as a whole.
+    """
+    if all(document == documents[0] for document in documents):
+        return {}
+    found: dict[str, list[Any]] = {}
+    if all(isinstance(document, dict) for document in documents):
+        for name in dict.fromkeys(name for document in documents for name in document):
+            found |= differences([document.get(name) for document in documents], f"{pointer}/{escape(name)}")
+        return found
+    if all(isinstance(document, list) for document in documents):
+        if len({len(document) for document in documents}) == 1:
+            for number, values in enumerate(zip(*documents, strict=True)):
+                found |= differences(list(values), f"{pointer}/{number}")
+            objects = all(isinstance(value, dict) for document in documents for value in document)
+            if objects or len(found) <= max(1, len(documents[0]) // 2):
+                return found
+    return {pointer: list(documents)}
+
+
+def short_names(found: Sequence[str], taken: Iterable[str] = ()) -> dict[str, str]:
+    """For each pointer a name that no other has, and none of those that are taken: the last part of it, or all of it
+    with dots or, where even that is not enough, as it is."""
+    given: dict[str, str] = {}
+    for name in (_last, _dotted, str):
+        rest = {pointer: name(pointer) for pointer in found if pointer not in given}
+        used = collections.Counter([*rest.values(), *given.values(), *taken])
+        given.update({pointer: name for pointer, name in rest.items() if used[name] == 1 and not name.isdigit()})
+    return {pointer: given.get(pointer, pointer) for pointer in found}
+
+
+def _last(pointer: str) -> str:
+    return names(pointer)[-1]
+
+
+def _dotted(pointer: str) -> str:
+    return pointer[1:].replace("/", ".")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from . import _calls as calls
 from ._data import Event
 from ._progress import Waiting, goes_on
-from ._sweep import TABLE_S, Member, SweepTable, SweepView
+from ._sweep import TABLE_S, Member, SweepTable, SweepView, about_table
 from .errors import SignoriniError
 from .job import Job
 
@@ -59,7 +59,15 @@ class Sweep(SweepView):
 
     def table(self) -> SweepTable:
         """The table as it is now; it fills while the sweep runs."""
-        return self._table()
+        table = self._table()
+        if self._of_table is None:
+            # without units a table is what it is
+            with contextlib.suppress(SignoriniError):
+                page = self._client._send(calls.jobs_of_sweep(self.id))
+                for job in page["jobs"]:
+                    self._of_table = about_table(self._client._send(calls.problem(job["id"])))
+        table.about = self._of_table or {}
+        return table
 
     def _table(self, deadline: float | None = None) -> SweepTable:
         return SweepTable(self._client._send(calls.sweep_table(self.id), deadline), self.title)
