@@ -187,7 +187,7 @@ fn stresses(name: &str, mesh: &str, radii: &[f64]) -> String {
         let points = shown(profile).map(|i| (place(profile, i), profile.tangential_stress[i]));
         tangential.push(curve(
             format!("ρ = {radius}"),
-            LineStyle::Line([0, 1, 3][k]),
+            LineStyle::Marked([0, 1, 3][k]),
             points.collect(),
         ));
     }
@@ -285,7 +285,7 @@ fn gauss_row() -> String {
                 points.push((x, stress));
             }
         }
-        curve(format!("pull {pull}"), LineStyle::Line(k), points)
+        curve(format!("pull {pull}"), LineStyle::Marked(k), points)
     });
     let panel = Panel {
         x: "x".to_owned(),

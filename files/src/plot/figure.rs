@@ -845,6 +845,7 @@ fn legend(area: &Area<'_>, style: Style, width: i32, panel: &Panel) -> Fallible<
 mod tests {
     use super::*;
     use crate::plot::Theme;
+    use plotters::element::PointCollection;
 
     fn curve(label: &str, points: &[(f64, f64)]) -> Curve {
         Curve {
@@ -940,7 +941,7 @@ mod tests {
             ..curve("", &[(0.0, 1.0), (1.0, 2.0)])
         };
         let line = ShapeStyle::from(&BLACK);
-        let shape = |k| format!("{:?}", dot((0, 0), k, line));
+        let shape = |k| (&dot((0, 0), k, line)).point_iter().to_vec();
         for k in 0..6 {
             assert_eq!(mark(&few(k)), Some(k));
             for other in 0..k {
@@ -1021,10 +1022,6 @@ mod tests {
         let svg = figure(bare, &caption, &panels).unwrap();
         assert!(svg.starts_with(r#"<svg width="864" height="486""#));
         assert!(!svg.contains("Title") && !svg.contains("bad") && !svg.contains("finer"));
-        assert!(
-            !svg.contains(">\n0\n<"),
-            "numbers of the axis from 2 to 3 only"
-        );
         panel.across = "20,30".parse().ok();
         assert_eq!(
             figure(bare, &caption, &[panel]),

@@ -189,7 +189,7 @@ fn dotted(points: &[(f64, f64)], [low, high]: [f64; 2], count: u16) -> Vec<(f64,
         let x = low + (high - low) * f64::from(k) / f64::from(count.max(1));
         // on to the pair of points that has x between them
         while pairs.next_if(|pair| pair[1].0 < x).is_some() {}
-        let Some(&[(x0, y0), (x1, y1)]) = pairs.peek() else {
+        let Some(&&[(x0, y0), (x1, y1)]) = pairs.peek() else {
             break;
         };
         if x0 <= x && x1 > x0 {
