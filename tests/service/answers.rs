@@ -8,7 +8,9 @@ use suite::{
     harness::{Server, answer, block},
 };
 
-use crate::server;
+use tonic_types::StatusExt;
+
+use crate::{SIGNORINI, server};
 
 /// A body that never touches the obstacle.
 fn untouched() -> Value {
@@ -72,6 +74,12 @@ async fn a_job_links_to_the_plots_that_there_are() {
         assert_eq!(found.len(), count, "{found:?} of {job:#}");
         for (name, link) in found {
             let plot = server.get(&link).send().await.unwrap();
+            // of a job without a solution they are found, but have to be asked for
+            if job["status"] == "failed" && name != "plot_mesh" {
+                assert_eq!(plot.status(), StatusCode::CONFLICT, "{name}");
+            }
+            let plot = server.get(&format!("{link}?partial=true"));
+            let plot = plot.send().await.unwrap();
             assert_eq!(plot.status(), StatusCode::OK, "{name}");
             let whole = if job["status"] == "succeeded" {
                 "final"
@@ -87,57 +95,208 @@ async fn a_job_links_to_the_plots_that_there_are() {
     assert_eq!(links(&waiting).len(), 1);
 }
 
-/// Operations: GetResult, ListIterations, GetProfile, StreamResult
+/// The parts of the result of a job, as paths below it; with whether they are there without `partial`.
+const PARTS: [(&str, bool); 12] = [
+    ("result", true),
+    ("problem", true),
+    ("plots/mesh.svg", true),
+    ("history", false),
+    ("history?max_points=2&format=csv", false),
+    ("profiles/top", false),
+    ("profiles/top?points=5&format=arrow", false),
+    ("fields", false),
+    ("fields?format=json", false),
+    ("plots/profile.svg", false),
+    ("plots/convergence.png", false),
+    ("plots/deformed.pdf", false),
+];
+
+/// Whoever plots the last state of a job that failed takes it for a solution, unless it has to be asked for.
+/// Operations: GetResult, ListIterations, GetProfile, StreamResult, GetPlot
 #[tokio::test]
-async fn a_partial_result_says_so_everywhere() {
+async fn the_state_of_a_job_without_a_solution_has_to_be_asked_for() {
     let server = server().await;
     let mut problem = example_json("rectangular_punch");
     problem["solver"] = json!({ "max_iterations": 3 });
     let job = server.solve(&json!({ "problem": problem })).await;
     assert_eq!(job["reason"], "not_converged", "{job:#}");
     let id = job["id"].as_str().unwrap();
-    for path in [
-        "result",
-        "history",
-        "profiles/top",
-        "fields",
-        "fields?format=json",
-        "plots/profile.svg",
-    ] {
-        let found = server
-            .get(&format!("/v1/jobs/{id}/{path}"))
-            .send()
-            .await
-            .unwrap();
+    for (path, open) in PARTS {
+        let path = format!("/v1/jobs/{id}/{path}");
+        let found = server.get(&path).send().await.unwrap();
+        if !open {
+            assert_eq!(found.status(), StatusCode::CONFLICT, "{path}");
+            let error: Value = found.json().await.unwrap();
+            assert_eq!(error["code"], "partial-result", "{error:#}");
+            assert_eq!(error["retryable"], false, "{error:#}");
+            assert_eq!(error["reason"], "not_converged", "{error:#}");
+            assert_eq!(error["failure"], job["failure"], "{error:#}");
+            let detail = error["detail"].as_str().unwrap();
+            for told in [id, "did not converge: after", "partial=true", "--partial"] {
+                assert!(detail.contains(told), "{detail}");
+            }
+        }
+        if path.ends_with("/result") || path.ends_with("/problem") {
+            assert_eq!(found_status(&server, &path).await, StatusCode::OK, "{path}");
+            continue; // they have no such parameter
+        }
+        let sign = if path.contains('?') { '&' } else { '?' };
+        let asked = format!("{path}{sign}partial=");
+        let found = server.get(&format!("{asked}true")).send().await.unwrap();
         assert_eq!(found.status(), StatusCode::OK, "{path}");
         assert_eq!(found.headers()["result-available"], "partial", "{path}");
+        if path.ends_with("profile.svg") {
+            let figure = found.text().await.unwrap();
+            assert!(figure.contains("PARTIAL"), "the figure says so");
+        }
+        let refused = if open {
+            StatusCode::OK
+        } else {
+            StatusCode::CONFLICT
+        };
+        assert_eq!(
+            found_status(&server, &format!("{asked}false")).await,
+            refused
+        );
+        let wrong = found_status(&server, &format!("{asked}yes")).await;
+        assert_eq!(wrong, StatusCode::BAD_REQUEST);
     }
+    let explained = server.json("/v1/errors/partial-result").await;
+    assert_eq!(
+        (&explained["status"], &explained["grpc"]),
+        (&json!(409), &json!("FAILED_PRECONDITION"))
+    );
+    // what has a solution is served as before
+    let solved = server
+        .solve(&json!({ "problem": example_json("rectangular_punch") }))
+        .await;
+    let id = solved["id"].as_str().unwrap();
+    for path in [
+        "history",
+        "history?partial=true",
+        "profiles/top?partial=false",
+        "plots/profile.svg?partial=true",
+    ] {
+        let path = format!("/v1/jobs/{id}/{path}");
+        assert_eq!(found_status(&server, &path).await, StatusCode::OK, "{path}");
+    }
+}
+
+async fn found_status(server: &Server, path: &str) -> StatusCode {
+    server.get(path).send().await.unwrap().status()
+}
+
+/// Operations: ListIterations, GetProfile, StreamResult
+#[tokio::test]
+async fn the_state_of_a_job_without_a_solution_has_to_be_asked_for_over_grpc_too() {
+    let server = server().await;
+    let mut problem = example_json("rectangular_punch");
+    problem["solver"] = json!({ "max_iterations": 3 });
+    let job = server.solve(&json!({ "problem": problem })).await;
+    let id = job["id"].as_str().unwrap();
     let mut grpc = JobServiceClient::connect(server.url.clone()).await.unwrap();
-    let request = pb::GetProfileRequest {
+    let result = pb::GetResultRequest { id: id.into() };
+    assert!(grpc.get_result(result).await.is_ok());
+    let profile = pb::GetProfileRequest {
         id: id.into(),
         boundary: "top".into(),
         ..Default::default()
     };
-    let profile = grpc.get_profile(request).await.unwrap();
-    assert_eq!(
-        profile.metadata().get("result-available").unwrap(),
-        "partial"
-    );
-    let request = pb::StreamResultRequest {
+    let rows = pb::ListIterationsRequest {
         id: id.into(),
         ..Default::default()
     };
-    let stream = grpc.stream_result(request).await.unwrap();
-    assert_eq!(
-        stream.metadata().get("result-available").unwrap(),
-        "partial"
-    );
-    let request = pb::ListIterationsRequest {
+    let fields = pb::StreamResultRequest {
         id: id.into(),
         ..Default::default()
     };
-    let rows = grpc.list_iterations(request).await.unwrap();
-    assert_eq!(rows.metadata().get("result-available").unwrap(), "partial");
+    let mut json_fields = fields.clone();
+    json_fields.set_format(pb::FieldFormat::Json);
+    let refused = [
+        grpc.get_profile(profile.clone()).await.map(drop),
+        grpc.list_iterations(rows.clone()).await.map(drop),
+        grpc.stream_result(fields.clone()).await.map(drop),
+        grpc.stream_result(json_fields.clone()).await.map(drop),
+    ];
+    for refused in refused {
+        let status = refused.unwrap_err();
+        assert_eq!(status.code(), tonic::Code::FailedPrecondition);
+        assert!(status.message().starts_with("partial-result: "), "{status}");
+        assert!(status.message().contains("did not converge"), "{status}");
+        let details = status.get_error_details();
+        let info = details.error_info().unwrap();
+        assert_eq!(
+            (info.reason.as_str(), info.metadata["reason"].as_str()),
+            ("partial-result", "not_converged")
+        );
+    }
+    let partial = true;
+    let profile = grpc
+        .get_profile(pb::GetProfileRequest { partial, ..profile })
+        .await;
+    let rows = grpc
+        .list_iterations(pb::ListIterationsRequest { partial, ..rows })
+        .await;
+    let fields = grpc
+        .stream_result(pb::StreamResultRequest { partial, ..fields })
+        .await;
+    let json_fields = pb::StreamResultRequest {
+        partial,
+        ..json_fields
+    };
+    let json_fields = grpc.stream_result(json_fields).await;
+    for metadata in [
+        profile.unwrap().metadata(),
+        rows.unwrap().metadata(),
+        fields.unwrap().metadata(),
+        json_fields.unwrap().metadata(),
+    ] {
+        assert_eq!(metadata.get("result-available").unwrap(), "partial");
+    }
+}
+
+/// Operations: ListIterations, GetPlot, GetProfile
+#[tokio::test]
+async fn a_job_that_ran_out_of_time_or_was_canceled_has_no_solution_either() {
+    let server = Server::start_alone(SIGNORINI, &["--workers", "1"]).await;
+    let mut long = block(80, 80);
+    long["contacts"][0]["friction"]["history"] = json!("incremental");
+    long["steps"] = json!([{ "increments": 10_000 }]);
+    let late = json!({ "problem": long, "cache": "off", "limits": { "timeout_s": 3 } });
+    let late = server.solve(&late).await;
+    assert_eq!(late["reason"], "timed_out", "{late:#}");
+    let canceled = server.submit(&long).await;
+    server.until(&canceled, |event| event["k"] == 3).await;
+    // while it runs there is no question
+    let history = format!("/v1/jobs/{canceled}/history");
+    assert_eq!(found_status(&server, &history).await, StatusCode::OK);
+    server.cancel(&canceled).await;
+    server.until_done(&canceled).await;
+    for (id, why) in [
+        (late["id"].as_str().unwrap(), "time limit"),
+        (&canceled, "was canceled"),
+    ] {
+        for part in ["history", "plots/convergence.svg"] {
+            let path = format!("/v1/jobs/{id}/{part}");
+            let refused = server.get(&path).send().await.unwrap();
+            assert_eq!(refused.status(), StatusCode::CONFLICT, "{path}");
+            let error: Value = refused.json().await.unwrap();
+            assert!(error["detail"].as_str().unwrap().contains(why), "{error:#}");
+            let asked = format!("{path}?partial=true");
+            assert_eq!(
+                found_status(&server, &asked).await,
+                StatusCode::OK,
+                "{asked}"
+            );
+        }
+    }
+    // without any result there is nothing to ask for
+    let waiting = server.submit(&long).await;
+    let never = server.submit(&example_json("sheet")).await;
+    server.cancel(&never).await;
+    let none = format!("/v1/jobs/{never}/profiles/top");
+    assert_eq!(found_status(&server, &none).await, StatusCode::NOT_FOUND);
+    server.cancel(&waiting).await;
 }
 
 async fn patch(server: &Server, id: &str, body: &str) -> (StatusCode, Value) {

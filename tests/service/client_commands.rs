@@ -292,6 +292,57 @@ async fn a_problem_is_submitted_waited_for_listed_and_its_result_printed() {
 }
 
 #[tokio::test]
+async fn the_state_of_a_job_without_a_solution_is_printed_and_drawn_if_it_is_asked_for() {
+    let (server, folder) = (server().await, tempfile::tempdir().unwrap());
+    let url = &*server.url;
+    let mut cut = example_json("rectangular_punch");
+    cut["solver"] = json!({ "max_iterations": 3 });
+    let cut = write(folder.path(), "cut.json", &cut.to_string());
+    let (id, _) = ends(url, &["submit", &cut, "-q"], 0).await;
+    let id = id.trim();
+    ends(url, &["wait", id, "-q"], 9).await;
+    // the result document says itself that it is none
+    let (_, told) = ends(url, &["result", id], 0).await;
+    assert!(told.contains("the result is partial"), "{told}");
+    let name = |file: &str| folder.path().join(file).to_str().unwrap().to_owned();
+    let (csv, vtu, svg) = (name("a.csv"), name("a.vtu"), name("a.convergence.svg"));
+    let figure = name("b.svg");
+    let cases: [&[&str]; 8] = [
+        &["result", id, "--profile"],
+        &["result", id, "-f", "csv"],
+        &["result", id, "--history", "-f", "jsonl"],
+        &["result", id, "-o", &csv],
+        &["result", id, "-o", &vtu, "-o", &svg],
+        &["plot", id],
+        &["plot", id, "convergence"],
+        &["plot", id, "deformed", "-o", &figure],
+    ];
+    for case in cases {
+        let (_, told) = ends(url, case, 1).await;
+        for part in ["did not converge", "--partial", "explain partial-result"] {
+            assert!(told.contains(part), "{case:?}: {told}");
+        }
+        ends(url, &[case, &["--partial"]].concat(), 0).await;
+    }
+    for file in [&csv, &vtu, &svg, &figure] {
+        assert!(std::fs::metadata(file).unwrap().len() > 100, "{file}");
+    }
+    assert!(
+        std::fs::read_to_string(&figure)
+            .unwrap()
+            .contains("PARTIAL")
+    );
+    let (drawn, _) = ends(url, &["plot", id, "profile", "--partial"], 0).await;
+    assert!(drawn.contains("partial: no solution"), "{drawn}");
+    ends(url, &["plot", id, "mesh", "-o", &figure], 0).await;
+    let explained = ends(url, &["explain", "partial-result"], 0).await.0;
+    assert!(
+        explained.contains("409") && explained.contains("--partial"),
+        "{explained}"
+    );
+}
+
+#[tokio::test]
 async fn every_end_has_its_exit_code() {
     let (server, folder) = (
         Server::start(SIGNORINI, &["--workers", "1", "--max-queued", "2"]).await,

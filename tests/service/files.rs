@@ -77,6 +77,7 @@ async fn ranges_of_fields_add_up_to_the_whole_file() {
                 id: id.clone(),
                 format: format.into(),
                 offset,
+                ..Default::default()
             };
             let mut pieces = grpc.stream_result(request).await.unwrap().into_inner();
             let mut place = offset;
@@ -94,6 +95,7 @@ async fn ranges_of_fields_add_up_to_the_whole_file() {
             id: id.clone(),
             format: format.into(),
             offset: length as u64 + 1,
+            ..Default::default()
         };
         assert_eq!(
             grpc.stream_result(request).await.unwrap_err().code(),

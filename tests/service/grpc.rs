@@ -81,8 +81,7 @@ async fn a_job_is_submitted_watched_and_fetched_over_grpc() {
         .get_profile(pb::GetProfileRequest {
             id: job.id.clone(),
             boundary: "top".into(),
-            step: None,
-            points: None,
+            ..Default::default()
         })
         .await;
     let profile = profile.unwrap().into_inner();

@@ -136,8 +136,7 @@ async fn both_protocols_report_the_same_events_and_profiles_of_a_job() {
         .get_profile(pb::GetProfileRequest {
             id,
             boundary: "top".into(),
-            step: None,
-            points: None,
+            ..Default::default()
         })
         .await
         .unwrap()
@@ -189,7 +188,7 @@ async fn both_protocols_serve_every_load_step() {
         id: id.clone(),
         boundary: "top".into(),
         step: Some("0".into()),
-        points: None,
+        ..Default::default()
     });
     let profile = profile.await.unwrap().into_inner();
     assert_eq!(first["tangential_stress"], json!(profile.tangential_stress));
@@ -197,7 +196,7 @@ async fn both_protocols_serve_every_load_step() {
         id,
         boundary: "top".into(),
         step: Some("unload".into()),
-        points: None,
+        ..Default::default()
     });
     assert_eq!(none.await.unwrap_err().code(), tonic::Code::NotFound);
 }

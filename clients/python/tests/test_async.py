@@ -63,7 +63,12 @@ def test_jobs(server: sg.LocalServer, punch: sg.Result, tmp_path: pathlib.Path) 
             failing = await client.submit(unconverged_problem())
             with pytest.raises(sg.JobFailed):
                 await failing.wait(60, progress=False)
-            assert (await failing.result(partial=True)).partial
+            last = await failing.result(partial=True)
+            assert last.partial and (await last.profile()).partial and (await last.history()).partial
+            assert (await last.fields()).partial
+            with pytest.raises(sg.PartialResult):
+                await failing.svg("profile")
+            assert "PARTIAL" in await failing.svg("profile", partial=True)
 
     asyncio.run(run())
 

@@ -145,6 +145,26 @@ def test_a_failed_job_keeps_its_last_state(client: sg.Client) -> None:
     assert len(result.history) == 5
 
 
+def test_the_figures_of_a_failed_job_have_to_be_asked_for(client: sg.Client, tmp_path: pathlib.Path) -> None:
+    job = client.submit(unconverged_problem(), name="no solution")
+    with pytest.raises(sg.JobFailed):
+        job.wait(60, progress=False)
+    for plot in ("profile", "convergence", "deformed"):
+        with pytest.raises(sg.PartialResult, match="did not converge: after 5 iterations.* partial=true") as caught:
+            job.svg(plot)
+        assert isinstance(caught.value, sg.errors.Conflict) and caught.value.code == "partial-result"
+        assert "PARTIAL" in job.svg(plot, partial=True)
+    assert job.svg("mesh").startswith("<")
+    with pytest.raises(sg.PartialResult):
+        job.save_figure(tmp_path / "a.pdf")
+    assert job.save_figure(tmp_path / "a.pdf", partial=True).exists()
+    # a result that was asked for as partial asks so for its parts, and is so in a file
+    result = job.result(partial=True)
+    assert result.save_vtu(tmp_path / "a.vtu").exists()
+    kept = sg.Result.open(result.save(tmp_path / "kept.zip"))
+    assert kept.partial and kept.profile().partial and len(kept.history) == 5 and kept.fields().partial
+
+
 def test_what_is_wrong_with_a_problem_is_told_in_full(client: sg.Client) -> None:
     problem = sg.examples.rectangular_punch()
     problem.materials[0].youngs_modulus = -1

@@ -159,6 +159,11 @@ impl Status {
         matches!(self, Status::Succeeded | Status::Failed | Status::Canceled)
     }
 
+    /// Whether a job of this status has ended without a solution: what it has is the state at which it stopped.
+    pub fn is_without_solution(self) -> bool {
+        matches!(self, Status::Failed | Status::Canceled)
+    }
+
     /// The allowed changes of the status:
     ///
     /// ```text

@@ -10,7 +10,7 @@ use axum::{
 use base::text::{count, number_of, size};
 use base::{
     catalog::{Code, Kind, explained_at},
-    job::{JobId, Status as JobStatus, SweepId},
+    job::{Failure, JobId, Reason, Status as JobStatus, SweepId},
 };
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -154,6 +154,18 @@ pub enum ApiError {
     /// The job has not ended and has no result yet.
     #[error("the job is {0}; its result is available when it has ended")]
     ResultNotReady(JobStatus),
+    /// The job ended without a solution, and its last state was not asked for.
+    #[error("{}", stopped(id, status, failure.as_deref()))]
+    PartialResult {
+        /// The job.
+        id: JobId,
+        /// How the job ended.
+        status: JobStatus,
+        /// Why the job ended so.
+        reason: Option<Reason>,
+        /// What went wrong, if the job failed.
+        failure: Option<Box<Failure>>,
+    },
     /// The request body is too large.
     #[error("the body is larger than {limit_bytes} bytes")]
     PayloadTooLarge {
@@ -246,6 +258,23 @@ fn uploads(owner: &Option<String>, most: &usize) -> String {
         Some(owner) => format!("{owner} uploads {most} meshes"),
         None => format!("{most} meshes are being uploaded"),
     }
+}
+
+/// The message that a job has nothing but the state at which it stopped.
+fn stopped(id: &JobId, status: &JobStatus, failure: Option<&Failure>) -> String {
+    let end = match (status, failure) {
+        (JobStatus::Canceled, _) => "was canceled".to_owned(),
+        (_, None) => "failed".to_owned(),
+        (_, Some(failure)) => {
+            let detail = shortened(&failure.detail, 300);
+            let detail = detail.trim_end_matches('.');
+            format!("failed: {}: {detail}", failure.title)
+        }
+    };
+    format!(
+        "{id} {end}. It has no solution, only the state at which it stopped: partial=true (on the command line --partial) \
+         serves that"
+    )
 }
 
 /// A limit that an owner has reached.
@@ -367,6 +396,7 @@ impl ApiError {
             ApiError::StaleVersion(_) => Code::StaleVersion,
             ApiError::RangeNotSatisfiable(_) => Code::RangeNotSatisfiable,
             ApiError::ResultNotReady(_) => Code::ResultNotReady,
+            ApiError::PartialResult { .. } => Code::PartialResult,
             ApiError::PayloadTooLarge { .. }
             | ApiError::EncodedTooLarge { .. }
             | ApiError::MessageTooLarge { .. }
@@ -434,6 +464,12 @@ impl ApiError {
                 document["memory_budget_bytes"] = json!(budget_bytes);
             }
             ApiError::QuotaExceeded(quota) => document["quota"] = json!(quota),
+            ApiError::PartialResult {
+                reason, failure, ..
+            } => {
+                document["reason"] = json!(reason);
+                document["failure"] = json!(failure);
+            }
             _ => {}
         }
         document
@@ -477,6 +513,12 @@ impl From<ApiError> for Status {
                     estimate.memory_bytes.to_string(),
                 );
                 metadata.insert("memory_budget_bytes".to_string(), budget_bytes.to_string());
+            }
+            ApiError::PartialResult {
+                reason: Some(reason),
+                ..
+            } => {
+                metadata.insert("reason".to_string(), <&str>::from(*reason).to_string());
             }
             ApiError::QuotaExceeded(quota) => {
                 let subject = format!("owner:{}", quota.owner);

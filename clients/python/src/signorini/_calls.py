@@ -307,29 +307,35 @@ def result(id: str, partial: bool, input_hash: str) -> Call[Document]:
     return Call("GET", _job(id) + "/result", decode)
 
 
-def profile(id: str, boundary: str, step: int | str | None, points: int | str | None) -> Call[dict[str, Array]]:
+PARTIAL: Params = (("partial", "true"),)
+"""Asks for the state of a job without a solution; otherwise absent, since earlier services do not know it."""
+
+
+def profile(
+    id: str, boundary: str, step: int | str | None, points: int | str | None, partial: bool = False
+) -> Call[dict[str, Array]]:
     params = [("format", "npz")]
     if step is not None:
         params.append(("step", str(step)))
     if points is not None:
         params.append(("points", str(points)))
     path = f"{_job(id)}/profiles/{quote(boundary, safe='')}"
-    return _file(id, path, NPZ, tuple(params))
+    return _file(id, path, NPZ, tuple(params), partial)
 
 
-def history(id: str, max_points: int | None) -> Call[dict[str, Array]]:
+def history(id: str, max_points: int | None, partial: bool = False) -> Call[dict[str, Array]]:
     params: Params = (("format", "npz"),)
     if max_points is not None:
         params += (("max_points", str(max_points)),)
-    return _file(id, _job(id) + "/history", NPZ, params)
+    return _file(id, _job(id) + "/history", NPZ, params, partial)
 
 
-def fields(id: str) -> Call[dict[str, Array]]:
-    return _file(id, _job(id) + "/fields", NPZ, (("format", "npz"),))
+def fields(id: str, partial: bool = False) -> Call[dict[str, Array]]:
+    return _file(id, _job(id) + "/fields", NPZ, (("format", "npz"),), partial)
 
 
-def vtu(id: str) -> Call[bytes]:
-    return _file(id, _job(id) + "/fields", FILES["vtu"], (("format", "vtu"),))
+def vtu(id: str, partial: bool = False) -> Call[bytes]:
+    return _file(id, _job(id) + "/fields", FILES["vtu"], (("format", "vtu"),), partial)
 
 
 class Look(TypedDict, total=False):
@@ -347,7 +353,7 @@ class Look(TypedDict, total=False):
 
 
 def plot(
-    id: str, name: str, ending: str, theme: str, size: str, step: int | str | None, look: Mapping[str, Any]
+    id: str, name: str, ending: str, theme: str, size: str, step: int | str | None, look: Mapping[str, Any], partial: bool = False
 ) -> Call[bytes]:
     unknown = look.keys() - Look.__annotations__
     if unknown:
@@ -359,10 +365,11 @@ def plot(
         if value is not None:
             text = value if isinstance(value, str) else ",".join(repr(float(number)) for number in value)
             params += ((option, text),)
-    return _file(id, f"{_job(id)}/plots/{quote(name, safe='')}.{ending}", FILES[ending], params)
+    return _file(id, f"{_job(id)}/plots/{quote(name, safe='')}.{ending}", FILES[ending], params, partial)
 
 
-def _file(id: str, path: str, kind: Kind, params: Params) -> Call[Any]:
+def _file(id: str, path: str, kind: Kind, params: Params, partial: bool = False) -> Call[Any]:
+    params += PARTIAL if partial else ()
     # compressed, it has no length by which to tell that it is whole
     headers = {"Accept": kind.media, "Accept-Encoding": "identity"}
     return Call("GET", path, lambda content: content, params, headers, kind=kind, about=id)

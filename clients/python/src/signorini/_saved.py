@@ -26,25 +26,26 @@ FORMAT = "signorini result 1"
 
 
 def requests(
-    id: str, input_hash: str, summary: Mapping[str, Any], steps: list[str], fields: bool
+    id: str, input_hash: str, summary: Mapping[str, Any], steps: list[str], fields: bool, partial: bool
 ) -> Iterator[Call[Any]]:
     """What a result is asked for: numbers, problem, history, and of each contact its profile, at each load step.
 
     fields: displacements and stresses of the whole body, too
+    partial: whether it is the state of a job without a solution
     """
     yield calls.job(id)
     yield calls.result(id, True, input_hash)
     yield calls.problem(id)
-    yield calls.history(id, None)
+    yield calls.history(id, None, partial)
     for boundary in summary["contacts"]:
-        yield calls.profile(id, boundary, None, None)
-        yield calls.profile(id, boundary, None, "nodes")
+        yield calls.profile(id, boundary, None, None, partial)
+        yield calls.profile(id, boundary, None, "nodes", partial)
         for number, name in enumerate(steps):
-            yield calls.profile(id, boundary, number, None)
-            yield calls.profile(id, boundary, name, None)
+            yield calls.profile(id, boundary, number, None, partial)
+            yield calls.profile(id, boundary, name, None, partial)
     if fields:
-        yield calls.fields(id)
-        yield calls.vtu(id)
+        yield calls.fields(id, partial)
+        yield calls.vtu(id, partial)
 
 
 def packed(id: str, answers: Mapping[str, tuple[str, bytes]]) -> bytes:
@@ -63,7 +64,9 @@ def packed(id: str, answers: Mapping[str, tuple[str, bytes]]) -> bytes:
 
 
 def key(call: Call[Any]) -> str:
-    return f"{call.method} {call.path}?{urlencode(call.params)}"
+    """The name of a request in the file. What is partial is so whether it is asked for as such or not."""
+    params = [param for param in call.params if param not in calls.PARTIAL]
+    return f"{call.method} {call.path}?{urlencode(params)}"
 
 
 def write(path: str | os.PathLike[str], content: bytes) -> pathlib.Path:

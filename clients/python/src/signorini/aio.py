@@ -336,9 +336,10 @@ class AsyncJob(JobView):
         *,
         size: str = "page",
         step: int | str | None = None,
+        partial: bool = False,
         **look: Unpack[calls.Look],
     ) -> str:
-        found = await self._client._send(calls.plot(self.id, plot, "svg", theme, size, step, look))
+        found = await self._client._send(calls.plot(self.id, plot, "svg", theme, size, step, look, partial))
         return found.decode()
 
     async def save_figure(
@@ -349,10 +350,11 @@ class AsyncJob(JobView):
         *,
         size: str = "page",
         step: int | str | None = None,
+        partial: bool = False,
         **look: Unpack[calls.Look],
     ) -> pathlib.Path:
         ending = calls.figure_ending(path)
-        return write(path, await self._client._send(calls.plot(self.id, plot, ending, theme, size, step, look)))
+        return write(path, await self._client._send(calls.plot(self.id, plot, ending, theme, size, step, look, partial)))
 
 
 class AsyncResult(Summary):
@@ -368,28 +370,28 @@ class AsyncResult(Summary):
         self, boundary: str | None = None, *, step: int | str | None = None, points: int | str | None = None
     ) -> Profile:
         name = self._boundary(boundary)
-        found = await self._client._send(calls.profile(self.job.id, name, step, points))
+        found = await self._client._send(calls.profile(self.job.id, name, step, points, self.partial))
         about = await self.about(step)
         partial = self.partial and about.get("step") is None
         return Profile(**known(Profile, found), boundary=name, about=about, partial=partial)
 
     async def history(self) -> History:
-        found = await self._client._send(calls.history(self.job.id, None))
+        found = await self._client._send(calls.history(self.job.id, None, self.partial))
         return History(**known(History, found), about=await self.about(), partial=self.partial)
 
     async def fields(self) -> Fields:
-        found = await self._client._send(calls.fields(self.job.id))
+        found = await self._client._send(calls.fields(self.job.id, self.partial))
         about = await self.about()
         profiles = {name: await self.profile(name, points="nodes") for name in obstacles(self._problem or {})}
         return Fields(**known(Fields, found), profiles=profiles, about=about, partial=self.partial)
 
     async def save_vtu(self, path: str | os.PathLike[str]) -> pathlib.Path:
-        return write(path, await self._client._send(calls.vtu(self.job.id)))
+        return write(path, await self._client._send(calls.vtu(self.job.id, self.partial)))
 
     async def save(self, path: str | os.PathLike[str], *, fields: bool = True) -> pathlib.Path:
         """Writes all of it to a file; see `Result.save`."""
         steps = [str(step["name"]) for step in self.steps]
-        wanted = requests(self.job.id, self.job.input_hash, self.summary, steps, fields)
+        wanted = requests(self.job.id, self.job.input_hash, self.summary, steps, fields, self.partial)
         return write(
             path, packed(self.job.id, {key(call): await self._client._send(calls.unread(call)) for call in wanted})
         )

@@ -6,7 +6,7 @@ SignoriniError
 │   ├── BadRequest, TooLarge
 │   ├── Unauthenticated, Forbidden
 │   ├── NotFound             ├── NoResult, Deleted
-│   ├── Conflict             ├── JobActive, ResultNotReady, StaleVersion
+│   ├── Conflict             ├── JobActive, ResultNotReady, PartialResult, StaleVersion
 │   ├── QuotaExceeded, RateLimited
 │   └── ServiceError         ├── Unavailable, StorageFull
 ├── JobFailed                with the reason and the job ─ JobCanceled
@@ -144,6 +144,10 @@ class ResultNotReady(Conflict):
     """The job has not ended, and has no result yet."""
 
 
+class PartialResult(Conflict):
+    """The job failed or was canceled, and has only the state at which it stopped: `partial=True` asks for that."""
+
+
 class StaleVersion(Conflict):
     """The job was changed by somebody else in the meantime."""
 
@@ -231,6 +235,7 @@ CLASSES: Mapping[str, type[ApiError]] = {
     "deleted": Deleted,
     "job-active": JobActive,
     "result-not-ready": ResultNotReady,
+    "partial-result": PartialResult,
     "id-conflict": Conflict,
     "idempotency-key-reuse": Conflict,
     "stale-version": StaleVersion,

@@ -105,7 +105,7 @@ class Job(JobView):
         """The result. Raises `ResultNotReady` while the job runs, `JobFailed` where it has no solution.
 
         partial: whether the last state of an iteration that did not end will do, or, while the job runs, the last load
-            step that has ended
+            step that has ended. The profiles, history and fields of the result are then of that state, too
         """
         if not self.ended:
             self.refresh()
@@ -120,6 +120,7 @@ class Job(JobView):
         *,
         size: str = "page",
         step: int | str | None = None,
+        partial: bool = False,
         **look: Unpack[calls.Look],
     ) -> str:
         """A figure that the service draws: `profile`, `convergence`, `deformed` or `mesh`.
@@ -128,8 +129,10 @@ class Job(JobView):
         step: the load step at whose end it is, by name or number; of `profile` and `convergence`
         look: `style="bare"` without title, parameters, verdict and warnings; `stress` of `deformed`; `xlim`, `ylim`,
             `ylim_below` are limits of axes, two numbers each
+        partial: whether the state at which a job that failed or was canceled stopped will do, which is not a solution;
+            without it such a job raises `PartialResult`, but for its `mesh`
         """
-        return self._client._send(calls.plot(self.id, plot, "svg", theme, size, step, look)).decode()
+        return self._client._send(calls.plot(self.id, plot, "svg", theme, size, step, look, partial)).decode()
 
     def save_figure(
         self,
@@ -139,11 +142,12 @@ class Job(JobView):
         *,
         size: str = "page",
         step: int | str | None = None,
+        partial: bool = False,
         **look: Unpack[calls.Look],
     ) -> pathlib.Path:
         """The same as a file, of the kind that its name ends with: .svg, .png (300 dots to an inch) or .pdf."""
         ending = calls.figure_ending(path)
-        return write(path, self._client._send(calls.plot(self.id, plot, ending, theme, size, step, look)))
+        return write(path, self._client._send(calls.plot(self.id, plot, ending, theme, size, step, look, partial)))
 
 
 class Result(Summary):
@@ -169,7 +173,7 @@ class Result(Summary):
             points and the peaks
         """
         name = self._boundary(boundary)
-        found = self._client._send(calls.profile(self.job.id, name, step, points))
+        found = self._client._send(calls.profile(self.job.id, name, step, points, self.partial))
         about = self._about(step)
         # a step that has ended is what it is, whatever became of the next one
         partial = self.partial and about.get("step") is None
@@ -178,18 +182,18 @@ class Result(Summary):
     @functools.cached_property
     def history(self) -> History:
         """A row for each iteration."""
-        found = self._client._send(calls.history(self.job.id, None))
+        found = self._client._send(calls.history(self.job.id, None, self.partial))
         return History(**known(History, found), about=self.about, partial=self.partial)
 
     def fields(self) -> Fields:
         """Displacements and stresses of the whole body."""
-        found = self._client._send(calls.fields(self.job.id))
+        found = self._client._send(calls.fields(self.job.id, self.partial))
         profiles = {name: self.profile(name, points="nodes") for name in obstacles(self._problem)}
         return Fields(**known(Fields, found), profiles=profiles, about=self.about, partial=self.partial)
 
     def save_vtu(self, path: str | os.PathLike[str]) -> pathlib.Path:
         """Writes the fields for ParaView, completely or not at all."""
-        return write(path, self._client._send(calls.vtu(self.job.id)))
+        return write(path, self._client._send(calls.vtu(self.job.id, self.partial)))
 
     def save(self, path: str | os.PathLike[str], *, fields: bool = True) -> pathlib.Path:
         """Writes all of it to a file, which `Result.open` reads without the service: numbers, problem, history, the
@@ -198,7 +202,7 @@ class Result(Summary):
         fields: displacements and stresses of the whole body, too
         """
         steps = [str(step["name"]) for step in self.steps]
-        wanted = requests(self.job.id, self.job.input_hash, self.summary, steps, fields)
+        wanted = requests(self.job.id, self.job.input_hash, self.summary, steps, fields, self.partial)
         answers = {key(call): self._client._send(calls.unread(call)) for call in wanted}
         return write(path, packed(self.job.id, answers))
 

@@ -168,6 +168,8 @@ catalog! {
         "Only a job that has ended can be deleted or retried, and only a mesh that no queued or running job uses can be deleted. Cancel the job, or wait for its end."),
     ResultNotReady: of_request("The result is not ready", 409, Grpc::FailedPrecondition, Some(1),
         "The job is queued or running and has no result yet. Wait for it: GET /v1/jobs/{id}?wait=30&until=terminal, WaitJob, or its events."),
+    PartialResult: of_request("The job has no solution, only the state at which it stopped", 409, Grpc::FailedPrecondition, None,
+        "The job failed or was canceled; `failure` says why. Its profiles, history, fields and figures show the state at which it stopped, which is not a solution of the problem, so they are served only to those who ask for that: with the parameter partial=true (field `partial` over gRPC, --partial on the command line, partial=True in Python). The result document is served without it, since it says itself that the job has not converged. To get a solution, see what the failure advises, and submit the problem again."),
     IdConflict: of_request("The id belongs to another job", 409, Grpc::AlreadyExists, None,
         "A job with this id was submitted with other content. An id belongs to one job; use a new one."),
     Deleted: of_request("The job or sweep was deleted", 410, Grpc::NotFound, None,

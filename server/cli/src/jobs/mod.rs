@@ -58,7 +58,7 @@ pub(super) async fn profile_charts(
     result: Value,
 ) -> anyhow::Result<String> {
     Ok(plot::draw_all(
-        &plot::profiles(service, id, result, None).await?,
+        &plot::profiles(service, id, result, None, false).await?,
     ))
 }
 

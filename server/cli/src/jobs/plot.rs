@@ -22,7 +22,7 @@ use super::{
     },
     chart::{Chart, Curve, Scale},
     id::Id,
-    result::{PARTIAL, download},
+    result::{IS_PARTIAL, download, partial},
 };
 
 #[derive(Debug, Args)]
@@ -53,6 +53,10 @@ pub(crate) struct Arguments {
     /// The stress that the figure deformed shows [default: von_mises]
     #[arg(long, value_parser = ["von_mises", "xx", "yy", "zz", "xy"])]
     stress: Option<String>,
+
+    /// Draw also a job that failed or was canceled: the state at which it stopped, which is not a solution
+    #[arg(long)]
+    partial: bool,
 
     #[command(flatten)]
     look: output::Look,
@@ -114,13 +118,14 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         let mut more = form_urlencoded::Serializer::new(String::new());
         more.extend_pairs(arguments.step.iter().map(|step| ("step", step)));
         more.extend_pairs(arguments.stress.iter().map(|stress| ("stress", stress)));
+        more.extend_pairs(partial(arguments.partial));
         let (format, more) = (format.name(), more.finish());
         let route = format!("/v1/jobs/{id}/plots/{name}.{format}?{look}&{more}");
         let route = route.trim_end_matches('&');
         let answer = service.fetch(route).await?;
         let available = answer.headers().get(RESULT_AVAILABLE);
         if available.is_some_and(|available| available == "partial") {
-            eprintln!("{PARTIAL}");
+            eprintln!("{IS_PARTIAL}");
         }
         download(&service, &path, answer)?;
         eprintln!("{}", path.display());
@@ -135,7 +140,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     if arguments.plot != Some(Plot::Convergence) || arguments.step.is_some() {
         let result: Value = service.get(&format!("/v1/jobs/{id}/result")).await?;
         if result["result_available"] == "partial" {
-            eprintln!("{PARTIAL}");
+            eprintln!("{IS_PARTIAL}");
         }
         if let Some(wanted) = &arguments.step {
             step = number_of_step(&result, wanted);
@@ -145,11 +150,11 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
             }
         }
         if arguments.plot != Some(Plot::Convergence) {
-            figures.extend(profiles(&service, id, result, step).await?);
+            figures.extend(profiles(&service, id, result, step, arguments.partial).await?);
         }
     }
     if arguments.plot != Some(Plot::Profile) {
-        figures.push(convergence(&service, id, step).await?);
+        figures.push(convergence(&service, id, step, arguments.partial).await?);
     }
     output::print(&draw_all(&figures))?;
     Ok(Exit::Ok)
@@ -198,13 +203,19 @@ fn names_of_steps(result: &Value) -> Vec<&str> {
 }
 
 /// Makes charts of the stresses along each contact boundary at the end of load step `step`, or of the last step, with
-/// the range that figures have.
+/// the range that figures have. `wanted`: whether the state of a job without a solution will do.
 pub(super) async fn profiles(
     service: &Service,
     id: JobId,
     mut result: Value,
     step: Option<u32>,
+    wanted: bool,
 ) -> anyhow::Result<Vec<Chart>> {
+    // a load step that has ended is what it is, whatever became of the job
+    let state = match step {
+        None if result["result_available"] == "partial" => " (partial: no solution)",
+        _ => "",
+    };
     let of_step = step.and_then(|number| result["steps"].get_mut(number as usize));
     let summary = match of_step {
         Some(step) => step["summary"].take(),
@@ -214,10 +225,13 @@ pub(super) async fn profiles(
         serde_json::from_value(summary).with_context(|| misunderstood("the result"))?;
     let mut figures = vec![];
     for boundary in summary.contacts.keys() {
-        let at = step.map_or(String::new(), |number| format!("&step={number}"));
+        let mut query = form_urlencoded::Serializer::new("format=json".to_owned());
+        query.extend_pairs(step.map(|number| ("step", number.to_string())));
+        query.extend_pairs(partial(wanted));
         let path = format!(
-            "/v1/jobs/{id}/profiles/{}?format=json{at}",
-            segment(boundary)
+            "/v1/jobs/{id}/profiles/{}?{}",
+            segment(boundary),
+            query.finish()
         );
         let profile: ContactProfile = service.get(&path).await?;
         let columns = [
@@ -257,7 +271,7 @@ pub(super) async fn profiles(
             });
         }
         figures.push(Chart {
-            title: format!("Stresses along {boundary:?}"),
+            title: format!("Stresses along {boundary:?}{state}"),
             across: "s".into(),
             curves,
             scale: Scale::Within(view.stresses),
@@ -267,17 +281,22 @@ pub(super) async fn profiles(
     Ok(figures)
 }
 
-/// Makes a chart of the residuals by iteration, of load step `step` or of all steps.
-async fn convergence(service: &Service, id: JobId, step: Option<u32>) -> anyhow::Result<Chart> {
+/// Makes a chart of the residuals by iteration, of load step `step` or of all steps. `wanted`: whether those of a job
+/// without a solution will do.
+async fn convergence(
+    service: &Service,
+    id: JobId,
+    step: Option<u32>,
+    wanted: bool,
+) -> anyhow::Result<Chart> {
+    let mut query = form_urlencoded::Serializer::new("format=json".to_owned());
     // of one step all rows are wanted, of all steps no more than can be seen
-    let thinned = if step.is_some() {
-        ""
-    } else {
-        "&max_points=2000"
-    };
-    let mut rows: Vec<TimedIteration> = service
-        .get(&format!("/v1/jobs/{id}/history?format=json{thinned}"))
-        .await?;
+    if step.is_none() {
+        query.append_pair("max_points", "2000");
+    }
+    query.extend_pairs(partial(wanted));
+    let path = format!("/v1/jobs/{id}/history?{}", query.finish());
+    let mut rows: Vec<TimedIteration> = service.get(&path).await?;
     if let Some(number) = step {
         rows.retain(|timed| timed.row.step == number);
     }

@@ -13,7 +13,10 @@ use form_urlencoded::Serializer;
 use reqwest::Response;
 use serde::Deserialize;
 use serde_json::{Value, json};
-use service::{formats, verbs::page::MAX_PAGE_SIZE};
+use service::{
+    formats,
+    verbs::{page::MAX_PAGE_SIZE, results::PARTIAL},
+};
 use solver::solution::ContactProfile;
 use tokio::{runtime::Handle, task::block_in_place};
 
@@ -53,6 +56,11 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "STEP")]
     step: Option<String>,
 
+    /// Serve also the profile, history, fields and figures of a job that failed or was canceled: the state at which it
+    /// stopped, which is not a solution
+    #[arg(long)]
+    partial: bool,
+
     /// How to print the result: csv and jsonl print the profile, unless --history is given
     #[arg(short, long, value_enum, default_value_t = Format::Table)]
     format: Format,
@@ -70,7 +78,7 @@ pub(crate) struct Arguments {
 }
 
 /// The remark that is printed with a partial result.
-pub(super) const PARTIAL: &str =
+pub(super) const IS_PARTIAL: &str =
     "signorini: the result is partial: the job has not ended, or did not converge";
 
 /// The scalars of a result, as the service answers them.
@@ -97,7 +105,7 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     let scalars: Scalars =
         serde_json::from_value(document.clone()).with_context(|| misunderstood("the result"))?;
     if document["result_available"] == "partial" {
-        eprintln!("{PARTIAL}");
+        eprintln!("{IS_PARTIAL}");
     }
     let contacts: Vec<&str> = scalars
         .summary
@@ -137,7 +145,8 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     let asked_for_profile =
         arguments.profile.is_some() || arguments.points.is_some() || arguments.step.is_some();
     if arguments.history {
-        let path = format!("{base}/history?format={}", of_rows(arguments.format));
+        let format = of_rows(arguments.format);
+        let path = format!("{base}/history?{}", arguments.query_of(format));
         let rows = |text: &str| -> anyhow::Result<String> {
             let rows: Vec<TimedIteration> = serde_json::from_str(text)?;
             Ok(rows
@@ -182,10 +191,17 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
 }
 
 impl Arguments {
-    /// The query of a request for a profile.
-    fn of_profile(&self, format: &str) -> String {
+    /// The query of a request for a part of the result in this format.
+    fn query_of(&self, format: &str) -> String {
         let mut query = Serializer::new(String::new());
         query.append_pair("format", format);
+        query.extend_pairs(partial(self.partial));
+        query.finish()
+    }
+
+    /// The query of a request for a profile.
+    fn of_profile(&self, format: &str) -> String {
+        let mut query = Serializer::new(self.query_of(format));
         query.extend_pairs(self.points.iter().map(|points| ("points", points)));
         query.extend_pairs(self.step.iter().map(|step| ("step", step)));
         query.finish()
@@ -220,16 +236,23 @@ impl Arguments {
                 let query = self.of_profile(format);
                 Some(format!("profiles/{}?{query}", segment(boundary)))
             }
-            Part::History => Some(format!("history?format={format}")),
-            Part::Fields => Some(format!("fields?format={format}")),
+            Part::History => Some(format!("history?{}", self.query_of(format))),
+            Part::Fields => Some(format!("fields?{}", self.query_of(format))),
             Part::Plot(plot) => {
                 let mut query = Serializer::new(self.look.query());
                 query.extend_pairs(self.step.iter().map(|step| ("step", step)));
+                query.extend_pairs(partial(self.partial));
                 let (plot, query) = (plot.as_str(), query.finish());
                 Some(format!("plots/{plot}.{format}?{query}"))
             }
         })
     }
+}
+
+/// The parameter that asks for the state of a job without a solution, if it is wanted. It is not sent otherwise, since a
+/// service of an earlier version does not know it.
+pub(super) fn partial(wanted: bool) -> Option<(&'static str, &'static str)> {
+    wanted.then_some((PARTIAL.name, "true"))
 }
 
 /// The name of a format of rows in the service; a table is made from JSON.
@@ -270,6 +293,7 @@ async fn of_sweep(service: &Service, base: &str, arguments: &Arguments) -> anyho
         || arguments.history
         || arguments.points.is_some()
         || arguments.step.is_some()
+        || arguments.partial
     {
         eprintln!(
             "signorini: a sweep has only a table; for a profile, submit a member as a job of its own (POST …/members/N/job)"

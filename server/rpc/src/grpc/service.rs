@@ -224,7 +224,8 @@ impl JobService for Grpc {
         let (caller, request) = caller_and_message(request)?;
         let (id, boundary) = (ID.read(&request.id)?, &request.boundary);
         let (step, points) = (request.step.as_deref(), points(request.points.as_deref())?);
-        let profile = profiles::profile(&self.service, &caller, id, boundary, step, points);
+        let (service, partial) = (&self.service, request.partial);
+        let profile = profiles::profile(service, &caller, id, boundary, step, points, partial);
         let found = profile.await?;
         Ok(marked(found.content.into(), found.available))
     }
@@ -236,7 +237,7 @@ impl JobService for Grpc {
         let (caller, request) = caller_and_message(request)?;
         let max_points = request.max_points.map(|most| MAX_POINTS.check(most));
         let (id, most) = (ID.read(&request.id)?, max_points.transpose()?);
-        let found = history::history(&self.service, &caller, id, most).await?;
+        let found = history::history(&self.service, &caller, id, most, request.partial).await?;
         let (available, mut rows) = (found.available, found.content);
         rows.retain(|timed| timed.row.k > request.after);
         let more = rows.len() > MAX_ROWS;
@@ -256,7 +257,12 @@ impl JobService for Grpc {
         request: Request<pb::StreamResultRequest>,
     ) -> Reply<Self::StreamResultStream> {
         let (caller, request) = caller_and_message(request)?;
-        let pb::StreamResultRequest { id, format, offset } = request;
+        let pb::StreamResultRequest {
+            id,
+            format,
+            offset,
+            partial,
+        } = request;
         let id = ID.read(&id)?;
         let format = match pb::FieldFormat::try_from(format) {
             Ok(pb::FieldFormat::Unspecified | pb::FieldFormat::Vtu) => Format::Vtu,
@@ -269,14 +275,15 @@ impl JobService for Grpc {
             }
         };
         let (pieces, total_bytes, sha256, available) = if format == Format::Json {
-            let found = fields::fields(&self.service, &caller, id).await?;
+            let found = fields::fields(&self.service, &caller, id, partial).await?;
             let fields = found.content;
             let info = fields.info.clone();
             check_offset(offset, info.bytes)?;
             let pieces = fields.bytes(&self.service, offset, info.bytes).boxed();
             (pieces, info.bytes, info.digest, found.available)
         } else {
-            let found = fields::converted_fields(&self.service, &caller, id, format).await?;
+            let found =
+                fields::converted_fields(&self.service, &caller, id, format, partial).await?;
             let bytes = found.content;
             let total = bytes.len() as u64;
             check_offset(offset, total)?;

@@ -14,7 +14,7 @@ use store::PartInfo;
 
 use super::{
     fields_in_memory::{LoadedFields, Shared},
-    results::{Found, no_result, with_result},
+    results::{Found, is_wanted, no_result, with_result},
     service::{Service, detached},
 };
 use crate::{
@@ -33,14 +33,16 @@ pub struct StoredFields {
     loaded: Option<Arc<LoadedFields>>,
 }
 
-/// Returns the fields at all nodes, as JSON.
+/// Returns the fields at all nodes, as JSON. `partial`: whether those of a job without a solution will do.
 pub fn fields<'a>(
     service: &'a Arc<Service>,
     caller: &'a Caller,
     id: JobId,
+    partial: bool,
 ) -> BoxFuture<'a, Result<Found<StoredFields>, ApiError>> {
     Box::pin(async move {
         let found = with_result(service, caller, id).await?;
+        is_wanted(&found.job, partial)?;
         let job = found.job.clone();
         drop(found);
         are_kept(service, &job).await?;
@@ -140,15 +142,17 @@ impl StoredFields {
     }
 }
 
-/// Returns the fields in another format than JSON, in memory.
+/// Returns the fields in another format than JSON, in memory; `partial` as for `fields`.
 pub fn converted_fields<'a>(
     service: &'a Arc<Service>,
     caller: &'a Caller,
     id: JobId,
     format: Format,
+    partial: bool,
 ) -> BoxFuture<'a, Result<Found<Vec<u8>>, ApiError>> {
     Box::pin(async move {
         let found = with_result(service, caller, id).await?;
+        is_wanted(&found.job, partial)?;
         let job = found.job.clone();
         drop(found);
         are_kept(service, &job).await?;
@@ -179,7 +183,7 @@ mod tests {
         let ada = &caller("ada");
         let id = solved(service, ada).await;
         let all = service.sent.take(usize::MAX).unwrap();
-        let convert = || converted_fields(service, ada, id, Format::Npz);
+        let convert = || converted_fields(service, ada, id, Format::Npz, false);
         let mut conversions = pin!(async { tokio::join!(convert(), convert(), convert()) });
         tokio::select! {
             biased;
@@ -200,7 +204,7 @@ mod tests {
         let service = &service(folder.path()).await;
         let ada = &caller("ada");
         let id = solved(service, ada).await;
-        let found = fields(service, ada, id).await.unwrap().content;
+        let found = fields(service, ada, id, false).await.unwrap().content;
         let mut pieces = pin!(found.bytes(service, 0, u64::MAX));
         let mut json = pieces.next().await.unwrap().unwrap();
         assert!(service.sent.take(128 << 20).is_err());

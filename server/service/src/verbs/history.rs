@@ -13,7 +13,7 @@ use store::Snapshot;
 
 use super::{
     jobs,
-    results::{Found, room_for},
+    results::{Found, is_wanted, room_for},
     service::{Service, detached},
 };
 use crate::{error::ApiError, parameters::Parameter};
@@ -26,17 +26,19 @@ pub const MAX_POINTS: Parameter<Integers> = Parameter {
 };
 
 /// Returns the iterations of the last attempt of a job, reduced to a maximum number of rows. They are read from the
-/// result or, while there is none, from the job's events.
+/// result or, while there is none, from the job's events. `partial`: whether those of a job without a solution will do.
 pub fn history<'a>(
     service: &'a Arc<Service>,
     caller: &'a Caller,
     id: JobId,
     max_points: Option<i64>,
+    partial: bool,
 ) -> BoxFuture<'a, Result<Found<Vec<TimedIteration>>, ApiError>> {
     Box::pin(async move {
         let (service, caller) = (service.clone(), caller.clone());
         // what is read goes on if the client does not wait, and its memory counts until then
-        detached(async move { read_history(&service, &caller, id, max_points).await }).await
+        detached(async move { read_history(&service, &caller, id, max_points, partial).await })
+            .await
     })
 }
 
@@ -45,10 +47,12 @@ async fn read_history(
     caller: &Caller,
     id: JobId,
     max_points: Option<i64>,
+    partial: bool,
 ) -> Result<Found<Vec<TimedIteration>>, ApiError> {
     let share = room_for(service, caller, id, &["history"]).await?;
     let load = async {
         let mut found = jobs::snapshot(service, caller, id).await?;
+        is_wanted(&found.job, partial)?;
         let available = found.job.result_available;
         let content = StoredHistory::load(&mut found).await?;
         Ok(Found {

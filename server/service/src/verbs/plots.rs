@@ -175,6 +175,8 @@ pub struct Figure {
     pub style: Style,
     /// The load step at whose end the figure is drawn, by its name or its number from 0; absent: the last one.
     pub step: Option<String>,
+    /// Whether the figure of a job without a solution will do.
+    pub partial: bool,
 }
 
 /// Returns one figure, drawn from the stored data. Only the data that it needs are read.
@@ -190,15 +192,16 @@ pub fn plot<'a>(
             format,
             style,
             step,
+            partial,
         } = figure;
         // before there is a permit to work: who has that must not wait for memory
         let fields = match plot {
-            Plot::Mesh | Plot::Deformed => fields_of(service, caller, id, plot).await?,
+            Plot::Mesh | Plot::Deformed => fields_of(service, caller, id, plot, partial).await?,
             Plot::Profile | Plot::Convergence => None,
         };
         // the rest once there is a permit, so that waiting requests use no memory for it
         let load = async {
-            let mut found = snapshot(service, caller, id, plot).await?;
+            let mut found = snapshot(service, caller, id, plot, partial).await?;
             if step.is_some() && found.job.result_available == ResultAvailable::None {
                 return Err(results::no_result(&found.job));
             }
@@ -274,12 +277,18 @@ async fn snapshot(
     caller: &Caller,
     id: JobId,
     plot: Plot,
+    partial: bool,
 ) -> Result<Snapshot, ApiError> {
-    match plot {
+    let found = match plot {
         // these show the problem or the iterations, and so can be drawn while the job waits or runs
-        Plot::Mesh | Plot::Convergence => jobs::snapshot(service, caller, id).await,
-        Plot::Profile | Plot::Deformed => results::with_result(service, caller, id).await,
+        Plot::Mesh | Plot::Convergence => jobs::snapshot(service, caller, id).await?,
+        Plot::Profile | Plot::Deformed => results::with_result(service, caller, id).await?,
+    };
+    // the mesh is that of the problem, whatever became of the job
+    if plot != Plot::Mesh {
+        results::is_wanted(&found.job, partial)?;
     }
+    Ok(found)
 }
 
 /// Loads the fields of a job for a figure, once there is memory for them.
@@ -288,8 +297,11 @@ async fn fields_of(
     caller: &Caller,
     id: JobId,
     plot: Plot,
+    partial: bool,
 ) -> Result<Option<Arc<LoadedFields>>, ApiError> {
-    let job = snapshot(service, caller, id, plot).await?.job.clone();
+    let found = snapshot(service, caller, id, plot, partial).await?;
+    let job = found.job.clone();
+    drop(found);
     if plot == Plot::Deformed {
         fields::are_kept(service, &job).await?;
     }

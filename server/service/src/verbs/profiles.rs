@@ -12,7 +12,7 @@ use solver::solution::{ContactProfile, sample};
 use store::{ProfilePoints, Snapshot};
 
 use super::{
-    results::{Found, StepResult, read, room_for, with_result},
+    results::{Found, StepResult, is_wanted, read, room_for, with_result},
     service::Service,
 };
 use crate::{
@@ -92,7 +92,7 @@ impl Values for Places {
 }
 
 /// Returns the profile of one contact boundary: at the end of the solution, or at the end of a load step, given by its
-/// name or its number from 0.
+/// name or its number from 0. `partial`: whether that of a job without a solution will do.
 pub fn profile<'a>(
     service: &'a Service,
     caller: &'a Caller,
@@ -100,6 +100,7 @@ pub fn profile<'a>(
     boundary: &'a str,
     step: Option<&'a str>,
     points: Points,
+    partial: bool,
 ) -> BoxFuture<'a, Result<Found<ContactProfile>, ApiError>> {
     Box::pin(async move {
         let _room = match step {
@@ -107,6 +108,7 @@ pub fn profile<'a>(
             None => None,
         };
         let mut found = with_result(service, caller, id).await?;
+        is_wanted(&found.job, partial)?;
         let available = found.job.result_available;
         let step = match step {
             None => None,

@@ -6,6 +6,7 @@ use base::{
     caller::Caller,
     job::{Job, JobId, ResultAvailable},
     run::Summary,
+    values::Words,
 };
 use futures_util::future::BoxFuture;
 use schemars::JsonSchema;
@@ -16,7 +17,7 @@ use super::{
     jobs,
     service::{Service, detached},
 };
-use crate::{error::ApiError, transfer::Share};
+use crate::{error::ApiError, parameters::Parameter, transfer::Share};
 
 /// The scalars of a result at the end of one load step.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
@@ -142,6 +143,28 @@ pub(super) async fn with_result(
         ResultAvailable::Partial | ResultAvailable::Final => Ok(found),
         ResultAvailable::None => Err(no_result(&found.job)),
     }
+}
+
+/// Whether the state at which a job without a solution stopped will do.
+pub const PARTIAL: Parameter<Words<bool>> = Parameter {
+    name: "partial",
+    meaning: "Whether a job that failed or was canceled is served too, with the state at which it stopped, which is not a solution; default false",
+    values: Words(|| vec![("false", false), ("true", true)]),
+};
+
+/// Fails if the job ended without a solution and the state at which it stopped is not wanted (`partial`). Who plots that
+/// state without having asked for it takes it for a solution. The result document needs no such question: it says in
+/// `converged` and `outcome` what it is.
+pub(super) fn is_wanted(job: &Job, partial: bool) -> Result<(), ApiError> {
+    if partial || !job.status.is_without_solution() {
+        return Ok(());
+    }
+    Err(ApiError::PartialResult {
+        id: job.id,
+        status: job.status,
+        reason: job.reason,
+        failure: job.failure.clone().map(Box::new),
+    })
 }
 
 /// Reads a stored part of a result from its JSON.

@@ -123,17 +123,21 @@ async fn a_job_of_another_is_not_found_by_any_verb() {
     unknown("wait", wait.await);
     unknown("watch", watch::watch(service, bob, id, 0).await);
     unknown("result", results::result(service, bob, id).await);
-    unknown("history", history::history(service, bob, id, None).await);
-    let profile = profiles::profile(service, bob, id, "top", None, Points::Nodes);
+    unknown(
+        "history",
+        history::history(service, bob, id, None, true).await,
+    );
+    let profile = profiles::profile(service, bob, id, "top", None, Points::Nodes, true);
     unknown("profile", profile.await);
-    unknown("fields", fields::fields(service, bob, id).await);
-    let npz = fields::converted_fields(service, bob, id, Format::Npz);
+    unknown("fields", fields::fields(service, bob, id, true).await);
+    let npz = fields::converted_fields(service, bob, id, Format::Npz, true);
     unknown("fields", npz.await);
     let figure = Figure {
         plot: files::plot::Plot::Mesh,
         format: Format::Svg,
         style: Default::default(),
         step: None,
+        partial: true,
     };
     unknown("plot", plots::plot(service, bob, id, figure).await);
     let edit = Edit {

@@ -89,7 +89,7 @@ macro_rules! functions {
         }
     )*};
 }
-functions!(() (A) (A B) (A B C) (A B C D) (A B C D E) (A B C D E G) (A B C D E G H));
+functions!(() (A) (A B) (A B C) (A B C D) (A B C D E) (A B C D E G) (A B C D E G H) (A B C D E G H I));
 
 /// Makes the route of an operation: it reads and checks the input, and calls the handler. A `strict` route refuses
 /// unknown parameters.

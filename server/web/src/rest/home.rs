@@ -69,7 +69,8 @@ fn html(jobs: &[Job]) -> String {
             escaped(&job.owner),
             job.created_at
         );
-        if job.links.contains_key("plot_profile") {
+        // of a job without a solution it would need to be asked for
+        if job.links.contains_key("plot_profile") && !job.status.is_without_solution() {
             let _ = write!(
                 page,
                 "<a href=v1/jobs/{id}/plots/profile.svg><img loading=lazy alt=\"stresses along the contact of {name}\" \

@@ -13,6 +13,7 @@ use service::{
     verbs::{
         plots::{self as verbs, Figure, SIZE, STRESS, STYLE, THEME, XLIM, YLIM, YLIM_BELOW},
         profiles::STEP,
+        results::PARTIAL,
     },
 };
 
@@ -67,6 +68,7 @@ pub(super) async fn plot(
     (plot, format): (Plot, Format),
     look: Looks,
     step: Option<String>,
+    partial: Option<bool>,
     part: Part,
 ) -> Result<Response, ApiError> {
     let stress = look.stress;
@@ -80,7 +82,7 @@ pub(super) async fn plot(
         ),
     ];
     if let Some((_, name)) = vain.into_iter().find(|(vain, _)| *vain) {
-        let mut known = vec![THEME.name, SIZE.name, STYLE.name, XLIM.name, YLIM.name];
+        let mut known = vec![THEME.name, SIZE.name, STYLE.name, XLIM.name, YLIM.name, PARTIAL.name];
         match plot {
             Plot::Deformed => known.push(STRESS.name),
             Plot::Profile | Plot::Convergence => known.extend([YLIM_BELOW.name, STEP.name]),
@@ -102,6 +104,7 @@ pub(super) async fn plot(
             stress: stress.unwrap_or_default(),
         },
         step,
+        partial: partial.unwrap_or_default(),
     };
     let found = verbs::plot(&call.service, &call.caller, id, figure).await?;
     let name = format!("{id}.{}", plot.as_str());

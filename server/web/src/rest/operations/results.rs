@@ -17,7 +17,7 @@ use service::{
         jobs::{self, ID},
         plots::PLOT,
         profiles::{self, BOUNDARY, POINTS, Points, STEP},
-        results::{self, JobResult},
+        results::{self, JobResult, PARTIAL},
     },
 };
 use solver::solution::{ContactProfile, Fields};
@@ -48,32 +48,35 @@ pub(super) fn operations() -> Vec<Operation> {
         get(
             READ,
             "/v1/jobs/{id}/history",
-            (ID, TABLE, MAX_POINTS, PART),
+            (ID, TABLE, MAX_POINTS, PARTIAL, PART),
             list_iterations,
         )
         .rpcs(&["ListIterations"])
         .summary("Returns the iterations of a job's last attempt, one row each")
-        .file_of_result("The rows", data::<Vec<TimedIteration>>(Format::OF_TABLES)),
+        .file_of_result("The rows", data::<Vec<TimedIteration>>(Format::OF_TABLES))
+        .fails(&[Code::PartialResult]),
         get(
             READ,
             "/v1/jobs/{id}/profiles/{boundary}",
-            (ID, BOUNDARY, TABLE, STEP, POINTS, PART),
+            (ID, BOUNDARY, TABLE, STEP, POINTS, PARTIAL, PART),
             get_profile,
         )
         .rpcs(&["GetProfile"])
         .summary("Returns columns along a contact boundary, by arc length")
         .file_of_result("The columns", data::<ContactProfile>(Format::OF_TABLES))
-        .fails(NO_RESULT),
+        .fails(NO_RESULT)
+        .fails(&[Code::PartialResult]),
         get(
             READ,
             "/v1/jobs/{id}/fields",
-            (ID, FIELDS, PART),
+            (ID, FIELDS, PARTIAL, PART),
             stream_result,
         )
         .rpcs(&["StreamResult"])
         .summary("Returns mesh, displacements and stresses")
         .file_of_result("The fields", data::<Fields>(Format::OF_FIELDS))
-        .fails(NO_RESULT),
+        .fails(NO_RESULT)
+        .fails(&[Code::PartialResult]),
         delete(CANCEL, "/v1/jobs/{id}/fields", (ID,), delete_fields)
             .rpcs(&["DeleteFields"])
             .summary("Deletes mesh, displacements and stresses of a job that has ended, which are most of its data; summary, history and profiles remain")
@@ -82,13 +85,14 @@ pub(super) fn operations() -> Vec<Operation> {
         get(
             READ,
             "/v1/jobs/{id}/plots/{plot}",
-            (ID, PLOT, plots::LOOK, STEP, PART),
+            (ID, PLOT, plots::LOOK, STEP, PARTIAL, PART),
             plots::plot,
         )
         .rest_only("GetPlot")
         .summary("Draws a figure: mesh, deformed body, stresses along the contact, convergence")
         .file_of_result("The figure", figures())
-        .fails(NO_RESULT),
+        .fails(NO_RESULT)
+        .fails(&[Code::PartialResult]),
     ]
 }
 
@@ -156,9 +160,11 @@ async fn list_iterations(
     id: JobId,
     format: Format,
     max_points: Option<i64>,
+    partial: Option<bool>,
     part: Part,
 ) -> Result<Response, ApiError> {
-    let found = rows::history(&call.service, &call.caller, id, max_points).await?;
+    let partial = partial.unwrap_or_default();
+    let found = rows::history(&call.service, &call.caller, id, max_points, partial).await?;
     let (available, rows, share) = (found.available, found.content, found.share);
     let bytes = call.service.work(move || formats::history(&rows, format));
     let bytes = bytes.await?.map_err(ApiError::internal)?;
@@ -177,13 +183,15 @@ async fn get_profile(
     format: Format,
     step: Option<String>,
     points: Option<Points>,
+    partial: Option<bool>,
     part: Part,
 ) -> Result<Response, ApiError> {
     let Call {
         service, caller, ..
     } = &call;
-    let points = points.unwrap_or_default();
-    let profile = profiles::profile(service, caller, id, &boundary, step.as_deref(), points);
+    let (step, points) = (step.as_deref(), points.unwrap_or_default());
+    let partial = partial.unwrap_or_default();
+    let profile = profiles::profile(service, caller, id, &boundary, step, points, partial);
     let found = profile.await?;
     let (available, profile) = (found.available, found.content);
     let bytes = service.work(move || formats::profile(&profile, format));
@@ -201,19 +209,20 @@ async fn stream_result(
     call: Call,
     id: JobId,
     format: Format,
+    partial: Option<bool>,
     part: Part,
 ) -> Result<Response, ApiError> {
     let Call {
         service, caller, ..
     } = &call;
-    let name = format!("{id}.fields");
+    let (name, partial) = (format!("{id}.fields"), partial.unwrap_or_default());
     if format != Format::Json {
-        let found = stored::converted_fields(service, caller, id, format).await?;
+        let found = stored::converted_fields(service, caller, id, format, partial).await?;
         let whole = data::whole(&part, format, name, found.content)?;
         return Ok(marked(whole, found.available));
     }
     // JSON may be large, and is sent in pieces
-    let found = stored::fields(service, caller, id).await?;
+    let found = stored::fields(service, caller, id, partial).await?;
     let (available, fields) = (found.available, found.content);
     let file = data::File {
         format,
