@@ -25,6 +25,7 @@ const POLICY: &[(&str, &[&str])] = &[
             "GetJob",
             "ListJobs",
             "CountJobs",
+            "GetJobTable",
             "GetJobProblem",
             "WatchJob",
             "GetResult",

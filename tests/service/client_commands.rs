@@ -343,6 +343,62 @@ async fn the_state_of_a_job_without_a_solution_is_printed_and_drawn_if_it_is_ask
 }
 
 #[tokio::test]
+async fn jobs_are_printed_and_saved_as_one_table() {
+    let (server, folder) = (server().await, tempfile::tempdir().unwrap());
+    let url = &*server.url;
+    let problem = problem(folder.path(), "rectangular_punch");
+    for number in ["1", "2", "3"] {
+        let label = format!("n={number}");
+        ends(
+            url,
+            &[
+                "submit", &problem, "--label", &label, "--name", "=1+1", "--wait",
+            ],
+            0,
+        )
+        .await;
+    }
+    let columns = [
+        "--columns",
+        "label.n,name,status,normal_force,normal_force_error",
+    ];
+    let (csv, told) = ends(url, &[&["table"], &columns[..]].concat(), 0).await;
+    let lines: Vec<&str> = csv.lines().collect();
+    assert_eq!(
+        lines[0],
+        "label.n,name,status,normal_force,normal_force_error"
+    );
+    assert!(lines.len() == 4 && !told.contains("newest"), "{csv}{told}");
+    assert!(lines[1].starts_with("3,'=1+1,succeeded,"), "{csv}");
+    let force: f64 = lines[1].split(',').nth(3).unwrap().parse().unwrap();
+    let job = &server.json("/v1/jobs?label.n=3").await["jobs"][0];
+    assert_eq!(job["quantities"][0]["value"], force);
+    let (csv, told) = ends(url, &["table", "-n", "2"], 0).await;
+    assert_eq!(csv.lines().count(), 3);
+    assert!(told.contains("2 newest jobs only"), "{told}");
+    let name = |file: &str| folder.path().join(file).to_str().unwrap().to_owned();
+    for (file, start) in [
+        ("a.arrow", &b"ARROW1"[..]),
+        ("a.npz", b"PK"),
+        ("a.json", b"[{\"id\":"),
+        ("a.csv", b"id,name"),
+    ] {
+        ends(url, &["table", "--label", "n=1", "-o", &name(file)], 0).await;
+        assert!(
+            std::fs::read(name(file)).unwrap().starts_with(start),
+            "{file}"
+        );
+    }
+    let (_, told) = ends(url, &["table", "--columns", "id,colour"], 2).await;
+    assert!(
+        told.contains("label.KEY") && told.contains("peak_tangential_stress"),
+        "{told}"
+    );
+    let (_, told) = ends(url, &["table", "-o", &name("a.xlsx")], 2).await;
+    assert!(told.contains(".arrow"), "{told}");
+}
+
+#[tokio::test]
 async fn every_end_has_its_exit_code() {
     let (server, folder) = (
         Server::start(SIGNORINI, &["--workers", "1", "--max-queued", "2"]).await,

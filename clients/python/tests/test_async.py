@@ -69,6 +69,8 @@ def test_jobs(server: sg.LocalServer, punch: sg.Result, tmp_path: pathlib.Path) 
             with pytest.raises(sg.PartialResult):
                 await failing.svg("profile")
             assert "PARTIAL" in await failing.svg("profile", partial=True)
+            table = await client.table(["id", "status"], status="failed", page_size=1)
+            assert failing.id in table["id"] and set(table["status"]) == {"failed"}
 
     asyncio.run(run())
 

@@ -11,6 +11,7 @@ import sys
 import types
 import uuid
 
+import numpy as np
 import pytest
 from conftest import BINARY, long_problem, unconverged_problem
 
@@ -163,6 +164,34 @@ def test_the_figures_of_a_failed_job_have_to_be_asked_for(client: sg.Client, tmp
     assert result.save_vtu(tmp_path / "a.vtu").exists()
     kept = sg.Result.open(result.save(tmp_path / "kept.zip"))
     assert kept.partial and kept.profile().partial and len(kept.history) == 5 and kept.fields().partial
+
+
+def test_jobs_as_one_table(client: sg.Client) -> None:
+    labels = {"table": "yes"}
+    for indentation in (0.1, 0.2):
+        problem = sg.examples.rectangular_punch(refine=0)
+        problem.contacts[0].indentation = indentation
+        client.submit(problem, name=f"d = {indentation}", labels={**labels, "d": indentation}).wait(60, progress=False)
+    hasty = sg.examples.rectangular_punch(refine=0).with_values({"solver.max_iterations": 3})
+    with pytest.raises(sg.JobFailed):
+        client.submit(hasty, labels=labels).wait(60, progress=False)
+    table = client.table(labels=labels, order_by="created_at asc", page_size=1)
+    assert list(table)[:4] == ["id", "name", "status", "reason"] and len(table) == 3
+    assert table["status"].tolist() == ["succeeded", "succeeded", "failed"] and table["reason"][2] == "not_converged"
+    assert table["contacts"].tolist() == ["top"] * 3
+    first = client.job(str(table["id"][0])).result()
+    assert table["normal_force"][0] == float(first.normal_force)
+    assert table["normal_force_error"][0] == first.normal_force.error
+    # of a job without a solution only if they are asked for
+    assert np.isnan(table["normal_force"][2])
+    chosen = client.table(["label.d", "normal_force.top", "attempt"], partial=True, labels=labels)
+    assert list(chosen) == ["label.d", "normal_force.top", "attempt"]
+    assert chosen["label.d"].tolist() == ["", "0.2", "0.1"] and np.isfinite(chosen["normal_force.top"]).all()
+    assert chosen["attempt"].dtype.kind == "i" and "label.d" in repr(chosen)
+    assert chosen.to_pandas()["normal_force.top"].tolist() == chosen.to_arrow()["normal_force.top"].to_pylist()
+    assert len(client.table(labels={"table": "no"})) == 0
+    with pytest.raises(sg.BadRequest, match="id, name, status.*label.KEY"):
+        client.table(["colour"])
 
 
 def test_what_is_wrong_with_a_problem_is_told_in_full(client: sg.Client) -> None:

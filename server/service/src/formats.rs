@@ -18,6 +18,8 @@ use serde::Serialize;
 use solver::solution::{ContactProfile, Fields, Residuals};
 use strum::{IntoStaticStr, VariantArray};
 
+use crate::error::ApiError;
+
 /// A format of data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr, VariantArray)]
 #[strum(serialize_all = "snake_case")]
@@ -169,6 +171,18 @@ pub fn too_wide(bytes: u64) -> String {
         "npz, where each text is as wide as the longest of its column: that would be {}",
         size(bytes)
     )
+}
+
+/// Writes the table of an answer in one of the formats of tables except JSON.
+pub fn answer_table(table: &Table, format: Format) -> Result<Vec<u8>, ApiError> {
+    let padded = table.padded_bytes();
+    if format == Format::Npz && padded > MOST_PADDED_BYTES {
+        return Err(ApiError::NotAcceptable {
+            got: too_wide(padded),
+            available: "csv, jsonl, arrow".into(),
+        });
+    }
+    write_table(table, format).map_err(ApiError::internal)
 }
 
 /// Makes a table of the rows of a sweep; `paths`: the JSON Pointers of the values in which members differ.

@@ -27,7 +27,7 @@ type checkers alone read (TYPE_CHECKING) may also name a type that comes later.
     errors, pointer, _extras          what can go wrong; places in a problem; packages that need not be installed
     _paper, _style, _around           how figures are saved; how they look; the texts around them, panels, legends
     _shapes, _profiles, figures       where the parts of a problem lie; figures of profiles; all figures
-    _data                             numbers with their errors, profiles, histories, fields
+    _data, _table                     numbers with their errors, profiles, histories, fields; tables
     _parts, _whole, problem           what is wrong with a value; what a problem can do; its types (generated)
     mesh, obstacle, examples          from which a problem is made
     _retry, _answer, _events          when a request is sent again; whether an answer is whole; the stream of events
@@ -56,6 +56,7 @@ from ._data import (
     Warning,
 )
 from ._sweep import SweepTable
+from ._table import JobTable
 from .aio import AsyncClient, AsyncJob, AsyncResult, AsyncSweep
 from .client import Client
 from .errors import (
@@ -115,6 +116,7 @@ __all__ = [
     "JobActive",
     "JobCanceled",
     "JobFailed",
+    "JobTable",
     "LocalServer",
     "NoResult",
     "NotFound",

@@ -248,6 +248,13 @@ def jobs_of_sweep(id: str) -> Call[Document]:
     return jobs((("sweep", id), ("page_size", "1")), "")
 
 
+def job_table(params: Params, columns: Sequence[str] | None, partial: bool, page_token: str) -> Call[Document]:
+    if columns is not None:
+        params += (("columns", ",".join(columns)),)
+    params += PARTIAL if partial else ()
+    return _get("/v1/jobs/table", "columns", "rows", params=(("format", "json"), *params, *_page(page_token)))
+
+
 def count(params: Params) -> Call[Document]:
     return _get("/v1/jobs/count", "total", params=params)
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import collections
-import difflib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,20 +11,17 @@ import numpy as np
 from . import _html, figures
 from . import pointer as pointers
 from ._data import Array
-from ._extras import load
 from ._parts import kinds_at
 from ._progress import sweep_line
+from ._table import Table
 from .problem import Problem
 
 if TYPE_CHECKING:
     import pandas
-    import pyarrow
     from matplotlib.figure import Figure
 
 TABLE_S = 5.0
 """Seconds for which a table is asked for that is only told about."""
-SHOWN_ROWS = 10
-"""Rows of a table that its `repr` shows."""
 SHOWN_COLUMNS = ("status", "normal_force", "tangential_force", "stick_width", "peak_tangential_stress", "warnings")
 """What it shows besides the parameters."""
 
@@ -99,7 +95,7 @@ class SweepView:
         return _html.sweep(self)
 
 
-class SweepTable:
+class SweepTable(Table):
     """A row for each member: its parameters and what came of it. NaN where a member is not solved; the numbers of one
     that failed to converge (column `status`) are those of its last state.
 
@@ -114,40 +110,15 @@ class SweepTable:
         self.about: Mapping[str, Any] = about or {}
         pointed = [name for name in found if name.startswith("/")]
         short = pointers.short_names(pointed, [name for name in found if name not in pointed])
-        self.columns: dict[str, Array] = {
-            short.get(name, name): _typed(name, column) if name in short else column for name, column in found.items()
-        }
+        super().__init__(
+            {short.get(name, name): _typed(name, column) if name in short else column for name, column in found.items()}
+        )
         self.parameters = [short[name] for name in pointed]
         self.title = title
 
-    def __getitem__(self, name: str) -> Array:
-        """A column. Raises KeyError with the names that there are."""
-        if name not in self.columns:
-            close = difflib.get_close_matches(name, self.columns, 1)
-            guess = f"did you mean {close[0]!r}? " if close else ""
-            raise KeyError(f"there is no column {name!r}; {guess}there are {', '.join(self.columns)}")
-        return self.columns[name]
-
-    def __contains__(self, name: object) -> bool:
-        return name in self.columns
-
-    def __iter__(self) -> Iterator[str]:
-        """The names of the columns."""
-        return iter(self.columns)
-
-    def __len__(self) -> int:
-        return len(self.columns["number"])
-
     def __repr__(self) -> str:
         names = ["number", *self.parameters, *(name for name in SHOWN_COLUMNS if name in self.columns)]
-        rows = [names] + [
-            [_cell(self.columns[name][row]) for name in names] for row in range(min(len(self), SHOWN_ROWS))
-        ]
-        widths = [max(len(row[column]) for row in rows) for column in range(len(names))]
-        lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-        if len(self) > SHOWN_ROWS:
-            lines.append(f"… {len(self) - SHOWN_ROWS} more rows")
-        return "\n".join([*lines, *self.hinted_notes()])
+        return "\n".join([*self._lines(names), *self.hinted_notes()])
 
     def plot(self, quantity: str, **options: Any) -> Figure:
         """Draws a column over the parameters; see `signorini.figures.sweep`."""
@@ -173,14 +144,8 @@ class SweepTable:
         return [*notes, "client.explain(code) tells what a code means"] if notes else []
 
     def to_pandas(self) -> pandas.DataFrame:
-        """As a table of pandas (`pip install signorini[pandas]`)."""
-        table: pandas.DataFrame = load("pandas", "pandas").DataFrame(self.columns).set_index("number")
-        return table
-
-    def to_arrow(self) -> pyarrow.Table:
-        """As a table of Arrow (`pip install signorini[arrow]`)."""
-        table: pyarrow.Table = load("pyarrow", "arrow").table(self.columns)
-        return table
+        """As a table of pandas (`pip install signorini[pandas]`), with the numbers of the members as its index."""
+        return super().to_pandas().set_index("number")
 
 
 def counted(words: Iterable[str]) -> str:
@@ -188,8 +153,6 @@ def counted(words: Iterable[str]) -> str:
     return ", ".join(f"{word} {count}" for word, count in collections.Counter(words).most_common())
 
 
-def _cell(value: Any) -> str:
-    return f"{value:.5g}" if isinstance(value, float) else str(value)
 
 
 def _typed(pointer: str, column: Array) -> Array:

@@ -30,6 +30,7 @@ from ._progress import Waiting, goes_on
 from ._retry import BROKEN, LOG, Attempts
 from ._saved import AsyncSaved, key, packed, requests, write
 from ._sweep import TABLE_S, Member, SweepTable, SweepView, about_table
+from ._table import JobTable
 from .errors import NotFound, SignoriniError
 from .local import LocalServer
 from .problem import Problem
@@ -138,6 +139,21 @@ class AsyncClient:
             for document in page["jobs"]:
                 yield AsyncJob(self, document)
             token = page.get("next_page_token") or None
+
+    async def table(
+        self, columns: Sequence[str] | None = None, *, partial: bool = False, **filters: Unpack[calls.Listing]
+    ) -> JobTable:
+        """The jobs and the numbers of their results as one table; see `Client.table`."""
+        params = calls.filters(**filters)
+        names: list[str] = []
+        rows: list[Mapping[str, Any]] = []
+        token: str | None = ""
+        while token is not None:
+            page = await self._send(calls.job_table(params, columns, partial, token))
+            names = page["columns"]
+            rows += page["rows"]
+            token = page.get("next_page_token") or None
+        return JobTable(names, rows)
 
     async def count(self, *, group_by: str | None = None, **filters: Unpack[calls.Filters]) -> Mapping[str, Any]:
         return await self._send(calls.count(calls.filters(**filters, group_by=group_by)))

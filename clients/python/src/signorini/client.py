@@ -18,6 +18,7 @@ from ._data import Event, StoredMesh, Validation
 from ._events import Cursor
 from ._pool import Pool
 from ._retry import BROKEN, LOG, Attempts
+from ._table import JobTable
 from .errors import NotFound
 from .job import Job
 from .local import LocalServer
@@ -154,6 +155,29 @@ class Client:
             page = self._send(calls.jobs(params, token))
             yield from (Job(self, document) for document in page["jobs"])
             token = page.get("next_page_token") or None
+
+    def table(
+        self, columns: Sequence[str] | None = None, *, partial: bool = False, **filters: Unpack[calls.Listing]
+    ) -> JobTable:
+        """The jobs that match all filters of `jobs`, and the numbers of their results, as one table; all pages of it.
+
+        columns: names of columns: those of a job, `label.KEY`, `normal_force`, `normal_force.BOUNDARY`,
+            `normal_force_error`, …; absent: the most important ones
+        partial: whether the table also has the numbers of jobs that failed or were canceled, which are those of the
+            state at which they stopped
+
+        Raises `BadRequest` with all columns that there are for one that does not exist.
+        """
+        params = calls.filters(**filters)
+        names: list[str] = []
+        rows: list[Mapping[str, Any]] = []
+        token: str | None = ""
+        while token is not None:
+            page = self._send(calls.job_table(params, columns, partial, token))
+            names = page["columns"]
+            rows += page["rows"]
+            token = page.get("next_page_token") or None
+        return JobTable(names, rows)
 
     def count(self, *, group_by: str | None = None, **filters: Unpack[calls.Filters]) -> Mapping[str, Any]:
         """How many jobs match the filters of `jobs`; by `group_by` also of each status, name, …"""

@@ -6,7 +6,10 @@ use serde_json::Value;
 use store::{FILTERS, Field, Filter};
 
 use super::{
-    super::{exit::Exit, service::Connection},
+    super::{
+        exit::Exit,
+        service::{Connection, Service},
+    },
     listing::{Found, Shown},
     submit::label,
 };
@@ -20,6 +23,19 @@ pub(crate) struct Arguments {
     sweeps: bool,
 
     #[command(flatten)]
+    selected: Selected,
+
+    #[command(flatten)]
+    shown: Shown,
+
+    #[command(flatten)]
+    service: Connection,
+}
+
+/// The jobs or sweeps that a command is about.
+#[derive(Debug, Args)]
+pub(super) struct Selected {
+    #[command(flatten)]
     filters: Filters,
 
     /// List only jobs with this label; can be repeated
@@ -29,12 +45,6 @@ pub(crate) struct Arguments {
     /// The largest number of jobs or sweeps to list, the newest first; 0: all
     #[arg(short = 'n', long, default_value_t = 20, value_name = "N")]
     limit: usize,
-
-    #[command(flatten)]
-    shown: Shown,
-
-    #[command(flatten)]
-    service: Connection,
 }
 
 /// The filters that the service has, each with an option: the names and values for a query.
@@ -105,35 +115,47 @@ const PAGE: usize = 1000;
 
 pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     let service = arguments.service.open()?;
-    let most = match arguments.limit {
-        0 => usize::MAX,
-        some => some,
-    };
     let list = if arguments.sweeps { "sweeps" } else { "jobs" };
-    let (mut found, mut page): (Vec<Value>, Option<String>) = (vec![], None);
-    loop {
-        let mut query = Serializer::new(String::new());
-        query.extend_pairs(&arguments.filters.0);
-        for (key, value) in &arguments.labels {
-            query.append_pair(&format!("label.{key}"), value);
-        }
-        query.append_pair("page_size", &(most - found.len()).min(PAGE).to_string());
-        query.extend_pairs(page.iter().map(|token| ("page_token", token)));
-        let mut answer: Value = service
-            .get(&format!("/v1/{list}?{}", query.finish()))
-            .await?;
-        if let Value::Array(entries) = answer[list].take() {
-            found.extend(entries);
-        }
-        page = answer["next_page_token"].as_str().map(str::to_owned);
-        if page.is_none() || found.len() >= most {
-            break;
-        }
-    }
+    let (found, _) = arguments.selected.fetch(&service, list).await?;
     if found.is_empty() && arguments.shown.is_table() {
         eprintln!("there are no such {list}");
         return Ok(Exit::Ok);
     }
     arguments.shown.print(&Found::Many(found))?;
     Ok(Exit::Ok)
+}
+
+impl Selected {
+    /// The documents of the selected jobs or sweeps, from as many pages as are needed, and whether the list goes on.
+    pub(super) async fn fetch(
+        &self,
+        service: &Service,
+        list: &str,
+    ) -> anyhow::Result<(Vec<Value>, bool)> {
+        let most = match self.limit {
+            0 => usize::MAX,
+            some => some,
+        };
+        let (mut found, mut page): (Vec<Value>, Option<String>) = (vec![], None);
+        loop {
+            let mut query = Serializer::new(String::new());
+            query.extend_pairs(&self.filters.0);
+            for (key, value) in &self.labels {
+                query.append_pair(&format!("label.{key}"), value);
+            }
+            query.append_pair("page_size", &(most - found.len()).min(PAGE).to_string());
+            query.extend_pairs(page.iter().map(|token| ("page_token", token)));
+            let mut answer: Value = service
+                .get(&format!("/v1/{list}?{}", query.finish()))
+                .await?;
+            if let Value::Array(entries) = answer[list].take() {
+                found.extend(entries);
+            }
+            page = answer["next_page_token"].as_str().map(str::to_owned);
+            if page.is_none() || found.len() >= most {
+                break;
+            }
+        }
+        Ok((found, page.is_some()))
+    }
 }

@@ -4,7 +4,7 @@
 //!
 //! | subject | where |
 //! |---|---|
-//! | commands | `submit`, `watch`, `wait`, `get`, `ls`, `result`, `plot`, `change` (cancel, retry, rm), `validate` |
+//! | commands | `submit`, `watch`, `wait`, `get`, `ls`, `table`, `result`, `plot`, `change` (cancel, retry, rm), `validate` |
 //! | files of problems, decks and sweeps, and the lines of their violations | `file` |
 //! | following a job through restarts of the service | `follow` |
 //! | how jobs are printed | `listing` |
@@ -21,6 +21,7 @@ mod ls;
 mod plot;
 mod result;
 mod submit;
+mod table;
 mod validate;
 mod wait;
 mod watch;
@@ -77,6 +78,8 @@ pub(super) enum Command {
     Get(get::Arguments),
     /// List jobs, newest first
     Ls(Box<ls::Arguments>),
+    /// Print or save jobs and the numbers of their results, with their errors, as one table
+    Table(Box<table::Arguments>),
     /// Print or save the result of a job, or the table of a sweep
     Result(Box<result::Arguments>),
     /// Draw stresses and convergence in the terminal, or save and open figures
@@ -94,6 +97,7 @@ pub(super) async fn run(command: Command) -> anyhow::Result<Exit> {
         Command::Wait(arguments) => wait::run(arguments).await,
         Command::Get(arguments) => get::run(arguments).await,
         Command::Ls(arguments) => ls::run(*arguments).await,
+        Command::Table(arguments) => table::run(*arguments).await,
         Command::Result(arguments) => result::run(*arguments).await,
         Command::Plot(arguments) => plot::run(arguments).await,
         Command::Change(command) => change::run(command).await,

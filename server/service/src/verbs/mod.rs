@@ -16,6 +16,7 @@
 //! | checking a problem without storing it | `problems` |
 //! | one job | `jobs` |
 //! | lists, their filters and pages | `lists`, `filters`, `page` |
+//! | jobs and their numbers as one table | `job_table` |
 //! | many jobs at once | `bulk` |
 //! | watching a job | `watch` |
 //! | sweeps | `sweeps` |
@@ -45,6 +46,7 @@ mod uploads;
 
 // Jobs.
 pub mod bulk;
+pub mod job_table;
 pub mod jobs;
 pub mod lists;
 pub mod retry;

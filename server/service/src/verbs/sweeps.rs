@@ -448,14 +448,7 @@ async fn make_table(
         let (_, rows) = with_values(loaded)?;
         let table = formats::members_table(&sweep.paths, &rows);
         drop(rows);
-        let padded = table.padded_bytes();
-        if format == Format::Npz && padded > formats::MOST_PADDED_BYTES {
-            return Err(ApiError::NotAcceptable {
-                got: formats::too_wide(padded),
-                available: "csv, jsonl, arrow".into(),
-            });
-        }
-        let bytes = formats::write_table(&table, format).map_err(ApiError::internal)?;
+        let bytes = formats::answer_table(&table, format)?;
         Ok(with_own_share(bytes, share))
     };
     let load = load_members(service, (sweep.id, sweep.key), 0, i64::MAX);

@@ -156,7 +156,7 @@ const SENT: [&str; 13] = [
     "x-request-id",
 ];
 /// The headers that pages of the allowed origins may read.
-const READ: [&str; 12] = [
+const READ: [&str; 13] = [
     "accept-ranges",
     "content-digest",
     "content-disposition",
@@ -164,6 +164,7 @@ const READ: [&str; 12] = [
     "etag",
     "idempotency-replayed",
     "location",
+    "next-page-token",
     "preference-applied",
     "result-available",
     "retry-after",

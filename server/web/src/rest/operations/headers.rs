@@ -29,6 +29,15 @@ pub(super) fn result_available() -> Description {
     )
 }
 
+/// The header with the token of the next part of a table.
+pub(super) fn next_page_token() -> Description {
+    header(
+        "Next-Page-Token",
+        text(),
+        "The page_token of the next part; absent from the last one",
+    )
+}
+
 /// The header that says how long to wait before polling.
 pub(super) fn retry_after() -> Description {
     let seconds = json!({ "type": "integer", "minimum": 0, "maximum": u32::MAX });

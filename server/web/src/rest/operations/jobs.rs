@@ -1,25 +1,33 @@
 //! The operations on jobs that exist: get, list, wait, watch, edit, cancel, delete.
 
+use std::collections::BTreeMap;
+
 use axum::{
     Json,
-    http::{StatusCode, header},
+    http::{HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
 };
 use base::{
     catalog::Code,
     event::Event,
     job::{Job, JobId},
-    values::Values,
+    values::{Values, Words},
 };
+use files::table::Table;
 use schemars::JsonSchema;
 use serde::Serialize;
+use serde_json::{Value, value::RawValue};
 use service::{
     error::ApiError,
+    formats::{self, Format},
+    parameters::Parameter,
     verbs::{
         bulk::{self, BulkResult},
+        job_table::{self, COLUMNS, Columns, NEXT_PAGE_TOKEN, ROWS},
         jobs::{self as verbs, Cancellation, ID, LabelChanges},
         lists::{self, Count, GROUP_BY, ORDER_BY},
         page::{PAGE_SIZE, PAGE_TOKEN, Paging},
+        results::PARTIAL,
         watch::{self, AFTER_SEQ, UNTIL, Until, WAIT},
     },
 };
@@ -27,20 +35,23 @@ use solver::problem::Problem;
 use store::{Filter, GroupBy, Order};
 
 use super::{
-    content::{json, lines, merge_patch, nothing, stream, the_problem},
+    content::{data, json, lines, merge_patch, nothing, stream, the_problem},
     headers::etag,
     operation::{CANCEL, Operation, READ, SUBMIT, delete, get, patch, post},
 };
 use crate::rest::{
+    accept::FormatOf,
     bodies::{self, Edits, MergePatch},
     body::is_merge_patch,
     call::Call,
+    data::{self, PART, Part},
     events::{self, LAST_EVENT_ID},
     filters::FILTERS,
     headers::{Header, IF_MATCH, IF_NONE_MATCH, Tags, version_tag},
 };
 
 pub(super) fn operations() -> Vec<Operation> {
+    const TABLE: FormatOf = FormatOf(Format::OF_TABLES);
     vec![
         get(READ, "/v1/jobs", (FILTERS, PAGE_SIZE, PAGE_TOKEN, ORDER_BY), list_jobs)
             .rpcs(&["ListJobs"])
@@ -51,6 +62,17 @@ pub(super) fn operations() -> Vec<Operation> {
             .rpcs(&["CountJobs"])
             .summary("Counts jobs")
             .answers(200, "The number of jobs", json::<Count>()),
+        get(
+            READ,
+            "/v1/jobs/table",
+            (FILTERS, COLUMNS, TABLE, NUMBERS_OF_ALL, ROWS, PAGE_TOKEN, ORDER_BY, PART),
+            list_job_table,
+        )
+        .rest_only("GetJobTable")
+        .summary("Returns jobs and the numbers of their results, with their errors, as one table: a row for each job, newest first")
+        .file("The rows. There may be fewer than asked for before the table ends, since a limited number of jobs is checked for each answer: it ends where there is no next page", data::<JobTable>(Format::OF_TABLES))
+        .with_next_page()
+        .fails(&[Code::BadPageToken]),
         get(READ, "/v1/jobs/{id}", (ID, WAIT, UNTIL, IF_NONE_MATCH), get_job)
             .rpcs(&["GetJob", "WaitJob"])
             .summary("Returns a job now, or after it has changed or ended")
@@ -153,6 +175,75 @@ async fn list_jobs(
         jobs: page.items,
         next_page_token: page.next,
     }))
+}
+
+/// `partial` of the table, which has a row for every job.
+const NUMBERS_OF_ALL: Parameter<Words<bool>> = Parameter {
+    meaning: "Whether the table also has the numbers of jobs that failed or were canceled, which are those of the state at which they stopped, not of a solution; default false",
+    ..PARTIAL
+};
+
+/// A part of the table of jobs.
+#[derive(Serialize, JsonSchema)]
+struct JobTable {
+    /// The names of the columns.
+    columns: Vec<String>,
+    /// The rows: the values by the names of their columns, null where a job has no such number.
+    #[schemars(with = "Vec<BTreeMap<String, Value>>")]
+    rows: Vec<Box<RawValue>>,
+    next_page_token: Option<String>,
+}
+
+#[expect(
+    clippy::too_many_arguments,
+    reason = "each is a parameter of the request"
+)]
+async fn list_job_table(
+    call: Call,
+    filter: Filter,
+    columns: Option<Columns>,
+    format: Format,
+    partial: Option<bool>,
+    size: Option<i64>,
+    token: Option<String>,
+    order: Option<Order>,
+    part: Part,
+) -> Result<Response, ApiError> {
+    let request = job_table::Request {
+        filter,
+        order,
+        paging: Paging { size, token },
+        columns,
+        partial: partial.unwrap_or_default(),
+    };
+    let (table, next) = job_table::table(&call.service, &call.caller, request).await?;
+    let token = next.clone();
+    let write = move || match format {
+        Format::Json => table_as_json(&table, token),
+        _ => formats::answer_table(&table, format),
+    };
+    let bytes = call.service.work(write).await??;
+    let mut response = data::whole(&part, format, "jobs".into(), bytes)?;
+    if let Some(token) = next {
+        let token = HeaderValue::from_str(&token).map_err(ApiError::internal)?;
+        response.headers_mut().insert(NEXT_PAGE_TOKEN, token);
+    }
+    Ok(response)
+}
+
+fn table_as_json(table: &Table, next_page_token: Option<String>) -> Result<Vec<u8>, ApiError> {
+    let lines = table.jsonl().map_err(ApiError::internal)?;
+    let rows = lines.lines().map(|line| RawValue::from_string(line.into()));
+    let table = JobTable {
+        columns: table
+            .columns
+            .iter()
+            .map(|column| column.name.to_string())
+            .collect(),
+        rows: rows.collect::<Result<_, _>>().map_err(ApiError::internal)?,
+        next_page_token,
+    };
+    serde_json::to_vec(&table).map_err(ApiError::internal)
 }
 
 async fn count_jobs(

@@ -110,9 +110,10 @@ mod tests {
             .collect();
         let named: BTreeSet<String> = named.into_iter().map(str::to_owned).collect();
         assert_eq!(named, rpcs());
-        // plots, pages and documents, and what is asked by HTTP everywhere (probes, metrics), have no rpc
+        // plots, the table for programs that read files, pages and documents, and what is asked by HTTP everywhere (probes, metrics), have no rpc
         let rest_only = [
             "/v1/jobs/{id}/plots/{plot}",
+            "/v1/jobs/table",
             "/",
             "/docs",
             "/docs/{file}",

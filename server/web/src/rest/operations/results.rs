@@ -24,7 +24,7 @@ use solver::solution::{ContactProfile, Fields};
 
 use super::{
     content::{bytes, data, json, nothing},
-    headers::result_available,
+    headers::{next_page_token, result_available},
     operation::{CANCEL, Content, Operation, READ, delete, get},
 };
 use crate::rest::{
@@ -128,6 +128,14 @@ impl Operation {
             .answers(304, "The file has not changed", nothing())
             .with([tag()])
             .fails(&[Code::NotAcceptable, Code::RangeNotSatisfiable])
+    }
+
+    /// Adds to the answers of `file` the header that leads to the next part of a table.
+    pub(super) fn with_next_page(mut self) -> Self {
+        for answer in &mut self.answers {
+            answer.headers.push((next_page_token(), false));
+        }
+        self
     }
 
     /// Adds the answers of `file` for a file of a job, with the header that says whether the result is partial or
