@@ -36,8 +36,12 @@ pub struct Member {
     pub tangential_force: f64,
     /// The friction force ∫|σ_t| over all contacts (force).
     pub friction_force: f64,
-    /// Length of all contacts together, along the boundaries.
+    /// Length of all contacts together, along the boundaries; the ends of contact are interpolated between nodes, for this
+    /// and the other lengths: [`Widths`](crate::solution::Widths).
     pub contact_width: f64,
+    /// The error of `contact_width` due to the distances between the nodes at the ends of contact: 0.75 of each distance, the
+    /// part that a job states for each end. It contains no error of forces; absent where an end is unknown.
+    pub contact_width_error: Option<f64>,
     /// The length of contact that sticks, |u_t − d| < ε.
     pub stick_width: f64,
     /// The length of contact that slips.
@@ -214,16 +218,6 @@ impl Member {
 
     fn of_contacts(contacts: &BTreeMap<String, ContactSummary>, warnings: &[Warning]) -> Member {
         let sum = |f: fn(&ContactSummary) -> f64| contacts.values().map(f).fold(0.0, |a, b| a + b);
-        let width = |parts: &[[f64; 2]]| -> f64 {
-            let lengths = parts.iter().map(|[start, end]| end - start);
-            lengths.fold(0.0, |a, b| a + b)
-        };
-        let widths = |f: fn(&ContactSummary) -> &Vec<[f64; 2]>| {
-            contacts
-                .values()
-                .map(|contact| width(f(contact)))
-                .fold(0.0, |a, b| a + b)
-        };
         let largest = |f: fn(&ContactSummary) -> Option<Peak>| {
             let values = contacts.values().filter_map(f).map(|peak| peak.value);
             let larger = |a: f64, b: f64| if b.abs() > a.abs() { b } else { a };
@@ -234,9 +228,12 @@ impl Member {
             normal_force: sum(|contact| contact.normal_force),
             tangential_force: sum(|contact| contact.tangential_force),
             friction_force: sum(|contact| contact.friction_force),
-            contact_width: widths(|contact| &contact.contact),
-            stick_width: widths(|contact| &contact.stick),
-            slip_width: widths(|contact| &contact.slip),
+            contact_width: sum(|contact| contact.widths.contact),
+            contact_width_error: contacts
+                .values()
+                .try_fold(0.0, |all, contact| Some(all + contact.widths.error?)),
+            stick_width: sum(|contact| contact.widths.stick),
+            slip_width: sum(|contact| contact.widths.slip),
             peak_normal_stress: largest(|contact| contact.peak_normal_stress),
             peak_tangential_stress: largest(|contact| contact.peak_tangential_stress),
             iterations: 0,

@@ -70,3 +70,4 @@ mod unmerged;
 mod unseen;
 mod verdicts;
 mod verify;
+mod widths;

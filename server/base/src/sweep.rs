@@ -92,8 +92,14 @@ pub struct MemberRow {
     pub tangential_force: Option<f64>,
     /// Friction force ∫|σ_t| over all contacts (force).
     pub friction_force: Option<f64>,
-    /// Length of all contacts together.
+    /// Length of all contacts together. Its ends, and those of the lengths of stick and slip, are interpolated between
+    /// the outermost nodes in contact and the nodes beside them.
     pub contact_width: Option<f64>,
+    /// The error of `contact_width` due to the distances between nodes: for each end of contact 0.75 of the distance to the
+    /// next node, as in the `accuracy` of a job. Errors of the forces are not in it, and lengths of stick and slip have no stated
+    /// error. Absent where an end is unknown, and in rows of older versions, whose lengths end at nodes.
+    #[serde(default)]
+    pub contact_width_error: Option<f64>,
     /// Length of the contact that sticks.
     pub stick_width: Option<f64>,
     /// Length of the contact that slips.
@@ -178,6 +184,7 @@ impl MemberRow {
             tangential_force,
             friction_force,
             contact_width,
+            contact_width_error,
             stick_width,
             slip_width,
             peak_normal_stress,
@@ -204,6 +211,7 @@ impl MemberRow {
             tangential_force: Some(tangential_force),
             friction_force: Some(friction_force),
             contact_width: Some(contact_width),
+            contact_width_error,
             stick_width: Some(stick_width),
             slip_width: Some(slip_width),
             peak_normal_stress: Some(peak_normal_stress),

@@ -130,7 +130,7 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     fields("Comparison", "solution::Comparison").answer(),
     fields("Refinement", "solution::Refinement").answer(),
     names("Outcome", "solution::Outcome").answer(),
-    fields("ContactSummary", "solution::ContactSummary").answer(),
+    fields("ContactSummary", "solution::ContactSummary").answer().ours(&["widths: _"]),
     fields("Peak", "solution::Peak").answer(),
     fields("Residuals", "solution::Residuals").answer(),
     fields("ContactProfile", "solution::ContactProfile").answer(),

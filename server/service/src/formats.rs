@@ -207,6 +207,7 @@ pub fn members_table(paths: &[String], rows: &[MemberRow]) -> Table {
         real("tangential_force",        |row| row.tangential_force),
         real("friction_force",          |row| row.friction_force),
         real("contact_width",           |row| row.contact_width),
+        real("contact_width_error",     |row| row.contact_width_error),
         real("stick_width",             |row| row.stick_width),
         real("slip_width",              |row| row.slip_width),
         real("peak_normal_stress",      |row| row.peak_normal_stress),

@@ -95,6 +95,14 @@ impl Section {
         moduli.fold(0.0, f64::max)
     }
 
+    /// The modulus E* of a material by which its surface yields to a pressure, E/(1 − ν²) in plane strain and E in plane
+    /// stress (stress); of an orthotropic material a mean of both directions.
+    pub fn contact_modulus(&self, material: usize) -> f64 {
+        let moduli = &self.moduli[material];
+        let normal = (moduli[0][0] * moduli[1][1]).sqrt();
+        (normal - moduli[0][1]) * (normal + moduli[0][1]) / normal
+    }
+
     /// The two parts of the moduli of a material, if it is nearly incompressible.
     pub fn split(&self, material: usize) -> Option<&Split> {
         self.splits[material].as_ref()

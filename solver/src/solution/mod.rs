@@ -231,6 +231,25 @@ pub struct ContactSummary {
     /// Largest |σ_t|, with its sign, over the continuous profile; absent without friction.
     pub peak_tangential_stress: Option<Peak>,
 }
+    /// The lengths of contact, stick and slip, with the ends of contact interpolated between nodes. Not part of the
+    /// document and its digest: rows of sweeps have them.
+    #[serde(skip)]
+    pub widths: Widths,
+}
+
+/// The lengths of all intervals of a contact, whose ends are interpolated between the outermost nodes in contact and the
+/// nodes beside them: lengths of nodes change by whole distances between nodes where the load changes a little.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Widths {
+    /// The length in contact.
+    pub contact: f64,
+    /// The error of `contact` due to the distances between nodes, the sum for all ends; absent where the end is unknown:
+    /// the solution did not converge, or the nodes miss a shape of the obstacle.
+    pub error: Option<f64>,
+    /// The length that sticks.
+    pub stick: f64,
+    /// The length that slips.
+    pub slip: f64,
 
 /// A value and where it occurs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -72,6 +72,7 @@ QUANTITIES = {
     "stick_width": "width of stick",
     "slip_width": "width of slip",
     "contact_width": "width of contact",
+    "contact_width_error": "error of the width of contact",
     "peak_normal_stress": r"peak of  $\sigma_n$",
     "peak_tangential_stress": r"peak of  $\sigma_t$",
 }

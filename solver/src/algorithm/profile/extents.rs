@@ -2,22 +2,28 @@
 
 use std::cmp::Ordering;
 
+use super::quantities::EndOfContact;
 use super::{Highest, PatchView};
 use crate::contact::edge_nodes;
 use crate::element::edge3;
 use crate::element::gauss::GAUSS_3;
 use crate::friction::BoundLaw;
 use crate::problem::Condition;
-use crate::solution::{ContactSummary, Peak};
+use crate::solution::{ContactSummary, Outcome, Peak, Widths};
+
+/// The error of an end of contact, as a part of the distance between the outermost node in contact and the next one:
+/// calibrated by `tests/verification/calibration.rs`.
+pub const PART_OF_SPACING: f64 = 0.75;
 
 /// The number of samples per edge in the search for a peak, before its place is narrowed down.
 const SAMPLES: usize = 16;
 
-/// The extents of a contact, each as intervals of arc length.
+/// The extents of a contact, each as intervals of arc length, and their lengths with interpolated ends of contact.
 struct Extents {
     contact: Vec<[f64; 2]>,
     stick: Vec<[f64; 2]>,
     slip: Vec<[f64; 2]>,
+    widths: Widths,
 }
 
 impl PatchView<'_> {
@@ -33,6 +39,7 @@ impl PatchView<'_> {
             contact,
             stick,
             slip,
+            widths,
         } = self.extents();
         ContactSummary {
             normal: self.patch.contact.normal,
@@ -44,6 +51,7 @@ impl PatchView<'_> {
             slip,
             peak_normal_stress: self.peak_normal_stress(),
             peak_tangential_stress: self.peak_tangential_stress(),
+            widths,
         }
     }
 
@@ -52,6 +60,10 @@ impl PatchView<'_> {
         let s = &self.patch.contact.boundary.s;
         let (mut contact, mut stick, mut slip) =
             (Vec::new(), Vec::<[f64; 2]>::new(), Vec::<[f64; 2]>::new());
+        let mut widths = Widths {
+            error: self.error_of_width(),
+            ..Widths::default()
+        };
         let mut i = 0;
         while i < self.count() {
             if !self.engaged(i) {
@@ -63,8 +75,13 @@ impl PatchView<'_> {
                 i += 1;
             }
             let (from, to) = (s[first], s[i]);
+            let beyond = [
+                self.length_beyond(first, first.checked_sub(1)),
+                self.length_beyond(i, Some(i + 1).filter(|next| *next < self.count())),
+            ];
             if self.active(first) {
                 contact.push([from, to]);
+                widths.contact += beyond[0] + (to - from) + beyond[1];
             }
             let mut cuts = vec![from];
             cuts.extend(
@@ -73,12 +90,19 @@ impl PatchView<'_> {
                     .filter(|c| *c > from && *c < to),
             );
             cuts.push(to);
-            for pair in cuts.windows(2) {
-                let list = if self.sticks(0.5 * (pair[0] + pair[1])) {
-                    &mut stick
+            for (piece, pair) in cuts.windows(2).enumerate() {
+                let (list, length) = if self.sticks(0.5 * (pair[0] + pair[1])) {
+                    (&mut stick, &mut widths.stick)
                 } else {
-                    &mut slip
+                    (&mut slip, &mut widths.slip)
                 };
+                *length += pair[1] - pair[0];
+                if piece == 0 {
+                    *length += beyond[0];
+                }
+                if piece + 2 == cuts.len() {
+                    *length += beyond[1];
+                }
                 // adjacent pieces in the same state are one
                 match list.last_mut() {
                     Some([_, end]) if *end == pair[0] => *end = pair[1],
@@ -91,7 +115,53 @@ impl PatchView<'_> {
             contact,
             stick,
             slip,
+            widths,
         }
+    }
+
+    /// The length of contact beyond its outermost node `inside`, up to the open node `outside` at most.
+    ///
+    /// At the end of a smooth contact in the plane, at the distance d from it, the pressure is K √d inside and the gap
+    /// ⁴⁄₃ (K/E*) d^(3/2) outside, with any K. The pressure p at the one node and the gap g at the other, at the distance
+    /// h, therefore give the part η = d/h of the open length: η^(3/2)/(1−η)^(1/2) = q with q = ¾ E* g/(p h), which is
+    /// η³ + q²η − q² = 0. A node that just closes (g = 0) ends the contact, and so does one that just opens (p = 0): the
+    /// end moves without a jump when the load changes.
+    fn length_beyond(&self, inside: usize, outside: Option<usize>) -> f64 {
+        let Some(outside) = outside.filter(|_| self.active(inside)) else {
+            return 0.0;
+        };
+        let s = &self.patch.contact.boundary.s;
+        let length = (s[outside] - s[inside]).abs();
+        let gap = self.system.opening(self.v, self.patch.first + outside);
+        let stiff = 0.75 * self.contact_modulus(inside) * gap.max(0.0);
+        length * (1.0 - open_part(stiff, self.pressure(inside) * length))
+    }
+
+    /// The modulus E* of the material at a node (stress).
+    fn contact_modulus(&self, i: usize) -> f64 {
+        let model = self.system.model;
+        let node = self.patch.contact.boundary.nodes[i];
+        let material = match model.section.materials() {
+            [_] => 0,
+            _ => {
+                let mut elements = model.mesh.elements.iter();
+                let there = elements.position(|element| element.contains(&node));
+                there.map_or(0, |element| model.section.material_of(element))
+            }
+        };
+        model.section.contact_modulus(material)
+    }
+
+    /// The error of the length in contact: of each end what [`PatchView::quantities`] takes for it as a place, so that it
+    /// bounds the end at the node and the interpolated one.
+    fn error_of_width(&self) -> Option<f64> {
+        let known = self.finished.outcome == Outcome::Converged
+            && self.missed().is_empty()
+            && self.overlap_without_contact() == 0.0;
+        let of_end = |end: &EndOfContact| {
+            PART_OF_SPACING * end.spacing + end.truncation + self.displaced_end(end.node)
+        };
+        known.then(|| self.ends_of_contact().iter().map(of_end).sum())
     }
 
     fn sticks(&self, s: f64) -> bool {
@@ -345,6 +415,27 @@ fn narrowed(value: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     0.5 * (low + high)
 }
 
+/// The solution η of η³ + q²η − q² = 0 from 0 to 1, for q = `gap`/`pressure`, both ≥ 0: the open part of the length between
+/// two nodes. 1 if there is no pressure, whatever the gap.
+fn open_part(gap: f64, pressure: f64) -> f64 {
+    if pressure <= 0.0 || !gap.is_finite() {
+        return 1.0;
+    }
+    if gap == 0.0 {
+        return 0.0;
+    }
+    let q = gap / pressure;
+    if q > LARGE_RATIO {
+        return 1.0;
+    }
+    // the only real root, since the cubic grows; by the hyperbolic form, whose terms do not cancel
+    let scale = 2.0 * q / 3f64.sqrt();
+    scale * ((1.5 * 3f64.sqrt() / q).asinh() / 3.0).sinh()
+}
+
+/// The ratio q in [`open_part`] above which 1 − η ≈ q⁻² is below rounding.
+const LARGE_RATIO: f64 = 1e7;
+
 fn quadratic_roots(a: f64, b: f64, c: f64) -> Vec<f64> {
     let discriminant = b * b - 4.0 * a * c;
     if discriminant < 0.0 {
@@ -366,6 +457,21 @@ mod tests {
     fn a_peak_is_found_between_two_places() {
         let found = narrowed(&|x| 1.0 - (x - 0.3) * (x - 0.3), 0.0, 1.0);
         assert!((found - 0.3).abs() < 1e-5, "{found}");
+    }
+
+    #[test]
+    fn the_open_part_solves_its_cubic_and_ends_at_the_nodes() {
+        for q in [1e-6, 0.01, 0.3, 1.0, 5.0, 300.0, 1e6] {
+            let part = open_part(q, 1.0);
+            let left = part.powi(3) - q * q * (1.0 - part);
+            assert!((0.0..=1.0).contains(&part), "{q} {part}");
+            assert!(left.abs() <= 1e-9 * q.max(q * q), "{q} {part} {left}");
+        }
+        assert_eq!(open_part(0.0, 1.0), 0.0);
+        assert_eq!(open_part(0.0, 0.0), 1.0);
+        assert_eq!(open_part(1.0, 0.0), 1.0);
+        assert_eq!(open_part(f64::INFINITY, 1.0), 1.0);
+        assert!((open_part(1e8, 1.0) - 1.0).abs() < 1e-12);
     }
 
     #[test]

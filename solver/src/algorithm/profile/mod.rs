@@ -20,6 +20,7 @@ mod quantities;
 mod resolution;
 mod warnings;
 
+pub use extents::PART_OF_SPACING;
 pub use quantities::{Estimable, Quantity};
 
 use std::cell::OnceCell;

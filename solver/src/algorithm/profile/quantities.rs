@@ -74,7 +74,7 @@ pub(super) struct EndOfContact {
     s: f64,
     /// The length from the node to the end of the obstacle, if that is inside the next edge, which is left out of the
     /// contact.
-    truncation: f64,
+    pub(super) truncation: f64,
     /// The distance between the outermost node in contact and the next node (length).
     pub(super) spacing: f64,
     /// The edge between the outermost node in contact and the next node.
