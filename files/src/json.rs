@@ -13,7 +13,7 @@ use crate::inline::{Extract, Places};
 use crate::schema::violations;
 use crate::source::{BYTE_ORDER_MARK, ReadError};
 use solver::error::{Reason, Violation, escape};
-use solver::problem::{MeshSource, Problem};
+use solver::problem::{MeshSource, Problem, elastic_slip_rule};
 
 /// The names that lead to an inline mesh.
 const INLINE: &[&str] = &["mesh", "inline"];
@@ -83,7 +83,10 @@ pub(crate) fn check(text: &str, places: &Places) -> Result<Problem, Vec<Violatio
     }
     match violations(text) {
         Ok(list) if list.is_empty() => {}
-        Ok(list) => return Err(list),
+        Ok(mut list) => {
+            suggest_elastic_slip(text, &mut list);
+            return Err(list);
+        }
         Err(error) => {
             return Err(vec![Violation::new(
                 "",
@@ -102,6 +105,29 @@ pub(crate) fn check(text: &str, places: &Places) -> Result<Problem, Vec<Violatio
             hint,
         )]
     })
+}
+
+/// Adds to each violation of a missing elastic slip what to take, by the displacements of its obstacle.
+fn suggest_elastic_slip(text: &str, violations: &mut [Violation]) {
+    const SLIP: &str = "/friction/elastic_slip";
+    let missing =
+        |found: &&mut Violation| found.reason == Reason::Missing && found.pointer.ends_with(SLIP);
+    let mut missing = violations.iter_mut().filter(missing).peekable();
+    if missing.peek().is_none() {
+        return;
+    }
+    let Ok(problem) = serde_json::from_str::<serde_json::Value>(text) else {
+        return;
+    };
+    for violation in missing {
+        let contact = violation.pointer.strip_suffix(SLIP).unwrap_or_default();
+        let moved = |field: &str| {
+            let given = problem.pointer(&format!("{contact}/{field}"));
+            given.and_then(serde_json::Value::as_f64).unwrap_or(0.0)
+        };
+        let rule = elastic_slip_rule(moved("indentation"), moved("tangential_displacement"));
+        violation.hint = format!("{} {rule}", violation.hint);
+    }
 }
 
 /// The place, in words, of the first bracket beyond [`MOST_NESTED`] open ones.
@@ -293,6 +319,36 @@ mod tests {
                 "/mesh/grid/x/1",
             ]
         );
+    }
+
+    #[test]
+    fn a_missing_elastic_slip_is_suggested_from_the_displacements_of_the_obstacle() {
+        let hints = |more: &str| -> Vec<String> {
+            let slipless = GOOD.replace(", \"elastic_slip\": 1e-4", "");
+            let text = slipless.replace(
+                "\"boundary\": \"top\",",
+                &format!("\"boundary\": \"top\",{more}"),
+            );
+            let found = parse(&text).unwrap_err().into_iter();
+            found.map(|violation| violation.hint).collect()
+        };
+        let [hint] = &hints("\"indentation\": -0.02, \"tangential_displacement\": 0.5,")[..] else {
+            panic!("not one violation");
+        };
+        assert!(
+            hint.starts_with("The field has no default.") && hint.contains("5.0e-4"),
+            "{hint}"
+        );
+        // of what is no number nothing is taken
+        for more in ["", "\"indentation\": \"deep\","] {
+            let all = hints(more);
+            let suggests = |hint: &String| hint.contains("the slip that you expect");
+            assert_eq!(
+                all.iter().filter(|hint| suggests(hint)).count(),
+                1,
+                "{all:?}"
+            );
+        }
     }
 
     #[test]

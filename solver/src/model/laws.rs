@@ -6,7 +6,7 @@ use crate::error::{AllChecks, Checked, Reason};
 use crate::friction::{Average, BoundLaw, FrictionLaw};
 use crate::problem::{
     Analysis, Condition, Contact, Friction, History, Interpolation, Measure, Normalization,
-    Obstacle, PrescribedBound, Smoothing, Transition,
+    Obstacle, PrescribedBound, Smoothing, Transition, elastic_slip_rule,
 };
 use crate::solution::WarningCode;
 use crate::spline::scatter;
@@ -308,7 +308,7 @@ impl Checks {
             None => self.pressure_bound(friction, pointer),
         };
         all.check(sound);
-        all.check(self.slip(analysis, friction, pointer));
+        all.check(self.slip(analysis, contact, friction, pointer));
         let law = bound.map(|bound| FrictionLaw {
             bound,
             elastic_slip: friction.elastic_slip,
@@ -427,7 +427,13 @@ impl Checks {
     }
 
     /// Checks the transition from stick to slip.
-    fn slip(&mut self, analysis: &Analysis, friction: &Friction, pointer: &str) -> Checked {
+    fn slip(
+        &mut self,
+        analysis: &Analysis,
+        contact: &Contact,
+        friction: &Friction,
+        pointer: &str,
+    ) -> Checked {
         let mut all = AllChecks::default();
         let at = |field: &str| format!("{pointer}/{field}");
         all.check(self.require(
@@ -435,7 +441,7 @@ impl Checks {
             at("elastic_slip"),
             friction.elastic_slip,
             "a length > 0",
-            "About 1e-4 of the contact's width; below 1e-5 the result no longer changes physically.",
+            &elastic_slip_rule(contact.indentation, contact.tangential_displacement),
         ));
         if friction.history == History::Incremental && friction.transition != Transition::Linear {
             all.fail(self.report(

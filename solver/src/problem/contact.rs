@@ -246,7 +246,10 @@ pub struct Friction {
     /// `bound` is set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nonlocal_radius: Option<f64>,
-    /// Elastic slip ε > 0 (length): the tangential displacement at which the friction bound is reached.
+    /// Elastic slip ε > 0 (length): the tangential displacement at which the friction bound is reached. It has no default,
+    /// because it is a length. If it is not known from a measurement, take a thousandth of the slip in the problem: of
+    /// `indentation` or `tangential_displacement`, whichever is larger in size. Friction is then close to Coulomb's; a smaller
+    /// one needs a finer mesh.
     pub elastic_slip: f64,
     /// Shape of the averaging kernel.
     #[serde(default)]
@@ -276,6 +279,24 @@ pub struct Friction {
     /// with or without contact.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bound: Option<PrescribedBound>,
+}
+
+/// The rule for an elastic slip that is not known from a measurement, in words, with its value for an obstacle that is moved
+/// this far (lengths). An obstacle that is not moved at all, as where loads press the body, gives no value.
+pub fn elastic_slip_rule(indentation: f64, tangential_displacement: f64) -> String {
+    /// The elastic slip as a part of the slip: forces then differ from Coulomb's by about a hundredth at most, and the meshes of
+    /// the examples bear it.
+    const PART: f64 = 1e-3;
+    let moved = indentation.abs().max(tangential_displacement.abs());
+    let value = PART * moved;
+    if value > 0.0 && value.is_finite() {
+        format!(
+            "If it is not known, take a thousandth of the slip, here of the displacement of the obstacle: {value:.1e}."
+        )
+    } else {
+        "If it is not known, take a thousandth of the slip that you expect, such as the displacement of the body beside the obstacle."
+            .to_owned()
+    }
 }
 
 /// A prescribed friction bound τ (stress).

@@ -14,6 +14,7 @@ mod support;
 pub use contact::{
     Along, BoundTable, Condition, Contact, Friction, FrictionPoints, History, Interpolation,
     Kernel, Measure, NormalOf, Normalization, Obstacle, PrescribedBound, Smoothing, Transition,
+    elastic_slip_rule,
 };
 pub use load::{Load, LoadFields};
 pub use material::{Elasticity, Material, MaterialFields, Orthotropic};

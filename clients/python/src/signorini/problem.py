@@ -959,6 +959,9 @@ class Friction(Part):
     min(shear_cap, cohesion + coefficient · S_ρ(p)) where S_ρ(p) > 0; or with a prescribed `bound` τ.
 
     elastic_slip: Elastic slip ε > 0 (length): the tangential displacement at which the friction bound is reached.
+        It has no default, because it is a length. If it is not known from a measurement, take a thousandth of the
+        slip in the problem: of `indentation` or `tangential_displacement`, whichever is larger in size. Friction is
+        then close to Coulomb's; a smaller one needs a finer mesh.
     bound: A prescribed τ ≥ 0 (Tresca's law) instead of coefficient, radius, cohesion and cap. It acts on all of
         Γ_C, with or without contact.
     coefficient: Friction coefficient μ ≥ 0 (the thesis's ν). Required unless `bound` is set.
