@@ -56,8 +56,8 @@ fn trapezoid(angles: [f64; 2], contacts: Vec<Value>) -> Value {
     })
 }
 
-/// A profile that was measured on a part of the surface only presses with its last point, where the surface may go on. One
-/// that is wider than the body ends at the body's edge, and so does a punch at its own.
+/// A profile that was measured on a part of the surface only presses with its last point, where the surface may go on. A punch
+/// ends at its own edge. Where the body itself ends in a right angle, the pressure of a smooth obstacle has a limit.
 #[test]
 fn the_last_point_of_a_profile_is_told_apart_from_an_edge() {
     let ends = |obstacle: Value| {
@@ -80,21 +80,51 @@ fn the_last_point_of_a_profile_is_told_apart_from_an_edge() {
     let table =
         |from: f64, to: f64| json!({"kind": "table", "x": [from, 0.1, to], "gap": [0, 0, 0]});
     assert_eq!(ends(table(-0.5, 0.5)), [2, 0]);
-    assert_eq!(ends(table(-3.0, 0.5)), [1, 1]);
-    assert_eq!(ends(table(-0.5, 3.0)), [1, 1]);
-    assert_eq!(ends(table(-3.0, 3.0)), [0, 2]);
+    assert_eq!(ends(table(-3.0, 0.5)), [1, 0]);
+    assert_eq!(ends(table(-0.5, 3.0)), [1, 0]);
+    assert_eq!(ends(table(-3.0, 3.0)), [0, 0]);
     assert_eq!(
         ends(json!({"kind": "polyline", "points": [[-0.5, 0], [0.5, 0]]})),
         [2, 0]
     );
     assert_eq!(
         ends(json!({"kind": "polyline", "points": [[-3, 0], [3, 0]]})),
-        [0, 2]
+        [0, 0]
     );
     assert_eq!(
         ends(json!({"kind": "flat", "from": -0.5, "to": 0.5})),
         [0, 2]
     );
+}
+
+/// At a corner of the body on a smooth obstacle that goes on, the pressure has a limit up to a right angle, and the error of
+/// its peak is stated; with friction, or in a wider corner, it has none.
+#[test]
+fn only_a_corner_with_a_pressure_without_a_limit_is_a_sharp_edge() {
+    let friction = json!({"coefficient": 0.2, "nonlocal_radius": 0, "elastic_slip": 0.001});
+    // of the foot, which those of the top complete to 180 degrees
+    for (angles, friction, sharp) in [
+        ([90.0, 90.0], None, 0),
+        ([120.0, 100.0], None, 0),
+        ([75.0, 120.0], None, 1),
+        ([60.0, 80.0], None, 2),
+        ([90.0, 90.0], Some(&friction), 2),
+    ] {
+        let mut contact =
+            json!({"boundary": "top", "obstacle": {"kind": "flat"}, "indentation": 0.02});
+        if let Some(friction) = friction {
+            contact["friction"] = friction.clone();
+        }
+        let solution = solved(&trapezoid(angles, vec![contact]));
+        let warnings = solution.summary.warnings.iter();
+        let found = warnings
+            .filter(|w| w.code == WarningCode::SharpEdge)
+            .count();
+        assert_eq!(found, sharp, "{angles:?} {friction:?}");
+        let peak = quantity(&solution, QuantityName::PeakNormalStress);
+        let without_limit = peak.method == ErrorMethod::NoLimit;
+        assert_eq!(without_limit, sharp > 0, "{angles:?}: {peak:?}");
+    }
 }
 
 /// Whatever the angle of the corner, the order of the contacts, and whether the other one has friction.

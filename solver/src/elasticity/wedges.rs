@@ -43,6 +43,8 @@ pub enum Side {
     Slides(f64),
     /// The side does not move.
     Sticks,
+    /// Nothing touches the side.
+    Free,
 }
 
 /// How the pressure on the sides grows towards the point.
@@ -165,6 +167,7 @@ impl Pencil {
             .flat_map(|([n, t], side)| match side {
                 Side::Slides(_) => vec![n],
                 Side::Sticks => vec![n, t],
+                Side::Free => vec![],
             })
             .collect();
         (0..self.size()).filter(|i| !held.contains(i)).collect()
@@ -298,6 +301,30 @@ mod tests {
 
     /// A smooth flat obstacle is a line of symmetry: beside an interface at a right angle there is no exponent below 1, and
     /// only friction across two materials leads to a logarithm. A corner of 270° has those of |π/α ± 1|.
+    /// A corner between a smooth obstacle and a free side is half of a wedge with free sides: stresses have a limit up to a right
+    /// angle, where this is a half-plane, and none beyond.
+    #[test]
+    fn a_corner_on_a_smooth_obstacle_has_a_limit_up_to_a_right_angle() {
+        for sides in [
+            [Side::Slides(0.0), Side::Free],
+            [Side::Free, Side::Slides(0.0)],
+        ] {
+            for (degrees, limited) in [
+                (45.0, true),
+                (80.0, true),
+                (90.0, true),
+                (100.0, false),
+                (135.0, false),
+            ] {
+                let found = growth(&[wedge(0.0, degrees, 1.0)], sides, [false; 2]).unwrap();
+                assert_eq!(found.exponent.is_none(), limited, "{degrees} {found:?}");
+            }
+            // the edge of a smooth punch on a half-plane
+            let edge = growth(&[wedge(0.0, 180.0, 1.0)], sides, [false; 2]).unwrap();
+            assert!((edge.exponent.unwrap() - 0.5).abs() < 0.01, "{edge:?}");
+        }
+    }
+
     #[test]
     fn smooth_sides_are_lines_of_symmetry() {
         for second in [1.0, 5.0] {

@@ -133,7 +133,7 @@ impl PatchView<'_> {
 
     /// The wedges of material around a node, counter-clockwise from the edge before it to the edge after it. At an end
     /// of the boundary, the next side of the body's surface takes the place of the missing edge.
-    fn wedges_at(&self, i: usize) -> Option<Vec<Wedge>> {
+    pub(super) fn wedges_at(&self, i: usize) -> Option<Vec<Wedge>> {
         let (model, boundary) = (self.system.model, &self.patch.contact.boundary);
         let node = boundary.nodes[i];
         let last = self.count() - 1;

@@ -52,6 +52,9 @@ pub(super) struct PatchView<'a> {
     anchors: Vec<[f64; 3]>,
     /// The junction with the fastest growth of the pressure, computed when first needed.
     worst_junction: OnceCell<Option<Junction>>,
+    /// Whether the first and the last node are corners of the body in which the pressure has a limit, computed when first
+    /// needed.
+    mild_corners: OnceCell<[bool; 2]>,
     /// The gaps of an obstacle that is pushed along a direction, computed when first needed.
     displaced_gaps: OnceCell<DisplacedGaps>,
     /// The averaged pressure and the friction bound at the nodes, computed when first needed.
@@ -173,6 +176,7 @@ impl<'a> PatchView<'a> {
             pressed: None,
             anchors: Vec::new(),
             worst_junction: OnceCell::new(),
+            mild_corners: OnceCell::new(),
             displaced_gaps: OnceCell::new(),
             at_nodes: OnceCell::new(),
             highest_traction: OnceCell::new(),

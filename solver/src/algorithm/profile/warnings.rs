@@ -2,6 +2,7 @@
 
 use super::PatchView;
 use crate::contact::edge_nodes;
+use crate::elasticity::{Dof, Side, growth};
 use crate::friction::BoundLaw;
 use crate::problem::{Condition, Measure, Normalization};
 use crate::solution::{Outcome, Warning, WarningCode};
@@ -361,8 +362,8 @@ impl PatchView<'_> {
         node.on_axis || node.symmetric()
     }
 
-    /// Whether the obstacle may end at a node: the node is not on a line of symmetry and not in a corner that another
-    /// obstacle touches too.
+    /// Whether the contact may end at a node with a pressure without a limit: the node is not on a line of symmetry, not in a
+    /// corner that another obstacle touches too, and not a corner of the body in which the pressure has a limit.
     pub(super) fn may_be_sharp(&self, i: usize) -> bool {
         let (system, node) = (self.system, self.patch.contact.boundary.nodes[i]);
         let others = (0..system.patches.len()).filter(|p| *p != self.p);
@@ -371,7 +372,45 @@ impl PatchView<'_> {
             patch.contact.boundary.nodes.iter().zip(system.range(patch))
         });
         let touched = there.any(|(other, k)| *other == node && self.finished.state.active[k]);
-        !self.symmetric(i) && !touched
+        !self.symmetric(i) && !touched && !self.is_mild_corner(i)
+    }
+
+    /// Whether the body itself ends at the first or the last node of the boundary, on an obstacle that goes on, in a corner so
+    /// narrow that the pressure has a limit: up to a right angle, if the material is isotropic. Only without friction, whose
+    /// traction at the corner no pressure alone can balance.
+    fn is_mild_corner(&self, i: usize) -> bool {
+        let ends = self.mild_corners.get_or_init(|| {
+            let last = self.count() - 1;
+            [0, last].map(|end| self.has_limit_in_corner(end))
+        });
+        ends[usize::from(i > 0)]
+    }
+
+    fn has_limit_in_corner(&self, i: usize) -> bool {
+        /// A corner that is wider has no limit, whatever the material.
+        const WIDEST: f64 = 0.75 * std::f64::consts::PI;
+        let node = &self.system.nodes[self.patch.first + i];
+        let slides_freely = self.patch.contact.condition == Condition::Unilateral
+            && self.patch.law.is_none()
+            && node.oblique.is_none()
+            && matches!(node.tangent, Dof::Free(_));
+        if !slides_freely || !self.active(i) {
+            return false;
+        }
+        let Some(wedges) = self.wedges_at(i) else {
+            return false;
+        };
+        let angle: f64 = wedges.iter().map(|w| w.angles[1] - w.angles[0]).sum();
+        let contact = [i > 0, i == 0];
+        let sides = contact.map(|contact| {
+            if contact {
+                Side::Slides(0.0)
+            } else {
+                Side::Free
+            }
+        });
+        angle <= WIDEST
+            && growth(&wedges, sides, [false; 2]).is_some_and(|growth| growth.exponent.is_none())
     }
 
     /// The largest |σ_t| that a prescribed bound exerts on edges without a node in contact; none without such friction.
