@@ -63,7 +63,7 @@ def test_the_summary(punch: sg.Result) -> None:
     assert "sharp_edge" in [warning.code for warning in punch.warnings]
     text = repr(punch)
     assert text.startswith("outcome           converged\nverdict ") and "normal force      9" in text
-    assert "warning: sharp_edge: " in text
+    assert "\nnote: sharp_edge: " in text and "warning: sharp_edge" not in text
     assert repr(punch.profile()).startswith("<Profile of 'top': ") and " rows; .s, .x, .y, " in repr(punch.profile())
     assert repr(punch.history).startswith("<History: ") and ".to_pandas()" in repr(punch.history)
     assert repr(punch.fields()).startswith("<Fields: ") and " nodes, " in repr(punch.fields())
@@ -205,6 +205,9 @@ def test_columns_that_this_client_does_not_know_are_left_out(punch: sg.Result) -
     columns = punch.profile().columns()
     assert "new" not in known(Profile, {**columns, "new": columns["s"]})
     assert str(Warning("code", "in words")) == "code: in words"
+    read = Warning.from_json({"code": "a", "message": "b", "pointer": "/problem/mesh", "severity": "serious"})
+    assert (read.pointer, read.kind) == ("/mesh", "serious warning")
+    assert Warning.from_json({"code": "a", "message": "b"}).kind == "warning"
 
 
 def test_arrays_are_read_in_many_threads(monkeypatch: pytest.MonkeyPatch) -> None:

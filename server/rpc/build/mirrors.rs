@@ -95,7 +95,9 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     // the checks of a problem
     fields("ValidateProblemResponse", "problems::Validation").answer(),
     fields("Violation", "solver::error::Violation").answer(),
-    fields("Warning", "solution::Warning").answer(),
+    fields("Warning", "solution::Warning").answer().ours(&["code"])
+        .theirs(&["severity: pb::Severity::from(code.severity()).into()", "code: code.into_message()"]),
+    names("Severity", "solution::Severity").answer(),
     fields("Estimate", "solver::Estimate").answer(),
 
     // jobs

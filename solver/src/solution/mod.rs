@@ -11,9 +11,10 @@ pub use crate::phase::Phase;
 pub use accuracy::{Accuracy, ErrorMethod, EstimatedQuantity, QuantityName, Verdict};
 pub use sample::{at_all_points, sample};
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
@@ -230,7 +231,6 @@ pub struct ContactSummary {
     pub peak_normal_stress: Option<Peak>,
     /// Largest |σ_t|, with its sign, over the continuous profile; absent without friction.
     pub peak_tangential_stress: Option<Peak>,
-}
     /// The lengths of contact, stick and slip, with the ends of contact interpolated between nodes. Not part of the
     /// document and its digest: rows of sweeps have them.
     #[serde(skip)]
@@ -250,6 +250,7 @@ pub struct Widths {
     pub stick: f64,
     /// The length that slips.
     pub slip: f64,
+}
 
 /// A value and where it occurs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -284,8 +285,9 @@ impl Residuals {
     }
 }
 
-/// A point to consider before relying on a result.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// A point to consider before relying on a result. Its JSON also has the severity of its code ([`WarningCode::severity`]),
+/// which is derived whenever a warning is written, ignored where one is read, and left out of digests.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct Warning {
     /// The kind of warning, stable for programs.
     pub code: WarningCode,
@@ -293,6 +295,51 @@ pub struct Warning {
     pub pointer: String,
     /// The warning with its numbers, and what to do.
     pub message: String,
+}
+
+/// A point to consider before relying on a result.
+#[derive(Serialize, JsonSchema)]
+#[schemars(rename = "Warning")]
+struct WrittenWarning<'a> {
+    /// The kind of warning, stable for programs.
+    code: WarningCode,
+    /// How much the warning matters, the same for all warnings of the kind.
+    severity: Severity,
+    /// JSON Pointer to the part of the problem that the warning is about.
+    pointer: &'a str,
+    /// The warning with its numbers, and what to do.
+    message: &'a str,
+}
+
+impl Serialize for Warning {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Warning {
+            code,
+            pointer,
+            message,
+        } = self;
+        let written = WrittenWarning {
+            code: *code,
+            severity: code.severity(),
+            pointer,
+            message,
+        };
+        written.serialize(serializer)
+    }
+}
+
+impl JsonSchema for Warning {
+    fn schema_name() -> Cow<'static, str> {
+        WrittenWarning::schema_name()
+    }
+
+    fn schema_id() -> Cow<'static, str> {
+        WrittenWarning::schema_id()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        WrittenWarning::json_schema(generator)
+    }
 }
 
 /// A kind of warning.

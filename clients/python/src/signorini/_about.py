@@ -10,8 +10,8 @@ from ._style import parameters
 
 
 def about(result: Summary, problem: Mapping[str, Any], step: int | str | None = None) -> dict[str, Any]:
-    """Title, parameters of friction (μ, ρ, ε by contact), verdict, warnings, units, kind of
-    analysis, the problem itself, extents; at the end of a step."""
+    """Title, parameters of friction (μ, ρ, ε by contact), verdict, warnings without notes, units, kind of analysis,
+    the problem itself, extents; at the end of a step."""
     contacts = {contact["boundary"]: contact for contact in problem.get("contacts") or []}
     said = {
         "title": problem.get("title") or "",
@@ -32,7 +32,7 @@ def about(result: Summary, problem: Mapping[str, Any], step: int | str | None = 
         **said,
         "verdict": result.verdict,
         "outcome": result.outcome,
-        "warnings": [warning.code for warning in result.warnings],
+        "warnings": [warning.code for warning in result.warnings if warning.severity != "note"],
         "extents": {name: {"stick": contact.stick, "slip": contact.slip} for name, contact in result.contacts.items()},
         "peaks": {
             name: {

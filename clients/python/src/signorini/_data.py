@@ -85,11 +85,21 @@ class Warning:
     message: str
     pointer: str = ""
     """JSON Pointer into the problem."""
+    severity: str = "warning"
+    """`serious`: the result is not that of the intended problem; `warning`: some numbers are not, or may not be;
+    `note`: a property of the problem."""
 
     @classmethod
     def from_json(cls, document: Mapping[str, Any]) -> Warning:
         pointer = str(document.get("pointer") or "")
-        return cls(str(document["code"]), str(document["message"]), pointer.removeprefix("/problem"))
+        # services of earlier versions tell no severity
+        severity = str(document.get("severity") or "warning")
+        return cls(str(document["code"]), str(document["message"]), pointer.removeprefix("/problem"), severity)
+
+    @property
+    def kind(self) -> str:
+        """What it is called before its text: `serious warning`, `warning` or `note`."""
+        return "serious warning" if self.severity == "serious" else self.severity
 
     def __str__(self) -> str:
         return f"{self.code}: {self.message}"
@@ -122,7 +132,7 @@ class Validation:
     def __str__(self) -> str:
         lines = ["valid" if self.valid else f"invalid: {len(self.violations)} violation(s)"]
         lines += [f"  {n}. {violation}" for n, violation in enumerate(self.violations, 1)]
-        lines += [f"  warning: {warning}" for warning in self.warnings]
+        lines += [f"  {warning.kind}: {warning}" for warning in self.warnings]
         if self.estimate:
             mebibytes = self.estimate["memory_bytes"] / 2**20
             lines.append(
@@ -530,7 +540,7 @@ class Summary:
         rows = list(self.lines())
         width = max(len(name) for name, _ in rows)
         text = "\n".join(f"{name:<{width}}  {value}" for name, value in rows)
-        notes = [f"verdict: {reason}" for reason in self.reasons] + [f"warning: {w}" for w in self.warnings]
+        notes = [f"verdict: {reason}" for reason in self.reasons] + [f"{w.kind}: {w}" for w in self.warnings]
         return "\n".join([text, *notes])
 
     __repr__ = __str__

@@ -36,7 +36,7 @@ def job(found: JobView, residuals: Sequence[float] = ()) -> str:
         rows.append(("iteration", str(progress["iteration"])))
     if found.run_s is not None:
         rows.append(("time", "from the cache" if found.cached_from else duration(found.run_s)))
-    rows += [("warning", warning.code.replace("_", " ")) for warning in found.warnings]
+    rows += [(warning.kind, warning.code.replace("_", " ")) for warning in found.warnings]
     return _card(found.title, found.status, rows, _curve(residuals, progress.get("tolerance")))
 
 
@@ -44,7 +44,7 @@ def result(found: Summary) -> str:
     """A table: forces with their errors, extents, verdict, warnings."""
     rows = [(name, value) for name, value in found.lines() if name != "verdict"]
     rows += [("because", reason) for reason in found.reasons]
-    rows += [("warning", warning.message) for warning in found.warnings]
+    rows += [(warning.kind, warning.message) for warning in found.warnings]
     title = "Partial result: the iteration did not end" if found.partial else "Result"
     return _card(title, found.verdict, rows)
 

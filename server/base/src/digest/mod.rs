@@ -7,13 +7,13 @@ use std::io::{self, Write};
 
 use number::{ROOM, Recent};
 use serde::Serialize;
-use serde_json::json;
+use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use solver::body::Source;
 use solver::element::Element;
 use solver::model::Model;
 use solver::problem::{InlineMesh, MeshInput, MeshSource, Problem};
-use solver::solution::{Fields, GaussFields, Solution};
+use solver::solution::{self, Fields, GaussFields, Solution, StepSolution};
 
 use crate::bodies::Key;
 
@@ -39,15 +39,15 @@ pub fn of_body(model: &Model) -> postcard::Result<Key> {
     Ok(hash.sha256().finalize().into())
 }
 
-/// Fingerprint of a result: equal digests mean equal bits. Times, the program's version and the statements about
-/// accuracy are not included. All numbers must be finite: others have no canonical form. `go_on` is called before every
+/// Fingerprint of a result: equal digests mean equal bits. Times, the program's version, the statements about accuracy and
+/// the severities of warnings are not included. All numbers must be finite: others have no canonical form. `go_on` is called before every
 /// row and load step; `None` if it returns false.
 pub fn digest(
     solution: &Solution,
     input_hash: &str,
     go_on: &mut dyn FnMut() -> bool,
 ) -> serde_json::Result<Option<String>> {
-    let mut summary = serde_json::to_value(&solution.summary)?;
+    let mut summary = without_severities(&solution.summary)?;
     summary["input_hash"] = json!(input_hash);
     if let Some(summary) = summary.as_object_mut() {
         summary.remove("accuracy");
@@ -62,13 +62,28 @@ pub fn digest(
         return Ok(None);
     }
     hash.text_of(r#","profiles":"#).json(&solution.profiles)?;
-    hash.text_of(r#","steps":"#);
-    if !hash.array(&solution.steps, go_on)? {
-        return Ok(None);
+    hash.text_of(r#","steps":["#);
+    for (number, step) in solution.steps.iter().enumerate() {
+        if !go_on() {
+            return Ok(None);
+        }
+        hash.text_of(if number == 0 { "" } else { "," });
+        hash.step(step)?;
     }
-    hash.text_of(r#","summary":"#).json(&summary)?;
+    hash.text_of(r#"],"summary":"#).json(&summary)?;
     hash.text_of("}");
     Ok(Some(hash.finish()))
+}
+
+/// A summary as JSON, with its warnings as they were before they had severities, which follow from their codes.
+fn without_severities(summary: &solution::Summary) -> serde_json::Result<Value> {
+    let mut summary = serde_json::to_value(summary)?;
+    for warning in summary["warnings"].as_array_mut().into_iter().flatten() {
+        if let Some(warning) = warning.as_object_mut() {
+            warning.remove("severity");
+        }
+    }
+    Ok(summary)
 }
 
 /// A finished hash as text.
@@ -155,6 +170,26 @@ impl Hash {
         }
         self.text_of("]");
         Ok(true)
+    }
+
+    /// Writes a load step without the severities of its warnings.
+    fn step(&mut self, step: &StepSolution) -> serde_json::Result<()> {
+        // all of them by name, so that a new one is not forgotten here
+        let StepSolution {
+            history,
+            name,
+            profiles,
+            summary,
+            node_profiles: _,
+            friction_profiles: _,
+        } = step;
+        self.text_of(r#"{"history":"#).json(history)?;
+        self.text_of(r#","name":"#).json(name)?;
+        self.text_of(r#","profiles":"#).json(profiles)?;
+        self.text_of(r#","summary":"#)
+            .json(&without_severities(summary)?)?;
+        self.text_of("}");
+        Ok(())
     }
 
     /// Writes a problem without its title. A mesh that the problem contains is written by this type, not by serde.
@@ -386,10 +421,7 @@ mod tests {
     }
     use std::collections::BTreeMap;
 
-    use solver::{
-        problem::{BoundaryPart, Curve, CurveKind, Elasticity, ElementRange},
-        solution::StepSolution,
-    };
+    use solver::problem::{BoundaryPart, Curve, CurveKind, Elasticity, ElementRange};
 
     #[test]
     fn a_title_does_not_change_the_input() {
@@ -437,6 +469,11 @@ mod tests {
     #[test]
     fn a_digest_is_the_hash_of_one_canonical_document() {
         let mut solution = fake::solution();
+        solution.summary.warnings = vec![solution::Warning {
+            code: solution::WarningCode::SharpEdge,
+            pointer: "/contacts/0".into(),
+            message: "The contact ends at a sharp edge.".into(),
+        }];
         solution.steps.push(StepSolution {
             name: "indent".into(),
             summary: solution.summary.clone(),
@@ -470,6 +507,11 @@ mod tests {
             .as_object_mut()
             .unwrap()
             .remove("accuracy");
+        for summary in ["/summary", "/steps/0/summary"] {
+            let warnings = document.pointer_mut(&format!("{summary}/warnings"));
+            let warning = warnings.unwrap()[0].as_object_mut().unwrap();
+            assert_eq!(warning.remove("severity"), Some(json!("note")));
+        }
         let mut whole = Hash::new();
         whole.json(&document).unwrap();
         assert_eq!(digest_of(&solution, "h").unwrap(), whole.finish());
