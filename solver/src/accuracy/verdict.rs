@@ -71,7 +71,7 @@ pub(super) fn scale(
 ) -> f64 {
     let scale = match name {
         QuantityName::TangentialForce => own(QuantityName::FrictionForce).iter().sum(),
-        QuantityName::ContactStart | QuantityName::ContactEnd | QuantityName::StickEnd => {
+        name if name.is_extent() => {
             images
                 * length(
                     own(QuantityName::ContactStart).into_iter(),
@@ -213,10 +213,7 @@ pub(super) fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<Fi
 
 /// The value of a quantity, how far it may be wrong, and the main cause, in words.
 fn uncertainty(q: &EstimatedQuantity, error: f64, relative: f64) -> String {
-    let is_end = matches!(
-        q.quantity,
-        QuantityName::ContactStart | QuantityName::ContactEnd | QuantityName::StickEnd
-    );
+    let is_end = q.quantity.is_extent();
     let (value, part, finer) = (q.value, percent(relative), q.finer.unwrap_or_default());
     let mostly = |share: Option<f64>| share.is_some_and(|share| share > 0.5 * error);
     let of_load = |why: &str| {

@@ -33,8 +33,7 @@ pub fn warning(code: WarningCode) -> WarningKind {
         .find(|variant| variant["const"] == code.as_str())
         .and_then(|variant| variant["description"].as_str())
         .unwrap_or_default();
-    let reasons = REASONS.iter().find(|(of, ..)| *of == code);
-    let (why, advice) = reasons.map_or(("", ""), |(_, why, advice)| (*why, *advice));
+    let (why, advice) = reasons(code);
     WarningKind {
         code: code.as_str(),
         severity: code.severity(),
@@ -45,142 +44,145 @@ pub fn warning(code: WarningCode) -> WarningKind {
     }
 }
 
-/// Why each warning matters, and what to do; a test finds one that is missing.
+/// Why a warning matters, and what to do.
 #[rustfmt::skip] // a warning after the other
-const REASONS: &[(WarningCode, &str, &str)] = &[
-    (WarningCode::UnitsDisagree,
-        "Forces are integrals of stresses over lengths, so a force in the wrong unit is wrong by a power of ten, and nothing in the computation can notice it.",
-        "Use units that belong together, for example mm, N and MPa (1 N/mm² is 1 MPa), or m, N and Pa, and convert every number that was given in another unit."),
-    (WarningCode::LinesInside,
-        "A support, load or contact acts on the surface of the body only. Lines inside it are left out of the boundary, so that it may be shorter than its name suggests.",
-        "If a crack or a joint was meant, the nodes on its two sides must be different nodes. Otherwise remove the lines from the physical curve or the surface of the deck."),
-    (WarningCode::SupportsOverlap,
-        "Only one of the displacements can hold. The last row was taken, as programs that read such decks do.",
-        "Check that the last row is the one that you mean, and delete the others."),
-    (WarningCode::CentreNodesDropped,
-        "Elements here have 8 nodes. The geometry is the same where the centre node lay in the middle; the solution on the mesh differs slightly from that of 9-node elements.",
-        "Nothing, or export 8-node elements (in Gmsh: Mesh.SecondOrderIncomplete = 1)."),
-    (WarningCode::ElementsReversed,
-        "Elements must be numbered counterclockwise. They were turned around; nothing else changed.",
-        "Nothing. If the whole mesh is reversed, the plane may be seen from behind: check that x and y are as you mean them."),
-    (WarningCode::RaisedToSecondOrder,
-        "Elements here are quadratic. Midside nodes were put in the middle of each side, so that curved boundaries stay polygons.",
-        "Export second-order elements, or name the curve of the boundary in mesh.curves, so that its nodes are put onto it."),
-    (WarningCode::RigidElementsLeftOut,
-        "The elements belong to a rigid tool: they are an obstacle, not part of the elastic body.",
-        "Nothing, if the tool is rigid. If it is elastic, remove *RIGID BODY; two elastic bodies in contact cannot be solved yet."),
-    (WarningCode::DeckDiffers,
-        "The deck asks for something that is solved differently here, so that results may differ from those of the program for which it was written.",
-        "Read the message, which names the line and the difference, and decide whether it matters for your purpose."),
-    (WarningCode::CoincidentNodes,
-        "Two sides that look joined are not: the body has a crack there, which opens without resistance and whose faces do not touch each other.",
-        "If the parts should be joined, merge the nodes (in Gmsh: Coherence; in a deck: equal node numbers). If the crack is meant, nothing."),
-    (WarningCode::StripCutsPolyline,
-        "The strip follows its polyline at grid lines only, and cuts the corners between them.",
-        "Put a grid line at each corner of the polyline."),
-    (WarningCode::ObstacleCutsEdge,
-        "Contact is modelled on whole edges. The part of the last edge that lies below the obstacle is left out, which makes the contact too short by up to that part.",
-        "Put a node at the end of the obstacle; grids and adaptive meshes do that by themselves."),
-    (WarningCode::SmoothingFlattens,
-        "The profile that is pressed is not the measured one any more: with this standard deviation most of its shape counts as noise, and contact areas and peaks are those of a flatter body.",
-        "Check the standard deviation: it is that of the noise of a single height, in the unit of length, not the roughness of the surface."),
-    (WarningCode::DeviationDiffers,
-        "The standard deviation decides how much of the profile is noise, and how large the stated errors are. One that is too small follows the noise, one that is too large removes the shape.",
-        "Give the standard deviation of a single height about the true surface, as the instrument's data sheet or repeated measurements have it. If short features of the profile are real, measure them with more points."),
-    (WarningCode::ContactTurns,
-        "At a corner the normal jumps, and the contact conditions are different on its two sides. Stresses may grow without limit there.",
-        "Name the two sides as two contacts, or round the corner."),
-    (WarningCode::SymmetricDrag,
-        "A line of symmetry mirrors the drag as well: the half that is not modelled would be dragged the opposite way, which is not what a moving tool does.",
-        "Model the whole body, or leave the drag out."),
-    (WarningCode::RadialDrag,
-        "A rigid body of revolution can move along its axis only. Dragged along the radius it would have to stretch.",
-        "Give tangential_displacement 0 on surfaces across the axis; to twist or to slide sideways is not axisymmetric."),
-    (WarningCode::MaterialJunction,
-        "Where two materials meet at the surface in contact, the pressure has no limit as the mesh is refined. Its value at that node depends on the mesh alone.",
-        "Use forces, and the pressure averaged over a length. Do not quote the peak."),
-    (WarningCode::MeshTooCoarseForRadius,
-        "The averaged pressure S_ρ is an integral over a length 2ρ. Where edges are longer than ρ, the mesh and not the law decides what is averaged: the result is nearly that of Coulomb's law on this mesh, and σ_t has the mesh's own peaks.",
-        "Refine the contact until edges are at most ρ/2, or set mesh.refine to a tolerance, which does it where it matters."),
-    (WarningCode::MeshTooCoarseForContact,
-        "With few elements in the contact neither its ends nor the peak of the pressure are resolved: a smooth peak is off by about 0.28/n² of itself with n elements across.",
-        "Refine there until at least six whole elements touch, or set mesh.refine to a tolerance."),
-    (WarningCode::NoContact,
-        "All contact forces are zero: the obstacle was not pushed far enough, or from the wrong side.",
-        "The message has the smallest gap and the indentation that would close it. Check the sign of the indentation (positive pushes against the body), the obstacle's place and the side of the boundary."),
-    (WarningCode::ContactReachesObstacleEnd,
-        "The last point of the obstacle is pressed. If the real surface goes on there, it would press too: the force is too small, and the pressure has a peak that does not exist.",
-        "Give more points, or push less. If the surface really ends there, the edge is sharp, and the peak of the pressure has no limit."),
-    (WarningCode::SharpEdge,
-        "At a sharp edge of a rigid obstacle, or of the body, linear elasticity has no largest pressure: on each finer mesh its value is larger. Forces converge, and so does σ_t with nonlocal_radius > 0, since that averages the pressure.",
-        "Nothing: this belongs to the problem. Quote forces and σ_t, not the peak of σ_n. A real edge has a radius: `rounded_flat` models it."),
-    (WarningCode::FrictionLostAtEnd,
-        "Near an end of the contact boundary part of the averaged pressure lies beyond it, where nothing can carry friction. The total friction force is then less than μ times the normal force even where everything slides.",
-        "Choose a smaller nonlocal_radius, or \"normalization\": \"conserving\", which keeps the total."),
-    (WarningCode::ObstacleBetweenNodes,
-        "Contact is checked along edges as quadratic curves. Between two nodes the obstacle stands in the body, or off it, by more than the mesh can follow.",
-        "Refine the contact, or set mesh.refine to a tolerance. A profile with more detail than the mesh should be smoothed."),
-    (WarningCode::DirectionIsLinear,
-        "Gaps are linear in the push along `direction`. For so long a way the curved obstacle would meet other points of the body first.",
-        "Push less, or place the obstacle nearer to the body, so that the way is short."),
-    (WarningCode::KinkInContact,
-        "At a kink of the obstacle, or at a corner of the body, the pressure grows without limit as the mesh is refined, slowly (as a logarithm) or fast.",
-        "Quote forces and averages, not the peak. Where the real shape is smooth, give more points or \"interpolation\": \"spline\"."),
-    (WarningCode::RadiusExceedsContact,
-        "S_ρ averages over a length that is larger than the contact: the friction bound is spread beyond the contact and nearly uniform in it.",
-        "Check nonlocal_radius and its unit. It is a length of the surface's texture, which is usually much smaller than a contact."),
-    (WarningCode::BoundBeyondContact,
-        "A prescribed bound acts where it is given, also where the surfaces have separated. There it pulls at a free surface.",
-        "Give the bound on the contact only, for example by a table that falls to 0 at its ends."),
-    (WarningCode::CohesionJumps,
-        "With cohesion the bound does not fall to zero with the pressure: it jumps at the end of the contact, and so does σ_t.",
-        "Nothing if the cohesion is meant; then σ_t near the end depends on the mesh. Otherwise set cohesion to 0."),
-    (WarningCode::OscillatingStick,
-        "Inside stick, σ_t alternates from point to point and cancels in the sum. Forces are right, single values of σ_t are not.",
-        "Refine the mesh there, raise elastic_slip, or read σ_t as means over edges."),
-    (WarningCode::SlowContraction,
-        "Pressure and friction feed each other almost as much as is possible. The solution was found, but a little more friction may have none, or several.",
-        "Set \"check_uniqueness\": true if the result matters, and lower the coefficient to see how far away the limit is."),
-    (WarningCode::NotConverged,
-        "The state is not a solution: its forces and stresses may be far from one.",
-        "Look at the convergence plot. Raise elastic_slip, refine the mesh, apply the load in more increments, or use algorithm auto."),
-    (WarningCode::RoundingLimitsResidual,
-        "elastic_slip is so small beside the displacements that the last digits of these decide between stick and slip.",
-        "Raise elastic_slip to the value in the message. The forces are as accurate as stated; places of stick may not be."),
-    (WarningCode::FalseConvergence,
-        "The iteration stopped by its own criterion at a state that violates the equations: it is not a solution.",
-        "Use algorithm auto, which checks the true residual."),
-    (WarningCode::ContactCycling,
-        "The same contact states repeat: the last one is not a solution.",
-        "Use algorithm auto, refine the mesh, or raise elastic_slip."),
-    (WarningCode::OutOfBalance,
-        "The forces of supports, loads and contacts do not add up: the computed state is not an equilibrium, usually because the body is nearly free to move, or nearly incompressible.",
-        "Check the supports. With Poisson's ratio very near to ½, use a slightly smaller one."),
-    (WarningCode::SlidesAway,
-        "Loads push the body along its contacts by more than friction can hold, and nothing else holds it: there is no equilibrium.",
-        "Add a support, lower the load, or raise the coefficient. The message has both forces."),
-    (WarningCode::LargeSlip,
-        "Gaps are those of the places before deformation. A body that slides farther than its contact is long would touch at other points.",
-        "Drag less. For sliding over long ways the obstacle must be placed anew."),
-    (WarningCode::LargeStrain,
-        "Linear elasticity holds for strains of some per cent. At strains above a quarter forces and extents are off by as much.",
-        "Push less, or check the units of indentation and shape. Read the result as a qualitative one."),
-    (WarningCode::LargeDisplacement,
-        "The equations are those of the undeformed body. Displacements of a tenth of its size change its shape, its contact and the direction of its forces.",
-        "Check loads and units. Read the result as a qualitative one."),
-    (WarningCode::UniquenessUnknown,
-        "The check for a second solution was inconclusive: the solution is one, but there may be others.",
-        "Raise max_iterations, or vary the coefficient and look for a jump."),
-    (WarningCode::NotUnique,
-        "The problem has at least two solutions. Which of them the body takes depends on its history, which a total law does not know.",
-        "Give the history: \"history\": \"incremental\" with steps. Do not quote the result as the solution."),
-    (WarningCode::IncrementsMatter,
-        "The incremental law depends on the path, and with twice as many increments the forces are others: the path is not resolved.",
-        "Give the steps more increments until the forces stay."),
-    (WarningCode::RefinementUnfinished,
-        "Refinement ended before all stated errors were within the tolerance. The result is that of the last mesh, with its stated errors.",
-        "The message says what stood in the way: raise the tolerance, begin with a finer mesh where the error is, or round a kink."),
-];
+fn reasons(code: WarningCode) -> (&'static str, &'static str) {
+    use WarningCode::*;
+    match code {
+        UnitsDisagree => (
+            "Forces are integrals of stresses over lengths, so a force in the wrong unit is wrong by a power of ten, and nothing in the computation can notice it.",
+            "Use units that belong together, for example mm, N and MPa (1 N/mm² is 1 MPa), or m, N and Pa, and convert every number that was given in another unit."),
+        LinesInside => (
+            "A support, load or contact acts on the surface of the body only. Lines inside it are left out of the boundary, so that it may be shorter than its name suggests.",
+            "If a crack or a joint was meant, the nodes on its two sides must be different nodes. Otherwise remove the lines from the physical curve or the surface of the deck."),
+        SupportsOverlap => (
+            "Only one of the displacements can hold. The last row was taken, as programs that read such decks do.",
+            "Check that the last row is the one that you mean, and delete the others."),
+        CentreNodesDropped => (
+            "Elements here have 8 nodes. The geometry is the same where the centre node lay in the middle; the solution on the mesh differs slightly from that of 9-node elements.",
+            "Nothing, or export 8-node elements (in Gmsh: Mesh.SecondOrderIncomplete = 1)."),
+        ElementsReversed => (
+            "Elements must be numbered counterclockwise. They were turned around; nothing else changed.",
+            "Nothing. If the whole mesh is reversed, the plane may be seen from behind: check that x and y are as you mean them."),
+        RaisedToSecondOrder => (
+            "Elements here are quadratic. Midside nodes were put in the middle of each side, so that curved boundaries stay polygons.",
+            "Export second-order elements, or name the curve of the boundary in mesh.curves, so that its nodes are put onto it."),
+        RigidElementsLeftOut => (
+            "The elements belong to a rigid tool: they are an obstacle, not part of the elastic body.",
+            "Nothing, if the tool is rigid. If it is elastic, remove *RIGID BODY; two elastic bodies in contact cannot be solved yet."),
+        DeckDiffers => (
+            "The deck asks for something that is solved differently here, so that results may differ from those of the program for which it was written.",
+            "Read the message, which names the line and the difference, and decide whether it matters for your purpose."),
+        CoincidentNodes => (
+            "Two sides that look joined are not: the body has a crack there, which opens without resistance and whose faces do not touch each other.",
+            "If the parts should be joined, merge the nodes (in Gmsh: Coherence; in a deck: equal node numbers). If the crack is meant, nothing."),
+        StripCutsPolyline => (
+            "The strip follows its polyline at grid lines only, and cuts the corners between them.",
+            "Put a grid line at each corner of the polyline."),
+        ObstacleCutsEdge => (
+            "Contact is modelled on whole edges. The part of the last edge that lies below the obstacle is left out, which makes the contact too short by up to that part.",
+            "Put a node at the end of the obstacle; grids and adaptive meshes do that by themselves."),
+        SmoothingFlattens => (
+            "The profile that is pressed is not the measured one any more: with this standard deviation most of its shape counts as noise, and contact areas and peaks are those of a flatter body.",
+            "Check the standard deviation: it is that of the noise of a single height, in the unit of length, not the roughness of the surface."),
+        DeviationDiffers => (
+            "The standard deviation decides how much of the profile is noise, and how large the stated errors are. One that is too small follows the noise, one that is too large removes the shape.",
+            "Give the standard deviation of a single height about the true surface, as the instrument's data sheet or repeated measurements have it. If short features of the profile are real, measure them with more points."),
+        ContactTurns => (
+            "At a corner the normal jumps, and the contact conditions are different on its two sides. Stresses may grow without limit there.",
+            "Name the two sides as two contacts, or round the corner."),
+        SymmetricDrag => (
+            "A line of symmetry mirrors the drag as well: the half that is not modelled would be dragged the opposite way, which is not what a moving tool does.",
+            "Model the whole body, or leave the drag out."),
+        RadialDrag => (
+            "A rigid body of revolution can move along its axis only. Dragged along the radius it would have to stretch.",
+            "Give tangential_displacement 0 on surfaces across the axis; to twist or to slide sideways is not axisymmetric."),
+        MaterialJunction => (
+            "Where two materials meet at the surface in contact, the pressure has no limit as the mesh is refined. Its value at that node depends on the mesh alone.",
+            "Use forces, and the pressure averaged over a length. Do not quote the peak."),
+        MeshTooCoarseForRadius => (
+            "The averaged pressure S_ρ is an integral over a length 2ρ. Where edges are longer than ρ, the mesh and not the law decides what is averaged: the result is nearly that of Coulomb's law on this mesh, and σ_t has the mesh's own peaks.",
+            "Refine the contact until edges are at most ρ/2, or set mesh.refine to a tolerance, which does it where it matters."),
+        MeshTooCoarseForContact => (
+            "With few elements in the contact neither its ends nor the peak of the pressure are resolved: a smooth peak is off by about 0.28/n² of itself with n elements across.",
+            "Refine there until at least six whole elements touch, or set mesh.refine to a tolerance."),
+        NoContact => (
+            "All contact forces are zero: the obstacle was not pushed far enough, or from the wrong side.",
+            "The message has the smallest gap and the indentation that would close it. Check the sign of the indentation (positive pushes against the body), the obstacle's place and the side of the boundary."),
+        ContactReachesObstacleEnd => (
+            "The last point of the obstacle is pressed. If the real surface goes on there, it would press too: the force is too small, and the pressure has a peak that does not exist.",
+            "Give more points, or push less. If the surface really ends there, the edge is sharp, and the peak of the pressure has no limit."),
+        SharpEdge => (
+            "At a sharp edge of a rigid obstacle, or of the body, linear elasticity has no largest pressure: on each finer mesh its value is larger. Forces converge, and so does σ_t with nonlocal_radius > 0, since that averages the pressure.",
+            "Nothing: this belongs to the problem. Quote forces and σ_t, not the peak of σ_n. A real edge has a radius: `rounded_flat` models it."),
+        FrictionLostAtEnd => (
+            "Near an end of the contact boundary part of the averaged pressure lies beyond it, where nothing can carry friction. The total friction force is then less than μ times the normal force even where everything slides.",
+            "Choose a smaller nonlocal_radius, or \"normalization\": \"conserving\", which keeps the total."),
+        ObstacleBetweenNodes => (
+            "Contact is checked along edges as quadratic curves. Between two nodes the obstacle stands in the body, or off it, by more than the mesh can follow.",
+            "Refine the contact, or set mesh.refine to a tolerance. A profile with more detail than the mesh should be smoothed."),
+        DirectionIsLinear => (
+            "Gaps are linear in the push along `direction`. For so long a way the curved obstacle would meet other points of the body first.",
+            "Push less, or place the obstacle nearer to the body, so that the way is short."),
+        KinkInContact => (
+            "At a kink of the obstacle, or at a corner of the body, the pressure grows without limit as the mesh is refined, slowly (as a logarithm) or fast.",
+            "Quote forces and averages, not the peak. Where the real shape is smooth, give more points or \"interpolation\": \"spline\"."),
+        RadiusExceedsContact => (
+            "S_ρ averages over a length that is larger than the contact: the friction bound is spread beyond the contact and nearly uniform in it.",
+            "Check nonlocal_radius and its unit. It is a length of the surface's texture, which is usually much smaller than a contact."),
+        BoundBeyondContact => (
+            "A prescribed bound acts where it is given, also where the surfaces have separated. There it pulls at a free surface.",
+            "Give the bound on the contact only, for example by a table that falls to 0 at its ends."),
+        CohesionJumps => (
+            "With cohesion the bound does not fall to zero with the pressure: it jumps at the end of the contact, and so does σ_t.",
+            "Nothing if the cohesion is meant; then σ_t near the end depends on the mesh. Otherwise set cohesion to 0."),
+        OscillatingStick => (
+            "Inside stick, σ_t alternates from point to point and cancels in the sum. Forces are right, single values of σ_t are not.",
+            "Refine the mesh there, or raise elastic_slip: a thousandth of the indentation or of the obstacle's displacement along the surface, whichever is larger, is small enough where it is not known from a measurement. Or choose \"points\": \"nodal\", or read σ_t as means over edges."),
+        SlowContraction => (
+            "Pressure and friction feed each other almost as much as is possible. The solution was found, but a little more friction may have none, or several.",
+            "Set \"check_uniqueness\": true if the result matters, and lower the coefficient to see how far away the limit is."),
+        NotConverged => (
+            "The state is not a solution: its forces and stresses may be far from one.",
+            "Look at the convergence plot. Raise elastic_slip, refine the mesh, apply the load in more increments, or use algorithm auto."),
+        RoundingLimitsResidual => (
+            "elastic_slip is so small beside the displacements that the last digits of these decide between stick and slip.",
+            "Raise elastic_slip to the value in the message; it need not be below a thousandth of the obstacle's displacement. The forces are as accurate as stated; places of stick may not be."),
+        FalseConvergence => (
+            "The iteration stopped by its own criterion at a state that violates the equations: it is not a solution.",
+            "Use algorithm auto, which checks the true residual."),
+        ContactCycling => (
+            "The same contact states repeat: the last one is not a solution.",
+            "Use algorithm auto, refine the mesh, or raise elastic_slip."),
+        OutOfBalance => (
+            "The forces of supports, loads and contacts do not add up: the computed state is not an equilibrium, usually because the body is nearly free to move, or nearly incompressible.",
+            "Check the supports. With Poisson's ratio very near to ½, use a slightly smaller one."),
+        SlidesAway => (
+            "Loads push the body along its contacts by more than friction can hold, and nothing else holds it: there is no equilibrium.",
+            "Add a support, lower the load, or raise the coefficient. The message has both forces."),
+        LargeSlip => (
+            "Gaps are those of the places before deformation. A body that slides farther than its contact is long would touch at other points.",
+            "Drag less. For sliding over long ways the obstacle must be placed anew."),
+        LargeStrain => (
+            "Linear elasticity holds for strains of some per cent. At strains above a quarter forces and extents are off by as much.",
+            "Push less, or check the units of indentation and shape. Read the result as a qualitative one."),
+        LargeDisplacement => (
+            "The equations are those of the undeformed body. Displacements of a tenth of its size change its shape, its contact and the direction of its forces.",
+            "Check loads and units. Read the result as a qualitative one."),
+        UniquenessUnknown => (
+            "The check for a second solution was inconclusive: the solution is one, but there may be others.",
+            "Raise max_iterations, or vary the coefficient and look for a jump."),
+        NotUnique => (
+            "The problem has at least two solutions. Which of them the body takes depends on its history, which a total law does not know.",
+            "Give the history: \"history\": \"incremental\" with steps. Do not quote the result as the solution."),
+        IncrementsMatter => (
+            "The incremental law depends on the path, and with twice as many increments the forces are others: the path is not resolved.",
+            "Give the steps more increments until the forces stay."),
+        RefinementUnfinished => (
+            "Refinement ended before all stated errors were within the tolerance. The result is that of the last mesh, with its stated errors.",
+            "The message says what stood in the way: raise the tolerance, begin with a finer mesh where the error is, or round a kink."),
+    }
+}
 
 /// A drawing of what the warning is about.
 fn picture(code: WarningCode) -> Option<&'static str> {

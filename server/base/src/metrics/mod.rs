@@ -204,8 +204,6 @@ impl Metrics {
 /// Metrics in the older text format of Prometheus (0.0.4), made from their OpenMetrics text. The names of families differ
 /// in one point: the older format has the suffix `_total` in the name of a counter's family, and `_info` in that of an info.
 pub fn in_older_format(openmetrics: &str) -> String {
-    let mut suffix = "";
-    let mut family = String::new();
     let mut text = String::with_capacity(openmetrics.len());
     // the type of a family follows its description, which has to have the same name
     let kinds = openmetrics
@@ -225,14 +223,11 @@ pub fn in_older_format(openmetrics: &str) -> String {
         else {
             continue; // a unit, or the end
         };
-        if name != family {
-            name.clone_into(&mut family);
-            suffix = match kinds.get(name) {
-                Some(&"counter") => "_total",
-                Some(&"info") => "_info",
-                _ => "",
-            };
-        }
+        let suffix = match kinds.get(name) {
+            Some(&"counter") => "_total",
+            Some(&"info") => "_info",
+            _ => "",
+        };
         let rest = if rest == "info" { "gauge" } else { rest };
         let _ = writeln!(text, "# {keyword} {name}{suffix} {rest}");
     }
