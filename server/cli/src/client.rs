@@ -59,10 +59,8 @@ impl Trust {
     /// Makes a client for the service at this address.
     pub(super) fn client(&self, url: &str) -> anyhow::Result<Way> {
         provide();
-        // an empty variable counts as one that is not set
-        let ca = self.ca.as_deref().filter(|file| !file.is_empty());
         let scheme = url.get(..8).map(str::to_ascii_lowercase);
-        let builder = match (ca, scheme.as_deref()) {
+        let builder = match (self.ca.as_deref(), scheme.as_deref()) {
             (Some(file), _) => Client::builder()
                 .tls_backend_preconfigured(pinned::trusting(authorities(file.as_ref())?)?),
             // the machine's, which it need not have

@@ -52,7 +52,7 @@ pub(super) struct Arguments {
 
 /// Runs the command: prints the answer of `/readyz`.
 pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
-    let (way, url) = match arguments.url.filter(|url| !url.is_empty()) {
+    let (way, url) = match arguments.url {
         Some(url) => (arguments.trust.client(&url)?, url),
         None => {
             let address = reachable(arguments.listen);

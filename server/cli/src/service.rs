@@ -54,9 +54,7 @@ impl Connection {
 
     /// The address of the service, without a slash at its end.
     pub(super) fn url(&self) -> String {
-        // an empty variable counts as one that is not set
-        let url = self.url.as_deref().filter(|url| !url.is_empty());
-        let url = url.unwrap_or("http://127.0.0.1:8080");
+        let url = self.url.as_deref().unwrap_or("http://127.0.0.1:8080");
         url.trim_end_matches('/').to_owned()
     }
 }

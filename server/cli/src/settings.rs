@@ -96,13 +96,7 @@ pub(super) fn with_file(
     line: &[OsString],
 ) -> Result<(Command, Lines), Vec<Wrong>> {
     let settings = settings();
-    let command = change(command, &|arg| {
-        if is_empty_variable(&arg) {
-            arg.env(Resettable::Reset)
-        } else {
-            arg
-        }
-    });
+    let command = without_empty_variables(command);
     let is_setting = |arg: &Arg| {
         let variable = arg.get_env();
         variable.is_some() && settings.iter().any(|known| known.get_env() == variable)
@@ -165,6 +159,18 @@ pub(super) fn settings() -> Vec<Arg> {
     all.get_arguments().cloned().collect()
 }
 
+/// The command, and all its subcommands, whose arguments take no empty environment variables.
+fn without_empty_variables(command: Command) -> Command {
+    let command = command.mut_args(|arg| {
+        if is_empty_variable(&arg) {
+            arg.env(Resettable::Reset)
+        } else {
+            arg
+        }
+    });
+    command.mut_subcommands(without_empty_variables)
+}
+
 /// Changes the arguments of all commands that read a file of settings.
 fn change(command: Command, with: &dyn Fn(Arg) -> Arg) -> Command {
     let command = if reads_file(&command) {
@@ -185,7 +191,7 @@ pub(super) fn key(arg: &Arg) -> String {
     name.trim_start_matches(PREFIX).to_ascii_lowercase()
 }
 
-/// Whether the environment variable of a setting is empty, which counts as not set, since many programs that start
+/// Whether the environment variable of an argument is empty, which counts as not set, since many programs that start
 /// services write empty variables.
 fn is_empty_variable(arg: &Arg) -> bool {
     let value = arg.get_env().and_then(env::var_os);

@@ -217,7 +217,7 @@ impl TokenStore {
     /// Opens the store, or connects to the service. `create`: whether a store may be created; `folder`: whether the
     /// address is ignored.
     async fn open(&self, create: bool, folder: bool) -> anyhow::Result<Target> {
-        let Some(url) = self.url.as_ref().filter(|url| !folder && !url.is_empty()) else {
+        let Some(url) = self.url.as_ref().filter(|_| !folder) else {
             let folder = self.folder.path();
             if !folder.exists() {
                 if create {
