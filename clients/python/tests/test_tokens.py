@@ -20,7 +20,14 @@ def test_a_kept_token_is_used_for_its_service_only(tmp_path: pathlib.Path, monke
     file.parent.mkdir()
     file.write_text(json.dumps({url: "sgn_kept"}))
     file.chmod(0o600)
-    assert Connection.of(url + "/", None, None).token == "sgn_kept"
+    for same in (url + "/", "HTTPS://Lab.Example", url + ":443/"):
+        assert Connection.of(same, None, None).token == "sgn_kept", same
+    for other in (url + ":8443", "http://lab.example", url + "/contact"):
+        assert Connection.of(other, None, None).token == "", other
+    # as earlier versions kept it
+    file.write_text(json.dumps({"https://Lab.Example:443": "sgn_kept", "http://[::1]:80": "sgn_local"}))
+    assert Connection.of(url, None, None).token == "sgn_kept"
+    assert Connection.of("http://[::1]", None, None).token == "sgn_local"
     assert Connection.of("https://other.example", None, None).token == ""
     assert Connection.of(url, "sgn_given", None).token == "sgn_given"
     monkeypatch.setenv("SIGNORINI_TOKEN", "sgn_set")

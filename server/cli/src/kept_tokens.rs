@@ -9,6 +9,7 @@ use std::{
 };
 
 use anyhow::{Context, bail, ensure};
+use reqwest::Url;
 
 /// The token that is kept for the service at this address; `None` if there is none.
 ///
@@ -21,10 +22,22 @@ pub(super) fn token_for(url: &str) -> anyhow::Result<Option<String>> {
     let Ok(text) = fs::read_to_string(&path) else {
         return Ok(None);
     };
-    if !text.contains(&format!("{url:?}")) {
+    let wanted = address(url);
+    let has = match serde_json::from_str::<BTreeMap<String, String>>(&text) {
+        Ok(tokens) => tokens.keys().any(|url| address(url) == wanted),
+        Err(_) => text.contains(&wanted),
+    };
+    if !has {
         return Ok(None);
     }
-    Ok(kept(&path)?.remove(url))
+    Ok(kept(&path)?.remove(&wanted))
+}
+
+/// The address of a service in the form that its token is kept under, whichever way it was written: the host in lower case,
+/// without the port that its scheme has anyway, and without a slash at the end.
+pub(super) fn address(url: &str) -> String {
+    let whole = Url::parse(url).map_or_else(|_| url.to_owned(), String::from);
+    whole.trim_end_matches('/').to_owned()
 }
 
 /// The file with the tokens, by the addresses of their services.
@@ -54,8 +67,13 @@ pub(super) fn kept(path: &Path) -> anyhow::Result<BTreeMap<String, String>> {
         "others can read {}, which has tokens: chmod 600 {0}, and rotate them (`signorini token rotate`)",
         path.display()
     );
-    let tokens = serde_json::from_str(&text);
-    tokens.with_context(|| format!("{} is not what `signorini login` wrote", path.display()))
+    let tokens: BTreeMap<String, String> = serde_json::from_str(&text)
+        .with_context(|| format!("{} is not what `signorini login` wrote", path.display()))?;
+    // earlier versions kept addresses as they were written
+    let tokens = tokens
+        .into_iter()
+        .map(|(url, token)| (address(&url), token));
+    Ok(tokens.collect())
 }
 
 /// Replaces the file.
@@ -72,4 +90,39 @@ pub(super) fn write(path: &Path, tokens: &BTreeMap<String, String>) -> anyhow::R
     new.persist(path)
         .with_context(|| path.display().to_string())?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn an_address_is_the_same_however_it_is_written() {
+        for (written, kept) in [
+            ("https://lab.example", "https://lab.example"),
+            ("https://lab.example/", "https://lab.example"),
+            ("HTTPS://Lab.Example:443/", "https://lab.example"),
+            ("http://127.0.0.1:80", "http://127.0.0.1"),
+            ("http://127.0.0.1:8080/", "http://127.0.0.1:8080"),
+            (
+                "https://lab.example:8443/Contact//",
+                "https://lab.example:8443/Contact",
+            ),
+            ("not an address/", "not an address"),
+        ] {
+            assert_eq!(address(written), kept);
+            assert_eq!(address(kept), kept);
+        }
+    }
+
+    #[test]
+    fn tokens_of_earlier_versions_are_found_by_other_spellings() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("tokens.json");
+        let old = [("https://Lab.example:443".to_owned(), "sgn_1".to_owned())];
+        write(&path, &old.into()).unwrap();
+        let all = kept(&path).unwrap();
+        assert_eq!(all.get(&address("https://lab.example/")).unwrap(), "sgn_1");
+    }
 }

@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use super::{
     exit::Exit,
-    kept_tokens::{file, kept, write},
+    kept_tokens::{address, file, kept, write},
     service::Connection,
 };
 
@@ -35,7 +35,7 @@ pub(super) async fn login(arguments: Arguments) -> anyhow::Result<Exit> {
     let me: Value = arguments.service.open_with(&token)?.get("/v1/me").await?;
     let path = file()?;
     let mut all = kept(&path)?;
-    all.insert(url.clone(), token);
+    all.insert(address(&url), token);
     write(&path, &all)?;
     let owner = me["owner"].as_str().unwrap_or_default();
     let scopes = me["scopes"].as_array().into_iter().flatten();
@@ -55,7 +55,7 @@ pub(super) async fn login(arguments: Arguments) -> anyhow::Result<Exit> {
 pub(super) fn logout(arguments: Arguments) -> anyhow::Result<Exit> {
     let (url, path) = (arguments.service.url(), file()?);
     let mut all = kept(&path)?;
-    if all.remove(&url).is_none() {
+    if all.remove(&address(&url)).is_none() {
         eprintln!(
             "signorini: no token for {url} is kept in {}",
             path.display()

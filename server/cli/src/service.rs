@@ -133,7 +133,7 @@ impl Service {
         let token = std::env::var("SIGNORINI_TOKEN").ok();
         let token = match token.filter(|token| !token.is_empty()) {
             Some(token) => Some(token),
-            None => kept_tokens::token_for(url.trim_end_matches('/'))?,
+            None => kept_tokens::token_for(url)?,
         };
         Service::with_token(url, trust, token)
     }

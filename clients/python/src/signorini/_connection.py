@@ -25,6 +25,22 @@ PING_S = 15.0
 """An event stream is never silent for longer: the service sends a comment."""
 
 
+def _address(url: str) -> str:
+    """The address of a service in the form that its token is kept under: the host in lower case, without the port that
+    its scheme has anyway, and without a slash at the end."""
+    try:
+        parts = urlsplit(url)
+        port = parts.port
+    except ValueError:
+        return url.rstrip("/")
+    host = (parts.hostname or "").lower()
+    host = f"[{host}]" if ":" in host else host
+    user = parts.netloc.rpartition("@")[0]
+    usual = {"http": 80, "https": 443}.get(parts.scheme)
+    place = (f"{user}@" if user else "") + host + (f":{port}" if port not in (None, usual) else "")
+    return parts._replace(netloc=place).geturl().rstrip("/")
+
+
 def _kept_token(url: str) -> str:
     """The token that `signorini login` has kept for a service, or an empty text. ValueError: others can read it."""
     folder = os.environ.get("XDG_CONFIG_HOME") or os.path.join(os.path.expanduser("~"), ".config")
@@ -34,16 +50,21 @@ def _kept_token(url: str) -> str:
         mode = path.stat().st_mode
     except OSError:
         return ""
-    # a file that has nothing for this service stops nobody
-    if json.dumps(url) not in text:
-        return ""
-    if mode & 0o077:
-        raise ValueError(f"others can read {path}, which has tokens: chmod 600 {path}, and rotate them")
+    wanted = _address(url)
     try:
         kept = json.loads(text)
     except ValueError as error:
+        # a file that has nothing for this service stops nobody
+        if wanted not in text:
+            return ""
         raise ValueError(f"{path} is not what `signorini login` wrote: {error}") from None
-    return str(kept.get(url, "")) if isinstance(kept, dict) else ""
+    # earlier versions kept addresses as they were written
+    tokens = {_address(str(of)): str(token) for of, token in kept.items()} if isinstance(kept, dict) else {}
+    if wanted not in tokens:
+        return ""
+    if mode & 0o077:
+        raise ValueError(f"others can read {path}, which has tokens: chmod 600 {path}, and rotate them")
+    return tokens[wanted]
 
 
 @dataclass(frozen=True)
@@ -63,7 +84,7 @@ class Connection:
         if urlsplit(url).scheme not in ("http", "https"):
             raise ValueError(f"the address of the service begins with http:// or https://, not {url!r}")
         if token is None:
-            token = os.environ.get("SIGNORINI_TOKEN") or _kept_token(url.rstrip("/"))
+            token = os.environ.get("SIGNORINI_TOKEN") or _kept_token(url)
         # read from a file, it ends with a line break; messages about an invalid token do not contain the token
         token = token.strip()
         if not (token.isascii() and token.isprintable()):
