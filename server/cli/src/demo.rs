@@ -75,7 +75,7 @@ async fn show(url: &str) -> anyhow::Result<Exit> {
     for (number, (name, by_rest, by_grpc)) in jobs.iter().enumerate() {
         progress(&format!("  {} of {}: {name} …", number + 1, jobs.len()))?;
         let of_rest = async {
-            let job = jobs::ended(&rest, *by_rest).await?;
+            let job = jobs::follow::ended(&rest, *by_rest).await?;
             let result: Value = rest.get(&format!("/v1/jobs/{by_rest}/result")).await?;
             anyhow::Ok((job, result))
         };
@@ -102,7 +102,7 @@ async fn show(url: &str) -> anyhow::Result<Exit> {
     ))?;
 
     let (id, result) = shown.with_context(|| format!("there is no example {SHOWN}"))?;
-    let figures = jobs::profile_charts(&rest, id, result).await?;
+    let figures = jobs::plot::profile_charts(&rest, id, result).await?;
     output::print(&format!(
         "The {SHOWN}: where σ_t is smaller than its bound the body sticks to the obstacle, elsewhere it slips.\n\n{figures}\n{NEXT}"
     ))?;

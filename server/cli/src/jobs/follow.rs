@@ -2,8 +2,8 @@
 
 use std::{ops::ControlFlow, time::Duration};
 
-use anyhow::{Context, bail};
-use base::job::{Job, Reason, Status};
+use anyhow::{Context, bail, ensure};
+use base::job::{Job, JobId, Reason, Status};
 use eventsource_stream::Eventsource;
 use futures_util::StreamExt;
 use reqwest::{Method, StatusCode, header};
@@ -92,6 +92,22 @@ pub(super) enum Waited {
     Ended(Value),
     /// The deadline has passed; this is the last document from the service, if it sent any.
     TimedOut(Option<Value>),
+}
+
+/// Waits for the end of a job; returns it. An error if it has not succeeded.
+pub(crate) async fn ended(service: &Service, id: JobId) -> anyhow::Result<Job> {
+    let document = match wait(service, Id::Job(id), None).await? {
+        Waited::Ended(document) => document,
+        Waited::TimedOut(last) => last.unwrap_or_default(),
+    };
+    let job: Job = serde_json::from_value(document).with_context(|| misunderstood("the job"))?;
+    let failure = job.failure.as_ref().map(|failure| failure.detail.as_str());
+    ensure!(
+        job.status == Status::Succeeded,
+        "the job failed: {}",
+        failure.unwrap_or_default()
+    );
+    Ok(job)
 }
 
 /// Waits until the job or sweep has ended, or until the deadline.

@@ -13,12 +13,12 @@
 mod change;
 mod chart;
 mod file;
-mod follow;
+pub(super) mod follow;
 mod get;
 mod id;
 mod listing;
 mod ls;
-mod plot;
+pub(super) mod plot;
 mod result;
 mod submit;
 mod table;
@@ -26,42 +26,9 @@ mod validate;
 mod wait;
 mod watch;
 
-use anyhow::{Context, ensure};
-use base::job::{Job, JobId, Status};
 use clap::Subcommand;
-use serde_json::Value;
 
-use super::{
-    exit::Exit,
-    service::{Service, misunderstood},
-};
-
-/// Waits for the end of a job; returns it. An error if it has not succeeded.
-pub(super) async fn ended(service: &Service, id: JobId) -> anyhow::Result<Job> {
-    let document = match follow::wait(service, id::Id::Job(id), None).await? {
-        follow::Waited::Ended(document) => document,
-        follow::Waited::TimedOut(last) => last.unwrap_or_default(),
-    };
-    let job: Job = serde_json::from_value(document).with_context(|| misunderstood("the job"))?;
-    let failure = job.failure.as_ref().map(|failure| failure.detail.as_str());
-    ensure!(
-        job.status == Status::Succeeded,
-        "the job failed: {}",
-        failure.unwrap_or_default()
-    );
-    Ok(job)
-}
-
-/// Draws the stresses along each contact boundary of a job for a terminal, as `plot` does. `result`: its result.
-pub(super) async fn profile_charts(
-    service: &Service,
-    id: JobId,
-    result: Value,
-) -> anyhow::Result<String> {
-    Ok(plot::draw_all(
-        &plot::profiles(service, id, result, None, false).await?,
-    ))
-}
+use super::exit::Exit;
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {

@@ -160,6 +160,15 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     Ok(Exit::Ok)
 }
 
+/// Draws the stresses along each contact boundary of a job for a terminal, as the command does. `result`: its result.
+pub(crate) async fn profile_charts(
+    service: &Service,
+    id: JobId,
+    result: Value,
+) -> anyhow::Result<String> {
+    Ok(draw_all(&profiles(service, id, result, None).await?))
+}
+
 /// Draws figures below each other, as wide as the terminal.
 pub(super) fn draw_all(figures: &[Chart]) -> String {
     let in_colour = std::io::stdout().is_terminal()
