@@ -293,7 +293,10 @@ impl Lines {
         let (normal, tangential) = (&contact.peak_normal_stress, &contact.peak_tangential_stress);
         self.add(&format!("contact {name:?}"), "");
         self.add("  touches, s", ranges(&contact.contact));
-        self.add("  sticks, s", ranges(&contact.stick));
+        // without friction nothing can stick
+        if tangential.is_some() || !contact.stick.is_empty() {
+            self.add("  sticks, s", ranges(&contact.stick));
+        }
         for (words, peak, quantity) in [
             ("  peak σ_n", normal, QuantityName::PeakNormalStress),
             ("  peak σ_t", tangential, QuantityName::PeakTangentialStress),
