@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use base::{
     bodies::BodyCache,
     caller::{Caller, Scope},
+    time::Time,
 };
 use futures_util::future::BoxFuture;
 use schemars::JsonSchema;
@@ -178,7 +179,7 @@ pub fn me<'a>(service: &'a Service, caller: &'a Caller) -> BoxFuture<'a, Result<
 }
 
 /// Returns the use of the service by each owner: first the owners with the most stored bytes, at most a thousand of
-/// them, then the owners who store nothing yet.
+/// them, then the owners who store nothing yet: those of waiting and running jobs, and of valid tokens.
 pub fn owners<'a>(
     service: &'a Service,
     _caller: &'a Caller,
@@ -188,8 +189,12 @@ pub fn owners<'a>(
         let mut sizes = service.store.sizes_of_owners(MOST).await?;
         let loads = service.store.loads().await?;
         let known: BTreeSet<&String> = sizes.iter().map(|size| &size.owner).collect();
+        let tokens = service.store.tokens();
+        let now = Time::now();
+        let with_token = tokens.iter().filter(|token| token.is_valid(now));
         let others: BTreeSet<&String> = loads
             .keys()
+            .chain(with_token.map(|token| &token.owner))
             .filter(|owner| !known.contains(owner))
             .collect();
         let others: Vec<&String> = others.into_iter().take(MOST as usize).collect();
