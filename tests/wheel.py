@@ -15,6 +15,7 @@ import shutil
 import subprocess
 import sys
 import time
+import zipfile
 
 TOP = pathlib.Path(__file__).resolve().parent.parent
 KEPT = TOP / "target/wheel-root"
@@ -89,6 +90,12 @@ class Times:
         return found
 
 
+def licences(wheel):
+    """The names of the licences in a wheel."""
+    names = [pathlib.PurePath(name) for name in zipfile.ZipFile(wheel).namelist() if not name.endswith("/")]
+    return sorted(name.name for name in names if name.parent.name == "licenses")
+
+
 def wheels(binary, root, folder):
     """Makes both wheels, and fetches from outside what they depend on, as this root's Python wants it."""
     made = subprocess.run([TOP / "clients/python/wheel", binary], stdout=subprocess.PIPE, text=True, check=True).stdout.split()[-1]
@@ -101,6 +108,8 @@ def wheels(binary, root, folder):
     subprocess.run([TOOLS, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--only-binary=:all:",
                     "--implementation=cp", "--python-version=" + version, *platforms, "--dest", folder / "all", made], check=True)
     (pure_wheel,) = pure.glob("*.whl")
+    assert licences(pure_wheel) == ["LICENSE-APACHE", "LICENSE-MIT"], licences(pure_wheel)
+    assert licences(made) == ["LICENSE-APACHE", "LICENSE-MIT", "LICENSES-PROGRAM.txt"], licences(made)
     shutil.copy(pure_wheel, folder)
     return pathlib.Path(made).name, pure_wheel.name
 

@@ -58,3 +58,9 @@ def test_the_map_names_each_module_after_those_that_it_uses() -> None:
     for number, name in enumerate(order):
         later = used(name) - set(order[:number])
         assert not later, f"the map has {name} before {', '.join(sorted(later))}, which it imports"
+
+
+def test_the_licences_are_those_of_the_project() -> None:
+    for name in ("LICENSE-APACHE", "LICENSE-MIT"):
+        client = pathlib.Path(__file__).resolve().parents[1]
+        assert (client / name).read_bytes() == (client.parents[1] / name).read_bytes(), name
