@@ -166,7 +166,7 @@ pub(crate) async fn profile_charts(
     id: JobId,
     result: Value,
 ) -> anyhow::Result<String> {
-    Ok(draw_all(&profiles(service, id, result, None).await?))
+    Ok(draw_all(&profiles(service, id, result, None, false).await?))
 }
 
 /// Draws figures below each other, as wide as the terminal.

@@ -342,6 +342,7 @@ mod tests {
             error,
             increments: None,
             direction: None,
+            measurement: None,
             relative: None,
             method: ErrorMethod::Unknown,
         }
