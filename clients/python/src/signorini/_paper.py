@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from matplotlib import rc_context
-from matplotlib.figure import Figure
+from matplotlib import figure, rc_context
 
 SAVED: Any = {
     # letters stay letters in vector files, so that a journal's editor can search and change them
@@ -17,7 +16,7 @@ SAVED: Any = {
 """Settings that matplotlib reads when a figure is saved, not when it is made."""
 
 
-class PaperFigure(Figure):
+class Figure(figure.Figure):
     """A figure of matplotlib that is saved with these settings; `dpi=` of `savefig` goes before them."""
 
     def savefig(self, *args: Any, **options: Any) -> None:

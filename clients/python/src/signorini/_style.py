@@ -142,9 +142,9 @@ def styled(size: str, theme: str, ax: Any = None, style: str = "full") -> Iterat
 
 def new(plt: Any, rows: int, columns: int, size: tuple[float, float], **options: Any) -> tuple[Any, Any]:
     """A new figure, and its axes as an array of rows and columns."""
-    from ._paper import PaperFigure
+    from ._paper import Figure
 
-    figure, axes = plt.subplots(rows, columns, figsize=size, FigureClass=PaperFigure, squeeze=False, **options)
+    figure, axes = plt.subplots(rows, columns, figsize=size, FigureClass=Figure, squeeze=False, **options)
     return figure, axes
 
 
