@@ -184,6 +184,10 @@ async fn list_iterations(
     Ok(marked((Extension(HasShare), whole), available))
 }
 
+#[expect(
+    clippy::too_many_arguments,
+    reason = "each is a parameter of the request"
+)]
 async fn get_profile(
     call: Call,
     id: JobId,
