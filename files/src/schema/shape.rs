@@ -8,14 +8,51 @@ use serde_json::{Map, Value, json};
 
 use solver::problem::Problem;
 
-/// The JSON Schema of a problem (draft 2020-12).
+/// The JSON Schema of a problem (draft 2020-12). It accepts null where the service does: in a field that may be absent.
 pub fn schema() -> Value {
+    let mut schema = of_problem();
+    accept_null_as_absent(&mut schema);
+    schema
+}
+
+/// The schema that problems are checked with here, which leaves null to that check.
+pub(super) fn of_problem() -> Value {
     schemars::schema_for!(Problem).to_value()
+}
+
+/// Lets the alternatives of an object, and the conditions on it, say that a field is absent or null, and present and not null: a
+/// field that they exclude may be null, and one that they ask for may not.
+fn accept_null_as_absent(schema: &mut Value) {
+    match schema {
+        Value::Array(list) => list.iter_mut().for_each(accept_null_as_absent),
+        Value::Object(words) => {
+            // the object itself is described elsewhere, with the types of its fields
+            if !words.contains_key("type") {
+                let asked = words.get("required").and_then(Value::as_array).cloned();
+                let fields = words.get("properties").and_then(Value::as_object).cloned();
+                let (asked, mut fields) = (asked.unwrap_or_default(), fields.unwrap_or_default());
+                for field in fields.values_mut().filter(|field| **field == false) {
+                    *field = json!({ "type": "null" });
+                }
+                for name in asked.iter().filter_map(Value::as_str) {
+                    let field = fields.entry(name).or_insert_with(|| json!({}));
+                    if field.as_object().is_some_and(Map::is_empty) {
+                        *field = json!({ "not": { "type": "null" } });
+                    }
+                }
+                if !fields.is_empty() {
+                    words.insert("properties".to_owned(), Value::Object(fields));
+                }
+            }
+            words.values_mut().for_each(accept_null_as_absent);
+        }
+        _ => {}
+    }
 }
 
 /// The shape of a problem.
 pub(super) static PROBLEM: LazyLock<Shape> = LazyLock::new(|| {
-    let schema = schema();
+    let schema = of_problem();
     // the schema is ours; a test reads it. A shape that allows anything leaves the decision to serde.
     shape(&schema, &schema).unwrap_or_default()
 });
@@ -335,8 +372,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_keyword_of_the_schema_is_supported() {
+    fn a_published_alternative_takes_null_for_absent() {
         let schema = schema();
+        let material = &schema["$defs"]["Material"];
+        let (null, given) = (json!({"type": "null"}), json!({"not": {"type": "null"}}));
+        assert_eq!(material["if"]["properties"]["orthotropic"], given);
+        assert_eq!(material["then"]["properties"]["youngs_modulus"], null);
+        let pressure = &schema["$defs"]["Load"]["oneOf"][0];
+        assert_eq!(pressure["properties"]["traction"], null);
+        assert_eq!(pressure["properties"]["pressure"], given);
+        assert_eq!(
+            schema["$defs"]["MeshInput"]["oneOf"][0]["properties"]["grid"],
+            given
+        );
+        // names that are unknown stay refused
+        assert_eq!(schema["additionalProperties"], json!(false));
+    }
+
+    #[test]
+    fn every_keyword_of_the_schema_is_supported() {
+        let schema = of_problem();
         let shape = shape(&schema, &schema).unwrap();
         assert!(shape.properties.contains_key("contacts"));
         for (keyword, value) in [("pattern", json!("a")), ("uniqueItems", json!(true))] {

@@ -1360,7 +1360,7 @@ class Problem(WholeProblem):
             *,
             analysis: Analysis | JSON,
             materials: Sequence[Material | JSON],
-            mesh: MeshInput,
+            mesh: MeshInput | JSON,
             contacts: Sequence[Contact | JSON] = ...,
             loads: Sequence[Load | JSON] = ...,
             quadrature: Whole = ...,
