@@ -113,3 +113,27 @@ async fn nobody_sees_or_changes_what_another_owner_has() {
     }
     assert_eq!(seen().await, before);
 }
+
+/// Operations: ListOwners
+#[tokio::test]
+async fn an_owner_who_has_only_a_valid_token_is_listed() {
+    let server = server().await;
+    let token =
+        |owner: &str, scopes: &[&str]| json!({"name": "test", "owner": owner, "scopes": scopes});
+    let (_, admin) = create(&server, None, token("root", &["admin"])).await;
+    let (bob, _) = create(&server, Some(&admin), token("bob", &["read"])).await;
+    let listed = async || -> Vec<String> {
+        let answer = server.get("/v1/owners").bearer_auth(&admin).send().await;
+        let found: Value = answer.unwrap().json().await.unwrap();
+        let owners = found["owners"].as_array().unwrap().iter();
+        owners
+            .map(|owner| owner["owner"].as_str().unwrap().to_owned())
+            .collect()
+    };
+    assert_eq!(listed().await, ["bob", "root"]);
+    let revoked = server
+        .delete(&format!("/v1/tokens/{bob}"))
+        .bearer_auth(&admin);
+    assert!(revoked.send().await.unwrap().status().is_success());
+    assert_eq!(listed().await, ["root"]);
+}

@@ -16,8 +16,11 @@ const DEVIATION: f64 = 5e-4;
 /// Copies of each profile in the tests of every day.
 const COPIES: usize = 8;
 
+/// The depth of a profile at a place.
+type Depth = fn(f64) -> f64;
+
 /// A tip, a tip with a wave on it, and a flat tip with round shoulders; each with its name and its depth at x.
-const PROFILES: [(&str, fn(f64) -> f64); 3] = [
+const PROFILES: [(&str, Depth); 3] = [
     ("round", |x| x * x / 16.0),
     ("wavy", |x| x * x / 16.0 + 0.004 * (4.0 * x).cos()),
     ("flat", |x| 0.03 * x.powi(4)),
@@ -42,7 +45,7 @@ fn block(heights: &[(f64, f64)], declared: Option<f64>, refine: u32) -> Value {
     })
 }
 
-fn heights(profile: fn(f64) -> f64, mut noise: impl FnMut() -> f64) -> Vec<(f64, f64)> {
+fn heights(profile: Depth, mut noise: impl FnMut() -> f64) -> Vec<(f64, f64)> {
     let places = (-50..=50).map(|i| f64::from(i) / 25.0);
     places.map(|x| (x, profile(x) + noise())).collect()
 }

@@ -17,7 +17,7 @@ const MOST_REASONS: usize = 5;
 /// The text that says that a phase begins.
 pub(super) fn phase(phase: Phase) -> &'static str {
     match phase {
-        Phase::Verify => "verify: solving once more on the refined mesh",
+        Phase::Verify => "verify: solving again, to find the errors",
         phase => phase.as_str(),
     }
 }

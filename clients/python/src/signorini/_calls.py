@@ -360,7 +360,14 @@ class Look(TypedDict, total=False):
 
 
 def plot(
-    id: str, name: str, ending: str, theme: str, size: str, step: int | str | None, look: Mapping[str, Any], partial: bool = False
+    id: str,
+    name: str,
+    ending: str,
+    theme: str,
+    size: str,
+    step: int | str | None,
+    look: Mapping[str, Any],
+    partial: bool = False,
 ) -> Call[bytes]:
     unknown = look.keys() - Look.__annotations__
     if unknown:

@@ -153,8 +153,6 @@ def counted(words: Iterable[str]) -> str:
     return ", ".join(f"{word} {count}" for word, count in collections.Counter(words).most_common())
 
 
-
-
 def _typed(pointer: str, column: Array) -> Array:
     """The values of a parameter as the problem has them: the service's table has no whole numbers, and no booleans."""
     kinds = kinds_at(Problem, pointer)

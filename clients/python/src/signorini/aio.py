@@ -370,7 +370,9 @@ class AsyncJob(JobView):
         **look: Unpack[calls.Look],
     ) -> pathlib.Path:
         ending = calls.figure_ending(path)
-        return write(path, await self._client._send(calls.plot(self.id, plot, ending, theme, size, step, look, partial)))
+        return write(
+            path, await self._client._send(calls.plot(self.id, plot, ending, theme, size, step, look, partial))
+        )
 
 
 class AsyncResult(Summary):

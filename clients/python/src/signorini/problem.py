@@ -741,7 +741,9 @@ exactly (its ends are not-a-knot); for a polyline its parameter is the length of
 @dataclass(kw_only=True, repr=False)
 class Smoothing(Part):
     """How far the points of a measured profile may be from the curve. Among all curves with Σ((gap −
-    curve)/standard_deviation)² ≤ number of points, the one whose curvature changes least is taken.
+    curve)/standard_deviation)² ≤ number of points, the one whose curvature changes least is taken. What the
+    deviation leaves open of forces, peaks and extents is part of their stated errors: the problem is solved for
+    twenty more profiles that could have been measured.
 
     standard_deviation: Standard deviation of the error of one point, > 0 (length).
     """

@@ -46,6 +46,7 @@ pub fn warning(code: WarningCode) -> WarningKind {
 
 /// Why a warning matters, and what to do.
 #[rustfmt::skip] // a warning after the other
+#[allow(clippy::too_many_lines)] // data: a text for each code
 fn reasons(code: WarningCode) -> (&'static str, &'static str) {
     use WarningCode::*;
     match code {

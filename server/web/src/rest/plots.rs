@@ -82,7 +82,14 @@ pub(super) async fn plot(
         ),
     ];
     if let Some((_, name)) = vain.into_iter().find(|(vain, _)| *vain) {
-        let mut known = vec![THEME.name, SIZE.name, STYLE.name, XLIM.name, YLIM.name, PARTIAL.name];
+        let mut known = vec![
+            THEME.name,
+            SIZE.name,
+            STYLE.name,
+            XLIM.name,
+            YLIM.name,
+            PARTIAL.name,
+        ];
         match plot {
             Plot::Deformed => known.push(STRESS.name),
             Plot::Profile | Plot::Convergence => known.extend([YLIM_BELOW.name, STEP.name]),
