@@ -821,6 +821,18 @@ fn keywords_without_effect_are_passed_over_and_others_refused_by_name() {
             "*STEP, NLGEOM",
         ),
         (
+            block(HELD, load).replace("*STEP", "*STEP, NLGEON"),
+            "*STEP with NLGEON",
+        ),
+        (
+            block(HELD, load).replace("*ELASTIC", "*ELASTIC, TYP=ENGINEERING"),
+            "*ELASTIC with TYP",
+        ),
+        (
+            block(HELD, load).replace("*SOLID SECTION", "*SOLID SECTION, ORIENTAION=A"),
+            "*SOLID SECTION with ORIENTAION",
+        ),
+        (
             block(HELD, load).replace("*CLOAD", "*CLOAD, FOLLOWER"),
             "*CLOAD with FOLLOWER",
         ),

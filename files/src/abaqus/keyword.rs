@@ -4,7 +4,9 @@ use super::block::{Block, Elements, Rows};
 use super::deck::{Deck, Inside};
 use super::element::{ElementType, Shape, Typed};
 use super::part::{Part, RigidLines};
-use super::supported::{IDLE, MOST_UNKNOWN, NOT_ELASTIC, NOT_WRITTEN_OUT, READ, UnknownKeyword};
+use super::supported::{
+    IDLE, MOST_UNKNOWN, NOT_ELASTIC, NOT_WRITTEN_OUT, PARAMETERS, READ, UnknownKeyword,
+};
 use super::written::{
     Amplitude, Elastic, Incomplete, MOST_NAMES, Name, Orientation, Replacement, Replaces, Section,
     fields,
@@ -95,6 +97,7 @@ impl Deck {
             self.too_many_names(line);
             return Block::Skip;
         }
+        self.check_parameters(keyword, line);
         if let Some(block) = self.begin_contact(keyword, line) {
             return block;
         }
@@ -152,6 +155,28 @@ impl Deck {
                 }
                 _ => self.unknown_keyword(name, line),
             },
+        }
+    }
+
+    /// Reports parameters that are not known: a misspelt one would be left out, and another set, material or step read.
+    fn check_parameters(&mut self, keyword: &Keyword, line: u64) {
+        let Some((of, known)) = PARAMETERS.iter().find(|(of, _)| *of == keyword.name) else {
+            return;
+        };
+        let of_mesh = matches!(*of, "NODE" | "ELEMENT" | "NSET" | "ELSET" | "INSTANCE");
+        for (name, _) in &keyword.parameters {
+            if known.iter().any(|known| same(name, known)) {
+                continue;
+            }
+            let got = format!("*{of} with {name:.40}");
+            let expected = format!("*{of} with {}", known.join(", "));
+            let hint =
+                "Correct the name, or remove the parameter if the solution does not depend on it.";
+            if of_mesh {
+                self.fault(line, Reason::NotUnderstood, got, &expected, hint);
+            } else {
+                self.doubt(line, got, &expected, hint);
+            }
         }
     }
 

@@ -38,6 +38,27 @@ pub(super) const READ: &[&str] = &[
     "TEMPERATURE",
 ];
 
+/// The parameters of keywords: those that are read or refused where the keyword is read, and those that do not change a
+/// linear static solution. Any other one is refused, since a misspelt parameter would be left out. Keywords that are not
+/// listed compare their parameters themselves, or are never used.
+#[rustfmt::skip] // a table
+pub(super) const PARAMETERS: &[(&str, &[&str])] = &[
+    ("NODE", &["NSET", "SYSTEM", "INPUT"]),
+    ("ELEMENT", &["TYPE", "ELSET", "INPUT"]),
+    ("NSET", &["NSET", "ELSET", "INSTANCE", "GENERATE", "UNSORTED", "INTERNAL"]),
+    ("ELSET", &["ELSET", "INSTANCE", "GENERATE", "UNSORTED", "INTERNAL"]),
+    ("SURFACE", &["NAME", "TYPE", "COMBINE", "FILLET RADIUS", "INTERNAL", "DEFINITION", "REGION TYPE"]),
+    ("PART", &["NAME"]),
+    ("INSTANCE", &["NAME", "PART"]),
+    ("ASSEMBLY", &["NAME"]),
+    ("MATERIAL", &["NAME"]),
+    ("ELASTIC", &["TYPE", "MODULI", "DEPENDENCIES"]),
+    ("ORIENTATION", &["NAME", "SYSTEM", "DEFINITION", "LOCAL DIRECTIONS"]),
+    ("SOLID SECTION", &["ELSET", "MATERIAL", "ORIENTATION", "CONTROLS"]),
+    ("STEP", &["NAME", "NLGEOM", "PERTURBATION", "INC", "INCF", "AMPLITUDE", "EXTRAPOLATION", "UNSYMM", "SOLVER", "CONVERT SDI"]),
+    ("STATIC", &["DIRECT", "SOLVER", "TIME RESET", "TOTAL TIME AT START", "RIKS", "STABILIZE", "ALLSDTOL", "CONTINUE", "FACTOR"]),
+];
+
 /// Keywords for nodes or elements that are not written in the deck, or that are moved.
 pub(super) const NOT_WRITTEN_OUT: &[&str] = &[
     "INCLUDE", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM",
