@@ -64,13 +64,12 @@ impl Dialect {
 }
 
 /// Keywords that OpenAPI 3.0 does not have.
-const UNKNOWN: [&str; 10] = [
+const UNKNOWN: [&str; 9] = [
     "if",
     "then",
     "else",
     "contentMediaType",
     "contentSchema",
-    "patternProperties",
     "propertyNames",
     "prefixItems",
     "$schema",
@@ -85,6 +84,12 @@ struct Dialect {
 
 impl Transform for Dialect {
     fn transform(&mut self, schema: &mut Schema) {
+        // what names of a pattern have, every further name has: without it there would be no names at all
+        if let Some(patterns) = schema.remove("patternProperties")
+            && let Some(of_one) = patterns.as_object().and_then(|all| all.values().next())
+        {
+            schema.insert("additionalProperties".into(), of_one.clone());
+        }
         for name in UNKNOWN {
             schema.remove(name);
         }
