@@ -25,7 +25,7 @@ use solver::{
     problem::{Problem, Refine, Step},
     solution::{Outcome, Phase, Solution},
 };
-use store::{MembersTask, Parts, Store};
+use store::{MembersTask, Overview, Parts, Store};
 
 use super::{
     ending::{NoSolution, Solved, ending_of_solution},
@@ -172,7 +172,11 @@ fn solve_metered(
     let document = document?;
     let accuracy = document.summary.solution.accuracy.as_ref();
     let unverified = accuracy.and_then(|accuracy| accuracy.verified) == Some(false);
-    let ending = ending_of_solution(&document, metered.outgrown);
+    let mut ending = ending_of_solution(&document, metered.outgrown);
+    if members.is_some() {
+        // the document is that of the first member: the row of the job would have its numbers under the sweep's name
+        ending.overview = Overview::default();
+    }
     let iterations = document.history.len();
     let mut go_on = run::patient(|| metered.is_to_stop());
     let parts = Parts::of(document, &mut go_on).map_err(|_| SolveError::NonFinite {
