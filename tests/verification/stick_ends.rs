@@ -1,10 +1,13 @@
 //! Errors where stick is so small, or alternates so often, that a mesh cannot show it.
 
+use serde_json::json;
 use solver::problem::{AccuracyMode, AdaptiveRefine, Elasticity, Problem, Refine};
-use solver::solution::{EstimatedQuantity, QuantityName, Solution, Verdict, WarningCode};
+use solver::solution::{
+    EstimatedQuantity, NodeState, QuantityName, Solution, Verdict, WarningCode,
+};
 
 use crate::catalogue;
-use crate::support::{quiet, solve};
+use crate::support::{problem as problem_of, quiet, solve};
 
 fn of_kind(solution: &Solution, name: QuantityName) -> Vec<&EstimatedQuantity> {
     let accuracy = solution.summary.accuracy.as_ref().unwrap();
@@ -90,6 +93,51 @@ fn too_many_ends_of_stick_do_not_stand_in_the_way_of_a_tolerance() {
             warning.code != WarningCode::RefinementUnfinished || !named,
             "{}",
             warning.message
+        );
+    }
+}
+
+/// Under the incremental law points that have slipped stay at ε from where they are anchored, to the last digit: they slip in
+/// the profile, and in the intervals.
+#[test]
+fn what_slips_in_the_profile_slips_in_the_intervals() {
+    let half = [
+        0.02, 0.04, 0.06, 0.08, 0.1, 0.12, 0.16, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0,
+    ];
+    let mut x: Vec<f64> = half.iter().rev().map(|x| -x).collect();
+    x.push(0.0);
+    x.extend(half);
+    for coefficient in [0.2, 0.25, 0.3, 0.35, 0.4, 0.45] {
+        let problem = json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {"grid": {"x": x, "y": [-16, -8, -4, -2, -1, -0.5, -0.25, -0.15, -0.1, -0.06, -0.03, 0]}, "refine": 1},
+            "materials": [{"youngs_modulus": 210000, "poissons_ratio": 0.3}],
+            "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
+            "contacts": [{"boundary": "top", "obstacle": {"kind": "circle", "radius": 10}, "indentation": 0.0028,
+                "tangential_displacement": 0.0005, "friction": {"coefficient": coefficient, "nonlocal_radius": 0.03,
+                "elastic_slip": 1e-4, "history": "incremental"}}],
+            "steps": [{"name": "press", "increments": 32, "spacing": "contact_width"},
+                {"name": "drag", "tangential_displacement": 1, "increments": 8}],
+        });
+        let solution = solve(&problem_of(&problem.to_string()));
+        let (contact, profile) = (
+            &solution.summary.contacts["top"],
+            &solution.node_profiles["top"],
+        );
+        for (s, state) in profile.s.iter().zip(&profile.state) {
+            let inside = |all: &[[f64; 2]]| all.iter().any(|[from, to]| from < s && s < to);
+            assert!(
+                !inside(&contact.stick) || *state == NodeState::Stick,
+                "{coefficient}: {s}"
+            );
+            assert!(
+                !inside(&contact.slip) || *state == NodeState::Slip,
+                "{coefficient}: {s}"
+            );
+        }
+        assert!(
+            !contact.stick.is_empty() && !contact.slip.is_empty(),
+            "{coefficient}"
         );
     }
 }

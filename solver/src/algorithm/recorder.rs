@@ -262,7 +262,7 @@ fn slipping(system: &System<'_>, state: &State, bound: &[f64]) -> (u32, u32) {
     let (mut slip, mut stick) = (0, 0);
     let points = system.points.iter().zip(bound);
     for (point, _) in points.filter(|(_, tau)| **tau > 0.0) {
-        let slides = system.slip(&state.v, point).abs() >= system.law(point).elastic_slip;
+        let slides = !system.law(point).sticks(system.slip(&state.v, point));
         *(if slides { &mut slip } else { &mut stick }) += 1;
     }
     (slip, stick)

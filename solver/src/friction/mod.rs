@@ -70,6 +70,12 @@ impl<A> FrictionLaw<A> {
         self.elastic_slip * psi(self.transition, slip / self.elastic_slip)
     }
 
+    /// Whether a point with the slip e sticks: |e| < ε. Slip that the incremental law moves to ε lies beside it by rounding,
+    /// and more where it is interpolated between points; a relative distance of 10⁻⁹ from ε is none.
+    pub fn sticks(&self, slip: f64) -> bool {
+        slip.abs() < self.elastic_slip * (1.0 - 1e-9)
+    }
+
     /// The move of a point's anchor at the end of an increment: the slip beyond the elastic slip; the whole slip if
     /// the point is `open` (length).
     pub fn anchor_move(&self, slip: f64, open: bool) -> f64 {

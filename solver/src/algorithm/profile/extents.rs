@@ -172,9 +172,7 @@ impl PatchView<'_> {
         let edge = (0..boundary.edge_count())
             .find(|k| boundary.edge_arc(*k)[1] >= s)
             .unwrap_or(0);
-        self.slip_at(edge, edge3::invert(&boundary.edge_arc(edge), s))
-            .abs()
-            < law.elastic_slip
+        law.sticks(self.slip_at(edge, edge3::invert(&boundary.edge_arc(edge), s)))
     }
 
     /// The arc lengths at which the size |e| of the slip equals ε, in order.

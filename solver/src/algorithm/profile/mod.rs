@@ -368,9 +368,7 @@ impl<'a> PatchView<'a> {
             let phi = |edge, xi| law.map_or(0.0, |law| law.phi(self.slip_at(edge, xi)));
             let sticks = match law {
                 None => self.patch.contact.condition == Condition::Bonded,
-                Some(law) => {
-                    self.at_node(i, |edge, xi| self.slip_at(edge, xi)).abs() < law.elastic_slip
-                }
+                Some(law) => law.sticks(self.at_node(i, |edge, xi| self.slip_at(edge, xi))),
             };
             let ratio = self.at_node(i, phi);
             let stress = match &self.tractions {
@@ -464,7 +462,7 @@ impl<'a> PatchView<'a> {
         let slip = self.slip_at(edge, xi);
         let sticks = match law {
             None => self.patch.contact.condition == Condition::Bonded,
-            Some(law) => slip.abs() < law.elastic_slip,
+            Some(law) => law.sticks(slip),
         };
         let [start, end, middle] = nodes;
         let beside = match xi {

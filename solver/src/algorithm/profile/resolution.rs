@@ -207,7 +207,7 @@ impl PatchView<'_> {
         let own = own.filter(|(point, _)| point.patch == self.p);
         let mut points: Vec<(f64, f64, bool)> = own
             .map(|(point, traction)| {
-                let slips = self.system.slip(self.v, point).abs() >= law.elastic_slip;
+                let slips = !law.sticks(self.system.slip(self.v, point));
                 (point.s, *traction, slips)
             })
             .collect();
