@@ -385,6 +385,8 @@ pub enum WarningCode {
     SmoothingFlattens,
     /// A standard deviation that differs from the scatter of the points of a measured profile.
     DeviationDiffers,
+    /// An elastic slip that is not small beside the way of the obstacle.
+    ElasticSlipLarge,
     /// A contact boundary with a corner between two edges.
     ContactTurns,
     /// An obstacle that is dragged along a contact with a line of symmetry at its end.
@@ -479,6 +481,7 @@ impl WarningCode {
             | RoundingLimitsResidual
             | SmoothingFlattens
             | DeviationDiffers
+            | ElasticSlipLarge
             | LinesInside
             | SupportsOverlap
             | DeckDiffers

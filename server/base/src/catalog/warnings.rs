@@ -89,6 +89,9 @@ fn reasons(code: WarningCode) -> (&'static str, &'static str) {
         DeviationDiffers => (
             "The standard deviation decides how much of the profile is noise, and how large the stated errors are. One that is too small follows the noise, one that is too large removes the shape.",
             "Give the standard deviation of a single height about the true surface, as the instrument's data sheet or repeated measurements have it. If short features of the profile are real, measure them with more points."),
+        ElasticSlipLarge => (
+            "Friction reaches its bound only where the slip exceeds elastic_slip. Below that it acts as a spring, so that tangential forces and the parts that slip are smaller than those of friction that slips at once.",
+            "Choose a thousandth of the obstacle's way, if the length is not known from a measurement; a deck gives it by *FRICTION, ELASTIC SLIP."),
         ContactTurns => (
             "At a corner the normal jumps, and the contact conditions are different on its two sides. Stresses may grow without limit there.",
             "Name the two sides as two contacts, or round the corner."),
