@@ -18,4 +18,4 @@ for coefficient in coefficients:
 
 # a filter by label is sent: left out, it would match every job, in a bulk deletion too
 by_label = count_jobs.sync(client=client, label_key=CountJobsLabelKey.from_dict({"label.study": "nobody's"}))
-assert by_label.count == 0, by_label
+assert by_label.to_dict()["total"] == 0, by_label

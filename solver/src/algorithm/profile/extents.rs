@@ -64,6 +64,7 @@ impl PatchView<'_> {
             error: self.error_of_width(),
             ..Widths::default()
         };
+        let ends = self.stick_ends();
         let mut i = 0;
         while i < self.count() {
             if !self.engaged(i) {
@@ -83,13 +84,14 @@ impl PatchView<'_> {
                 contact.push([from, to]);
                 widths.contact += beyond[0] + (to - from) + beyond[1];
             }
-            let mut cuts = vec![from];
-            cuts.extend(
-                self.stick_ends()
-                    .into_iter()
-                    .filter(|c| *c > from && *c < to),
-            );
-            cuts.push(to);
+            // where slip reaches ε at a node and stays there, rounding decides whether there is a root
+            let mut cuts = s[first..=i].to_vec();
+            cuts.extend(ends.iter().filter(|c| **c > from && **c < to));
+            cuts.sort_by(f64::total_cmp);
+            cuts.dedup();
+            if first == i {
+                cuts.push(to);
+            }
             for (piece, pair) in cuts.windows(2).enumerate() {
                 let (list, length) = if self.sticks(0.5 * (pair[0] + pair[1])) {
                     (&mut stick, &mut widths.stick)
@@ -169,9 +171,8 @@ impl PatchView<'_> {
             return self.patch.contact.condition == Condition::Bonded;
         };
         let boundary = &self.patch.contact.boundary;
-        let edge = (0..boundary.edge_count())
-            .find(|k| boundary.edge_arc(*k)[1] >= s)
-            .unwrap_or(0);
+        let node = boundary.s.partition_point(|node| *node < s);
+        let edge = (node.saturating_sub(1) / 2).min(boundary.edge_count() - 1);
         law.sticks(self.slip_at(edge, edge3::invert(&boundary.edge_arc(edge), s)))
     }
 
