@@ -97,7 +97,9 @@ impl Deck {
             self.too_many_names(line);
             return Block::Skip;
         }
-        self.check_parameters(keyword, line);
+        if self.has_unknown_parameters(keyword, line) {
+            return Block::Skip;
+        }
         if let Some(block) = self.begin_contact(keyword, line) {
             return block;
         }
@@ -159,25 +161,29 @@ impl Deck {
     }
 
     /// Reports parameters that are not known: a misspelt one would be left out, and another set, material or step read.
-    fn check_parameters(&mut self, keyword: &Keyword, line: u64) {
+    /// True if nodes, elements or sets are not read for that.
+    fn has_unknown_parameters(&mut self, keyword: &Keyword, line: u64) -> bool {
         let Some((of, known)) = PARAMETERS.iter().find(|(of, _)| *of == keyword.name) else {
-            return;
+            return false;
         };
-        let of_mesh = matches!(*of, "NODE" | "ELEMENT" | "NSET" | "ELSET" | "INSTANCE");
-        for (name, _) in &keyword.parameters {
-            if known.iter().any(|known| same(name, known)) {
-                continue;
-            }
-            let got = format!("*{of} with {name:.40}");
-            let expected = format!("*{of} with {}", known.join(", "));
-            let hint =
-                "Correct the name, or remove the parameter if the solution does not depend on it.";
-            if of_mesh {
-                self.fault(line, Reason::NotUnderstood, got, &expected, hint);
-            } else {
-                self.doubt(line, got, &expected, hint);
-            }
+        let names = keyword.parameters.iter().map(|(name, _)| &name[..]);
+        let is_known = |name: &&str| known.iter().any(|known| same(name, known));
+        let unknown: Vec<&str> = names.filter(|name| !is_known(name)).take(5).collect();
+        if unknown.is_empty() {
+            return false;
         }
+        let got = format!("*{of} with {:.80}", unknown.join(", "));
+        let expected = format!("*{of} with {}", known.join(", "));
+        let hint =
+            "Correct the name, or remove the parameter if the solution does not depend on it.";
+        let of_mesh = matches!(*of, "NODE" | "ELEMENT" | "NSET" | "ELSET");
+        if of_mesh {
+            self.here.incomplete = Incomplete::ALL;
+            self.fault(line, Reason::NotUnderstood, got, &expected, hint);
+        } else {
+            self.doubt(line, got, &expected, hint);
+        }
+        of_mesh
     }
 
     /// Reports that the deck has too many names of sets and surfaces.
