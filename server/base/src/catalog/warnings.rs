@@ -130,7 +130,7 @@ fn reasons(code: WarningCode) -> (&'static str, &'static str) {
             "Push less, or place the obstacle nearer to the body, so that the way is short."),
         KinkInContact => (
             "At a kink of the obstacle, or at a corner of the body, the pressure grows without limit as the mesh is refined, slowly (as a logarithm) or fast.",
-            "Quote forces and averages, not the peak. Where the real shape is smooth, give more points or \"interpolation\": \"spline\"."),
+            "Quote forces and averages, not the peak. Where the real shape is smooth, give more points or \"interpolation\": \"cubic\"."),
         RadiusExceedsContact => (
             "S_ρ averages over a length that is larger than the contact: the friction bound is spread beyond the contact and nearly uniform in it.",
             "Check nonlocal_radius and its unit. It is a length of the surface's texture, which is usually much smaller than a contact."),
