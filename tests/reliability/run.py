@@ -31,24 +31,24 @@ NOTES = tempfile.NamedTemporaryFile()
 
 
 def run(command):
-    """Runs a command of the table; its figure, or nothing if it fails."""
+    """Runs a command of the table: its figure, and why it failed if it did, which is the last line that it printed."""
     words = command.split()
-    noted = {"SIGNORINI_NOTES": NOTES.name, "SIGNORINI_MEMORY_BUDGET_BYTES": str(BUDGET_BYTES)}
+    noted = {"PYTHONUNBUFFERED": "1", "SIGNORINI_NOTES": NOTES.name, "SIGNORINI_MEMORY_BUDGET_BYTES": str(BUDGET_BYTES)}
     before = os.stat(NOTES.name).st_size
     if words[0].endswith(".py"):
         words = [sys.executable, str(HERE / words[0]), *words[1:]]
     print("\n-- " + command, flush=True)
     began = time.monotonic()
-    process = subprocess.Popen(words, cwd=TOP, stdout=subprocess.PIPE, text=True, env={**os.environ, **noted})
+    process = subprocess.Popen(words, cwd=TOP, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env={**os.environ, **noted})
     last = ""
     for line in process.stdout:
         print(line, end="", flush=True)
         last = line.strip() or last
     if process.wait() != 0:
-        return ""
+        return "", last
     noted = measured(before)
     print("   %.0f s%s" % (time.monotonic() - began, noted))
-    return last.removeprefix("figure: ") + noted
+    return last.removeprefix("figure: ") + noted, ""
 
 
 def measured(before):
@@ -106,9 +106,9 @@ def main():
     failed = []
     for command in commands:
         if command and "--page" not in options:
-            figure = run(command)
+            figure, why = run(command)
             if not figure:
-                failed.append(command)
+                failed.append("%s: %s" % (command, why))
             elif "--record" in options:
                 figures[command] = {"figure": figure, "date": datetime.date.today().isoformat()}
                 FIGURES.write_text(json.dumps(figures, indent=1, ensure_ascii=False, sort_keys=True) + "\n", encoding="utf-8")
