@@ -8,6 +8,7 @@ canceling, deleting and pausing work; a canceled job does not succeed. Two resta
 space again jobs are accepted within ten seconds, without a restart, and nothing is damaged. Needs `unshare`, and leave to mount.
 """
 
+import os
 import pathlib
 import subprocess
 import time
@@ -132,7 +133,7 @@ def control(server, ended, running, queued):
 
 
 def many_contacts(count):
-    """A strip with contacts side by side: each member of a sweep over it keeps kilobytes."""
+    """A strip with contacts side by side: each member of a sweep over it keeps half a kilobyte."""
     parts = {"c%d" % i: {"side": "top", "x": [i / count - 1e-9, (i + 0.5) / count + 1e-9]} for i in range(count)}
     return {
         "analysis": {"kind": "plane_strain"},
@@ -163,6 +164,8 @@ def mesh(number, lines=60):
 class Jobs:
     """Results of jobs, deleted by a filter."""
 
+    free = 16 << 20  # bytes
+
     def __init__(self, server):
         self.server, self.number = server, 0
 
@@ -182,6 +185,8 @@ class Jobs:
 
 class Meshes:
     """Meshes, deleted one by one."""
+
+    free = 16 << 20
 
     def __init__(self, server):
         self.server, self.hashes, self.number = server, [], 0
@@ -204,6 +209,8 @@ class Meshes:
 
 class Sweep:
     """A sweep, canceled and deleted while its rows cannot be stored."""
+
+    free = 4 << 20  # less than ten thousand rows take
 
     def __init__(self, server):
         self.server, self.id = server, None
@@ -230,9 +237,8 @@ class Sweep:
 def filled_by_itself(server, kind):
     """The store fills its disk, and has all of the space again that deletions free."""
     what = kind(server)
-    # the reserve and little else are left
-    with (server.inside() / "filling").open("wb") as file:
-        file.write(bytes(30 << 20))
+    free = os.statvfs(server.inside())
+    (server.inside() / "filling").write_bytes(bytes(free.f_bavail * free.f_frsize - kind.free))
     began = time.monotonic()
     while not (what.fill() == 507 and is_full(server)):
         check(time.monotonic() < began + 180, "%s: the disk is never full" % kind.__doc__)

@@ -29,6 +29,9 @@ pub(super) enum Mode {
     Create,
 }
 
+/// For how long a connection waits for locks that others hold, such as programs that make a backup.
+pub(super) const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
+
 /// Opens the database in this file.
 pub(super) fn open(file: &Path, mode: Mode) -> Result<Connection> {
     let flags = match mode {
@@ -39,7 +42,7 @@ pub(super) fn open(file: &Path, mode: Mode) -> Result<Connection> {
     };
     // one thread uses it at a time
     let connection = Connection::open_with_flags(file, flags | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;
-    connection.busy_timeout(Duration::from_secs(5))?;
+    connection.busy_timeout(BUSY_TIMEOUT)?;
     connection.set_prepared_statement_cache_capacity(MOST_STATEMENTS);
     connection.execute_batch("pragma foreign_keys = on")?;
     Ok(connection)

@@ -1,10 +1,10 @@
 //! The space of the database on the disk: tells its size, and gives free space back to the file system.
 
-use std::{path::Path, sync::Arc};
+use std::{path::Path, sync::Arc, time::Duration};
 
 use super::{
     compact,
-    connections::blocking,
+    connections::{BUSY_TIMEOUT, blocking},
     database::{Rebuild, Store, with_advice},
     delete::PAUSE,
     error::{Result, StoreError},
@@ -61,10 +61,8 @@ impl Store {
     /// Takes free pages out of the database, some at a time; returns how many. The file has them until the log is
     /// copied into it.
     async fn free_pages(self: &Arc<Self>) -> Result<i64> {
-        let kept = match self.has_room() {
-            Ok(()) => KEPT_PAGES,
-            Err(_) => 0,
-        };
+        let full = self.reserve.is_disk_full();
+        let kept = if full { 0 } else { KEPT_PAGES };
         let mut given = 0;
         loop {
             let before = self.pages().await?;
@@ -91,20 +89,28 @@ impl Store {
     }
 
     /// Shrinks the files of the database to the size of their content: SQLite does so only after a thousand more pages
-    /// were written, and never on a full disk. If a reader still needs pages of the log, the next call does it.
+    /// were written, and never on a full disk, where the log is emptied too, since the reserve may lack just its space.
+    /// If a reader still needs pages of the log, the next call does it.
     async fn shorten_files(self: &Arc<Self>) -> Result<()> {
         let pages = self.pages().await?;
         let content = pages.bytes_of(pages.count);
+        let full = self.reserve.is_disk_full();
+        let kept = if full { 0 } else { LOG_BYTES };
         if self.length(DATABASE) > content {
             self.identity.may_shrink_to(content);
-        } else if self.length(LOG) <= LOG_BYTES {
+        } else if self.length(LOG) <= kept {
             return Ok(());
         }
-        self.write(|writer| {
+        self.write(move |writer| {
+            let connection = writer.connection();
             // waits for nobody
-            let checkpoint = "pragma wal_checkpoint(passive)";
-            writer.connection().execute_batch(checkpoint)?;
-            if writer.store.length(LOG) > LOG_BYTES {
+            connection.execute_batch("pragma wal_checkpoint(passive)")?;
+            if full {
+                connection.busy_timeout(Duration::ZERO)?;
+                let emptied = connection.execute_batch("pragma wal_checkpoint(truncate)");
+                connection.busy_timeout(BUSY_TIMEOUT)?;
+                emptied?;
+            } else if writer.store.length(LOG) > LOG_BYTES {
                 // the next transaction begins the log anew
                 writer.begin_control()?.commit()?;
             }

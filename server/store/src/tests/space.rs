@@ -442,8 +442,20 @@ async fn on_a_full_disk_all_space_of_what_is_removed_is_given_back() {
         "new jobs fill it soon"
     );
     assert!(store.reserve.release());
+    // the log is emptied as well, as soon as nobody reads it
+    let log = || std::fs::metadata(path.with_extension("db-wal")).unwrap().len();
+    let reader = open(&path, Mode::Read).unwrap();
+    let reading = reader.unchecked_transaction().unwrap();
+    reading.values::<i64>("select id from job", ()).unwrap();
     assert!(store.give_space_back().await.unwrap() > 700);
+    assert!(log() > 3 << 20, "{}", log());
+    drop(reading);
+    store.give_space_back().await.unwrap();
+    assert_eq!(log(), 0);
     assert!(bytes() < 1 << 20, "{}", bytes());
+    store.health().await.unwrap();
+    assert!(store.reserve.retake());
+    solved(&store, "ada", "2", 10_000).await;
 }
 
 #[tokio::test]
