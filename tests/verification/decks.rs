@@ -789,6 +789,44 @@ fn texts_of_other_systems_are_read() {
     assert!(abaqus::read(binary.as_bytes()).is_err());
 }
 
+/// A comma in a number divides it in two: where the second number could have a meaning, the first would be taken for
+/// zero without a word.
+#[test]
+fn decimal_commas_are_told() {
+    let load = "*CLOAD\nR, 1, 2.\n";
+    let good = block(HELD, load).replace(SECTION, &format!("{SECTION}2.5\n"));
+    let thick = corner(&good);
+    for same in [
+        good.replace("1000., .3", "1000., .3, 20."),
+        good.replace("2.5\n", "2.5,,\n"),
+        good.replace("\n2, .5, 0\n", "\n2, .5, 0, 0,\n"),
+    ] {
+        near(corner(&same), thick);
+    }
+    let cork = good.replace("1000., .3", "1000., 0");
+    assert!(abaqus::problem(&cork).is_ok());
+    for (from, to, got) in [
+        ("1000., .3", "1000., 0,3", "ν = 0, and 3 as a temperature"),
+        (
+            "1000., .3",
+            "1000,0, 0.3",
+            "ν = 0, and 0.3 as a temperature",
+        ),
+        ("1000., .3", "1000,0, 0,3", "4 elastic constants"),
+        ("2.5\n", "2,5\n", "`2,5`"),
+        ("\n2, .5, 0\n", "\n2, 0,5, 0,0\n", "`2, 0,5, 0,0`"),
+        ("R, 1, 2.", "R, 1, 2,5", "`R, 1, 2,5`: 4 fields"),
+        ("L, 1, 2\n", "L, 1, 2, 0,0\n", "`L, 1, 2, 0,0`: 5 fields"),
+    ] {
+        assert!(good.contains(from), "{from}");
+        let found = refused(&good.replacen(from, to, 1));
+        assert!(
+            found.iter().any(|text| text.contains(got)),
+            "{to}: {found:?}"
+        );
+    }
+}
+
 #[test]
 fn keywords_without_effect_are_passed_over_and_others_refused_by_name() {
     let load = "*CLOAD\nR, 1, 2.\n";

@@ -568,6 +568,14 @@ fn a_contact_that_is_not_with_a_rigid_obstacle_is_refused() {
             "*FRICTION, EXPONENTIAL DECAY",
             "EXPONENTIAL DECAY",
         ),
+        // decimal commas
+        ("0.3,\n", "0,3\n", "a coefficient of 0 with a stick slope"),
+        ("START, 4., 4.", "START, 4,0, 4,0", "`START, 4,0, 4,0`"),
+        (
+            "CIRCL, 0., 0., 0., 4.",
+            "CIRCL, 0,0, 0,0, 0,0, 4,0",
+            "`CIRCL, 0,0, 0,0",
+        ),
         (
             "0.3,\n",
             "0.3, 0., 10.\n0.2, 0., 20.\n",

@@ -5,7 +5,8 @@ use super::deck::Deck;
 use super::element::Shape;
 use super::part::Numbered;
 use super::written::{
-    Elastic, Force, MOST_CONSTANTS, Name, Prescribed, Pressure, Sides, Target, fields, number,
+    DECIMAL_POINT, Elastic, Force, MOST_CONSTANTS, Name, Prescribed, Pressure, Sides, Target,
+    fields, number,
 };
 use solver::element::{Element, Family};
 use solver::error::Reason;
@@ -202,6 +203,10 @@ impl Deck {
         let Some(word) = words.first().filter(|word| !word.is_empty()) else {
             return;
         };
+        if words[1..].iter().any(|word| !word.is_empty()) {
+            let got = format!("`{text:.40}`");
+            self.doubt(line, got, "the thickness alone", DECIMAL_POINT);
+        }
         let thickness = number(word);
         if thickness.is_none() {
             self.doubt(
@@ -350,6 +355,13 @@ impl Deck {
                 Some(value) => place[axis] = value,
                 None => sound &= word.is_empty(),
             }
+        }
+        if words.any(|word| !word.is_empty()) {
+            self.here.incomplete.nodes = true;
+            let got = format!("`{text:.60}`");
+            let expected = "a node: its number, and at most x, y, z";
+            self.fault(line, Reason::Malformed, got, expected, DECIMAL_POINT);
+            return;
         }
         let Some(label) = label.filter(|_| sound) else {
             self.here.incomplete.nodes = true;

@@ -8,7 +8,7 @@ use super::contact_parts::{
 use super::deck::Deck;
 use super::keyword::Keyword;
 use super::tool::Piece;
-use super::written::{Name, Target, fields, number};
+use super::written::{DECIMAL_POINT, Name, Target, fields, number};
 
 /// The largest number of contact pairs, of rigid bodies, and of pieces of an analytical surface.
 const MOST: usize = 1000;
@@ -368,6 +368,12 @@ impl Deck {
                 let known =
                     friction.coefficient.is_none() && values.iter().skip(2).all(Option::is_none);
                 match values.first() {
+                    Some(Some(0.0)) if values[1..].iter().any(Option::is_some) => self.doubt(
+                        line,
+                        format!("`{text:.60}`: a coefficient of 0 with a stick slope"),
+                        "a friction coefficient > 0 before a stick slope, or 0 alone",
+                        DECIMAL_POINT,
+                    ),
                     Some(Some(coefficient)) if readable && known => {
                         friction.coefficient = Some(*coefficient);
                         friction.stick_slope = values.get(1).copied().flatten();
@@ -402,6 +408,16 @@ impl Deck {
     fn segment(&mut self, name: Name, words: &[&str], line: u64, text: &str) {
         let numbers: Vec<Option<f64>> = words.iter().skip(1).map(|word| number(word)).collect();
         let point = |k: usize| Some([(*numbers.get(2 * k)?)?, (*numbers.get(2 * k + 1)?)?]);
+        // further values would be left out, such as those that decimal commas make
+        let most = if ["START", "LINE"].contains(&&words[0].to_uppercase()[..]) {
+            2
+        } else {
+            4
+        };
+        if numbers.iter().skip(most).any(Option::is_some) {
+            let expected = format!("at most {most} coordinates");
+            return self.doubt(line, format!("`{text:.60}`"), &expected, DECIMAL_POINT);
+        }
         let surface = self.here.analytical.entry(name).or_default();
         let from = surface.at;
         let piece = match (&words[0].to_uppercase()[..], from) {

@@ -8,7 +8,9 @@ use super::element::{Theory, Typed};
 use super::read::read;
 use super::rigid::Body;
 use super::supports::supports;
-use super::written::{Elastic, MOST_CONSTANTS, Name, Orientation, Section, numbered, on_line};
+use super::written::{
+    DECIMAL_POINT, Elastic, MOST_CONSTANTS, Name, Orientation, Section, numbered, on_line,
+};
 use crate::source::ReadError;
 use solver::element::Element;
 use solver::error::{Findings, Reason, Violation};
@@ -358,13 +360,8 @@ fn materials(built: &mut Built) -> Vec<Material> {
             }
             None if elastic.unreadable || !told.insert(&row.material) => {}
             None => {
-                let (got, expected) = constants(elastic);
-                built.doubt(
-                    elastic.line,
-                    got,
-                    expected,
-                    "Write the constants of one temperature in that order; other forms of elasticity must be converted.",
-                );
+                let (got, expected, hint) = constants(elastic);
+                built.doubt(elastic.line, got, expected, hint);
             }
         }
     }
@@ -427,6 +424,8 @@ impl Orientation {
 fn elasticity(elastic: &Elastic) -> Option<Elasticity> {
     // a temperature may follow
     match (&elastic.kind[..], &elastic.values[..]) {
+        // with a decimal comma in 0,3 there seems to be a temperature of 3 after a ratio of 0
+        ("ISO" | "ISOTROPIC", [_, 0.0, _]) => None,
         ("ISO" | "ISOTROPIC", [e, nu] | [e, nu, _]) => Some(Elasticity::Isotropic {
             youngs_modulus: *e,
             poissons_ratio: *nu,
@@ -449,12 +448,21 @@ fn elasticity(elastic: &Elastic) -> Option<Elasticity> {
     }
 }
 
-/// What the deck has, and what is expected, for elastic constants that are not understood.
-fn constants(elastic: &Elastic) -> (String, &'static str) {
+/// What the deck has, what is expected, and what to do, for elastic constants that are not understood.
+fn constants(elastic: &Elastic) -> (String, &'static str, &'static str) {
+    const OF_ONE_TEMPERATURE: &str = "Write the constants of one temperature in that order; other forms of elasticity must be converted.";
     let known = ["ISO", "ISOTROPIC", "ENGINEERING CONSTANTS"].contains(&&elastic.kind[..]);
     if !known {
         let got = format!("*ELASTIC, TYPE={:.40}", elastic.kind);
-        return (got, "TYPE=ISO or TYPE=ENGINEERING CONSTANTS");
+        let expected = "TYPE=ISO or TYPE=ENGINEERING CONSTANTS";
+        return (got, expected, OF_ONE_TEMPERATURE);
+    }
+    if let [e, 0.0, third] = elastic.values[..] {
+        return (
+            format!("E = {e}, ν = 0, and {third} as a temperature"),
+            "E, ν; a ν of 0 without a temperature",
+            DECIMAL_POINT,
+        );
     }
     let got = match elastic.values.len() {
         count @ ..=MOST_CONSTANTS => format!("{count} elastic constants"),
@@ -463,6 +471,7 @@ fn constants(elastic: &Elastic) -> (String, &'static str) {
     (
         got,
         "E, ν; or E1, E2, E3, ν12, ν13, ν23, G12, G13, G23; at one temperature",
+        OF_ONE_TEMPERATURE,
     )
 }
 

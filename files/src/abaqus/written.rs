@@ -19,6 +19,10 @@ pub(super) const MOST_NAMES: usize = 1 << 16;
 /// The largest number of constants of a material.
 pub(super) const MOST_CONSTANTS: usize = 10;
 
+/// Advice for a number that seems to have a decimal comma, which divides it in two.
+pub(super) const DECIMAL_POINT: &str =
+    "A comma separates values: write numbers with a decimal point, as in `0.3`.";
+
 /// A node or element, a range of them, or a set: a member of a set, or what a load acts on.
 #[derive(Clone, Debug, Eq, Ord, PartialEq, PartialOrd)]
 pub(super) enum Target {
