@@ -304,6 +304,11 @@ async fn the_state_of_a_job_without_a_solution_is_printed_and_drawn_if_it_is_ask
     // the result document says itself that it is none
     let (_, told) = ends(url, &["result", id], 0).await;
     assert!(told.contains("the result is partial"), "{told}");
+    let (rows, _) = ends(url, &["ls", "-f", "csv"], 0).await;
+    assert!(
+        rows.contains("not_converged") && !rows.contains("normal_force"),
+        "{rows}"
+    );
     let name = |file: &str| folder.path().join(file).to_str().unwrap().to_owned();
     let (csv, vtu, svg) = (name("a.csv"), name("a.vtu"), name("a.convergence.svg"));
     let figure = name("b.svg");

@@ -86,7 +86,8 @@ pub struct MemberRow {
     /// The first violations of an invalid member; pointers refer to its problem.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub violations: Vec<Violation>,
-    /// Normal force ∫p ≥ 0 over all contacts (force); the results are absent until the member is solved.
+    /// Normal force ∫p ≥ 0 over all contacts (force); the results are absent until the member is solved, and of a
+    /// member that failed.
     pub normal_force: Option<f64>,
     /// Tangential force ∫σ_t over all contacts (force).
     pub tangential_force: Option<f64>,
@@ -164,8 +165,24 @@ impl MemberRow {
         self.parameters = values.map(|(path, value)| (path, value.into())).collect();
     }
 
-    /// The row with each kind of warning once, however many contacts have it.
+    /// The row with each kind of warning once, however many contacts have it, and without the numbers of a state that is
+    /// no solution: who plots a column must not get them. A job of the member's own has that state, as a partial result.
     pub fn tidied(mut self) -> MemberRow {
+        if self.status.is_without_solution() {
+            for number in [
+                &mut self.normal_force,
+                &mut self.tangential_force,
+                &mut self.friction_force,
+                &mut self.contact_width,
+                &mut self.contact_width_error,
+                &mut self.stick_width,
+                &mut self.slip_width,
+                &mut self.peak_normal_stress,
+                &mut self.peak_tangential_stress,
+            ] {
+                *number = None;
+            }
+        }
         let mut kinds: Vec<WarningCode> = vec![];
         for code in std::mem::take(&mut self.warnings) {
             if !kinds.contains(&code) {
@@ -176,7 +193,7 @@ impl MemberRow {
         self
     }
 
-    /// The row of a member that was solved, converged or not.
+    /// The row of a member whose iterations have ended, converged or not.
     pub fn solved(number: usize, member: Member) -> MemberRow {
         let Member {
             outcome,

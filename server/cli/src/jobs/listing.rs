@@ -367,8 +367,12 @@ fn csv(documents: &[Value]) -> anyhow::Result<String> {
 /// Columns of the forces and peaks of results with their errors. Where jobs have several contacts, a column has the name
 /// of its contact too: `normal_force.hub`.
 fn quantities(documents: &[Value]) -> Vec<Column> {
+    // numbers of a state that is no solution would be taken for results
     fn of(one: &Value) -> impl Iterator<Item = &Value> {
-        one["quantities"].as_array().into_iter().flatten()
+        let status = one["status"].as_str().and_then(|name| name.parse().ok());
+        let solved = status.is_none_or(|status: Status| !status.is_without_solution());
+        let all = one["quantities"].as_array().filter(|_| solved);
+        all.into_iter().flatten()
     }
     fn name(q: &Value) -> [&str; 2] {
         ["contact", "quantity"].map(|key| q[key].as_str().unwrap_or_default())

@@ -443,7 +443,11 @@ async fn on_a_full_disk_all_space_of_what_is_removed_is_given_back() {
     );
     assert!(store.reserve.release());
     // the log is emptied as well, as soon as nobody reads it
-    let log = || std::fs::metadata(path.with_extension("db-wal")).unwrap().len();
+    let log = || {
+        std::fs::metadata(path.with_extension("db-wal"))
+            .unwrap()
+            .len()
+    };
     let reader = open(&path, Mode::Read).unwrap();
     let reading = reader.unchecked_transaction().unwrap();
     reading.values::<i64>("select id from job", ()).unwrap();
