@@ -208,8 +208,9 @@ def test_a_parameter_with_the_name_of_a_result_keeps_its_column(client: sg.Clien
     table = sweep.table()
     assert table.parameters == ["solver.thesis.friction_force"]
     assert table["solver.thesis.friction_force"].tolist() == [1, 2]
-    results = [member["friction_force"] for member in sweep.members()]
-    np.testing.assert_allclose(table["friction_force"], results)
+    # the algorithm of the thesis leads to no solution, and a member without one has no numbers
+    assert [member["friction_force"] for member in sweep.members()] == [None, None]
+    assert np.isnan(table["friction_force"]).all()
     assert {"solver.thesis.friction_force", "friction_force"} <= set(sweep.to_pandas().columns)
     # whatever the names: each column is there once
     pointers = ["/a/number", "/a.b", "/c/d", "/c.d", "/e/d", "/x/status"]
