@@ -182,6 +182,40 @@ async fn the_state_of_a_job_without_a_solution_has_to_be_asked_for() {
     }
 }
 
+/// Operations: GetProfile, GetPlot
+#[tokio::test]
+async fn a_load_step_that_converged_is_served_although_a_later_one_failed() {
+    let server = server().await;
+    let mut problem = example_json("rectangular_punch");
+    problem["solver"] = json!({ "max_iterations": 3 });
+    problem["steps"] = json!([{ "name": "rest", "indentation": 0.0 }, { "name": "press" }]);
+    let job = server.solve(&json!({ "problem": problem })).await;
+    assert_eq!(job["reason"], "not_converged", "{job:#}");
+    let id = job["id"].as_str().unwrap();
+    for (part, step, status) in [
+        ("profiles/top", "step=rest", StatusCode::OK),
+        ("profiles/top", "step=press", StatusCode::CONFLICT),
+        ("profiles/top", "step=press&partial=true", StatusCode::OK),
+        ("plots/profile.svg", "step=rest", StatusCode::OK),
+        ("plots/profile.svg", "step=press", StatusCode::CONFLICT),
+        (
+            "plots/profile.svg",
+            "step=press&partial=true",
+            StatusCode::OK,
+        ),
+        ("plots/convergence.svg", "step=0", StatusCode::OK),
+        ("plots/convergence.svg", "step=1", StatusCode::CONFLICT),
+    ] {
+        let path = format!("/v1/jobs/{id}/{part}?{step}");
+        let found = server.get(&path).send().await.unwrap();
+        assert_eq!(found.status(), status, "{path}");
+        if status == StatusCode::OK && part.ends_with("profile.svg") {
+            let figure = found.text().await.unwrap();
+            assert_eq!(figure.contains("PARTIAL"), step != "step=rest", "{path}");
+        }
+    }
+}
+
 async fn found_status(server: &Server, path: &str) -> StatusCode {
     server.get(path).send().await.unwrap().status()
 }

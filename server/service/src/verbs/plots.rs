@@ -201,7 +201,7 @@ pub fn plot<'a>(
         };
         // the rest once there is a permit, so that waiting requests use no memory for it
         let load = async {
-            let mut found = snapshot(service, caller, id, plot, partial).await?;
+            let mut found = snapshot(service, caller, id, plot).await?;
             if step.is_some() && found.job.result_available == ResultAvailable::None {
                 return Err(results::no_result(&found.job));
             }
@@ -209,6 +209,11 @@ pub fn plot<'a>(
                 None => None,
                 Some(wanted) => profiles::find_step(&mut found, wanted, id).await?,
             };
+            // the mesh is that of the problem, whatever became of the job
+            if plot != Plot::Mesh {
+                let step = step.as_ref().map(|step| &step.1);
+                results::is_step_wanted(&found.job, step, partial)?;
+            }
             let number = step.as_ref().map(|(number, _)| *number);
             let mut columns: Vec<(String, Vec<u8>)> = vec![];
             if matches!(plot, Plot::Profile | Plot::Deformed) {
@@ -277,18 +282,12 @@ async fn snapshot(
     caller: &Caller,
     id: JobId,
     plot: Plot,
-    partial: bool,
 ) -> Result<Snapshot, ApiError> {
-    let found = match plot {
+    match plot {
         // these show the problem or the iterations, and so can be drawn while the job waits or runs
-        Plot::Mesh | Plot::Convergence => jobs::snapshot(service, caller, id).await?,
-        Plot::Profile | Plot::Deformed => results::with_result(service, caller, id).await?,
-    };
-    // the mesh is that of the problem, whatever became of the job
-    if plot != Plot::Mesh {
-        results::is_wanted(&found.job, partial)?;
+        Plot::Mesh | Plot::Convergence => jobs::snapshot(service, caller, id).await,
+        Plot::Profile | Plot::Deformed => results::with_result(service, caller, id).await,
     }
-    Ok(found)
 }
 
 /// Loads the fields of a job for a figure, once there is memory for them.
@@ -299,10 +298,11 @@ async fn fields_of(
     plot: Plot,
     partial: bool,
 ) -> Result<Option<Arc<LoadedFields>>, ApiError> {
-    let found = snapshot(service, caller, id, plot, partial).await?;
+    let found = snapshot(service, caller, id, plot).await?;
     let job = found.job.clone();
     drop(found);
     if plot == Plot::Deformed {
+        results::is_wanted(&job, partial)?;
         fields::are_kept(service, &job).await?;
     }
     let fields = fields::load(service, job.key).await?;
@@ -354,8 +354,11 @@ impl Loaded {
                 Some((_, step)) => Some(&step.summary),
                 None => summary.as_ref(),
             },
-            // a load step that has ended is what it is, whatever becomes of the job
-            partial: self.step.is_none() && self.job.result_available != ResultAvailable::Final,
+            // a load step that converged is a solution, whatever becomes of the job
+            partial: match &self.step {
+                Some((_, step)) => !step.summary.converged,
+                None => self.job.result_available != ResultAvailable::Final,
+            },
             step: self.step.as_ref().map(|(_, step)| step.name.as_str()),
             profiles: &profiles,
             fields,

@@ -12,7 +12,7 @@ use solver::solution::{ContactProfile, sample};
 use store::{ProfilePoints, Snapshot};
 
 use super::{
-    results::{Found, StepResult, is_wanted, read, room_for, with_result},
+    results::{Found, StepResult, is_step_wanted, read, room_for, with_result},
     service::Service,
 };
 use crate::{
@@ -108,12 +108,13 @@ pub fn profile<'a>(
             None => None,
         };
         let mut found = with_result(service, caller, id).await?;
-        is_wanted(&found.job, partial)?;
         let available = found.job.result_available;
         let step = match step {
             None => None,
-            Some(wanted) => find_step(&mut found, wanted, id).await?.map(|step| step.0),
+            Some(wanted) => find_step(&mut found, wanted, id).await?,
         };
+        is_step_wanted(&found.job, step.as_ref().map(|step| &step.1), partial)?;
+        let step = step.map(|step| step.0);
         let here = match points {
             Points::All => ProfilePoints::All,
             Points::Friction => ProfilePoints::Friction,

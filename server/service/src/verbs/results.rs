@@ -148,7 +148,7 @@ pub(super) async fn with_result(
 /// Whether the state at which a job without a solution stopped will do.
 pub const PARTIAL: Parameter<Words<bool>> = Parameter {
     name: "partial",
-    meaning: "Whether a job that failed or was canceled is served too, with the state at which it stopped, which is not a solution; default false",
+    meaning: "Whether a job that failed or was canceled is served too, with the state at which it stopped, which is not a solution; a load step that converged is served anyway; default false",
     values: Words(|| vec![("false", false), ("true", true)]),
 };
 
@@ -165,6 +165,18 @@ pub(super) fn is_wanted(job: &Job, partial: bool) -> Result<(), ApiError> {
         reason: job.reason,
         failure: job.failure.clone().map(Box::new),
     })
+}
+
+/// As `is_wanted`, for a load step: one that converged is a solution, whatever became of the job after it. No step: the end.
+pub(super) fn is_step_wanted(
+    job: &Job,
+    step: Option<&StepResult>,
+    partial: bool,
+) -> Result<(), ApiError> {
+    is_wanted(
+        job,
+        partial || step.is_some_and(|step| step.summary.converged),
+    )
 }
 
 /// Reads a stored part of a result from its JSON.
