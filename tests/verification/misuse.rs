@@ -378,3 +378,41 @@ fn the_end_of_a_path_tells_of_a_large_slip_before_it() {
     let told = at_end.iter().find(|w| w.code == WarningCode::LargeSlip);
     assert!(told.unwrap().message.starts_with("In load step \"away\": "));
 }
+
+/// Values in `steps` are factors. Lengths in their place are told, if none of them comes near to the whole.
+#[test]
+fn factors_of_steps_that_look_like_lengths_are_told() {
+    let contact = json!({"boundary": "top", "obstacle": {"kind": "parabola", "radius": 8.0}, "indentation": 0.02,
+        "tangential_displacement": 0.002,
+        "friction": {"coefficient": 0.3, "nonlocal_radius": 0.2, "elastic_slip": 1e-5}});
+    let codes = |steps: Value| {
+        let mut document = block(&contact, 1.0);
+        document["steps"] = steps;
+        let problem = problem(&document.to_string());
+        let model = Model::new(&problem, None).unwrap();
+        let mut all = model.warnings.into_iter();
+        all.find(|w| w.code == WarningCode::FactorsSmall)
+            .map(|w| w.message)
+    };
+    let lengths = json!([{"indentation": 0.01, "tangential_displacement": 0}, {"indentation": 0.02, "tangential_displacement": 0.5}]);
+    says(
+        codes(lengths).as_deref(),
+        &[
+            "0.02 times the `indentation` of 0.02",
+            "4.0000e-4",
+            "factors",
+        ],
+    );
+    let drag = json!([{"indentation": 1, "tangential_displacement": 0.002}]);
+    says(
+        codes(drag).as_deref(),
+        &["`tangential_displacement` of 0.002"],
+    );
+    for sound in [
+        json!([]),
+        json!([{"indentation": 0.01}, {"indentation": 1}, {"indentation": 0.0}]),
+        json!([{"indentation": 1, "tangential_displacement": 0}]),
+    ] {
+        assert_eq!(codes(sound), None);
+    }
+}

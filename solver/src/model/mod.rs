@@ -215,6 +215,7 @@ impl Checks {
         all.check(self.controls(problem));
         all.check(self.thesis(problem));
         all.check(self.steps(&problem.steps));
+        self.warn_of_small_factors(problem);
         let mut numbers = Vec::new();
         for (i, contact) in problem.contacts.iter().enumerate() {
             let at = |field: &str| format!("/contacts/{i}/{field}");

@@ -387,6 +387,8 @@ pub enum WarningCode {
     DeviationDiffers,
     /// An elastic slip that is not small beside the way of the obstacle.
     ElasticSlipLarge,
+    /// Load steps that reach only a small part of the indentation or the tangential displacement.
+    FactorsSmall,
     /// A contact boundary with a corner between two edges.
     ContactTurns,
     /// An obstacle that is dragged along a contact with a line of symmetry at its end.
@@ -493,7 +495,7 @@ impl WarningCode {
             | MeshTooCoarseForRadius => Severity::Warning,
             CentreNodesDropped | ElementsReversed | RaisedToSecondOrder | RigidElementsLeftOut
             | ContactTurns | KinkInContact | SharpEdge | MaterialJunction | CohesionJumps
-            | SlowContraction => Severity::Note,
+            | SlowContraction | FactorsSmall => Severity::Note,
         }
     }
 }

@@ -92,6 +92,9 @@ fn reasons(code: WarningCode) -> (&'static str, &'static str) {
         ElasticSlipLarge => (
             "Friction reaches its bound only where the slip exceeds elastic_slip. Below that it acts as a spring, so that tangential forces and the parts that slip are smaller than those of friction that slips at once.",
             "Choose a thousandth of the obstacle's way, if the length is not known from a measurement; a deck gives it by *FRICTION, ELASTIC SLIP."),
+        FactorsSmall => (
+            "Values in `steps` multiply those of the contacts: they are factors, not lengths. A length in their place is multiplied by the length in the contact, and the obstacle hardly moves.",
+            "Write 1 for the whole indentation or tangential displacement, 0.5 for a half. If the contact has a unit length, so that the factors are lengths, nothing is wrong."),
         ContactTurns => (
             "At a corner the normal jumps, and the contact conditions are different on its two sides. Stresses may grow without limit there.",
             "Name the two sides as two contacts, or round the corner."),
