@@ -223,8 +223,12 @@ impl App {
             "listening on {address}: version {version}, store in {data}, {workers}, isolation {isolation}, {budget} of \
              memory for jobs"
         );
-        if config.allow_unauthenticated && !store.has_tokens() && !config.trust.is_on() {
-            warn!(%address, "anyone who can reach {address} can do everything: there is no token");
+        if !store.has_tokens() && !config.trust.is_on() {
+            if config.listen.ip().to_canonical().is_loopback() {
+                info!(%address, "every account of this machine can do everything: there is no token");
+            } else {
+                warn!(%address, "anyone who can reach {address} can do everything: there is no token");
+            }
         }
         Ok(App {
             address,

@@ -13,7 +13,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use solver::error::{Findings, Reason, Violation};
 use store::Store;
-use tracing::info;
+use tracing::{info, warn};
 
 use super::service::detached;
 use crate::{error::ApiError, parameters::Variable};
@@ -222,9 +222,17 @@ pub fn revoke<'a>(
     Box::pin(async move {
         let (store, by, id) = (store.clone(), caller.owner().to_owned(), id.to_owned());
         detached(async move {
-            let revoked = store.revoke_token(&id, Time::of_the_machine()).await?;
+            let now = Time::of_the_machine();
+            let revoked = store.revoke_token(&id, now).await?;
             let token = revoked.ok_or_else(|| unknown(&id))?;
             info!(token.id = id, by, "token {id} was revoked by {by}");
+            let is_admin = |token: &Token| token.is_valid(now) && token.scopes.contains(&Scope::Admin);
+            if token.scopes.contains(&Scope::Admin) && !store.tokens().iter().any(is_admin) {
+                warn!(
+                    "no valid token has the scope admin: stop the service, and create one with `signorini token create \
+                     --scope admin`"
+                );
+            }
             Ok(token)
         })
         .await
