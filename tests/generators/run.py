@@ -61,7 +61,7 @@ def prepare():
     # Node.js and npm of the environment
     os.environ["PATH"] = "%s:%s" % (ENVIRONMENT / "bin", os.environ["PATH"])
     shutil.copy(HERE / "package.json", FOLDER)
-    run("npm", "install", "--silent", "--no-audit", "--no-fund")
+    run("npm", "install", "--loglevel", "error", "--no-audit", "--no-fund")
 
 
 def openapi_python_client(description):
