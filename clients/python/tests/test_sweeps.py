@@ -211,6 +211,7 @@ def test_a_parameter_with_the_name_of_a_result_keeps_its_column(client: sg.Clien
     # the algorithm of the thesis leads to no solution, and a member without one has no numbers
     assert [member["friction_force"] for member in sweep.members()] == [None, None]
     assert np.isnan(table["friction_force"]).all()
+    np.testing.assert_array_equal(table["iterations"], [member["iterations"] for member in sweep.members()])
     assert {"solver.thesis.friction_force", "friction_force"} <= set(sweep.to_pandas().columns)
     # whatever the names: each column is there once
     pointers = ["/a/number", "/a.b", "/c/d", "/c.d", "/e/d", "/x/status"]
