@@ -22,9 +22,32 @@ pub fn external_mesh(problem: &Problem, stored: Option<Mesh>) -> Option<External
                 .filter_map(|support| support.nodes.as_deref());
             let sets: BTreeSet<&str> = sets.collect();
             let read = abaqus::read_for(text.as_bytes(), |set| sets.contains(set));
-            Some(at("/mesh/abaqus", read))
+            let mut external = at("/mesh/abaqus", read);
+            if let Ok(external) = &mut external {
+                external.warnings.extend(of_deck(problem, text));
+            }
+            Some(external)
         }
         MeshSource::Stored(_) => stored.map(|mesh| Ok(mesh.into())),
+    }
+}
+
+/// What a problem does not take over from the deck that it has as its mesh, if it is the problem of that deck: its mesh may
+/// be refined, and its solver be another.
+fn of_deck(problem: &Problem, text: &str) -> Vec<Warning> {
+    if !abaqus::has_step(text) {
+        return vec![];
+    }
+    match abaqus::problem_with_warnings(text) {
+        Ok((deck, warnings))
+            if deck.contacts == problem.contacts
+                && deck.materials == problem.materials
+                && deck.supports == problem.supports
+                && deck.loads == problem.loads =>
+        {
+            warnings
+        }
+        Ok(_) | Err(_) => vec![],
     }
 }
 

@@ -152,10 +152,37 @@ pub fn smoothed(x: &[f64], y: &[f64], deviation: f64) -> Vec<f64> {
 /// value from the cubic through two neighbours on either side; and its own relative standard deviation. `None` of fewer
 /// than [`FEWEST_SCATTERED`] values.
 pub fn scatter(x: &[f64], y: &[f64]) -> Option<[f64; 2]> {
+    let distances = distances(x, y)?;
+    let count = distances.len() as f64;
+    let variance = distances.iter().map(|d| d * d).sum::<f64>() / count;
+    // neighbouring distances are correlated: of even places by −0.8, 0.4, −0.11, 0.01, whose squares add up to 2.6
+    Some([variance.sqrt(), (2.6 / (2.0 * count)).sqrt()])
+}
+
+/// The standard deviation of values that look like measured ones: their distances from cubics through neighbours change
+/// sign from place to place, as 7 of 10 do of noise, while those of a shape keep it, and those of single kinks are few.
+pub fn noise(x: &[f64], y: &[f64]) -> Option<f64> {
+    /// The part of all pairs of neighbours above which a profile looks measured.
+    const MOST_ALIKE: f64 = 0.5;
+    /// The part of the standard deviation below which a distance may be rounding.
+    const SLIGHT: f64 = 0.1;
+    let distances = distances(x, y)?;
+    let [deviation, _] = scatter(x, y)?;
+    let turns = |pair: &&[f64]| {
+        pair[0] * pair[1] < 0.0 && pair.iter().all(|d| d.abs() > SLIGHT * deviation)
+    };
+    let turning = distances.windows(2).filter(turns).count();
+    let all = distances.len() - 1;
+    (turning as f64 > MOST_ALIKE * all as f64).then_some(deviation)
+}
+
+/// The distance of each value, but for two at either end, from the cubic through two neighbours on either side, divided by
+/// the standard deviation that it has where values have 1. `None` of fewer than [`FEWEST_SCATTERED`] values.
+fn distances(x: &[f64], y: &[f64]) -> Option<Vec<f64>> {
     if x.len() < FEWEST_SCATTERED {
         return None;
     }
-    let square = |i: usize| {
+    let distance = |i: usize| {
         let near = [i - 2, i - 1, i + 1, i + 2];
         let weight = |j: usize| {
             let others = near.iter().filter(|k| **k != j);
@@ -169,13 +196,9 @@ pub fn scatter(x: &[f64], y: &[f64]) -> Option<[f64; 2]> {
             rest -= weight * y[j];
             variance += weight * weight;
         }
-        rest * rest / variance
+        rest / variance.sqrt()
     };
-    let inner = 2..x.len() - 2;
-    let count = inner.len() as f64;
-    let variance = inner.map(square).sum::<f64>() / count;
-    // neighbouring distances are correlated: of even places by −0.8, 0.4, −0.11, 0.01, whose squares add up to 2.6
-    Some([variance.sqrt(), (2.6 / (2.0 * count)).sqrt()])
+    Some((2..x.len() - 2).map(distance).collect())
 }
 
 /// The fewest values of which the scatter is known well enough to be compared with anything.

@@ -678,7 +678,7 @@ impl<'a> LoadHistory<'a> {
         observer: &mut dyn Observer,
     ) -> Finished {
         if let (Some(last), false) = (&self.last, self.anchors_moved) {
-            self.system.move_anchors(&last.state.v, &last.bound);
+            self.system.end_increment(&last.state, &last.bound);
             self.anchors_moved = true;
         }
         let level = path.level(to);

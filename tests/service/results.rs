@@ -321,11 +321,17 @@ async fn finished_load_steps_of_a_running_job_are_served() {
     let result = server.json(&at("result")).await;
     let steps = result["steps"].as_array().unwrap();
     assert_eq!((steps.len(), &steps[0]["name"]), (1, &json!("indent")));
-    // its summary has converged; `result_available` shows that the result is partial
+    // the step has converged, and the whole is not finished
+    let summary = &result["summary"];
     assert_eq!(
-        (&result["result_available"], &result["summary"]["converged"]),
-        (&json!("partial"), &json!(true))
+        [
+            &result["result_available"],
+            &summary["outcome"],
+            &summary["converged"]
+        ],
+        [&json!("partial"), &json!("unfinished"), &json!(false)]
     );
+    assert_eq!(steps[0]["summary"]["converged"], true);
     let first = result["summary"]["normal_force"].as_f64().unwrap();
     assert!(first > 0.0);
     let profile = server.json(&at("profiles/top?step=indent")).await;

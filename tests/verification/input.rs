@@ -3,7 +3,7 @@
 use solver::error::{SolveError, Violation};
 use solver::observer::Progress;
 use solver::problem::{Contact, Elasticity, MeshSource, Problem};
-use solver::solution::WarningCode;
+use solver::solution::{Verdict, WarningCode};
 
 use crate::support::{example, problem, solve, watching};
 
@@ -355,6 +355,42 @@ fn a_contact_that_never_engages_is_reported_with_its_smallest_gap() {
         warning.message
     );
     assert!(solution.summary.contacts["top"].contact.is_empty());
+    let accuracy = solution.summary.accuracy.as_ref().unwrap();
+    assert_eq!(
+        accuracy.verdict,
+        Verdict::Poor,
+        "nothing touches: {accuracy:?}"
+    );
+    assert!(
+        accuracy.reasons[0].contains("`no_contact`"),
+        "{:?}",
+        accuracy.reasons
+    );
+}
+
+/// Of two contacts one stays open, which may be meant: the other's numbers are as good as they were.
+#[test]
+fn one_of_two_contacts_that_never_engages_limits_the_verdict() {
+    let mut p = example("cylinder");
+    p.mesh.refine = serde_json::from_str(r#"{"tolerance": 0.005}"#).unwrap();
+    let mut stop = p.contacts[0].clone();
+    stop.boundary = "right".into();
+    stop.obstacle = serde_json::from_str(r#"{"kind": "flat", "along": "arc_length"}"#).unwrap();
+    stop.indentation = -1.0;
+    stop.friction = None;
+    stop.tangential_displacement = 0.0;
+    p.contacts.push(stop);
+    let solution = solve(&p);
+    let codes = solution.summary.warnings.iter().map(|w| w.code);
+    assert_eq!(
+        codes.filter(|code| *code == WarningCode::NoContact).count(),
+        1
+    );
+    assert!(solution.summary.normal_force > 0.0);
+    assert_eq!(
+        solution.summary.accuracy.as_ref().unwrap().verdict,
+        Verdict::Fair
+    );
 }
 
 #[test]

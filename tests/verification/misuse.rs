@@ -379,6 +379,109 @@ fn the_end_of_a_path_tells_of_a_large_slip_before_it() {
     assert!(told.unwrap().message.starts_with("In load step \"away\": "));
 }
 
+/// Load steps that lead elsewhere than was meant are told, and the same steps without the fault are not.
+#[test]
+fn load_steps_that_leave_something_out_are_told() {
+    let codes = |history: &str, steps: Value| {
+        let contact = json!({"boundary": "top", "obstacle": {"kind": "parabola", "radius": 8.0}, "indentation": 0.02,
+            "tangential_displacement": 0.002,
+            "friction": {"coefficient": 0.3, "nonlocal_radius": 0.2, "elastic_slip": 1e-6, "history": history}});
+        let mut document = block(&contact, 1.0);
+        document["loads"] = json!([{"boundary": "left", "pressure": 1}]);
+        document["steps"] = steps;
+        let model = Model::new(&problem(&document.to_string()), None).unwrap();
+        let mut codes: Vec<&str> = model.warnings.iter().map(|w| w.code.as_str()).collect();
+        codes.sort_unstable();
+        codes.join(" ")
+    };
+    let press = json!({"name": "press"});
+    let drag = json!({"tangential_displacement": 1});
+    let unload = json!({"indentation": 0.5});
+    let kept = json!({"indentation": 0.5, "tangential_displacement": 1});
+    let back = json!({"tangential_displacement": -1});
+    for (history, steps, told) in [
+        ("incremental", json!([press]), "never_applied"),
+        ("incremental", json!([press, drag]), ""),
+        ("incremental", json!([drag, unload]), "drag_returns"),
+        ("incremental", json!([drag, kept]), ""),
+        ("incremental", json!([drag, {"indentation": 0}]), ""),
+        ("incremental", json!([drag, press]), ""),
+        ("incremental", json!([drag, back]), ""),
+        (
+            "incremental",
+            json!([{"tangential_displacement": 1, "loads": 0}]),
+            "never_applied",
+        ),
+        ("total", json!([press, drag]), ""),
+        ("total", json!([drag, back]), "path_forgotten"),
+        ("total", json!([drag, kept]), "path_forgotten"),
+    ] {
+        assert_eq!(codes(history, steps.clone()), told, "{history} {steps}");
+    }
+}
+
+/// Points that scatter as measured ones do are told, with what they scatter by, whatever holds them; shapes are not: smooth
+/// ones, kinked ones, and those whose rounding does not matter.
+#[test]
+fn noise_without_a_standard_deviation_is_told() {
+    let x: Vec<f64> = (-30..=30).map(|k| 0.05 * f64::from(k)).collect();
+    // a fixed sequence that has no pattern
+    let mut seed = 7_u64;
+    let noise: Vec<f64> = x
+        .iter()
+        .map(|_| {
+            seed = seed
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 33) as f64 / f64::from(1u32 << 31) - 0.5
+        })
+        .collect();
+    let told_of = |y: &dyn Fn(usize) -> f64, kind: &str| {
+        let obstacle = match kind {
+            "polyline" => {
+                json!({"kind": kind, "points": (0..x.len()).map(|k| [x[k], y(k)]).collect::<Vec<_>>()})
+            }
+            _ => {
+                json!({"kind": kind, "x": x, "gap": (0..x.len()).map(y).collect::<Vec<_>>(), "interpolation": "cubic"})
+            }
+        };
+        let contact = json!({"boundary": "middle", "obstacle": obstacle, "indentation": 0.02});
+        let model = Model::new(&problem(&block(&contact, 1.0).to_string()), None).unwrap();
+        told(&model.warnings, WarningCode::NoiseUndeclared).map(str::to_owned)
+    };
+    let shape = |k: usize| x[k] * x[k] / 16.0;
+    for kind in ["table", "polyline"] {
+        let text = told_of(&|k| shape(k) + 1e-3 * noise[k], kind);
+        says(text.as_deref(), &["scatter by", "standard_deviation"]);
+        for sound in [
+            &shape as &dyn Fn(usize) -> f64,
+            &|k| x[k].powi(4),
+            &|k| 0.1 * x[k].abs(),
+            &|k| 0.02 * (3.0 * x[k]).sin(),
+            &|k| 0.1 * x[k].abs() + if k % 10 == 0 { 0.01 } else { 0.0 },
+            &|k| shape(k) + 1e-6 * noise[k],
+        ] {
+            assert_eq!(told_of(sound, kind), None, "{kind}");
+        }
+    }
+}
+
+/// The part of the friction that the average carries beyond the contact grows with the radius, and is told above 5 %.
+#[test]
+fn friction_beyond_the_contact_is_told() {
+    let told_of = |radius: f64| {
+        let contact = json!({"boundary": "top", "obstacle": {"kind": "parabola", "radius": 8.0}, "indentation": 0.02,
+            "tangential_displacement": 0.05,
+            "friction": {"coefficient": 0.3, "nonlocal_radius": radius, "elastic_slip": 1e-4}});
+        let found = solve(&problem(&block(&contact, 1.0).to_string()));
+        let text = told(&found.summary.warnings, WarningCode::FrictionBeyondContact);
+        text.map(|text| text.split(' ').next().unwrap().parse::<f64>().unwrap())
+    };
+    assert_eq!([told_of(0.0), told_of(0.05)], [None, None]);
+    let (some, more) = (told_of(0.4).unwrap(), told_of(0.8).unwrap());
+    assert!(5.0 < some && some < more && more < 60.0, "{some} {more}");
+}
+
 /// Values in `steps` are factors. Lengths in their place are told, if none of them comes near to the whole.
 #[test]
 fn factors_of_steps_that_look_like_lengths_are_told() {

@@ -75,6 +75,7 @@ impl Caption {
             Outcome::ContactCycling => Some(Mark::Partial("contact cycling")),
             Outcome::FalseConvergence => Some(Mark::Partial("false convergence")),
             Outcome::Canceled => Some(Mark::Partial("canceled")),
+            Outcome::Unfinished => Some(UNFINISHED),
             Outcome::Converged if partial => Some(UNFINISHED),
             Outcome::Converged => verdict.map(Mark::Verdict),
         };

@@ -13,7 +13,7 @@ use super::axis::{
 };
 use super::caption::Caption;
 use super::limits::Limits;
-use super::lines::{between, dashed, thinned};
+use super::lines::{between, dashed, thinned, without_returns};
 use super::numbers::{number, rounded, tick};
 use super::page::{self, Area, Fallible, LETTERS, LegendPlace, draw_text, px};
 use super::style::{Style, Texts};
@@ -503,7 +503,11 @@ impl<'a, 'b> Axes<'a, 'b> {
     fn draw_curve(&self, curve: &Curve, points: &[(f64, f64)]) -> Fallible<()> {
         let line = stroke(&self.palette, curve.style);
         let columns = (self.right - self.left) / page::FINE;
-        let points = thinned(points, &self.across, columns);
+        let points = match curve.style {
+            LineStyle::Points(_) => points.to_vec(),
+            _ => without_returns(points, &self.up),
+        };
+        let points = thinned(&points, &self.across, columns);
         let inside = || {
             let points = points.iter().copied();
             points.filter(|p| self.up.start <= p.1 && p.1 <= self.up.end)

@@ -45,6 +45,23 @@ pub(super) fn thinned(points: &[Point], across: &Range<f64>, columns: i32) -> Ve
     kept
 }
 
+/// The points of a curve without single ones that return into the range `up` between two beyond the same end of it: beside
+/// a peak without a limit the quadratic pressure of an edge turns back between its nodes.
+pub(super) fn without_returns(points: &[Point], up: &Range<f64>) -> Vec<Point> {
+    let returns = |k: usize| {
+        let around = k
+            .checked_sub(1)
+            .and_then(|before| points.get(before))
+            .zip(points.get(k + 1));
+        around.is_some_and(|(a, b)| {
+            let inside = up.start <= points[k].1 && points[k].1 <= up.end;
+            inside && (a.1.max(b.1) < up.start || a.1.min(b.1) > up.end)
+        })
+    };
+    let kept = (0..points.len()).filter(|&k| !returns(k));
+    kept.map(|k| points[k]).collect()
+}
+
 /// Cuts a line on the page into dashes. `pattern`: the lengths of dashes and gaps in turn; an empty pattern leaves the
 /// line as it is.
 pub(super) fn dashed(line: &[Point], pattern: &[f64]) -> Vec<Vec<Point>> {
@@ -116,6 +133,19 @@ mod tests {
             few,
             "nothing to leave out"
         );
+    }
+
+    #[test]
+    fn a_point_that_returns_beside_a_peak_is_left_out() {
+        let points = [
+            -1.0, -3.0, -9.0, -2.0, -12.0, -90.0, -9.0, -1.0, -9.0, -2.0, -3.0,
+        ];
+        let points: Vec<(f64, f64)> = (0..).map(f64::from).zip(points).collect();
+        let kept = without_returns(&points, &(-5.0..1.0));
+        let places: Vec<f64> = kept.iter().map(|p| p.0).collect();
+        assert_eq!(places, [0.0, 1.0, 2.0, 4.0, 5.0, 6.0, 8.0, 9.0, 10.0]);
+        assert_eq!(without_returns(&points, &(-100.0..1.0)), points);
+        assert_eq!(without_returns(&points[..1], &(-5.0..1.0)), points[..1]);
     }
 
     #[test]

@@ -215,7 +215,7 @@ impl MemberRow {
             Outcome::NotConverged => (Status::Failed, Some(Reason::NotConverged)),
             Outcome::ContactCycling => (Status::Failed, Some(Reason::ContactCycling)),
             Outcome::FalseConvergence => (Status::Failed, Some(Reason::FalseConvergence)),
-            Outcome::Canceled => (Status::Canceled, Some(Reason::UserCancel)),
+            Outcome::Canceled | Outcome::Unfinished => (Status::Canceled, Some(Reason::UserCancel)),
         };
         let failed = status == Status::Failed;
         let detail = failed.then(|| without_solution(outcome, iterations, &residuals));

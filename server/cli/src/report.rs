@@ -69,7 +69,7 @@ pub(super) fn document(title: Option<&str>, document: &Document) -> String {
     result(title, &document.summary, steps)
 }
 
-/// Writes how reliable a result is, for readers of its files: verdict and warnings.
+/// Writes the forces and how reliable a result is, for readers of its files: verdict and warnings.
 pub(super) fn trust(document: &Document) -> String {
     let solution = &document.summary.solution;
     let verdict = solution.accuracy.iter().map(|accuracy| {
@@ -84,7 +84,24 @@ pub(super) fn trust(document: &Document) -> String {
         let text = format!("{}: {}", warning.pointer, warning.message);
         (warning.code.severity().into(), text)
     });
-    lines(verdict.chain(warnings))
+    let forces = [
+        (
+            "normal force",
+            solution.normal_force,
+            QuantityName::NormalForce,
+        ),
+        (
+            "tangential force",
+            solution.tangential_force,
+            QuantityName::TangentialForce,
+        ),
+    ];
+    let forces = forces.into_iter().map(|(words, value, name)| {
+        let error = stated(solution.accuracy.as_ref(), name, None);
+        (words, format!("{}{error}", number(value)))
+    });
+    let forces = forces.take(if solution.contacts.is_empty() { 0 } else { 2 });
+    lines(verdict.chain(forces).chain(warnings))
 }
 
 /// Writes what the row of a job says about its result, in one line: the verdict, and the forces with their errors.
@@ -228,6 +245,7 @@ impl Lines {
                 "NOT CONVERGED: the iteration converged to a state that is not a solution; see the residuals"
             }
             Outcome::Canceled => "CANCELED",
+            Outcome::Unfinished => "UNFINISHED: load steps are missing, and these are the numbers",
         };
         self.add(
             "outcome",
@@ -292,10 +310,14 @@ impl Lines {
         };
         let (normal, tangential) = (&contact.peak_normal_stress, &contact.peak_tangential_stress);
         self.add(&format!("contact {name:?}"), "");
-        self.add("  touches, s", ranges(&contact.contact));
+        use QuantityName::{ContactEnd, ContactStart, StickEnd};
+        let touches =
+            ranges(&contact.contact) + &of_ends(accuracy, &[ContactStart, ContactEnd], name);
+        self.add("  touches, s", touches);
         // without friction nothing can stick
         if tangential.is_some() || !contact.stick.is_empty() {
-            self.add("  sticks, s", ranges(&contact.stick));
+            let sticks = ranges(&contact.stick) + &of_ends(accuracy, &[StickEnd], name);
+            self.add("  sticks, s", sticks);
         }
         for (words, peak, quantity) in [
             ("  peak σ_n", normal, QuantityName::PeakNormalStress),
@@ -305,9 +327,14 @@ impl Lines {
                 continue;
             };
             let stated = stated(accuracy, quantity, Some(name));
+            // the error is that of the value, not of its place
+            let (error, remark) = match stated.starts_with(" ±") {
+                true => (stated.as_str(), ""),
+                false => ("", stated.as_str()),
+            };
             self.add(
                 words,
-                format_args!("{} at s = {s:.4}{stated}", number(*value)),
+                format_args!("{}{error} at s = {s:.4}{remark}", number(*value)),
             );
         }
     }
@@ -343,6 +370,17 @@ fn stated(accuracy: Option<&Accuracy>, name: QuantityName, contact: Option<&str>
         Some(0.0) => String::new(),
         Some(error) => format!(" ± {error:.1e}"),
         None => ", error unknown".to_owned(),
+    }
+}
+
+/// The text after intervals that states the largest error of their ends; empty if an error is unknown, or none was assessed.
+fn of_ends(accuracy: Option<&Accuracy>, names: &[QuantityName], contact: &str) -> String {
+    let all = accuracy.iter().flat_map(|accuracy| &accuracy.quantities);
+    let own = all.filter(|q| q.contact == contact && names.contains(&q.quantity));
+    let errors: Option<Vec<f64>> = own.map(|q| q.error).collect();
+    match errors.unwrap_or_default().into_iter().fold(0.0, f64::max) {
+        0.0 => String::new(),
+        error => format!(", each end ± {error:.1e}"),
     }
 }
 

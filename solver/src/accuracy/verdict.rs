@@ -131,11 +131,16 @@ pub(super) fn conclude(
     }
 }
 
-/// Warnings that make stated errors unreliable, the best verdict that each permits, and the reason in words.
+/// Warnings that make stated errors unreliable, or the result that of another problem than was meant; the best verdict
+/// that each permits, and the reason in words.
 #[rustfmt::skip] // a table
-const DOUBTFUL: [(WarningCode, Verdict, &str); 3] = [
+const DOUBTFUL: [(WarningCode, Verdict, &str); 5] = [
+    (WarningCode::NoContact, Verdict::Fair,
+        "A contact never touches its obstacle (`no_contact`): where that was not intended, the result is that of another problem."),
     (WarningCode::NotUnique, Verdict::Poor,
         "There is a second solution with other forces; the errors do not tell which of the two occurs."),
+    (WarningCode::NoiseUndeclared, Verdict::Fair,
+        "The points of an obstacle scatter as measured ones do, and have no standard deviation (`noise_undeclared`): the stated errors do not contain that."),
     (WarningCode::MeshTooCoarseForContact, Verdict::Fair,
         "The mesh is too coarse for a contact (`mesh_too_coarse_for_contact`), so that the stated errors may be too small."),
     (WarningCode::MeshTooCoarseForRadius, Verdict::Fair,
@@ -144,7 +149,16 @@ const DOUBTFUL: [(WarningCode, Verdict, &str); 3] = [
 
 /// Lowers the verdict to the best verdict that the warnings permit.
 pub fn limit_by(warnings: &[Warning], accuracy: &mut Accuracy) {
+    let mut forces = accuracy
+        .quantities
+        .iter()
+        .filter(|q| q.quantity == QuantityName::NormalForce);
+    let nothing_touches = forces.all(|force| force.value == 0.0);
     for (code, best, reason) in DOUBTFUL {
+        let best = match code {
+            WarningCode::NoContact if nothing_touches => Verdict::Poor,
+            _ => best,
+        };
         let given = warnings.iter().any(|warning| warning.code == code);
         if !given || accuracy.verdict > best {
             continue;

@@ -236,7 +236,7 @@ impl OnMesh {
 /// Why an outcome is no solution; `None` if it is a solution, or was stopped.
 fn unsolved(outcome: Outcome) -> Option<&'static str> {
     match outcome {
-        Outcome::Converged | Outcome::Canceled => None,
+        Outcome::Converged | Outcome::Canceled | Outcome::Unfinished => None,
         Outcome::NotConverged => Some("its iterations do not converge"),
         Outcome::ContactCycling => Some("its contact and slip states repeat in a cycle"),
         Outcome::FalseConvergence => Some(

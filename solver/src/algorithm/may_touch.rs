@@ -455,6 +455,7 @@ impl MayTouch {
                 .map(|&g| system.points[g].clone())
                 .collect(),
             patches: system.patches.clone(),
+            touched: system.touched.clone(),
             ..*system
         };
         (part, load)

@@ -1,5 +1,7 @@
 //! The problem reduced to Γ_C at one load level: contact nodes, friction points, and the forces between them.
 
+use std::collections::BTreeSet;
+
 use crate::body::{AXIS_SHARE, ElasticBody};
 use crate::elasticity::Dof;
 use crate::error::SolveError;
@@ -33,6 +35,8 @@ pub struct System<'a> {
     /// The work that sliding has dissipated in the increments so far, under the incremental law (force × length,
     /// without 2π).
     pub dissipated: f64,
+    /// The contacts, by their number in `patches`, that touched at the end of an earlier increment.
+    pub touched: BTreeSet<usize>,
     /// A typical nodal force of this problem, for levels at which nothing acts: the force of the full loads, or the
     /// force on a contact node that is pushed by the indentation or the drag.
     pub reference_force: f64,
@@ -125,6 +129,7 @@ pub struct Path {
     /// The anchor g of every friction point.
     anchors: Vec<f64>,
     dissipated: f64,
+    touched: BTreeSet<usize>,
     level: Level,
 }
 
@@ -239,6 +244,7 @@ impl<'a> System<'a> {
             level: Level::FULL,
             semidefinite: model.held_by_contact,
             dissipated: 0.0,
+            touched: BTreeSet::new(),
             reference_force: 0.0,
             threads: 1,
             body,
@@ -403,7 +409,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// Resets anchors and dissipated work to the start of the load path; returns what they were, with the level.
+    /// Resets what earlier increments have left to the start of the load path; returns what it was, with the level.
     pub fn restart(&mut self) -> Path {
         let anchors = self.points.iter_mut();
         Path {
@@ -411,6 +417,7 @@ impl<'a> System<'a> {
                 .map(|point| std::mem::take(&mut point.anchor))
                 .collect(),
             dissipated: std::mem::take(&mut self.dissipated),
+            touched: std::mem::take(&mut self.touched),
             level: self.level,
         }
     }
@@ -419,6 +426,7 @@ impl<'a> System<'a> {
     pub fn resume(&mut self, path: Path) {
         self.set_level(path.level);
         self.dissipated = path.dissipated;
+        self.touched = path.touched;
         for (point, anchor) in self.points.iter_mut().zip(path.anchors) {
             point.anchor = anchor;
         }
@@ -469,6 +477,7 @@ impl<'a> System<'a> {
             nodes: self.nodes.clone(),
             points: Vec::new(),
             patches: self.patches.clone(),
+            touched: self.touched.clone(),
             ..*self
         };
         for patch in bonded.patches.iter().filter(|patch| patch.law.is_some()) {
@@ -480,9 +489,13 @@ impl<'a> System<'a> {
         bonded
     }
 
-    /// Ends an increment: the anchors of points that slide or are open move with the slip by Δg, which dissipates
-    /// τ|Δg|.
-    pub fn move_anchors(&mut self, v: &[f64], bound: &[f64]) {
+    /// Ends an increment: keeps which contacts touch, and moves the anchors of points that slide or are open with the
+    /// slip by Δg, which dissipates τ|Δg|.
+    pub fn end_increment(&mut self, State { v, active }: &State, bound: &[f64]) {
+        let touch = |patch: &Patch<'_>| active[self.range(patch)].contains(&true);
+        let touching = (0..self.patches.len()).filter(|&p| touch(&self.patches[p]));
+        let touching: Vec<usize> = touching.collect();
+        self.touched.extend(touching);
         let largest = bound.iter().fold(0.0f64, |a, b| a.max(*b));
         for (g, tau) in bound.iter().enumerate() {
             let point = &self.points[g];

@@ -9,7 +9,7 @@ use crate::problem::{
     Obstacle, PrescribedBound, Smoothing, Transition, elastic_slip_rule,
 };
 use crate::solution::WarningCode;
-use crate::spline::scatter;
+use crate::spline::{noise, scatter};
 
 /// The largest number of points of a table.
 const MOST_TABLE_POINTS: usize = 100_000;
@@ -26,6 +26,10 @@ const LARGE_DEVIATION: f64 = 0.1;
 /// By how many of its own standard deviations the scatter of points may differ from the declared deviation without a
 /// warning: enough for the roundness of a profile and for noise that is not quite normal.
 const MOST_SCATTER: f64 = 5.0;
+
+/// The part of the indentation above which noise of an obstacle's points changes pressures by per cents: on meshes of ten or
+/// more elements across the contact, ten times as much.
+const LEAST_NOISE: f64 = 1e-3;
 
 /// The part of the way of the obstacle above which an elastic slip changes tangential forces by some per cent: a cylinder that
 /// is dragged by five times the elastic slip has 7 % less than with a thousandth of it.
@@ -240,6 +244,39 @@ impl Checks {
             format!(
                 "The standard deviation is {deviation:.3e}, but the points scatter by {scatter:.3e} about the curve through their neighbours: {effect}."
             ),
+        );
+    }
+
+    /// Warns of points that scatter as measured ones do, and are taken as exact.
+    pub(super) fn warn_of_noise(&mut self, contact: &Contact, pointer: &str) {
+        let [x, y] = match &contact.obstacle {
+            Obstacle::Table {
+                x,
+                gap,
+                smoothing: None,
+                ..
+            } if x.len() == gap.len() => [x.clone(), gap.clone()],
+            Obstacle::Polyline { points, .. } => {
+                [0, 1].map(|k| points.iter().map(|p| p[k]).collect())
+            }
+            _ => return,
+        };
+        if x.windows(2).any(|pair| pair[1] <= pair[0]) {
+            return;
+        }
+        let least = y.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = y.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let size = match contact.indentation.abs() {
+            0.0 => most - least,
+            pushed => pushed,
+        };
+        let Some(deviation) = noise(&x, &y).filter(|noise| *noise > LEAST_NOISE * size) else {
+            return;
+        };
+        self.warn(
+            WarningCode::NoiseUndeclared,
+            pointer,
+            format!("The points scatter by {deviation:.1e} about the curve through their neighbours, as measured ones do, and are taken as exact: the pressure follows this noise, and no stated error contains it. If they are measured, give a `table` with \"interpolation\": \"cubic\" and \"smoothing\": {{\"standard_deviation\": {deviation:.1e}}}, or what is known of the instrument."),
         );
     }
 

@@ -22,6 +22,7 @@
 //! | distinct nodes at one place | `unmerged` |
 //! | the axis of a body of revolution | `axis` |
 //! | load levels | `level` |
+//! | load steps that were probably not meant | `path` |
 //! | problems that differ in numbers only | `variable` |
 //! | collecting violations and warnings | `checks` |
 //! | checks of single numbers | `numbers` |
@@ -43,6 +44,7 @@ mod loads;
 mod materials;
 mod nodes;
 mod numbers;
+mod path;
 mod sliding;
 mod supports;
 mod units;
@@ -215,11 +217,12 @@ impl Checks {
         all.check(self.controls(problem));
         all.check(self.thesis(problem));
         all.check(self.steps(&problem.steps));
-        self.warn_of_small_factors(problem);
+        self.warn_of_path(problem);
         let mut numbers = Vec::new();
         for (i, contact) in problem.contacts.iter().enumerate() {
             let at = |field: &str| format!("/contacts/{i}/{field}");
             let obstacle = self.obstacle(&contact.obstacle, &at("obstacle"));
+            self.warn_of_noise(contact, &at("obstacle"));
             let (friction, sound) = self.friction(&analysis, contact, &at("friction"));
             all.check(sound);
             all.check(self.push_direction(&analysis, contact.direction, &at("direction")));

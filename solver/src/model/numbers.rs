@@ -224,35 +224,6 @@ impl Checks {
         all.finish(())
     }
 
-    /// Tells of load steps whose factors are all so small that they may be meant as lengths.
-    pub(super) fn warn_of_small_factors(&mut self, problem: &Problem) {
-        /// Steps that lead to less than this part of the values have another aim than to apply them.
-        const SMALL: f64 = 0.1;
-        let mut tell = |name: &str, of_step: fn(&Step) -> f64, of_contact: fn(&Contact) -> f64| {
-            let factors = problem.steps.iter().map(|step| of_step(step).abs());
-            let most = factors.fold(0.0, f64::max);
-            let lengths = problem.contacts.iter().map(|one| of_contact(one).abs());
-            let length = lengths.fold(0.0, f64::max);
-            if length > 0.0 && most > 0.0 && most <= SMALL {
-                self.warn(
-                    WarningCode::FactorsSmall,
-                    "/steps",
-                    format!("The load steps reach at most {most} times the `{name}` of {length} in `contacts`, which is {:.4e}: values in `steps` are factors, and 1 is the whole.", most * length),
-                );
-            }
-        };
-        tell(
-            "indentation",
-            |step| step.indentation,
-            |contact| contact.indentation,
-        );
-        tell(
-            "tangential_displacement",
-            |step| step.tangential_displacement,
-            |contact| contact.tangential_displacement,
-        );
-    }
-
     /// Checks that the thesis's algorithm has quadrilaterals only: it extrapolates stresses to the boundary from rows
     /// of Gauss points, which triangles lack.
     pub(super) fn thesis_elements(&mut self, problem: &Problem, mesh: &Mesh) -> Checked {

@@ -33,8 +33,14 @@ impl Checks {
         for contact in contacts {
             let boundary = &contact.boundary;
             let on_axis = |i: usize| axis.holds(boundary.positions[i]);
+            // normals of the obstacle need not be those of the line of symmetry
             let held = |i: usize| match fixed.get(&boundary.nodes[i]) {
-                Some(held @ Held::Along { .. }) => held.along(boundary.tangent(i)) == Some(0.0),
+                Some(Held::Along {
+                    direction, value, ..
+                }) => {
+                    let [x, y] = boundary.tangent(i);
+                    *value == 0.0 && (direction[0] * x + direction[1] * y).abs() > STRAIGHT_ON
+                }
                 _ => false,
             };
             let mut ends = [0, boundary.nodes.len() - 1].into_iter();

@@ -106,6 +106,9 @@ pub enum Outcome {
     FalseConvergence,
     /// The observer asked to stop; the last state is kept.
     Canceled,
+    /// Load steps are missing: these are the results at the end of those so far, while others are solved, or because the
+    /// rest was stopped.
+    Unfinished,
 }
 
 /// The scalars of a solution.
@@ -389,6 +392,14 @@ pub enum WarningCode {
     ElasticSlipLarge,
     /// Load steps that reach only a small part of the indentation or the tangential displacement.
     FactorsSmall,
+    /// A displacement, a load or a prescribed displacement that no load step applies.
+    NeverApplied,
+    /// A load step that drags the obstacle back while its indentation or the loads change.
+    DragReturns,
+    /// Load steps that turn back under the total law, which depends on the end alone.
+    PathForgotten,
+    /// Points of an obstacle that scatter as measured ones do, without a standard deviation.
+    NoiseUndeclared,
     /// A contact boundary with a corner between two edges.
     ContactTurns,
     /// An obstacle that is dragged along a contact with a line of symmetry at its end.
@@ -403,6 +414,8 @@ pub enum WarningCode {
     MeshTooCoarseForContact,
     /// A body that never touches the obstacle.
     NoContact,
+    /// A body that touched the obstacle in an earlier increment and touches it no longer.
+    ContactOpened,
     /// Contact up to the last point of an obstacle that is given by points.
     ContactReachesObstacleEnd,
     /// Contact up to a sharp edge of the obstacle or of the body.
@@ -417,6 +430,8 @@ pub enum WarningCode {
     KinkInContact,
     /// A nonlocal radius larger than the contact.
     RadiusExceedsContact,
+    /// A part of the friction that acts where the body does not touch, within a nonlocal radius of the contact.
+    FrictionBeyondContact,
     /// A prescribed friction bound that acts where the body does not touch.
     BoundBeyondContact,
     /// A friction bound that jumps at the end of the pressure.
@@ -483,6 +498,10 @@ impl WarningCode {
             | RoundingLimitsResidual
             | SmoothingFlattens
             | DeviationDiffers
+            | NoiseUndeclared
+            | NeverApplied
+            | DragReturns
+            | PathForgotten
             | ElasticSlipLarge
             | LinesInside
             | SupportsOverlap
@@ -493,9 +512,19 @@ impl WarningCode {
             | OscillatingStick
             | MeshTooCoarseForContact
             | MeshTooCoarseForRadius => Severity::Warning,
-            CentreNodesDropped | ElementsReversed | RaisedToSecondOrder | RigidElementsLeftOut
-            | ContactTurns | KinkInContact | SharpEdge | MaterialJunction | CohesionJumps
-            | SlowContraction | FactorsSmall => Severity::Note,
+            CentreNodesDropped
+            | ElementsReversed
+            | RaisedToSecondOrder
+            | RigidElementsLeftOut
+            | ContactTurns
+            | KinkInContact
+            | SharpEdge
+            | MaterialJunction
+            | CohesionJumps
+            | SlowContraction
+            | FactorsSmall
+            | ContactOpened
+            | FrictionBeyondContact => Severity::Note,
         }
     }
 }

@@ -95,6 +95,21 @@ fn reasons(code: WarningCode) -> (&'static str, &'static str) {
         FactorsSmall => (
             "Values in `steps` multiply those of the contacts: they are factors, not lengths. A length in their place is multiplied by the length in the contact, and the obstacle hardly moves.",
             "Write 1 for the whole indentation or tangential displacement, 0.5 for a half. If the contact has a unit length, so that the factors are lengths, nothing is wrong."),
+        NeverApplied => (
+            "What the problem gives is multiplied by 0 in every load step: the result is that of a problem without it.",
+            "Name it in the steps that are to apply it: 1 is the whole. tangential_displacement is 0 in a step that does not name it, everything else 1."),
+        DragReturns => (
+            "The factors of a step are reached from those of the step before. One that leaves tangential_displacement out has 0 there, and drags the obstacle back while it is pushed or unloaded: the friction force changes its sign.",
+            "Give the step the tangential_displacement of the step before, or, if the obstacle is to return, a step of its own for that."),
+        PathForgotten => (
+            "The total law, the law of the thesis, gives friction by the present displacement. It has no memory: a loop is no loop, and nothing remains after unloading. It stands for one monotonic load.",
+            "Give \"history\": \"incremental\" in friction, and enough increments in the steps. With the total law the steps are states of their own, whatever their order."),
+        NoiseUndeclared => (
+            "Without a standard deviation every point is taken as exact: the contact follows the noise, with peaks that the true surface does not have, and the stated errors do not contain it.",
+            "Give \"smoothing\": {\"standard_deviation\": …} with \"interpolation\": \"cubic\", where the points are measured; from_points of the client for Python takes it. Where the roughness is real, refine until its peaks are resolved."),
+        FrictionBeyondContact => (
+            "The law averages the pressure over nonlocal_radius on either side, so that its friction bound reaches beyond the contact by that length. A part of the friction then acts where the body does not touch, which no surface does.",
+            "Nothing, if this is the law that you want. The part is small if nonlocal_radius is a small part of the contact."),
         ContactTurns => (
             "At a corner the normal jumps, and the contact conditions are different on its two sides. Stresses may grow without limit there.",
             "Name the two sides as two contacts, or round the corner."),
@@ -116,6 +131,9 @@ fn reasons(code: WarningCode) -> (&'static str, &'static str) {
         NoContact => (
             "All contact forces are zero: the obstacle was not pushed far enough, or from the wrong side.",
             "The message has the smallest gap and the indentation that would close it. Check the sign of the indentation (positive pushes against the body), the obstacle's place and the side of the boundary."),
+        ContactOpened => (
+            "The body was in contact in an earlier increment, and has left the obstacle: the result is that of the body after unloading. Forces of this contact are zero.",
+            "Nothing, if you unload it. Otherwise look at the factors in the load steps: a step has the factor 1 on indentation and loads unless it names another, and an indentation of 0 or less takes the obstacle away."),
         ContactReachesObstacleEnd => (
             "The last point of the obstacle is pressed. If the real surface goes on there, it would press too: the force is too small, and the pressure has a peak that does not exist.",
             "Give more points, or push less. If the surface really ends there, the edge is sharp, and the peak of the pressure has no limit."),

@@ -94,7 +94,11 @@ impl<'a> Run<'a> {
     /// much as all its data, so it is not made for every step.
     pub fn document_so_far(&self, solution: &Solution) -> Result<Document, SolveError> {
         let times = self.watch.borrow_mut().times();
-        Document::new(self.problem, solution.clone(), &times, &mut || true)
+        let mut so_far = solution.clone();
+        // each of these steps says itself that it converged
+        so_far.summary.outcome = Outcome::Unfinished;
+        so_far.summary.converged = false;
+        Document::new(self.problem, so_far, &times, &mut || true)
     }
 
     /// Solves the problem by `solve`, and records the times.
@@ -296,8 +300,14 @@ mod tests {
             },
         );
         let document = document.unwrap();
-        let first = first.unwrap().history;
-        assert!(!first.is_empty() && document.history.starts_with(&first));
+        let first = first.unwrap();
+        assert!(!first.history.is_empty() && document.history.starts_with(&first.history));
+        let summary = &first.summary.solution;
+        assert_eq!(
+            (summary.outcome, summary.converged),
+            (Outcome::Unfinished, false)
+        );
+        assert!(first.steps[0].summary.converged);
     }
 
     #[test]

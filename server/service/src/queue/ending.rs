@@ -123,7 +123,7 @@ pub(super) fn ending_of_solution(document: &Document, outgrown: Option<Outgrown>
         Outcome::NotConverged => failed(Reason::NotConverged),
         Outcome::ContactCycling => failed(Reason::ContactCycling),
         Outcome::FalseConvergence => failed(Reason::FalseConvergence),
-        Outcome::Canceled => Ending {
+        Outcome::Canceled | Outcome::Unfinished => Ending {
             result: partial,
             ..outgrown.map_or_else(Ending::canceled, out_of_memory)
         },

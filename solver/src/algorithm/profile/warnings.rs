@@ -25,11 +25,17 @@ const SLIGHT: f64 = 1e-3;
 /// turn there.
 const TURN: f64 = 0.02;
 
+/// The part of the friction that may act where the body does not touch without a note.
+const MOST_BEYOND: f64 = 0.05;
+
 /// The largest part of the friction that may be lost at the ends of the boundary without a warning.
 const MOST_LOST: f64 = 0.05;
 
 /// The largest distance from the obstacle at which a node may press, as a part of the largest normal displacement.
 const MOST_EARLY: f64 = 0.01;
+
+/// The largest displacement, as a part of the gap, that rounding leaves of a body after unloading.
+const LEFT: f64 = 1e-12;
 
 /// The smallest number of edges across a contact, of which half may be modelled, with which its pressure is reliable.
 const FEWEST_EDGES: usize = 6;
@@ -44,7 +50,21 @@ impl PatchView<'_> {
         self.warn_of_displaced(warnings);
         self.warn_of_kinks(warnings);
         self.warn_of_junction(warnings);
+        self.forget_far_ends(warnings);
         self.warn_of_contact(warnings);
+    }
+
+    /// Removes the warning about an end of the obstacle that cuts an edge, if the contact does not reach as far.
+    fn forget_far_ends(&self, warnings: &mut Vec<Warning>) {
+        let contact = self.patch.contact;
+        let reached = self.active(0) || self.active(self.count() - 1);
+        if reached || contact.condition != Condition::Unilateral {
+            return;
+        }
+        warnings.retain(|warning| {
+            let own = warning.pointer.strip_suffix("/obstacle") == Some(&contact.pointer);
+            warning.code != WarningCode::ObstacleCutsEdge || !own
+        });
     }
 
     fn warn_of_contact(&self, warnings: &mut Vec<Warning>) {
@@ -62,7 +82,11 @@ impl PatchView<'_> {
         }
         let mut touching = (0..self.count()).filter(|&i| self.active(i));
         let Some(first) = touching.next() else {
-            warn(WarningCode::NoContact, self.without_contact());
+            let code = match self.system.touched.contains(&self.p) {
+                true => WarningCode::ContactOpened,
+                false => WarningCode::NoContact,
+            };
+            warn(code, self.without_contact());
             return;
         };
         let last = touching.next_back().unwrap_or(first);
@@ -119,9 +143,17 @@ impl PatchView<'_> {
         let nearer = |i: &usize| contact.push[*i][0] > 0.0;
         let nodes = (0..self.count()).filter(nearer);
         let needed = nodes.map(engages).fold(f64::INFINITY, f64::min);
+        let needed = match needed {
+            needed if needed.abs() <= LEFT * smallest.abs() => 0.0,
+            needed => needed,
+        };
         if self.missed().is_empty() {
+            let never = match self.system.touched.contains(&self.p) {
+                true => "touches the obstacle no longer",
+                false => "never touches the obstacle",
+            };
             format!(
-                "The body never touches the obstacle: the smallest gap is {smallest:.6e}. There is contact if the indentation is above {needed:.6e}."
+                "The body {never}: the smallest gap is {smallest:.6e}. There is contact if the indentation is above {needed:.6e}."
             )
         } else {
             format!(
@@ -192,9 +224,19 @@ impl PatchView<'_> {
             warn(
                 WarningCode::FrictionLostAtEnd,
                 format!(
-                    "The averaged pressure reaches beyond the end of the contact boundary, and {:.1} % of the friction is lost there: at full sliding the friction force would be {:.3} of μ times the normal force. Choose a smaller nonlocal_radius, or \"normalization\": \"conserving\".",
+                    "The averaged pressure reaches beyond the end of the obstacle, or of the boundary, and {:.1} % of the friction is lost there: at full sliding the friction force would be {:.3} of μ times the normal force. Choose a smaller nonlocal_radius, or \"normalization\": \"conserving\".",
                     100.0 * lost,
                     1.0 - lost
+                ),
+            );
+        }
+        let beyond = self.friction_beyond_contact();
+        if beyond > MOST_BEYOND {
+            warn(
+                WarningCode::FrictionBeyondContact,
+                format!(
+                    "{:.0} % of the friction acts where the body does not touch: the averaged pressure, and friction with it, reaches beyond the contact by the nonlocal radius.",
+                    100.0 * beyond
                 ),
             );
         }
@@ -210,6 +252,24 @@ impl PatchView<'_> {
                 ),
             );
         }
+    }
+
+    /// The part of ∫|σ_t| at places without pressure.
+    fn friction_beyond_contact(&self) -> f64 {
+        let law = self.patch.contact.friction.as_ref();
+        if law.and_then(|law| law.bound.radius()).unwrap_or(0.0) == 0.0 {
+            return 0.0;
+        }
+        let (mut beyond, mut whole) = (0.0, 0.0);
+        let points = self.system.points.iter().zip(&self.finished.tractions);
+        for (point, traction) in points.filter(|(point, _)| point.patch == self.p) {
+            let active = &self.finished.state.active;
+            let touches = point.nodes.iter().any(|&node| active[node]);
+            let friction = point.weight * traction.abs();
+            whole += friction;
+            beyond += if touches { 0.0 } else { friction };
+        }
+        if whole > 0.0 { beyond / whole } else { 0.0 }
     }
 
     /// The part of ∫p that averaging moves beyond the ends of the contact boundary, where no friction acts.
