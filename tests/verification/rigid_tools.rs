@@ -513,6 +513,88 @@ fn fillets_are_a_spline() {
     close(numbers(&solve(&exact)), numbers(&solve(&problem)), 1e-5);
 }
 
+/// Friction depends on the way to the end of a step: an amplitude that goes beyond the end and back is refused with friction,
+/// and one that only rises is not. Without friction the end is all there is.
+#[test]
+fn an_amplitude_that_turns_back_is_refused_with_friction() {
+    let deck = |friction: &str, amplitude: &str| {
+        let whole = block(0.0)
+            + &touching(ROLLER, friction)
+            + &format!("*AMPLITUDE, NAME=A\n{amplitude}\n")
+            + &pressed([0.0, -0.05]);
+        assert!(whole.contains("*STATIC\n*BOUNDARY\n"), "{whole}");
+        whole.replace("*STATIC\n*BOUNDARY\n", "*STATIC\n*BOUNDARY, AMPLITUDE=A\n")
+    };
+    let friction = "*FRICTION, ELASTIC SLIP=1e-4\n0.3,\n";
+    let (turns, falls, rises) = (
+        "0., 0., 0.5, 2., 1., 1.",
+        "0., 1., 0.5, -1., 1., 0.5",
+        "0., 0., 0.5, 0.7, 1., 1., 2., 0.",
+    );
+    for amplitude in [turns, falls] {
+        let found = doubts(&deck(friction, amplitude));
+        let told = |text: &String| text.contains("rises and falls within the step");
+        assert!(!found.is_empty() && found.iter().all(told), "{found:#?}");
+        assert!(abaqus::problem(&deck("", amplitude)).is_ok());
+    }
+    assert!(
+        abaqus::problem(&deck(friction, rises)).is_ok(),
+        "it falls after the end of the step"
+    );
+}
+
+/// Friction with a stick slope, or by Lagrange multipliers, acts at once: its elastic slip is a part of the way, and not of
+/// the sides, which may be as long.
+#[test]
+fn the_elastic_slip_of_friction_that_acts_at_once_is_a_part_of_the_way() {
+    for (friction, expected) in [
+        ("*FRICTION\n0.3, 1e6\n", 1e-3 * 0.05),
+        ("*FRICTION, LAGRANGE\n0.3,\n", 1e-3 * 0.05),
+        ("*FRICTION\n0.3,\n", 0.005 * 0.5),
+        ("*FRICTION, ELASTIC SLIP=2e-4\n0.3, 1e6\n", 2e-4),
+    ] {
+        let deck = block(0.0) + &touching(ROLLER, friction) + &pressed([0.0, -0.05]);
+        let law = read(&deck).contacts[0].friction.clone().unwrap();
+        assert!(
+            (law.elastic_slip - expected).abs() < 1e-12,
+            "{friction}: {}",
+            law.elastic_slip
+        );
+    }
+}
+
+/// A half model of a deck, whose rigid surface ends its way beside the line of symmetry, and is no longer level there.
+#[test]
+fn a_dragged_half_model_is_told_whatever_the_obstacle_is() {
+    let obstacle = |at: f64| {
+        let points: Vec<[f64; 2]> = (-60..=60)
+            .map(|k| {
+                let x = 0.05 * f64::from(k);
+                [x + at, x * x / 16.0]
+            })
+            .collect();
+        json!({"kind": "polyline", "points": points, "interpolation": "cubic"})
+    };
+    for at in [0.0, 0.02] {
+        let problem = json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {"grid": {"x": [0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 1, 2, 3], "y": [-3, -1, -0.4, -0.1, 0]}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}, {"boundary": "left", "ux": 0}],
+            "contacts": [{"boundary": "top", "obstacle": obstacle(at), "normal": "obstacle", "indentation": 0.01,
+                "tangential_displacement": 0.02,
+                "friction": {"coefficient": 0.3, "nonlocal_radius": 0, "elastic_slip": 1e-4}}],
+        });
+        let problem = files::parse(&problem.to_string()).unwrap();
+        let model = solver::model::Model::new(&problem, None).unwrap();
+        let codes: Vec<WarningCode> = model.warnings.iter().map(|w| w.code).collect();
+        assert!(
+            codes.contains(&WarningCode::SymmetricDrag),
+            "at {at}: {codes:?}"
+        );
+    }
+}
+
 /// What cannot be translated is refused in words, with what is written instead.
 #[test]
 fn a_contact_that_is_not_with_a_rigid_obstacle_is_refused() {

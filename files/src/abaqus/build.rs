@@ -465,6 +465,13 @@ impl Merged {
         for (line, amplitude, value) in prescribed.chain(pressures).chain(forces) {
             let Some(name) = amplitude else { continue };
             match deck.factor(name) {
+                Ok(_) if deck.turns(name) && deck.has_friction() => self.doubts.add(on_line(
+                    line,
+                    Reason::NotUnderstood,
+                    format!("the amplitude `{name:.60}`, which rises and falls within the step, in a deck with friction"),
+                    "an amplitude that only rises, or only falls",
+                    "Friction depends on the way to the end: write a *STEP for each part of the amplitude.",
+                )),
                 Ok(factor) => *value *= factor,
                 Err(got) => self.doubts.add(on_line(
                     line,

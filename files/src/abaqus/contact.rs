@@ -20,6 +20,11 @@ use solver::solution::{Warning, WarningCode};
 /// The default of Abaqus for the elastic slip, in lengths of an element's side.
 const SLIP_TOLERANCE: f64 = 0.005;
 
+/// The elastic slip of friction that acts at once, as a part of the way of the rigid surface: as [`elastic_slip_rule`] has it.
+///
+/// [`elastic_slip_rule`]: solver::problem::elastic_slip_rule
+const SLIP_PART: f64 = 1e-3;
+
 /// The largest sine of the angle between two directions that count as parallel, since coordinates in files are rounded.
 const STRAIGHT: f64 = 1e-6;
 
@@ -207,9 +212,15 @@ impl Source<'_> {
         let surfaces = self.surfaces(line, names, remarks)?;
         let placed = self.placed(pair, &surfaces, remarks)?;
         let interaction = self.interaction(pair, remarks);
+        let shape = placed.shape(others, self.axisymmetric);
         let friction = interaction.and_then(|i| i.friction.as_ref());
-        let friction = friction.and_then(|said| self.friction(said, placed.edges, remarks));
-        let shape = match placed.shape(others, self.axisymmetric) {
+        let friction = friction.and_then(|said| {
+            let moved = shape
+                .as_ref()
+                .map_or([0.0; 2], |shape| largest(&shape.moved));
+            self.friction(said, placed.edges, moved, remarks)
+        });
+        let shape = match shape {
             Ok(shape) => shape,
             Err((got, expected)) => {
                 let got = format!("{got} (the rigid surface `{:.60}`)", surfaces.tool);
@@ -237,6 +248,29 @@ impl Source<'_> {
         })
     }
 
+    /// The names of surfaces that a contact pair may have, in words.
+    fn known_surfaces(&self) -> String {
+        let list = |names: Vec<&str>| match names.len() {
+            0 => "none".to_owned(),
+            _ => {
+                let names = names.into_iter().take(20);
+                let names: Vec<String> = names.map(|name| format!("`{name:.60}`")).collect();
+                names.join(", ")
+            }
+        };
+        let body = self
+            .mesh
+            .boundaries
+            .iter()
+            .filter(|(_, edges)| !edges.is_empty());
+        let rigid = self.tools.by_surface.keys();
+        format!(
+            "Surfaces of the body: {}; rigid surfaces: {}.",
+            list(body.map(|(name, _)| name.as_str()).collect()),
+            list(rigid.map(String::as_str).collect())
+        )
+    }
+
     /// Tells the boundary of the elastic body and the rigid surface of a contact pair apart.
     fn surfaces<'s>(
         &'s self,
@@ -253,7 +287,7 @@ impl Source<'_> {
                     line,
                     format!("a contact of two deformable bodies, `{first:.60}` and `{second:.60}`"),
                     "one surface of the elastic body, and one of a *RIGID BODY",
-                    "Both bodies cannot be elastic here. If one is much stiffer, make it rigid: *RIGID BODY, ELSET=…, REF NODE=….",
+                    &format!("Both bodies cannot be elastic here. If one is much stiffer, make it rigid: *RIGID BODY, ELSET=…, REF NODE=…. {}", self.known_surfaces()),
                 );
             }
             [Some(_), Some(_)] => {
@@ -296,7 +330,7 @@ impl Source<'_> {
                 line,
                 format!("`{name:.60}` in a contact pair"),
                 "a surface with sides of the elastic body's surface",
-                "Name it by *SURFACE, TYPE=ELEMENT.",
+                &format!("Sides are those on the outside of the body: of a set of elements only S1 … S4 that no other element shares, of a set of nodes those of which all nodes are in it, midside nodes too. {}", self.known_surfaces()),
             );
         };
         let Some(pieces) = chain(surfaces.pieces) else {
@@ -361,10 +395,12 @@ impl Source<'_> {
     }
 
     /// Translates friction into Coulomb's law, which depends on the load path; `None` if the contact is frictionless.
+    /// `moved`: the largest indentation and tangential displacement.
     fn friction(
         &self,
         said: &DeckFriction,
         edges: &[Edge],
+        moved: [f64; 2],
         remarks: &mut Remarks,
     ) -> Option<Friction> {
         let line = said.line;
@@ -380,12 +416,23 @@ impl Source<'_> {
             return None;
         }
         let side = self.mean_side(edges);
-        let tolerance = said.slip_tolerance.unwrap_or(SLIP_TOLERANCE);
-        let elastic_slip = said.elastic_slip.unwrap_or(tolerance * side);
-        if said.elastic_slip.is_none() && said.slip_tolerance.is_none() {
-            let ours = format!(
-                "the elastic slip is {elastic_slip:.4e} here, {SLIP_TOLERANCE} of the mean side of the contact"
-            );
+        let way = moved[0].abs().max(moved[1].abs());
+        let at_once = said.stick_slope.is_some() || said.lagrange;
+        let (elastic_slip, rule) = match (said.elastic_slip, said.slip_tolerance) {
+            (Some(slip), _) => (slip, ""),
+            (None, Some(tolerance)) => (tolerance * side, ""),
+            // friction that is meant to act at once is not that of a length of the mesh
+            (None, None) if at_once && way > 0.0 => (
+                SLIP_PART * way,
+                "a thousandth of the way of the rigid surface",
+            ),
+            (None, None) => (
+                SLIP_TOLERANCE * side,
+                "0.005 of the mean side of the contact",
+            ),
+        };
+        if !rule.is_empty() {
+            let ours = format!("the elastic slip is {elastic_slip:.4e} here, {rule}");
             remarks.differs(match (said.stick_slope, said.lagrange) {
                 (Some(slope), _) => format!("*FRICTION on line {line}: the stick slope of {slope:e} makes the slip at which friction is reached proportional to the pressure; {ours}. SLIP TOLERANCE or ELASTIC SLIP sets it."),
                 (None, true) => format!("*FRICTION on line {line}: LAGRANGE sticks without slip; {ours}."),

@@ -195,6 +195,32 @@ impl Deck {
         )
     }
 
+    /// Whether an amplitude rises and falls before the end of the current step.
+    pub(super) fn turns(&self, name: &Name) -> bool {
+        let (Some(amplitude), Ok(last)) = (self.amplitudes.get(name), self.factor(name)) else {
+            return false;
+        };
+        let (times, _) = amplitude.values.as_chunks::<2>();
+        let end = self.period.unwrap_or(1.0);
+        let within = times.iter().filter(|[time, _]| *time < end);
+        let factors: Vec<f64> = within.map(|[_, factor]| *factor).chain([last]).collect();
+        let (mut rises, mut falls) = (false, false);
+        for pair in factors.windows(2) {
+            rises |= pair[1] > pair[0];
+            falls |= pair[1] < pair[0];
+        }
+        rises && falls
+    }
+
+    /// Whether a contact has friction, so that the way to the end of a step matters.
+    pub(super) fn has_friction(&self) -> bool {
+        let mut laws = self.contact.interactions.values();
+        laws.any(|law| {
+            let friction = law.friction.as_ref();
+            friction.is_some_and(|said| said.coefficient.is_some_and(|mu| mu != 0.0))
+        })
+    }
+
     pub(super) fn target(&mut self, word: &str) -> Target {
         match word.parse() {
             Ok(label) => Target::Label(label),
