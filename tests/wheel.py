@@ -121,6 +121,10 @@ def the_program_works(root, times):
     demo = times("signorini demo", lambda: root.run("signorini", "demo", path=path))
     assert demo.strip(), "the demo prints nothing"
     print("    its last line: " + demo.strip().splitlines()[-1])
+    # what the documentation runs from the folder of the sources
+    command = "signorini examples files && cd files && signorini solve tests/data/abaqus/roller-cpe8.inp"
+    solved = times("signorini examples, and a deck from there", lambda: root.run("sh", "-c", command, path=path))
+    assert "normal force" in solved, solved
 
 
 def the_client_finds_its_own_program(root, times):

@@ -223,6 +223,75 @@ fn the_help_lists_every_exit_code() {
     assert_eq!(unknown.status.code(), Some(2));
 }
 
+/// The problem that a deck is converted to has the solution of the deck, and can be changed; what is no deck with a step,
+/// or no deck at all, is told as `solve` tells it.
+#[test]
+fn a_deck_is_converted_to_a_problem_with_the_same_solution() {
+    let top = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+    let deck = format!("{top}/tests/data/abaqus/roller-cpe8.inp");
+    let run = |arguments: &[&str]| Command::new(SIGNORINI).args(arguments).output().unwrap();
+    let converted = run(&["convert", &deck]);
+    assert_eq!(converted.status.code(), Some(0));
+    let told = String::from_utf8_lossy(&converted.stderr);
+    assert!(told.contains("spline"), "as `solve` warns: {told}");
+    let mut problem: Value = serde_json::from_slice(&converted.stdout).unwrap();
+    let force = |output: &Output| {
+        let text = String::from_utf8_lossy(&output.stdout);
+        let line = text.lines().find(|line| line.starts_with("normal force"));
+        line.unwrap_or_else(|| panic!("{text}")).to_owned()
+    };
+    let solved = solve(&problem.to_string(), &[]);
+    assert_eq!(force(&solved), force(&run(&["solve", &deck])));
+    let told = String::from_utf8_lossy(&solved.stdout);
+    assert!(
+        told.contains("spline"),
+        "it has the differences from the deck: {told}"
+    );
+    problem["contacts"][0]["friction"] =
+        json!({"coefficient": 0.5, "nonlocal_radius": 0.1, "elastic_slip": 1e-4});
+    problem["mesh"]["refine"] = json!(1);
+    assert_ne!(force(&solve(&problem.to_string(), &[])), force(&solved));
+
+    let mesh = format!("{top}/tests/data/gmsh/fillet-mixed-msh41-binary.msh");
+    assert_eq!(run(&["convert", &mesh]).status.code(), Some(2));
+    assert_eq!(run(&["convert", "/nowhere.inp"]).status.code(), Some(1));
+}
+
+#[test]
+fn the_files_of_the_documentation_are_written_and_those_that_are_there_are_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("a/b");
+    let write = || {
+        let output = Command::new(SIGNORINI)
+            .arg("examples")
+            .arg(&target)
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(0), "{output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let first = write();
+    assert!(
+        first.contains("files written") && !first.contains("stay"),
+        "{first}"
+    );
+    let problem = target.join("examples/sheet.json");
+    std::fs::write(&problem, "mine").unwrap();
+    let again = write();
+    assert!(
+        again.starts_with("0 files written") && again.contains("stay as they are"),
+        "{again}"
+    );
+    assert_eq!(std::fs::read_to_string(&problem).unwrap(), "mine");
+    let file = Command::new(SIGNORINI)
+        .arg("examples")
+        .arg(&problem)
+        .output()
+        .unwrap();
+    assert_eq!(file.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&file.stderr).contains("cannot make the folder"));
+}
+
 #[test]
 fn every_format_is_written_and_no_other_file_is_left() {
     let folder = tempfile::tempdir().unwrap();

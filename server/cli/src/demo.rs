@@ -117,7 +117,7 @@ const NEXT: &str = "What to do next
   signorini submit problem.json --watch          send it a problem, and watch it converge
   signorini schema                               all fields of a problem, with their meaning
 
-The folder examples has the five problems, docs/tutorial.md leads from here to a figure of a study.
+`signorini examples FOLDER` writes the five problems, docs/tutorial.md leads from here to a figure of a study.
 ";
 
 /// Shows on a terminal which job is waited for, in a line that the next one replaces.

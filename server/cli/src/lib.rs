@@ -6,7 +6,7 @@
 //! |---|---|
 //! | commands of the service | `serve`, `token`, `backup`, `restore`, `doctor`, `health`, `config` |
 //! | settings of `serve` and their sources | `settings` |
-//! | commands without a service | `solve`, `sweep`, `demo`, `explain` |
+//! | commands without a service | `solve`, `sweep`, `convert`, `demo`, `examples`, `explain` |
 //! | tokens for services | `login`, `kept_tokens` |
 //! | commands for a running service | `jobs` |
 //! | calls of the service and its refusals | `service`, `client` |
@@ -21,9 +21,10 @@
 mod backup;
 mod client;
 mod config;
+mod convert;
 mod demo;
 mod doctor;
-pub mod examples;
+mod examples;
 mod exit;
 mod explain;
 mod health;
@@ -106,6 +107,12 @@ enum Command {
     Jobs(jobs::Command),
     /// Print the JSON Schema of a problem: every field with its meaning and default
     Schema,
+    /// Print the problem of a deck as JSON: to change it, or to submit it with any client. Exit code: 0 printed, 2 not a
+    /// problem, 1 anything else
+    Convert(convert::Arguments),
+    /// Write the problems, decks and meshes of the documentation to a folder. Exit code: 0 written, 1 they cannot be
+    /// written
+    Examples(examples::Arguments),
     /// Explain an error code and what to do about it
     Explain(explain::Arguments),
     /// Print the OpenAPI 3.0 description of the REST API
@@ -192,6 +199,8 @@ pub fn main() -> ExitCode {
         Command::Completions(arguments) => pages::completions(&arguments, Cli::command()),
         Command::Man(arguments) => pages::man(&arguments, Cli::command()),
         Command::Schema => solve::schema(),
+        Command::Convert(arguments) => convert::run(&arguments),
+        Command::Examples(arguments) => examples::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
         Command::Openapi { reference } => {
             let text = if reference {

@@ -130,15 +130,24 @@ impl Service {
     /// Prepares calls to the service at this address, with the token of the environment, or else the one that `login` has
     /// kept.
     pub(super) fn at(url: &str, trust: &Trust) -> anyhow::Result<Service> {
-        let token = std::env::var("SIGNORINI_TOKEN").ok();
-        let token = match token.filter(|token| !token.is_empty()) {
-            Some(token) => Some(token),
-            None => kept_tokens::token_for(url)?,
+        let given = std::env::var("SIGNORINI_TOKEN").unwrap_or_default();
+        let token = match given.trim() {
+            "" => kept_tokens::token_for(url)?,
+            // no header can carry it
+            token if !token.bytes().all(|byte| byte.is_ascii_graphic()) => {
+                bail!(
+                    "SIGNORINI_TOKEN is not a token: it has a space, a line break or a character that no token has"
+                );
+            }
+            token => Some(token.to_owned()),
         };
         Service::with_token(url, trust, token)
     }
 
     fn with_token(url: &str, trust: &Trust, token: Option<String>) -> anyhow::Result<Service> {
+        if !url.contains("://") {
+            bail!("the address {url} has no scheme: write http://{url}, or https://");
+        }
         let Way { client, proxy } = trust.client(url)?;
         let url = url.trim_end_matches('/').to_owned();
         Ok(Service {

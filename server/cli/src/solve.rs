@@ -83,7 +83,7 @@ pub(super) fn run(
     }: &Arguments,
 ) -> anyhow::Result<Exit> {
     let start = Instant::now();
-    let (problem, told) = problem(file)?;
+    let (problem, _) = problem(file)?;
     let parse_s = start.elapsed().as_secs_f64();
     let contacts = problem.contacts.iter();
     let contacts: Vec<&str> = contacts.map(|contact| contact.boundary.as_str()).collect();
@@ -96,10 +96,7 @@ pub(super) fn run(
     let estimate = estimate.map_err(|violation| invalid(file, &[violation]))?;
     check_memory(estimate, memory, file.display())?;
     let solve = |observer: &mut dyn Observer| {
-        let mut external = files::external_mesh(&problem, stored.clone());
-        if let Some(Ok(external)) = &mut external {
-            external.warnings.extend(told.iter().cloned());
-        }
+        let external = files::external_mesh(&problem, stored.clone());
         solver::solve_on(&problem, external, observer)
     };
     let mut view = View::new(To::Error);
@@ -284,7 +281,7 @@ fn only_a_mesh(file: &Path) -> anyhow::Result<Ended> {
 }
 
 /// Reads the problem in a file; returns it with warnings about what it does not take over from a deck.
-fn problem(file: &Path) -> anyhow::Result<(Problem, Vec<Warning>)> {
+pub(super) fn problem(file: &Path) -> anyhow::Result<(Problem, Vec<Warning>)> {
     match read(file) {
         Ok(Some(found)) => Ok(found),
         Ok(None) => Err(only_a_mesh(file)?.into()),
