@@ -725,19 +725,30 @@ async fn the_command_line_manages_tokens() {
 #[tokio::test]
 async fn a_service_that_others_reach_needs_tokens_or_says_so() {
     let folder = tempfile::tempdir().unwrap();
-    let serve = |more: &[&str]| {
+    let at = |address: &str, more: &[&str]| {
         let mut command = std::process::Command::new(SIGNORINI);
         command
-            .args(["serve", "--listen", "0.0.0.0:0", "--data"])
+            .args(["serve", "--listen", address, "--data"])
             .arg(folder.path().join("data"))
             .args(more);
         command
     };
-    let refused = serve(&[]).output().unwrap();
-    let told = String::from_utf8(refused.stderr).unwrap();
+    let serve = |more: &[&str]| at("0.0.0.0:0", more);
+    // the name is for clients of a proxy, which are other machines, too
+    let behind_a_proxy = at("127.0.0.1:0", &["--allowed-host", "lab.example"]);
+    for mut open in [serve(&[]), behind_a_proxy] {
+        let refused = open.output().unwrap();
+        let told = String::from_utf8(refused.stderr).unwrap();
+        assert!(
+            refused.status.code() == Some(2) && told.contains("token create"),
+            "{told}"
+        );
+    }
+    let pattern = serve(&["--allowed-host", "http://lab.example/"])
+        .output()
+        .unwrap();
     assert!(
-        refused.status.code() == Some(2) && told.contains("token create"),
-        "{told}"
+        String::from_utf8_lossy(&pattern.stderr).contains("a name without scheme, path or pattern")
     );
     for more in [
         &["--allow-unauthenticated"][..],
@@ -764,6 +775,7 @@ async fn foreign_hosts_and_origins_are_refused() {
         "lab.example",
         "--allowed-origin",
         "https://dashboard.example",
+        "--allow-unauthenticated",
     ];
     let server = Server::start(SIGNORINI, &arguments).await;
     let own = server.url.trim_start_matches("http://").to_owned();

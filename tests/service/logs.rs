@@ -106,6 +106,7 @@ async fn each_request_and_each_end_of_a_job_is_one_line() {
         (&json!("local"), &json!(bytes))
     );
     assert_eq!(routed[0]["request_id"], "my.request-1");
+    assert_eq!(routed[0]["client"], "127.0.0.1");
     assert_eq!(routed[0]["trace_id"], "4bf92f3577b34da6a3ce929d0e0e4736");
     assert!(routed[0]["duration_s"].as_f64().unwrap() > 0.0);
     let unknown = of("route", "unknown");

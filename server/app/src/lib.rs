@@ -149,20 +149,32 @@ fn retention(config: &Config) -> Retention {
 /// The error that everybody could use the service from other machines, because it has no authentication.
 #[derive(Clone, Copy, Debug, thiserror::Error)]
 #[error(
-    "{0} can be reached from other machines, and there is no token: anyone who reaches it could do everything. Create a token \
-     first (`signorini token create --help`), or name a proxy that identifies users (--trusted-proxy), or listen on \
-     127.0.0.1; --allow-unauthenticated starts it anyway"
+    "{0} can be reached from other machines, directly or through the proxy that --allowed-host is for, and there is no token: \
+     anyone who reaches it could do everything. Create a token first (`signorini token create --help`), or name a proxy that \
+     identifies users (--trusted-proxy), or listen on 127.0.0.1 without --allowed-host; --allow-unauthenticated starts it anyway"
 )]
 pub struct OpenToAll(SocketAddr);
 
-fn refuse_open(config: &Config, store: &Store) -> Result<(), OpenToAll> {
-    let closed = config.listen.ip().to_canonical().is_loopback()
-        || store.has_tokens()
-        || config.trust.is_on();
-    if closed || config.allow_unauthenticated {
-        Ok(())
+/// Who can use the service without a token.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum OpenTo {
+    Nobody,
+    /// Every account of this machine.
+    Machine,
+    /// Everyone who reaches the address.
+    Network,
+}
+
+fn open_to(config: &Config, store: &Store) -> OpenTo {
+    // a name for other machines means that a proxy passes their requests on
+    let local =
+        config.listen.ip().to_canonical().is_loopback() && config.web.allowed_hosts.is_empty();
+    if store.has_tokens() || config.trust.is_on() {
+        OpenTo::Nobody
+    } else if local {
+        OpenTo::Machine
     } else {
-        Err(OpenToAll(config.listen))
+        OpenTo::Network
     }
 }
 
@@ -194,7 +206,10 @@ impl App {
             Isolation::Thread => Solver::Threads(solver::solve_on),
             Isolation::Process => Solver::Processes(Processes::new(worker_process)),
         };
-        refuse_open(config, &store)?;
+        let open_to = open_to(config, &store);
+        if open_to == OpenTo::Network && !config.allow_unauthenticated {
+            return Err(OpenToAll(config.listen).into());
+        }
         let exporting = match &config.telemetry.otlp_endpoint {
             Some(endpoint) => Some(spans::start(endpoint).context("spans cannot be sent")?),
             None => None,
@@ -223,12 +238,14 @@ impl App {
             "listening on {address}: version {version}, store in {data}, {workers}, isolation {isolation}, {budget} of \
              memory for jobs"
         );
-        if !store.has_tokens() && !config.trust.is_on() {
-            if config.listen.ip().to_canonical().is_loopback() {
-                info!(%address, "every account of this machine can do everything: there is no token");
-            } else {
-                warn!(%address, "anyone who can reach {address} can do everything: there is no token");
-            }
+        match open_to {
+            OpenTo::Nobody => {}
+            OpenTo::Machine => info!(
+                %address, "every account of this machine can do everything: there is no token"
+            ),
+            OpenTo::Network => warn!(
+                %address, "anyone who can reach {address} can do everything: there is no token"
+            ),
         }
         Ok(App {
             address,

@@ -1,6 +1,6 @@
 //! The allowed values of a parameter: describes them, reads them, and lists them in errors.
 
-use std::ops::RangeInclusive;
+use std::{borrow::Cow, ops::RangeInclusive};
 
 use serde_json::json;
 use strum::VariantArray;
@@ -20,6 +20,11 @@ pub trait Values {
 
     /// The value that this text stands for; `None` if it is not allowed.
     fn read(&self, text: &str) -> Option<Self::Value>;
+
+    /// The part of a text that is not allowed, for errors; all of it, unless a list has parts that are.
+    fn fault<'t>(&self, text: &'t str) -> Cow<'t, str> {
+        text.into()
+    }
 }
 
 /// Any text.

@@ -326,6 +326,14 @@ pub fn log_filter(text: &str) -> Result<Targets, String> {
         .map_err(|error| format!("{EXPECTED} ({error})"))
 }
 
+/// Reads the name of a host, with a port if that is not the usual one.
+fn host(text: &str) -> Result<String, String> {
+    match text.find(['/', '*', '?', '@', ' ']) {
+        Some(_) => Err("expected a name without scheme, path or pattern, such as lab.example or lab.example:8443".into()),
+        None => Ok(text.to_owned()),
+    }
+}
+
 /// Settings for requests from browsers.
 #[derive(Clone, Debug, Default, Args)]
 pub struct Web {
@@ -336,7 +344,8 @@ pub struct Web {
         long = "allowed-host",
         env = "SIGNORINI_ALLOWED_HOSTS",
         value_name = "HOST",
-        value_delimiter = ','
+        value_delimiter = ',',
+        value_parser = host
     )]
     pub allowed_hosts: Vec<String>,
 

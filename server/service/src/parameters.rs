@@ -20,7 +20,8 @@ pub struct Parameter<V> {
 impl<V: Values> Parameter<V> {
     /// Reads a value from its text.
     pub fn read(&self, text: &str) -> Result<V::Value, ApiError> {
-        self.values.read(text).ok_or_else(|| self.invalid(text))
+        let read = self.values.read(text);
+        read.ok_or_else(|| self.invalid(self.values.fault(text)))
     }
 
     /// The error for a value that is not allowed.

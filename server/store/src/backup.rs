@@ -10,15 +10,13 @@
 
 use std::{
     fs::{self, DirBuilder, File, OpenOptions},
-    io::{self, ErrorKind, Read, Write},
+    io::{self, ErrorKind, Write},
     os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt},
     path::{Path, PathBuf, absolute},
 };
 
 use base::{text::size, time::Time};
 use rustix::fs::{CWD, RenameFlags, renameat_with, statvfs};
-use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 use super::{
     connections::{Mode, blocking, open},
@@ -26,46 +24,17 @@ use super::{
     error::{Result, StoreError},
     folder::{DATABASE, JOURNAL, unusable},
     inspect::{absent, check_copy},
+    manifest::{FORMAT, MANIFEST, Manifest, digest},
     migrations,
     pages::Pages,
     progress::{self, Progress},
     sql::Sql,
 };
 
-/// The name of the manifest's file.
-pub(super) const MANIFEST: &str = "manifest.json";
 /// The files that writing a backup may leave in its folder, even if it is interrupted.
 const FILES: [&str; 4] = [MANIFEST, DATABASE, JOURNAL, progress::FILE];
-/// The version of the manifest's form that this program writes, and the latest one that it reads.
-pub(super) const FORMAT: u32 = 1;
 /// Bytes that stay free on the disk of the backup, which may be the disk of the store, too.
 const SPARE_BYTES: u64 = 64 << 20;
-
-/// What a backup contains.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Manifest {
-    /// The form of this manifest.
-    pub format: u32,
-    /// The version of the program that made the backup.
-    pub version: String,
-    /// The version of the tables.
-    pub tables: i64,
-    /// When the backup was begun. Everything that was acknowledged before that time is in it.
-    pub created_at: Time,
-    /// The number of jobs.
-    pub jobs: i64,
-    /// The number of jobs that waited or ran: they are solved after a restore.
-    pub unfinished: i64,
-    /// The number of stored meshes.
-    pub meshes: i64,
-    /// The size of the database (bytes).
-    pub bytes: u64,
-    /// The SHA-256 of the database, as `sha256:…`.
-    pub digest: String,
-    /// How many damaged records a check of the backup has found, all of them copied from the store; `None` if it was
-    /// not checked.
-    pub damaged: Option<usize>,
-}
 
 /// A backup that was made.
 #[derive(Debug)]
@@ -285,35 +254,4 @@ pub(super) fn new_file(path: &Path) -> io::Result<File> {
 /// Flushes a folder to the disk, and with it the names of its files.
 pub(super) fn sync_folder(path: &Path) -> io::Result<()> {
     File::open(path)?.sync_all()
-}
-
-/// The SHA-256 of a file, as `sha256:…`, and its size (bytes).
-fn digest(path: &Path) -> io::Result<(String, u64)> {
-    copy_and_digest(&mut File::open(path)?, &mut io::sink())
-}
-
-/// Copies everything from `from` to `to`; returns the SHA-256 as `sha256:…`, and the number of bytes.
-pub(super) fn copy_and_digest(
-    from: &mut impl Read,
-    to: &mut impl Write,
-) -> io::Result<(String, u64)> {
-    let (mut hash, mut bytes) = (Sha256::new(), 0);
-    let mut buffer = vec![0; 1 << 20];
-    loop {
-        let read = match from.read(&mut buffer) {
-            Ok(0) => break,
-            Ok(read) => read,
-            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
-            Err(error) => return Err(error),
-        };
-        hash.update(&buffer[..read]);
-        to.write_all(&buffer[..read])?;
-        bytes += read as u64;
-    }
-    let hex: String = hash
-        .finalize()
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect();
-    Ok((format!("sha256:{hex}"), bytes))
 }

@@ -15,7 +15,9 @@ use super::{
     error::{Record, Result, StoreError},
     events,
     folder::{DATABASE, Folder, unusable},
-    keys, meshes, migrations,
+    keys,
+    manifest::differs_from_manifest,
+    meshes, migrations,
     progress::{self, Known},
     results::StoredResult,
     rows::find,
@@ -101,6 +103,10 @@ impl Report {
     /// Begins a report with the comparison of the database with its last known commit.
     fn begin(folder: &Path) -> Result<Report> {
         let mut report = Report::default();
+        match differs_from_manifest(folder) {
+            Ok(found) => report.findings.extend(found),
+            Err(error) => report.finding("manifest", &error),
+        }
         let known = progress::read(folder)?;
         match compare_with_the_past(folder, &known, &folder.join(DATABASE)) {
             Ok(doubt) => report.findings.extend(doubt),

@@ -57,6 +57,7 @@
 //! | rebuilding the database | `compact` |
 //! | backups | `backup` |
 //! | restoring a backup | `restore` |
+//! | what a backup contains, and its digest | `manifest` |
 //! | doctor and salvage | `inspect`, `salvage` |
 //! | what tests of other crates do to a store | `for_tests` |
 //! | random sequences of everything, by seed | `tests/simulation` |
@@ -104,6 +105,7 @@ mod pages;
 mod events;
 mod labels;
 mod lookup;
+mod manifest;
 mod results;
 mod sizes;
 mod unattached;
@@ -163,7 +165,7 @@ use futures_util::future::BoxFuture;
 use self::database::Rebuild;
 
 pub use self::{
-    backup::{Backup, Manifest, back_up},
+    backup::{Backup, back_up},
     content::{Fingerprint, PIECE_BYTES, PIECES_PER_COMMIT},
     database::Store,
     database::with_advice,
@@ -178,6 +180,7 @@ pub use self::{
     health::Health,
     inspect::{Report, inspect},
     list::Keys,
+    manifest::Manifest,
     meshes::{Removal, StoredMesh},
     parts::{Part, Parts, ProfilePoints},
     progress::accept,

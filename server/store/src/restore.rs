@@ -10,10 +10,11 @@ use std::{
 use base::time::Time;
 
 use super::{
-    backup::{FORMAT, MANIFEST, Manifest, copy_and_digest, new_file, sync_folder},
+    backup::{new_file, sync_folder},
     connections::{Mode, blocking, open},
     error::{Result, StoreError},
     folder::{DATABASE, FILES, Folder, RESTORING, unusable},
+    manifest::{Manifest, changed, copy_and_digest, read_manifest},
     migrations,
     progress::{self, Progress},
 };
@@ -70,42 +71,6 @@ fn write_store(backup: &Path, data: &Path, replace: bool) -> Result<Restored> {
     Ok(Restored { manifest, replaced })
 }
 
-fn read_manifest(backup: &Path) -> Result<Manifest> {
-    let path = backup.join(MANIFEST);
-    let text = fs::read(&path).map_err(|error| {
-        let why = match error.kind() {
-            ErrorKind::NotFound => {
-                format!("it contains no {MANIFEST}: it is not a backup, or was not completed")
-            }
-            _ => format!("{}: {error}", path.display()),
-        };
-        StoreError::Folder(format!(
-            "{} cannot be read as a backup: {why}",
-            backup.display()
-        ))
-    })?;
-    let damaged = |error| StoreError::Lost(format!("{} is damaged: {error}", path.display()));
-    let manifest: serde_json::Value = serde_json::from_slice(&text).map_err(damaged)?;
-    let later = |what: &str| {
-        StoreError::Schema(format!(
-            "the backup {} was made by a later version of this program ({what}); use that version",
-            backup.display()
-        ))
-    };
-    if manifest["format"]
-        .as_u64()
-        .is_some_and(|format| format > FORMAT.into())
-    {
-        return Err(later("its manifest has another form"));
-    }
-    let manifest: Manifest = serde_json::from_value(manifest).map_err(damaged)?;
-    if manifest.tables > migrations::last_step() {
-        Err(later(&manifest.version))
-    } else {
-        Ok(manifest)
-    }
-}
-
 /// Whether the folder has files, apart from those that an interrupted restore or a file system leaves.
 fn is_occupied(data: &Path) -> io::Result<bool> {
     let store = data.join(DATABASE).exists();
@@ -129,20 +94,16 @@ fn copy(backup: &Path, new: &Path, manifest: &Manifest) -> Result<Option<progres
         file.sync_all()?;
         Ok(found)
     };
-    let (digest, bytes) = copied().map_err(|error| {
+    let found = copied().map_err(|error| {
         StoreError::Folder(format!(
             "cannot copy {} to {}: {error}",
             source.display(),
             new.display()
         ))
     })?;
-    if (&digest, bytes) != (&manifest.digest, manifest.bytes) {
+    if let Some(changed) = changed(&source, &found, manifest) {
         return Err(StoreError::Lost(format!(
-            "{} was changed: it has {bytes} bytes with {digest}, but {MANIFEST} says {} with {}; use \
-             another backup, or save what is intact with `signorini doctor --data {} --salvage NEW_FOLDER`",
-            source.display(),
-            manifest.bytes,
-            manifest.digest,
+            "{changed}; use another backup, or save what is intact with `signorini doctor --data {} --salvage NEW_FOLDER`",
             backup.display()
         )));
     }

@@ -10,7 +10,7 @@ use base::{
 use files::table::{self, Table};
 use futures_util::future::BoxFuture;
 use serde_json::json;
-use solver::solution::{EstimatedQuantity, QuantityName};
+use solver::solution::{ErrorMethod, EstimatedQuantity, QuantityName};
 use store::{Filter, Order};
 
 use super::{
@@ -33,7 +33,7 @@ pub const NEXT_PAGE_TOKEN: &str = "next-page-token";
 /// The columns of the table.
 pub const COLUMNS: Parameter<ColumnNames> = Parameter {
     name: "columns",
-    meaning: "Columns of the table, separated by commas and in this order: those of a job, label.KEY for the value of a label, normal_force for a number of the result of a job with one contact, normal_force.BOUNDARY for that of the contact of this name, and likewise normal_force_error for its ±; default: id, name, status, reason, verdict, created_at, run_s, contacts, all numbers with their errors, warnings, labels",
+    meaning: "Columns of the table, separated by commas and in this order: those of a job, label.KEY for the value of a label, normal_force for a number of the result of a job with one contact, normal_force.BOUNDARY for that of the contact of this name, and likewise normal_force_error for its ±; default: id, name, status, reason, verdict, created_at, run_s, contacts, all numbers with their errors, severity (of the most severe warning), warnings, labels. A peak that grows on finer meshes has no number",
     values: ColumnNames,
 };
 
@@ -56,10 +56,9 @@ impl Values for ColumnNames {
         let numbers = NUMBERS.iter().map(|quantity| <&str>::from(*quantity));
         let names: Vec<&str> = fields.chain(numbers).collect();
         format!(
-            "at most {MOST_COLUMNS} of these, each once and separated by commas: {}, label.KEY; the {} before it also with {ERROR} \
-             behind the name, and all these with .BOUNDARY behind that",
+            "at most {MOST_COLUMNS} of these, each once and separated by commas: {}, label.KEY; also their errors as normal_force{ERROR}, \
+             and those of the contact of a boundary as normal_force.BOUNDARY and normal_force{ERROR}.BOUNDARY",
             names.join(", "),
-            NUMBERS.len()
         )
     }
 
@@ -71,6 +70,17 @@ impl Values for ColumnNames {
             .iter()
             .all(|column| seen.insert(column.name.clone()));
         (each_once && columns.len() <= MOST_COLUMNS).then_some(Columns(columns))
+    }
+
+    /// The unknown names, and those that are there twice.
+    fn fault<'t>(&self, text: &'t str) -> Cow<'t, str> {
+        let mut seen = BTreeSet::new();
+        let mut wrong: Vec<&str> = text.split(',').collect();
+        wrong.retain(|name| !seen.insert(*name) || column(name).is_none());
+        match wrong.join(",") {
+            none if none.is_empty() => text.into(),
+            wrong => wrong.into(),
+        }
     }
 }
 
@@ -126,6 +136,7 @@ const FIELDS: &[(&str, Field)] = &[
     ("result_available", Field::Text(|job| <&str>::from(job.result_available).into())),
     ("verdict",          Field::Text(|job| job.verdict.map_or("", <&str>::from).into())),
     ("contacts",         Field::Text(|job| contacts(job).join(", ").into())),
+    ("severity",         Field::Text(|job| severity(job).into())),
     ("warnings",         Field::Text(|job| warnings(job).into())),
     ("input_hash",       Field::Text(|job| job.input_hash.clone().into())),
     ("cached_from",      Field::Text(|job| job.cached_from.map_or(Cow::Borrowed(""), |id| id.to_string().into()))),
@@ -165,7 +176,7 @@ impl Default for Columns {
             [name.to_owned(), format!("{name}{ERROR}")]
         });
         let all = before.map(str::to_owned).into_iter().chain(numbers);
-        let all = all.chain(["warnings", "labels"].map(str::to_owned));
+        let all = all.chain(["severity", "warnings", "labels"].map(str::to_owned));
         Columns(all.filter_map(|name| column(&name)).collect())
     }
 }
@@ -178,6 +189,8 @@ fn column(name: &str) -> Option<Column> {
         (None, Some(key)) => Of::Label(key.to_owned()),
         (None, None) => {
             let (number, contact) = match name.split_once('.') {
+                // the error of a number comes before the contact
+                Some((_, contact)) if contact.ends_with(ERROR) => return None,
                 Some((number, contact)) => (number, Some(contact.to_owned())),
                 None => (name, None),
             };
@@ -207,6 +220,12 @@ fn contacts(job: &Job) -> Vec<&str> {
         }
     }
     names
+}
+
+/// The severity of the most severe warning; empty if there is none.
+fn severity(job: &Job) -> &'static str {
+    let all = job.warnings.iter().map(|warning| warning.code.severity());
+    all.min().map_or("", <&str>::from)
 }
 
 fn warnings(job: &Job) -> String {
@@ -246,7 +265,11 @@ impl Columns {
                 } => reals(jobs, |job| {
                     let shown = partial || !job.status.is_without_solution();
                     let found = shown.then(|| number(job, *quantity, contact.as_deref()))??;
-                    if *error {
+                    // a peak that grows on finer meshes is that of the mesh
+                    let means_nothing = found.method == ErrorMethod::NoLimit;
+                    if means_nothing {
+                        None
+                    } else if *error {
                         found.error
                     } else {
                         Some(found.value)
@@ -327,7 +350,6 @@ pub fn table<'a>(
 mod tests {
     #![allow(clippy::unwrap_used)]
     use base::job::Status;
-    use solver::solution::ErrorMethod;
 
     use super::*;
 
@@ -386,6 +408,7 @@ mod tests {
             "ID",
             "contact_start",
             "normal_force_error_error",
+            "normal_force.top_error",
             "links",
         ] {
             let refused = COLUMNS.read(wrong).unwrap_err().to_string();
@@ -398,6 +421,10 @@ mod tests {
                 assert!(refused.contains(known), "{refused}");
             }
         }
+        let refused = COLUMNS.read("id,normal_forse,label.a,nmae,id").unwrap_err();
+        let refused = refused.to_string();
+        assert!(refused.contains("normal_forse,nmae,id"), "{refused}");
+        assert!(!refused.contains("label.a"), "{refused}");
         let many: Vec<String> = (0..=MOST_COLUMNS).map(|n| format!("label.{n}")).collect();
         assert!(COLUMNS.read(&many.join(",")).is_err());
     }
@@ -420,6 +447,23 @@ mod tests {
         assert_eq!(
             shown,
             "contacts,normal_force,normal_force_error,normal_force.hub\r\ntop,2.5,0.5,\r\n\"top, hub\",,,4.0\r\n,,,\r\n"
+        );
+    }
+
+    #[test]
+    fn a_peak_without_a_limit_is_no_number_of_a_row() {
+        let peak = EstimatedQuantity {
+            quantity: QuantityName::PeakNormalStress,
+            method: ErrorMethod::NoLimit,
+            ..number("top", -3043.0, None)
+        };
+        let jobs = [job(
+            Status::Succeeded,
+            &[number("top", 2.5, Some(0.5)), peak],
+        )];
+        assert_eq!(
+            csv("normal_force,peak_normal_stress", &jobs, false),
+            "normal_force,peak_normal_stress\r\n2.5,\r\n"
         );
     }
 

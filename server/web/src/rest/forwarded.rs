@@ -1,6 +1,8 @@
 //! Undoes what a proxy changes in a request: the path below which clients reach the service, and the host and scheme
-//! that they have used, if the proxy is trusted (RFC 7239, or the older X-Forwarded-Host and X-Forwarded-Proto). Links
-//! are paths, so that the client's address is not needed.
+//! that they have used, if the proxy is trusted (RFC 7239, or the older X-Forwarded-Host and X-Forwarded-Proto), and for the
+//! log the client's address. Links are paths, which do not need it.
+
+use std::net::{IpAddr, SocketAddr};
 
 use axum::{
     extract::Request,
@@ -84,6 +86,28 @@ pub(super) fn https(request: &Request, trust: &ProxyTrust) -> Option<bool> {
     Some(scheme.trim().eq_ignore_ascii_case("https"))
 }
 
+/// The address of the client: that which a trusted proxy gives in X-Forwarded-For or Forwarded, or else that of the
+/// connection.
+pub(super) fn client(request: &Request, trust: &ProxyTrust) -> Option<IpAddr> {
+    const OLDER: HeaderName = HeaderName::from_static("x-forwarded-for");
+    let headers = request.headers();
+    let named = || {
+        let new = last(headers, &header::FORWARDED).and_then(|text| parameter(&text, "for"));
+        let text = new.or_else(|| last(headers, &OLDER))?;
+        address(text.trim())
+    };
+    let peer = request.extensions().get::<Peer>().map(|peer| peer.0);
+    let found = is_from_proxy(request, trust).then(named).flatten().or(peer);
+    found.map(|address| address.to_canonical())
+}
+
+/// An address, with or without a port.
+fn address(text: &str) -> Option<IpAddr> {
+    let bare = text.trim_start_matches('[').trim_end_matches(']');
+    let with_port = || text.parse::<SocketAddr>().ok().map(|address| address.ip());
+    bare.parse().ok().or_else(with_port)
+}
+
 fn is_from_proxy(request: &Request, trust: &ProxyTrust) -> bool {
     let peer = request.extensions().get::<Peer>();
     peer.is_some_and(|Peer(address)| trust.includes(*address))
@@ -155,6 +179,35 @@ mod tests {
         let trust = ProxyTrust::of(&["10.0.0.1"]);
         let found = host(&request, &trust).map_err(|_| ())?;
         Ok(found.map(|host| host.to_string()))
+    }
+
+    #[test]
+    fn a_trusted_proxy_tells_the_address_of_its_client() {
+        let seen = |peer: &str, name: &str, value: &str| {
+            let request = Request::builder().uri("/").header(name, value);
+            let mut request = request.body(Body::empty()).unwrap();
+            let peer = Peer(peer.parse().unwrap());
+            request.extensions_mut().insert(peer);
+            let found = client(&request, &ProxyTrust::of(&["10.0.0.1"]));
+            found.unwrap().to_string()
+        };
+        let (older, new) = ("x-forwarded-for", "forwarded");
+        for (peer, name, value, expected) in [
+            ("10.0.0.1", older, "9.9.9.9, 192.0.2.7", "192.0.2.7"),
+            ("10.0.0.1", older, "192.0.2.7:4711", "192.0.2.7"),
+            (
+                "10.0.0.1",
+                new,
+                "for=9.9.9.9, for=\"[2001:db8::1]:4711\"",
+                "2001:db8::1",
+            ),
+            ("10.0.0.1", new, "for=\"[2001:db8::1]\"", "2001:db8::1"),
+            ("10.0.0.1", older, "unknown", "10.0.0.1"),
+            ("10.0.0.2", older, "192.0.2.7", "10.0.0.2"),
+            ("::ffff:10.0.0.2", older, "192.0.2.7", "10.0.0.2"),
+        ] {
+            assert_eq!(seen(peer, name, value), expected, "{peer} {name} {value}");
+        }
     }
 
     #[test]

@@ -2,14 +2,16 @@
 
 use parking_lot::Mutex;
 use std::{
+    net::IpAddr,
     pin::Pin,
+    sync::Arc,
     task::{Context, Poll, ready},
     time::Instant,
 };
 
 use axum::{
     body::{Body, Bytes, HttpBody},
-    extract::Request,
+    extract::{Request, State},
     http::{HeaderMap, HeaderName, HeaderValue},
     middleware::Next,
     response::Response,
@@ -22,11 +24,16 @@ use base::{
 };
 use http_body::{Frame, SizeHint};
 use opentelemetry::KeyValue;
-use service::spans::{self, Span};
+use service::{
+    config::ProxyTrust,
+    spans::{self, Span},
+    verbs::Service,
+};
 use tonic::Code;
 use tracing::{Level, debug, enabled, info};
 
 use super::{
+    forwarded,
     request_target::is_probe,
     request_target::{RequestTarget, UNKNOWN, name_of},
 };
@@ -42,8 +49,12 @@ const LONGEST_ID: usize = 64;
 const TARGET: &str = "service::request";
 
 /// Runs a request and reports it; the answer has the id of the request.
-pub(super) async fn observe(mut request: Request, next: Next) -> Response {
-    let mut observed = Observed::new(&request);
+pub(super) async fn observe(
+    State(service): State<Arc<Service>>,
+    mut request: Request,
+    next: Next,
+) -> Response {
+    let mut observed = Observed::new(&request, &service.config.trust);
     request.extensions_mut().insert(observed.trace.clone());
     let id = RequestId(observed.id.clone());
     request.extensions_mut().insert(id);
@@ -89,6 +100,8 @@ struct Observed {
     probe: bool,
     trace: Trace,
     id: String,
+    /// The address of the client, as far as it is known.
+    client: Option<IpAddr>,
     begun: Time,
     start: Instant,
     /// The HTTP status of the answer; `None` if the client has gone before there was one.
@@ -99,13 +112,14 @@ struct Observed {
 }
 
 impl Observed {
-    fn new(request: &Request) -> Observed {
+    fn new(request: &Request, trust: &ProxyTrust) -> Observed {
         METRICS.in_progress.inc();
         let trace = Trace::of_request(request.headers());
         Observed {
             target: RequestTarget::of(request),
             probe: is_probe(request.uri().path()),
             id: given_id(request.headers()).unwrap_or_else(|| trace.id().to_string()),
+            client: forwarded::client(request, trust),
             trace,
             begun: Time::now(),
             start: Instant::now(),
@@ -167,6 +181,7 @@ impl Observed {
         let owner = Some(&*self.owner).filter(|owner| !owner.is_empty());
         let trace = self.trace.id().to_string();
         let trace_id = Some(&trace).filter(|trace| *trace != id);
+        let client = self.client.map(tracing::field::display);
         macro_rules! tell {
             ($($fields:tt)*) => {
                 if self.probe {
@@ -184,6 +199,7 @@ info!(target: TARGET, $($fields)*)
                     code,
                     duration_s,
                     owner,
+                    client,
                     bytes,
                     request_id = id,
                     trace_id,
@@ -203,6 +219,7 @@ info!(target: TARGET, $($fields)*)
             status,
             duration_s,
             owner,
+            client,
             bytes,
             request_id = id,
             trace_id,

@@ -41,9 +41,15 @@ pub fn router(service: Arc<Service>, grpc: Router) -> Router {
         // outside of the authentication: a browser asks beforehand, without the token; and of the limits, whose refusals a page
         // may read
         .layer(option_layer(origin::cors(&service.config.web)))
-        .layer(middleware::from_fn_with_state(service, origin::own_site))
+        .layer(middleware::from_fn_with_state(
+            service.clone(),
+            origin::own_site,
+        ))
         // outermost: it sees what the client is answered
-        .layer(middleware::from_fn(request_report::observe));
+        .layer(middleware::from_fn_with_state(
+            service,
+            request_report::observe,
+        ));
     if prefix.is_empty() {
         routes
     } else {
