@@ -394,6 +394,25 @@ def test_a_study_over_words_and_obstacles(client: sg.Client) -> None:
     assert np.array_equal(ticks, np.round(ticks))
 
 
+def test_errors_of_a_column_are_bars(client: sg.Client) -> None:
+    study = client.sweep(sg.examples.cylinder(refine=0), {"contacts.0.indentation": [0.05, 0.1]})
+    table = study.wait(60, progress=False).table()
+    (axes,) = table.plot("contact_width").axes
+    (bars,) = axes.collections
+    heights = [float(np.ptp(bar[:, 1])) for bar in bars.get_segments()]  # type: ignore[attr-defined]
+    assert heights == pytest.approx(2 * table["contact_width_error"]) and min(heights) > 0
+    assert not table.plot("normal_force").axes[0].collections
+
+
+def test_the_legend_of_a_column_lies_below_its_panels(punch: sg.Result) -> None:
+    figure = punch.plot_profile(size="column")
+    figure.savefig(io.BytesIO(), format="png", dpi=figure.dpi)
+    legend = figure.axes[1].get_legend()
+    assert legend is not None and [text.get_text() for text in legend.get_texts()] != []
+    panels = [axes.get_window_extent() for axes in figure.axes]
+    assert not any(legend.get_window_extent().overlaps(panel) for panel in panels) and not overlapping(figure)
+
+
 def test_a_bare_figure_has_nothing_around_it(punch: sg.Result, client: sg.Client) -> None:
     fields, problem = punch.fields(), punch.job.problem()
     study = client.sweep(sg.examples.sheet(refine=0), {"contacts.0.friction.coefficient": [0.1, 0.2]})

@@ -50,6 +50,7 @@ def profile(
     """Normal and tangential stress along a contact by arc length, with the friction bound; stick and slip shaded.
 
     zoom: whether only what is under stress is shown, with a margin; else the whole boundary
+    xlim: limits of the arc length `s`, which is not the coordinate x on every boundary
     ylim, ylim_below: limits of the normal stress, and of the tangential stress
     ax: one for both stresses, or two
     """
@@ -61,7 +62,8 @@ def profile(
         across = across or (float(s[0]), float(s[-1]))
         for axes in {upper, lower}:
             _shade(axes, found, colours, across)
-        upper.plot(s, normal, color=colours.normal, label=QUANTITIES["normal_stress"])
+        pressed = up or _limits(s, normal)
+        upper.plot(s, _without_returns(normal, pressed[0]), color=colours.normal, label=QUANTITIES["normal_stress"])
         bound = found.friction_bound[part]
         signs = [sign for sign in (1, -1) if np.any(sign * tangential > 0)] or [1]
         if np.any(bound > 0):
@@ -75,20 +77,22 @@ def profile(
         if lower is upper:
             # away from the note on a peak that is cut
             lower.legend(loc="lower left" if _is_late(s, normal) else "lower right")
+        elif np.any(bound > 0) and size == "column" and ax is None:
+            # panels are so small that it would lie on the curves
+            legend_below(plt, figure, upper, lower, columns=2, every=(lower,))
         elif np.any(bound > 0):
             lower.legend(loc="best")
         _stress_axes(upper, lower, found, across)
         for axes in (upper, lower):
             axes.axhline(0, color=colours.ink, linewidth=0.5)
-        pressed = _limits(s, normal)
         # with the bound, unless it is far from being reached
         low, high = _limits(s, tangential, np.inf)
         reach = 1.08 * float(bound.max())
         rubbed = min(low, max(-reach, 1.6 * low)), max(high, min(reach, 1.6 * high))
-        if lower is upper:
+        if lower is upper and up is None:
             pressed = rubbed = min(pressed[0], rubbed[0]), max(pressed[1], rubbed[1])
         lower.set_ylim(*below or rubbed)
-        upper.set_ylim(*up or pressed)
+        upper.set_ylim(*pressed)
         _words(upper, found, colours, across)
         no_limit = style == "full" and lower is not upper
         _mark_cut(upper, s, normal, colours, found.about, found.boundary, no_limit)
@@ -157,7 +161,8 @@ def profiles(
         reach = []
         for each, name, look in zip(several, names, looks, strict=True):
             part = _view(each, False, across)
-            upper.plot(each.s[part], each.normal_stress[part], label=name, **look)
+            low = up[0] if up else _limits(each.s[part], each.normal_stress[part], CUT)[0]
+            upper.plot(each.s[part], _without_returns(each.normal_stress[part], low), label=name, **look)
             lower.plot(each.s[part], each.tangential_stress[part], label=name, **look)
             stresses = (each.normal_stress, CUT), (each.tangential_stress, np.inf)
             reach.append([_limits(each.s[part], stress[part], cut) for stress, cut in stresses])
@@ -382,6 +387,17 @@ def _mark_cut(
         text, (s[at], 0), xycoords=("data", "axes fraction"), xytext=(-10 if to_left else 10, 12),
         textcoords="offset points", ha="right" if to_left else "left", va="bottom", fontsize="small",
     )  # fmt: skip
+
+
+def _without_returns(values: Array, low: float) -> Array:
+    """Values without single ones above the end of the axis between two below it, which are not drawn.
+
+    Beside a peak without a limit the quadratic pressure of an edge turns back between its nodes.
+    """
+    drawn = np.array(values, float)
+    below = drawn < low
+    drawn[1:-1][~below[1:-1] & below[:-2] & below[2:]] = np.nan
+    return drawn
 
 
 def _position_axis(axes: Any, found: Profile, part: slice) -> None:

@@ -48,6 +48,13 @@ def requests(
         yield calls.vtu(id, partial)
 
 
+def _entry(name: str) -> zipfile.ZipInfo:
+    """An entry without the time, so that the same result is the same file."""
+    entry = zipfile.ZipInfo(name)
+    entry.compress_type = zipfile.ZIP_DEFLATED
+    return entry
+
+
 def packed(id: str, answers: Mapping[str, tuple[str, bytes]]) -> bytes:
     """The file: answers by request, each with its media type."""
     content = io.BytesIO()
@@ -58,8 +65,8 @@ def packed(id: str, answers: Mapping[str, tuple[str, bytes]]) -> bytes:
             name = names.setdefault(answer, f"{len(names):04}.{media.rpartition('/')[2].rpartition('-')[2]}")
             index[request] = {"media": media, "file": name}
         for answer, name in names.items():
-            file.writestr(name, answer)
-        file.writestr("index.json", json.dumps({"format": FORMAT, "job": id, "answers": index}))
+            file.writestr(_entry(name), answer)
+        file.writestr(_entry("index.json"), json.dumps({"format": FORMAT, "job": id, "answers": index}))
     return content.getvalue()
 
 

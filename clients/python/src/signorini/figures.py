@@ -472,8 +472,9 @@ def sweep(
 
     The axis is logarithmic where the values of the parameter grow by a factor, such as those of `logspace`, else
     linear; units are those that the problem names. A member with a warning that not all of them have has a hollow
-    marker; one without a solution interrupts its curve. Below is counted how many members have which warnings. Raises
-    ValueError where more than twelve curves would be needed, or a column has no numbers.
+    marker; one without a solution interrupts its curve. Bars are the errors of `contact_width`; other columns have
+    none. Below is counted how many members have which warnings. Raises ValueError where more than twelve curves would
+    be needed, or a column has no numbers.
     """
     across, up = limits(xlim=xlim, ylim=ylim)
     if not table.parameters:
@@ -490,6 +491,7 @@ def sweep(
         along = np.array([names.index(value) for value in table[x].tolist()], float)
     curves = _curves(table, x)
     warned = _warned(table, values)
+    errors = table.columns.get(f"{quantity}_error")
     with styled(size, theme, ax, style) as (plt, width, colours):
         if ax is None:
             height = (SLIDE if size == "slide" else 0.7) * width
@@ -502,6 +504,10 @@ def sweep(
             order = np.array(rows)[np.argsort(along[rows], kind="stable")]
             colour = look["color"]
             axes.plot(along[order], values[order], color=colour, linestyle=dashes)
+            if errors is not None:
+                axes.errorbar(
+                    along[order], values[order], errors[order], fmt="none", ecolor=colour, elinewidth=0.8, capsize=2
+                )
             for some, face in ((order[~warned[order]], colour), (order[warned[order]], colours.ground)):
                 axes.plot(
                     along[some],
@@ -511,6 +517,8 @@ def sweep(
                     markerfacecolor=face,
                     markersize=4,
                     linestyle="none",
+                    # hollow ones stay visible where curves lie on one another
+                    zorder=3 if face is colours.ground else 2,
                 )
             # the sample in the legend has line and marker
             axes.plot([], [], marker=marker, color=colour, linestyle=dashes, markersize=4, label=label or None)
