@@ -3,7 +3,7 @@
     tests/generators/run.py [NAME ...]      openapi-python-client, openapi-generator (Python, TypeScript),
                                             openapi-typescript; by default all of these; progenitor (Rust) by its name
 
-progenitor is left to `tests/soak generators`, since it and its client take minutes to compile. Version 0.15 stops where an operation
+progenitor is a step of its own, of `tests/run --all` alone, since it and its client take minutes to compile. Version 0.15 stops where an operation
 has answers of success of two types (200 with data, 206 with a part of the file or 204 without) or a body of two media types.
 `one_answer_each` leaves it one of each; a description without the others would hide them from all other clients.
 
@@ -126,10 +126,11 @@ def one_answer_each(description):
 
 def progenitor(description):
     rust = FOLDER / "rust"
-    os.environ["CARGO_TARGET_DIR"] = str(rust / "target")
+    # the tool and its client share what they are built from; neither is fast, nor debugged
+    os.environ.update({"CARGO_TARGET_DIR": str(rust / "target"), "CARGO_PROFILE_DEV_DEBUG": "0", "CARGO_INCREMENTAL": "0"})
     tool = rust / "bin/cargo-progenitor"
     if not tool.exists():
-        run("cargo", "install", "--quiet", "--locked", "--root", rust, "cargo-progenitor@" + PROGENITOR)
+        run("cargo", "install", "--debug", "--quiet", "--locked", "--root", rust, "cargo-progenitor@" + PROGENITOR)
     simpler = FOLDER / "one_answer_each.json"
     simpler.write_text(json.dumps(one_answer_each(json.loads(description.read_text()))))
     crate = fresh("progenitor")
