@@ -166,8 +166,13 @@ pub fn noise(x: &[f64], y: &[f64]) -> Option<f64> {
     const MOST_ALIKE: f64 = 0.5;
     /// The part of the standard deviation below which a distance may be rounding.
     const SLIGHT: f64 = 0.1;
+    /// The median distance of normal noise of deviation 1.
+    const MEDIAN: f64 = 0.6745;
     let distances = distances(x, y)?;
-    let [deviation, _] = scatter(x, y)?;
+    // single kinks and edges do not change the median
+    let mut sizes: Vec<f64> = distances.iter().map(|d| d.abs()).collect();
+    let (_, median, _) = sizes.select_nth_unstable_by(distances.len() / 2, f64::total_cmp);
+    let deviation = *median / MEDIAN;
     let turns = |pair: &&[f64]| {
         pair[0] * pair[1] < 0.0 && pair.iter().all(|d| d.abs() > SLIGHT * deviation)
     };

@@ -181,6 +181,8 @@ def refusals(server, folder, backup):
         else:
             (other / name).unlink()
         new = other.parent / "new"
+        if name == "signorini.db" or change is not None and code == DAMAGED:
+            run("doctor", "--data", other, code=DAMAGED)
         run("restore", other, "--data", new, code=code)
         equal(list(new.iterdir()) if new.exists() else [], [], "left of a refused restore: " + what)
     # a restore that was interrupted: not served, and done again

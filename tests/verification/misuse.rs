@@ -453,6 +453,11 @@ fn noise_without_a_standard_deviation_is_told() {
     for kind in ["table", "polyline"] {
         let text = told_of(&|k| shape(k) + 1e-3 * noise[k], kind);
         says(text.as_deref(), &["scatter by", "standard_deviation"]);
+        let with_an_edge = |k: usize| shape(k) + 1e-3 * noise[k] + if k > 50 { 0.2 } else { 0.0 };
+        assert!(
+            told_of(&with_an_edge, kind).is_some(),
+            "an edge does not hide it"
+        );
         for sound in [
             &shape as &dyn Fn(usize) -> f64,
             &|k| x[k].powi(4),

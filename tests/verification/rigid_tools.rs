@@ -531,7 +531,7 @@ fn an_amplitude_that_turns_back_is_refused_with_friction() {
         "0., 1., 0.5, -1., 1., 0.5",
         "0., 0., 0.5, 0.7, 1., 1., 2., 0.",
     );
-    for amplitude in [turns, falls] {
+    for amplitude in [turns, falls, "0., 1., 1., 0.5"] {
         let found = doubts(&deck(friction, amplitude));
         let told = |text: &String| text.contains("rises and falls within the step");
         assert!(!found.is_empty() && found.iter().all(told), "{found:#?}");

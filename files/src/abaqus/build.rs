@@ -465,7 +465,7 @@ impl Merged {
         for (line, amplitude, value) in prescribed.chain(pressures).chain(forces) {
             let Some(name) = amplitude else { continue };
             match deck.factor(name) {
-                Ok(_) if deck.turns(name) && deck.has_friction() => self.doubts.add(on_line(
+                Ok(_) if deck.has_friction() && deck.turns(name, line) => self.doubts.add(on_line(
                     line,
                     Reason::NotUnderstood,
                     format!("the amplitude `{name:.60}`, which rises and falls within the step, in a deck with friction"),

@@ -195,15 +195,17 @@ impl Deck {
         )
     }
 
-    /// Whether an amplitude rises and falls before the end of the current step.
-    pub(super) fn turns(&self, name: &Name) -> bool {
+    /// Whether an amplitude rises and falls before the end of the step, for a row on this line: in the first step from 0.
+    pub(super) fn turns(&self, name: &Name, line: u64) -> bool {
         let (Some(amplitude), Ok(last)) = (self.amplitudes.get(name), self.factor(name)) else {
             return false;
         };
         let (times, _) = amplitude.values.as_chunks::<2>();
         let end = self.period.unwrap_or(1.0);
         let within = times.iter().filter(|[time, _]| *time < end);
-        let factors: Vec<f64> = within.map(|[_, factor]| *factor).chain([last]).collect();
+        let before = (self.contact.step_of(line) == 0).then_some(0.0);
+        let within = within.map(|[_, factor]| *factor);
+        let factors: Vec<f64> = before.into_iter().chain(within).chain([last]).collect();
         let (mut rises, mut falls) = (false, false);
         for pair in factors.windows(2) {
             rises |= pair[1] > pair[0];

@@ -323,7 +323,10 @@ fn draw_panel(
     }
     axes.draw_marks(&panel.marks)?;
     for (curve, points) in panel.curves.iter().zip(&curves) {
-        axes.draw_curve(curve, points)?;
+        match panel.scale {
+            Scale::Peaked => axes.draw_curve(curve, &without_returns(points, &axes.up))?,
+            _ => axes.draw_curve(curve, points)?,
+        }
     }
     if panel.scale == Scale::Peaked {
         axes.draw_cuts(panel)?;
@@ -503,11 +506,7 @@ impl<'a, 'b> Axes<'a, 'b> {
     fn draw_curve(&self, curve: &Curve, points: &[(f64, f64)]) -> Fallible<()> {
         let line = stroke(&self.palette, curve.style);
         let columns = (self.right - self.left) / page::FINE;
-        let points = match curve.style {
-            LineStyle::Points(_) => points.to_vec(),
-            _ => without_returns(points, &self.up),
-        };
-        let points = thinned(&points, &self.across, columns);
+        let points = thinned(points, &self.across, columns);
         let inside = || {
             let points = points.iter().copied();
             points.filter(|p| self.up.start <= p.1 && p.1 <= self.up.end)

@@ -131,12 +131,12 @@ pub(super) fn conclude(
     }
 }
 
-/// Warnings that make stated errors unreliable, or the result that of another problem than was meant; the best verdict
-/// that each permits, and the reason in words.
+/// Warnings that make stated errors unreliable, or that say that the result may belong to another problem than was meant;
+/// the best verdict that each permits, and the reason in words.
 #[rustfmt::skip] // a table
 const DOUBTFUL: [(WarningCode, Verdict, &str); 5] = [
     (WarningCode::NoContact, Verdict::Fair,
-        "A contact never touches its obstacle (`no_contact`): where that was not intended, the result is that of another problem."),
+        "A contact never touches its obstacle (`no_contact`): unless that was intended, this is the result of another problem than was meant."),
     (WarningCode::NotUnique, Verdict::Poor,
         "There is a second solution with other forces; the errors do not tell which of the two occurs."),
     (WarningCode::NoiseUndeclared, Verdict::Fair,

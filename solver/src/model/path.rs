@@ -103,8 +103,8 @@ impl Checks {
         }
     }
 
-    /// Warns of a step that drags the obstacle back to where it began while it is pushed or pulled, which nobody asks for
-    /// who only leaves `tangential_displacement` out.
+    /// Warns of a step that drags the obstacle back to where it began while another factor changes: probably the step only
+    /// leaves `tangential_displacement` out.
     fn warn_of_return(&mut self, problem: &Problem) {
         let dragged = problem
             .contacts
@@ -115,7 +115,9 @@ impl Checks {
         };
         let returns = |pair: &[Step]| {
             let [before, step] = pair else { return false };
-            let changes = step.indentation != before.indentation || step.loads != before.loads;
+            let changes = step.indentation != before.indentation
+                || step.loads != before.loads
+                || step.supports != before.supports;
             dragged != 0.0
                 && before.tangential_displacement != 0.0
                 && step.tangential_displacement == 0.0
@@ -129,7 +131,7 @@ impl Checks {
         self.warn(
             WarningCode::DragReturns,
             &format!("/steps/{}", before + 1),
-            format!("The obstacle is dragged back by {back:.4e} to where it began, while its indentation or the loads change: the factor on `tangential_displacement` is 0 where a step does not name it. Give {} to keep it where it is.", problem.steps[before].tangential_displacement),
+            format!("The obstacle is dragged back by {back:.4e} to where it began, while the indentation, the loads or the supports change: the factor on `tangential_displacement` is 0 where a step does not name it. Give {} to keep it where it is.", problem.steps[before].tangential_displacement),
         );
     }
 
@@ -151,7 +153,7 @@ impl Checks {
             self.warn(
                 WarningCode::PathForgotten,
                 &format!("/contacts/{contact}/friction/history"),
-                format!("The load steps turn back (`{}`), but friction follows the total law, which depends on the present displacements alone: the end is what it would be without the way there. For loops, and for what remains after unloading, give \"history\": \"incremental\".", one.name),
+                format!("The load steps turn back (`{}`), but friction follows the total law, which depends on the present displacements alone: the end is the same as without the earlier steps. For loops, and for what remains after unloading, give \"history\": \"incremental\".", one.name),
             );
         }
     }

@@ -33,13 +33,11 @@ impl Checks {
         for contact in contacts {
             let boundary = &contact.boundary;
             let on_axis = |i: usize| axis.holds(boundary.positions[i]);
-            // normals of the obstacle need not be those of the line of symmetry
             let held = |i: usize| match fixed.get(&boundary.nodes[i]) {
-                Some(Held::Along {
-                    direction, value, ..
-                }) => {
-                    let [x, y] = boundary.tangent(i);
-                    *value == 0.0 && (direction[0] * x + direction[1] * y).abs() > STRAIGHT_ON
+                Some(held @ Held::Along { .. }) => {
+                    // along the body: normals of the obstacle need not be upright at the line of symmetry
+                    let [x, y] = contact.outward[i];
+                    held.along([y, -x]) == Some(0.0)
                 }
                 _ => false,
             };

@@ -70,10 +70,10 @@ impl Verdict {
     pub fn in_words(self) -> &'static str {
         match self {
             Verdict::Good => {
-                "good: forces to 1 % (tangential ones: of friction), extents to 5 % of the contact, peaks with a limit to 5 %, or better"
+                "good: forces to 1 % (tangential force: of the friction force), extents to 5 % of the contact, peaks with a limit to 5 %, or better"
             }
             Verdict::Fair => {
-                "fair: forces to 5 % (tangential ones: of friction), extents to 20 % of the contact, peaks with a limit to 20 %"
+                "fair: forces to 5 % (tangential force: of the friction force), extents to 20 % of the contact, peaks with a limit to 20 %"
             }
             Verdict::Poor => "POOR: some numbers are not reliable",
         }

@@ -518,7 +518,9 @@ class Summary:
 
     def lines(self) -> Iterator[tuple[str, str]]:
         """The summary in words, a name and a value each."""
-        if self.partial:
+        if self.outcome == "unfinished":
+            yield "state", "PARTIAL: load steps are missing; these are the numbers after the last one solved"
+        elif self.partial:
             yield "state", f"PARTIAL: the last state of an iteration that did not end ({self.outcome})"
         else:
             yield "outcome", self.outcome.replace("_", " ")

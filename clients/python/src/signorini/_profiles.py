@@ -158,10 +158,11 @@ def profiles(
             ends = [each.s[part][[0, -1]] for each, part in zip(several, parts, strict=True)]
             across = float(min(end[0] for end in ends)), float(max(end[1] for end in ends))
         looks = looks_of(plt, colours, len(several))
+        within = [(each, _view(each, False, across)) for each in several]
+        low = up[0] if up else min(_limits(each.s[part], each.normal_stress[part])[0] for each, part in within)
         reach = []
         for each, name, look in zip(several, names, looks, strict=True):
             part = _view(each, False, across)
-            low = up[0] if up else _limits(each.s[part], each.normal_stress[part], CUT)[0]
             upper.plot(each.s[part], _without_returns(each.normal_stress[part], low), label=name, **look)
             lower.plot(each.s[part], each.tangential_stress[part], label=name, **look)
             stresses = (each.normal_stress, CUT), (each.tangential_stress, np.inf)

@@ -52,6 +52,7 @@ def _entry(name: str) -> zipfile.ZipInfo:
     """An entry without the time, so that the same result is the same file."""
     entry = zipfile.ZipInfo(name)
     entry.compress_type = zipfile.ZIP_DEFLATED
+    entry.external_attr = 0o600 << 16
     return entry
 
 

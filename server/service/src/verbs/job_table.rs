@@ -56,8 +56,8 @@ impl Values for ColumnNames {
         let numbers = NUMBERS.iter().map(|quantity| <&str>::from(*quantity));
         let names: Vec<&str> = fields.chain(numbers).collect();
         format!(
-            "at most {MOST_COLUMNS} of these, each once and separated by commas: {}, label.KEY; also their errors as normal_force{ERROR}, \
-             and those of the contact of a boundary as normal_force.BOUNDARY and normal_force{ERROR}.BOUNDARY",
+            "at most {MOST_COLUMNS} of these, each once and separated by commas: {}, label.KEY; also the errors of numbers, as normal_force{ERROR}, \
+             and numbers of the contact of a boundary, as normal_force.BOUNDARY and normal_force{ERROR}.BOUNDARY",
             names.join(", "),
         )
     }

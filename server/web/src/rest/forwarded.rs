@@ -93,8 +93,13 @@ pub(super) fn client(request: &Request, trust: &ProxyTrust) -> Option<IpAddr> {
     let headers = request.headers();
     let named = || {
         let new = last(headers, &header::FORWARDED).and_then(|text| parameter(&text, "for"));
-        let text = new.or_else(|| last(headers, &OLDER))?;
-        address(text.trim())
+        let new = new.map(|text| address(text.trim()));
+        let older = last(headers, &OLDER).map(|text| address(text.trim()));
+        match (new, older) {
+            // the proxy has set one of them; the other may be the client's
+            (Some(new), Some(older)) if new != older => None,
+            (new, older) => new.or(older)?,
+        }
     };
     let peer = request.extensions().get::<Peer>().map(|peer| peer.0);
     let found = is_from_proxy(request, trust).then(named).flatten().or(peer);

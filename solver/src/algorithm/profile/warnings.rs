@@ -57,7 +57,9 @@ impl PatchView<'_> {
     /// Removes the warning about an end of the obstacle that cuts an edge, if the contact does not reach as far.
     fn forget_far_ends(&self, warnings: &mut Vec<Warning>) {
         let contact = self.patch.contact;
-        let reached = self.active(0) || self.active(self.count() - 1);
+        // at a line of symmetry the boundary ends, and not the obstacle
+        let mut ends = [0, self.count() - 1].into_iter();
+        let reached = ends.any(|end| self.active(end) && !self.symmetric(end));
         if reached || contact.condition != Condition::Unilateral {
             return;
         }
