@@ -13,17 +13,12 @@ use solver::error::{Reason, Violation};
 use solver::mesh::{Edge, Mesh, runs};
 use solver::problem::{
     Along, Contact, Friction, FrictionPoints, History, Interpolation, Kernel, Material, Measure,
-    NormalOf, Normalization, Obstacle, Step, Transition,
+    NormalOf, Normalization, Obstacle, SLIP_PART, Step, Transition,
 };
 use solver::solution::{Warning, WarningCode};
 
 /// The default of Abaqus for the elastic slip, in lengths of an element's side.
 const SLIP_TOLERANCE: f64 = 0.005;
-
-/// The elastic slip of friction that acts at once, as a part of the way of the rigid surface: as [`elastic_slip_rule`] has it.
-///
-/// [`elastic_slip_rule`]: solver::problem::elastic_slip_rule
-const SLIP_PART: f64 = 1e-3;
 
 /// The largest sine of the angle between two directions that count as parallel, since coordinates in files are rounded.
 const STRAIGHT: f64 = 1e-6;
@@ -419,19 +414,19 @@ impl Source<'_> {
         let way = moved[0].abs().max(moved[1].abs());
         let at_once = said.stick_slope.is_some() || said.lagrange;
         let (elastic_slip, rule) = match (said.elastic_slip, said.slip_tolerance) {
-            (Some(slip), _) => (slip, ""),
-            (None, Some(tolerance)) => (tolerance * side, ""),
+            (Some(slip), _) => (slip, None),
+            (None, Some(tolerance)) => (tolerance * side, None),
             // friction that is meant to act at once is not that of a length of the mesh
             (None, None) if at_once && way > 0.0 => (
                 SLIP_PART * way,
-                "a thousandth of the way of the rigid surface",
+                Some(format!("{SLIP_PART} of the way of the rigid surface")),
             ),
             (None, None) => (
                 SLIP_TOLERANCE * side,
-                "0.005 of the mean side of the contact",
+                Some(format!("{SLIP_TOLERANCE} of the mean side of the contact")),
             ),
         };
-        if !rule.is_empty() {
+        if let Some(rule) = rule {
             let ours = format!("the elastic slip is {elastic_slip:.4e} here, {rule}");
             remarks.differs(match (said.stick_slope, said.lagrange) {
                 (Some(slope), _) => format!("*FRICTION on line {line}: the stick slope of {slope:e} makes the slip at which friction is reached proportional to the pressure; {ours}. SLIP TOLERANCE or ELASTIC SLIP sets it."),

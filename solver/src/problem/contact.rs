@@ -281,14 +281,15 @@ pub struct Friction {
     pub bound: Option<PrescribedBound>,
 }
 
+/// The elastic slip as a part of the slip, where it is not known: forces then differ from Coulomb's by about a hundredth at
+/// most, and the meshes of the examples bear it.
+pub const SLIP_PART: f64 = 1e-3;
+
 /// The rule for an elastic slip that is not known from a measurement, in words, with its value for an obstacle that is moved
 /// this far (lengths). An obstacle that is not moved at all, as where loads press the body, gives no value.
 pub fn elastic_slip_rule(indentation: f64, tangential_displacement: f64) -> String {
-    /// The elastic slip as a part of the slip: forces then differ from Coulomb's by about a hundredth at most, and the meshes of
-    /// the examples bear it.
-    const PART: f64 = 1e-3;
     let moved = indentation.abs().max(tangential_displacement.abs());
-    let value = PART * moved;
+    let value = SLIP_PART * moved;
     if value > 0.0 && value.is_finite() {
         format!(
             "If it is not known, take a thousandth of the slip, here of the displacement of the obstacle: {value:.1e}."

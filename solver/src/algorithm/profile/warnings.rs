@@ -84,11 +84,11 @@ impl PatchView<'_> {
         }
         let mut touching = (0..self.count()).filter(|&i| self.active(i));
         let Some(first) = touching.next() else {
-            let code = match self.system.touched.contains(&self.p) {
-                true => WarningCode::ContactOpened,
-                false => WarningCode::NoContact,
+            let (code, how) = match self.system.touched.contains(&self.p) {
+                true => (WarningCode::ContactOpened, "touches the obstacle no longer"),
+                false => (WarningCode::NoContact, "never touches the obstacle"),
             };
-            warn(code, self.without_contact());
+            warn(code, self.without_contact(how));
             return;
         };
         let last = touching.next_back().unwrap_or(first);
@@ -130,7 +130,7 @@ impl PatchView<'_> {
     }
 
     /// The message for a body that touches the obstacle at no node: how far the obstacle is from it.
-    fn without_contact(&self) -> String {
+    fn without_contact(&self, how: &str) -> String {
         let contact = self.patch.contact;
         let moved = |i: usize| {
             self.system
@@ -150,12 +150,8 @@ impl PatchView<'_> {
             needed => needed,
         };
         if self.missed().is_empty() {
-            let never = match self.system.touched.contains(&self.p) {
-                true => "touches the obstacle no longer",
-                false => "never touches the obstacle",
-            };
             format!(
-                "The body {never}: the smallest gap is {smallest:.6e}. There is contact if the indentation is above {needed:.6e}."
+                "The body {how}: the smallest gap is {smallest:.6e}. There is contact if the indentation is above {needed:.6e}."
             )
         } else {
             format!(
