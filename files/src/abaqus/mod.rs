@@ -53,10 +53,12 @@ mod written;
 
 pub use problem::{has_step, problem, problem_with_warnings};
 
+use std::collections::BTreeSet;
 use std::io::BufRead;
 
 use crate::source::ReadError;
 use solver::mesh::{self, Mesh};
+use solver::problem::Problem;
 use solver::solution::{Warning, WarningCode};
 
 /// Reads the mesh of a deck, with warnings of what was changed. The analysis of the deck is not used, except that the
@@ -67,30 +69,51 @@ use solver::solution::{Warning, WarningCode};
 ///
 /// [`ReadError::Io`] if the reader fails; [`ReadError::Invalid`] with all violations of the deck, which name its lines.
 pub fn read(reader: impl BufRead) -> Result<(Mesh, Vec<Warning>), ReadError> {
-    read_for(reader, |_| false)
+    read_for(reader, None)
 }
 
-/// Reads the mesh of a deck that a problem contains. `holds`: whether the problem has a support on a given set of
-/// nodes; if overlapping rows of `*BOUNDARY` have reduced that set, a warning says so.
+/// Reads the mesh of a deck that a problem contains, with warnings of how that problem deviates from the deck, if it is
+/// the deck's own.
 pub(crate) fn read_for(
     reader: impl BufRead,
-    holds: impl Fn(&str) -> bool,
+    problem: Option<&Problem>,
 ) -> Result<(Mesh, Vec<Warning>), ReadError> {
     let mut built = read::read(reader)?.build();
     let left_out = built.tools.warning();
     let supports = supports::supports(&built);
-    built.raw.node_sets.extend(supports.sets);
-    let raw = built.faults.into_result(built.raw);
-    let read = raw.and_then(mesh::build).map_err(ReadError::Invalid);
-    let overlaps = supports.overlaps.into_iter().filter(|(set, _)| holds(set));
-    let overlaps = overlaps.map(|(_, message)| Warning {
+    let elastic = (problem.is_some() && built.is_problem()).then(|| built.elastic());
+    let mut raw = std::mem::take(&mut built.raw);
+    raw.node_sets.extend(supports.sets);
+    let faults = std::mem::take(&mut built.faults);
+    let read = faults.into_result(raw).and_then(mesh::build);
+    let (mesh, mut warnings) = read.map_err(ReadError::Invalid)?;
+    warnings.extend(left_out);
+    let Some(problem) = problem else {
+        return Ok((mesh, warnings));
+    };
+    let held = problem.supports.iter();
+    let held: BTreeSet<&str> = held
+        .filter_map(|support| support.nodes.as_deref())
+        .collect();
+    let overlaps = supports.overlaps.into_iter();
+    let overlaps = overlaps.filter(|(set, _)| held.contains(set.as_str()));
+    warnings.extend(overlaps.map(|(_, message)| Warning {
         code: WarningCode::SupportsOverlap,
         pointer: String::new(),
         message,
-    });
-    read.map(|(mesh, mut warnings)| {
-        warnings.extend(left_out);
-        warnings.extend(overlaps);
-        (mesh, warnings)
-    })
+    }));
+    if let Some(Ok((deck, deviations))) = elastic.map(|part| built.problem(part, Some(&mesh)))
+        && is_of_deck(problem, &deck)
+    {
+        warnings.extend(deviations);
+    }
+    Ok((mesh, warnings))
+}
+
+/// Whether a problem is the one of a deck. Its mesh may be refined, and its solver be another.
+fn is_of_deck(problem: &Problem, deck: &Problem) -> bool {
+    deck.contacts == problem.contacts
+        && deck.materials == problem.materials
+        && deck.supports == problem.supports
+        && deck.loads == problem.loads
 }

@@ -1,12 +1,14 @@
 //! Reads a deck as a whole problem. A part of the deck that is not supported is a violation that names its line.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::mem::take;
 
 use super::build::{Built, Row, key, sides_of_two};
 use super::contact;
 use super::element::{Theory, Typed};
 use super::read::read;
 use super::rigid::Body;
+use super::steps::Motion;
 use super::supports::supports;
 use super::written::{
     DECIMAL_POINT, Elastic, MOST_CONSTANTS, Name, Orientation, Section, numbered, on_line,
@@ -14,10 +16,10 @@ use super::written::{
 use crate::source::ReadError;
 use solver::element::Element;
 use solver::error::{Findings, Reason, Violation};
-use solver::mesh::RawMesh;
+use solver::mesh::{Mesh, RawMesh};
 use solver::problem::{
     Analysis, BoundaryValue, Elasticity, Load, Material, MeshInput, MeshSource, Orthotropic,
-    Problem, SolverControls,
+    Problem, SolverControls, Support,
 };
 use solver::solution::Warning;
 
@@ -56,84 +58,126 @@ pub fn problem_with_warnings(text: &str) -> Result<(Problem, Vec<Warning>), Vec<
         built.faults.add(violation);
         return Err(built.faults.into_violations());
     }
-    let analysis = analysis(&mut built);
-    let axisymmetric = matches!(analysis, Analysis::Axisymmetric {});
-    let quadrature = quadrature(&mut built);
-    let motions = built.take_motions(axisymmetric);
-    let factors = built.factors_of_steps();
-    built.keep_last_loads();
-    let thickness = match analysis {
-        Analysis::PlaneStrain {} => built.sections.first().and_then(|s| s.row.thickness),
-        _ => None,
+    let elastic = built.elastic();
+    let mesh = if built.has_contacts() {
+        Some(solver::mesh::build(take(&mut built.raw))?.0)
+    } else {
+        None
     };
-    let thickness = thickness.unwrap_or(1.0);
-    let materials = materials(&mut built);
-    let supports = supports(&built);
-    for (line, name) in supports.of_no_element {
-        let (what, ..) = built.not_meshed(&name);
-        built.doubt(
-            line,
-            format!("a displacement of `{name:.60}`, {what}"),
-            "nodes of plane elements, or the reference node of a *RIGID BODY",
-            "Name nodes of the mesh. A rigid tool is moved by its reference node (REF NODE of *RIGID BODY), or by the `indentation` of a contact in a problem as JSON.",
-        );
-    }
-    let loads = loads(&mut built, thickness);
-    let Built {
-        mut deck,
-        raw,
-        faults,
-        doubts,
-        tools,
-        pairs,
-        ..
-    } = built;
-    let mut violations = faults.into_violations();
-    let sound = violations.is_empty();
-    violations.extend(doubts.into_violations());
-    let (mut contacts, mut steps, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
-    if !pairs.is_empty() && sound {
-        let (mesh, _) = solver::mesh::build(raw)?;
-        let source = contact::Source {
-            said: &deck.contact,
-            pairs: &pairs,
-            tools: &tools,
-            mesh: &mesh,
-            materials: &materials,
-            axisymmetric,
-            motions: &motions,
-        };
-        let found = source.contacts(&factors);
-        (contacts, steps, warnings) = (found.contacts, found.steps, found.remarks.warnings);
-        violations.extend(found.remarks.violations);
-    }
-    if thickness != 1.0 {
-        warnings.push(contact::differs(format!(
-            "In plane strain, forces of the result are per unit of thickness: the forces of the deck, for a thickness of {thickness}, are {thickness} times as large."
-        )));
-    }
-    if !violations.is_empty() {
-        // those of the lines, of the analysis and of contacts, each as many as a list may have
-        let mut all = Findings::default();
-        violations
-            .into_iter()
-            .for_each(|violation| all.add(violation));
-        return Err(all.into_violations());
-    }
-    let problem = Problem {
-        title: deck.title.take(),
-        analysis,
-        mesh: MeshInput::new(MeshSource::Abaqus(text.to_owned())),
-        materials,
-        supports: supports.list,
-        loads,
-        contacts,
-        steps,
-        quadrature,
-        units: Default::default(),
-        solver: SolverControls::default(),
-    };
+    let (mut problem, warnings) = built.problem(elastic, mesh.as_ref())?;
+    problem.mesh.source = MeshSource::Abaqus(text.to_owned());
     Ok((problem, warnings))
+}
+
+/// The problem of a deck without its contacts.
+pub(super) struct ElasticPart {
+    analysis: Analysis,
+    quadrature: u32,
+    motions: Vec<Option<Motion>>,
+    /// The factors of loads and of supports at the end of each step.
+    factors: Vec<[f64; 2]>,
+    thickness: f64,
+    materials: Vec<Material>,
+    supports: Vec<Support>,
+    loads: Vec<Load>,
+}
+
+impl Built {
+    /// Whether the deck states a problem, of no more steps than one may have.
+    pub(super) fn is_problem(&self) -> bool {
+        self.deck.steps > 0 && self.too_long().is_none()
+    }
+
+    /// Whether contacts are made of the deck: they need its mesh.
+    fn has_contacts(&self) -> bool {
+        !self.pairs.is_empty() && self.faults.is_empty()
+    }
+
+    /// What the deck states without its contacts. Doubts are added to those of the deck.
+    pub(super) fn elastic(&mut self) -> ElasticPart {
+        let built = self;
+        let analysis = analysis(built);
+        let quadrature = quadrature(built);
+        let motions = built.take_motions(matches!(analysis, Analysis::Axisymmetric {}));
+        let factors = built.factors_of_steps();
+        built.keep_last_loads();
+        let thickness = match analysis {
+            Analysis::PlaneStrain {} => built.sections.first().and_then(|s| s.row.thickness),
+            _ => None,
+        };
+        let thickness = thickness.unwrap_or(1.0);
+        let materials = materials(built);
+        let supports = supports(built);
+        for (line, name) in supports.of_no_element {
+            let (what, ..) = built.not_meshed(&name);
+            built.doubt(
+                line,
+                format!("a displacement of `{name:.60}`, {what}"),
+                "nodes of plane elements, or the reference node of a *RIGID BODY",
+                "Name nodes of the mesh. A rigid tool is moved by its reference node (REF NODE of *RIGID BODY), or by the `indentation` of a contact in a problem as JSON.",
+            );
+        }
+        ElasticPart {
+            analysis,
+            quadrature,
+            motions,
+            factors,
+            thickness,
+            materials,
+            supports: supports.list,
+            loads: loads(built, thickness),
+        }
+    }
+
+    /// The problem of the deck, without its mesh, and a warning for each deviation from the deck. `mesh` may be missing
+    /// where no contacts are made.
+    pub(super) fn problem(
+        mut self,
+        elastic: ElasticPart,
+        mesh: Option<&Mesh>,
+    ) -> Result<(Problem, Vec<Warning>), Vec<Violation>> {
+        let found = mesh.filter(|_| self.has_contacts()).map(|mesh| {
+            let source = contact::Source {
+                said: &self.deck.contact,
+                pairs: &self.pairs,
+                tools: &self.tools,
+                mesh,
+                materials: &elastic.materials,
+                axisymmetric: matches!(elastic.analysis, Analysis::Axisymmetric {}),
+                motions: &elastic.motions,
+            };
+            source.contacts(&elastic.factors)
+        });
+        // those of the lines, of the analysis and of contacts, each as many as a list may have
+        let mut violations = Findings::default();
+        violations.extend(self.faults.into_violations());
+        violations.extend(self.doubts.into_violations());
+        let (mut contacts, mut steps, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
+        if let Some(found) = found {
+            (contacts, steps, warnings) = (found.contacts, found.steps, found.remarks.warnings);
+            violations.extend(found.remarks.violations);
+        }
+        let thickness = elastic.thickness;
+        if thickness != 1.0 {
+            warnings.push(contact::differs(format!(
+                "In plane strain, forces of the result are per unit of thickness: the forces of the deck, for a thickness of {thickness}, are {thickness} times as large."
+            )));
+        }
+        let problem = Problem {
+            title: self.deck.title.take(),
+            analysis: elastic.analysis,
+            mesh: MeshInput::new(MeshSource::Abaqus(String::new())),
+            materials: elastic.materials,
+            supports: elastic.supports,
+            loads: elastic.loads,
+            contacts,
+            steps,
+            quadrature: elastic.quadrature,
+            units: Default::default(),
+            solver: SolverControls::default(),
+        };
+        violations.into_result((problem, warnings))
+    }
 }
 
 /// The violations of a deck without a step, which is only a mesh: that it has none, and those of the mesh. Parts that a
