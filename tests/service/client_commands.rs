@@ -442,6 +442,20 @@ async fn every_end_has_its_exit_code() {
     ends(url, &["wait", &long], 3).await;
     ends(url, &["cancel", &long], 0).await;
 
+    let change = [
+        "edit", &cut, "--pin", "--name", "kept", "--label", "a=1", "--label", "b=2", "-f", "json",
+    ];
+    let (edited, _) = ends(url, &change, 0).await;
+    let edited: Value = serde_json::from_str(&edited).unwrap();
+    let job = edited.get(0).unwrap_or(&edited);
+    assert_eq!(job["pinned"], true, "{edited}");
+    assert_eq!(
+        (&job["name"], &job["labels"]),
+        (&json!("kept"), &json!({"a": "1", "b": "2"}))
+    );
+    ends(url, &["edit", &cut, "--unpin"], 0).await;
+    ends(url, &["edit", &cut, "--pin", "--unpin"], 2).await;
+
     // 2: not a problem, with all its lines; no id; an option that there is not
     let mut wrong = block(6, 6);
     wrong["materials"][0]["poissons_ratio"] = json!(0.7);
@@ -470,6 +484,8 @@ async fn every_end_has_its_exit_code() {
     ] {
         ends(url, &[verb, none], 6).await;
     }
+    ends(url, &["edit", none, "--pin"], 6).await;
+    ends(url, &["edit", none], 2).await;
     let (_, told) = ends("http://127.0.0.1:1", &["ls"], 5).await;
     assert!(told.contains("cannot reach http://127.0.0.1:1"), "{told}");
     server.post("/v1/queue/pause").send().await.unwrap();

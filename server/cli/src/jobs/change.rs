@@ -1,4 +1,6 @@
-//! The commands `signorini cancel`, `retry` and `rm`, which change jobs.
+//! The commands `signorini cancel`, `retry`, `edit` and `rm`, which change jobs.
+
+use std::collections::BTreeMap;
 
 use base::job::JobId;
 use clap::{Args, Subcommand};
@@ -13,6 +15,7 @@ use super::{
     },
     id::Id,
     listing::{Found, Shown},
+    submit::label,
 };
 
 #[derive(Debug, Subcommand)]
@@ -21,6 +24,8 @@ pub(crate) enum Command {
     Cancel(Cancel),
     /// Submit the problem of a job again, to be solved once more
     Retry(Retry),
+    /// Change the name, labels or priority of jobs, or keep them permanently
+    Edit(Edit),
     /// Delete jobs and sweeps that have ended
     Rm(Remove),
 }
@@ -29,6 +34,7 @@ pub(super) async fn run(command: Command) -> anyhow::Result<Exit> {
     match command {
         Command::Cancel(arguments) => cancel(arguments).await,
         Command::Retry(arguments) => retry(arguments).await,
+        Command::Edit(arguments) => edit(arguments).await,
         Command::Rm(arguments) => remove(arguments).await,
     }
 }
@@ -101,6 +107,80 @@ async fn retry(arguments: Retry) -> anyhow::Result<Exit> {
                 .submit(&format!("/v1/jobs/{id}/retry"), limits, &new_key())
                 .await?,
         );
+    }
+    arguments.shown.print(&Found::of(documents))?;
+    Ok(Exit::Ok)
+}
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  signorini edit job_… --pin\n  signorini edit $(signorini ls --label study=radius -n 0 -q) --label study=radius --label figure=3"
+)]
+pub(crate) struct Edit {
+    /// Jobs
+    #[arg(required = true, value_parser = job)]
+    ids: Vec<JobId>,
+
+    #[command(flatten)]
+    changes: Changes,
+
+    #[command(flatten)]
+    shown: Shown,
+
+    #[command(flatten)]
+    service: Connection,
+}
+
+#[derive(Debug, Args)]
+#[group(required = true, multiple = true)]
+struct Changes {
+    /// A name for people
+    #[arg(long)]
+    name: Option<String>,
+
+    /// A label for programs, as KEY=VALUE; can be repeated, and replaces all labels that the job has
+    #[arg(long = "label", value_name = "KEY=VALUE", value_parser = label)]
+    labels: Option<Vec<(String, String)>>,
+
+    /// Jobs of higher priority run first: -10 to 10; above 0 for administrators
+    #[arg(long, allow_hyphen_values = true, value_name = "N")]
+    priority: Option<i32>,
+
+    /// Keep the jobs permanently, whatever their age
+    #[arg(long)]
+    pin: bool,
+
+    /// Let the jobs be deleted when they are old enough
+    #[arg(long, conflicts_with = "pin")]
+    unpin: bool,
+}
+
+/// Changes each job, and prints it.
+async fn edit(arguments: Edit) -> anyhow::Result<Exit> {
+    let Changes {
+        name,
+        labels,
+        priority,
+        pin,
+        unpin,
+    } = arguments.changes;
+    let labels = labels.map(|labels| labels.into_iter().collect::<BTreeMap<_, _>>());
+    let mut changes = serde_json::Map::new();
+    let given = [
+        ("name", name.map(|name| json!(name))),
+        ("labels", labels.map(|labels| json!(labels))),
+        ("priority", priority.map(|priority| json!(priority))),
+        ("pinned", (pin || unpin).then(|| json!(pin))),
+    ];
+    for (field, value) in given {
+        changes.extend(value.map(|value| (field.to_owned(), value)));
+    }
+    let service = arguments.service.open()?;
+    let mut documents: Vec<Value> = vec![];
+    for id in arguments.ids {
+        let request = service.request(Method::PATCH, &format!("/v1/jobs/{id}"));
+        let answer = service.send_surely(request.json(&changes)).await?;
+        documents.push(service.document(answer).await?);
     }
     arguments.shown.print(&Found::of(documents))?;
     Ok(Exit::Ok)
