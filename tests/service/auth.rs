@@ -438,6 +438,11 @@ async fn a_wait_ends_with_the_token_that_it_began_with() {
     assert_eq!(document["code"], "unauthenticated");
     let answer = called.await.unwrap();
     assert_eq!(answer.unwrap_err().code(), Code::Unauthenticated);
+    // over both protocols; the metric is counted when an answer has ended
+    let unauthenticated = "signorini_requests_unauthenticated_total";
+    while metric(&server, &admin, unauthenticated).await < 2.0 {
+        assert!(revoked.elapsed() < Duration::from_secs(20));
+    }
 }
 
 /// The answer has the only copy of the new secret, though what asked for it is no longer valid.

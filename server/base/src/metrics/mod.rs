@@ -61,6 +61,8 @@ pub struct Metrics {
     pub accepted_connections: Counter,
     /// The number of connections that were closed at once or could only be used for the probes.
     pub refused_connections: Counter,
+    /// The number of requests and calls without a valid token.
+    pub unauthenticated_requests: Counter,
     jobs_accepted: Family<Labels<1>, Counter>,
     jobs_ended: Family<Labels<2>, Counter>,
     job_wait: Histogram,
@@ -89,6 +91,7 @@ impl Metrics {
             connections: Gauge::default(),
             accepted_connections: Counter::default(),
             refused_connections: Counter::default(),
+            unauthenticated_requests: Counter::default(),
             jobs_accepted: Family::default(),
             jobs_ended: Family::default(),
             job_wait: Histogram::new(LONG_S),
@@ -111,6 +114,7 @@ impl Metrics {
         all.register("signorini_connections", "Open connections", metrics.connections.clone());
         all.register("signorini_connections_accepted", "Accepted connections", metrics.accepted_connections.clone());
         all.register("signorini_connections_refused", "Connections closed or limited to probes because all connections were busy", metrics.refused_connections.clone());
+        all.register("signorini_requests_unauthenticated", "Requests refused because they had no valid token, over REST and gRPC", metrics.unauthenticated_requests.clone());
         all.register("signorini_jobs_accepted", "Accepted jobs, by the source of their result", metrics.jobs_accepted.clone());
         all.register("signorini_jobs_ended", "Ended jobs, by status and reason", metrics.jobs_ended.clone());
         all.register("signorini_job_wait_seconds", "Time from acceptance of a job to the start of its last attempt, in seconds", metrics.job_wait.clone());

@@ -153,6 +153,9 @@ impl Observed {
         let took = self.start.elapsed();
         METRICS.sent_bytes.inc_by(self.bytes);
         let code = self.code.unwrap_or(Code::Cancelled); // the client did not wait for it
+        if code == Code::Unauthenticated || self.status == Some(401) {
+            METRICS.unauthenticated_requests.inc();
+        }
         match &self.target {
             RequestTarget::Rpc(rpc) => METRICS.answered_call(rpc, name_of(code), took),
             RequestTarget::Route(method, route) => {
