@@ -36,6 +36,8 @@ const NO_GROUP: u32 = u32::MAX;
 /// The largest average number of physical groups of an element: a file names the groups of a surface once for all of
 /// its elements, and may name many.
 const MOST_GROUPS: usize = 16;
+/// For how many nodes and elements at most memory is reserved before they are read: the announced number may be wrong.
+const MOST_RESERVED: u64 = 1 << 20;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
@@ -154,6 +156,11 @@ impl<R: BufRead> File<R> {
                     match self.version {
                         Version::Two => self.elements_2()?,
                         Version::Four => self.elements_4()?,
+                    }
+                    // no later section names nodes, and the numbers of a large mesh take much memory
+                    self.labels = Labels::default();
+                    if self.version == Version::Two {
+                        self.merge_repeated();
                     }
                     self.end("$EndElements")?;
                 }
@@ -401,19 +408,25 @@ impl<R: BufRead> File<R> {
         Ok(())
     }
 
-    /// Reserves memory for the announced number of nodes, up to a limit, since that number may be wrong.
-    fn reserve(&mut self, count: u64) {
-        const MOST: u64 = 1 << 20;
-        let count = count.min(MOST) as usize;
+    /// Reserves memory for the announced number of nodes.
+    fn reserve_nodes(&mut self, count: u64) {
+        let count = count.min(MOST_RESERVED) as usize;
         self.raw.nodes.reserve_exact(count);
         self.raw.node_labels.reserve_exact(count);
+    }
+
+    /// Reserves memory for the announced number of elements.
+    fn reserve_elements(&mut self, count: u64) {
+        let count = count.min(MOST_RESERVED) as usize;
+        self.raw.elements.reserve_exact(count);
+        self.raw.element_labels.reserve_exact(count);
     }
 
     /// Reads the nodes of version 2. `parametric`: each position is followed by an entity, and by the node's
     /// coordinates on that entity.
     fn nodes_2(&mut self, parametric: bool) -> Result<(), ReadError> {
         let count: u64 = self.source.number("the number of nodes")?;
-        self.reserve(count);
+        self.reserve_nodes(count);
         for _ in 0..count {
             let label = self.int("a node number")?;
             let place = [self.float("x")?, self.float("y")?, self.float("z")?];
@@ -439,7 +452,7 @@ impl<R: BufRead> File<R> {
         let count = self.size("the number of nodes")?;
         self.size("the least node number")?;
         self.size("the largest node number")?;
-        self.reserve(count);
+        self.reserve_nodes(count);
         let mut labels = Vec::new();
         for _ in 0..blocks {
             let dimension = self.int("a dimension")?;
@@ -462,6 +475,7 @@ impl<R: BufRead> File<R> {
 
     fn elements_2(&mut self) -> Result<(), ReadError> {
         let count: u64 = self.source.number("the number of elements")?;
+        self.reserve_elements(count);
         let mut read = 0;
         while read < count {
             // in binary files a head precedes a run of elements of one kind
@@ -502,7 +516,6 @@ impl<R: BufRead> File<R> {
             }
             read += run;
         }
-        self.merge_repeated();
         Ok(())
     }
 
@@ -569,13 +582,10 @@ impl<R: BufRead> File<R> {
 
     fn elements_4(&mut self) -> Result<(), ReadError> {
         let blocks = self.size("the number of blocks")?;
-        for what in [
-            "the number of elements",
-            "the least element number",
-            "the largest element number",
-        ] {
-            self.size(what)?;
-        }
+        let count = self.size("the number of elements")?;
+        self.size("the least element number")?;
+        self.size("the largest element number")?;
+        self.reserve_elements(count);
         // taken out, so that the groups of an entity are not copied for each of its blocks
         let entities = std::mem::take(&mut self.entities);
         for _ in 0..blocks {

@@ -55,6 +55,8 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
         ));
     }
     distinct(&raw, found)?;
+    // those of a large mesh take much memory, and no later message names a node
+    raw.node_labels = Vec::new();
     let mut notes = Vec::new();
     let of_file = raw.nodes.len();
     let raised = normalize(&mut raw, &mut notes);
@@ -198,7 +200,6 @@ fn second_order(raw: &mut RawMesh) -> usize {
             nodes[corners + k] = *middles.entry(key(a, b)).or_insert_with(|| {
                 let [p, q] = [a, b].map(|n| raw.nodes[n as usize]);
                 raw.nodes.push([0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])]);
-                raw.node_labels.push(0); // no line of the file has it
                 raw.nodes.len() as u32 - 1
             });
         }
@@ -248,12 +249,10 @@ fn drop_unused(raw: &mut RawMesh, of_file: usize) -> (u32, BTreeMap<String, u32>
         if number[node] != NO_NODE {
             number[node] = used;
             raw.nodes[used as usize] = raw.nodes[node];
-            raw.node_labels[used as usize] = raw.node_labels[node];
             used += 1;
         }
     }
     raw.nodes.truncate(used as usize);
-    raw.node_labels.truncate(used as usize);
     for element in &mut raw.elements {
         *element = element.map_nodes(|n| number[n as usize]);
     }
