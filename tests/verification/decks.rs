@@ -373,14 +373,20 @@ fn an_amplitude_counts_at_the_end_of_the_step() {
         )),
         [0.1, -0.01094298],
     );
-    for (from, to) in [
-        ("A\n0", "A, DEFINITION=PERIODIC\n0"),
-        ("NAME=A", "NAME=C"),
-        ("1., .5", "1."),
+    for (from, to, why) in [
+        (
+            "A\n0",
+            "A, DEFINITION=SMOOTH STEP\n0",
+            "with DEFINITION=SMOOTH STEP",
+        ),
+        ("NAME=A", "NAME=C", "the unknown amplitude"),
+        ("1., .5", "1.", "with a time that has no factor"),
+        ("1., .5", "0., .5", "whose times do not increase: 0 after 0"),
+        ("0., 0., 1., .5\n", "", "without a table"),
     ] {
         let found = refused(&block(&table("0., 0., 1., .5"), load).replacen(from, to, 1));
         assert!(
-            found.len() == 1 && found[0].contains("amplitude `A`"),
+            found.len() == 1 && found[0].contains("amplitude `A`") && found[0].contains(why),
             "{found:?}"
         );
     }

@@ -128,7 +128,9 @@ impl Deck {
                 let values = self.numbers(line, text);
                 if let Some(known) = self.amplitudes.get_mut(name) {
                     let room = MOST_VALUES - known.values.len().min(MOST_VALUES);
-                    known.other |= values.len() > room;
+                    if values.len() > room {
+                        known.other = Some(format!("more than {MOST_VALUES} numbers"));
+                    }
                     known.values.extend(values.into_iter().take(room));
                 }
             }

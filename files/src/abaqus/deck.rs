@@ -169,13 +169,19 @@ impl Deck {
             return Err(format!("the unknown amplitude `{name:.60}`"));
         };
         let (times, rest) = amplitude.values.as_chunks::<2>();
-        if amplitude.other
-            || times.is_empty()
-            || !rest.is_empty()
-            || !times.is_sorted_by(|a, b| a[0] < b[0])
-        {
+        let back = times.windows(2).find(|pair| pair[0][0] >= pair[1][0]);
+        let why = match (&amplitude.other, back) {
+            (Some(other), _) => format!("with {other:.60}"),
+            (None, _) if times.is_empty() => "without a table".to_owned(),
+            (None, _) if !rest.is_empty() => "with a time that has no factor".to_owned(),
+            (None, Some([[time, _], [next, _]])) => {
+                format!("whose times do not increase: {next} after {time}")
+            }
+            (None, _) => String::new(),
+        };
+        if !why.is_empty() {
             return Err(format!(
-                "the amplitude `{name:.60}` (line {})",
+                "the amplitude `{name:.60}` (line {}), {why}",
                 amplitude.line
             ));
         }

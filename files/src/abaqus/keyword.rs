@@ -442,17 +442,18 @@ impl Deck {
         let Some(name) = self.named(keyword, "NAME") else {
             return Block::Skip;
         };
-        let unlike =
-            |parameter: &str, value: &str| keyword.has(parameter) && !keyword.is(parameter, value);
-        let known = ["NAME", "DEFINITION", "VALUE", "TIME"];
+        let other = keyword.parameters.iter().find(|(name, _)| match &name[..] {
+            "NAME" | "TIME" => false,
+            "DEFINITION" => !keyword.is("DEFINITION", "TABULAR"),
+            "VALUE" => !keyword.is("VALUE", "RELATIVE"),
+            _ => true,
+        });
         let amplitude = Amplitude {
             line,
-            other: unlike("DEFINITION", "TABULAR")
-                || unlike("VALUE", "RELATIVE")
-                || keyword
-                    .parameters
-                    .iter()
-                    .any(|(name, _)| !known.contains(&&name[..])),
+            other: other.map(|(name, value)| match value {
+                Some(value) => format!("{name}={value}"),
+                None => name.clone(),
+            }),
             values: Vec::new(),
         };
         self.amplitudes.insert(name.clone(), amplitude);

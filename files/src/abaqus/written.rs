@@ -76,8 +76,8 @@ pub(super) struct Orientation {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Amplitude {
     pub(super) line: u64,
-    /// Whether the amplitude is something other than a table of factors.
-    pub(super) other: bool,
+    /// The parameter by which the amplitude is something other than a table of factors.
+    pub(super) other: Option<String>,
     pub(super) values: Vec<f64>,
 }
 
