@@ -67,7 +67,7 @@ def test_a_profile_says_what_it_shows(punch: sg.Result, size: str, theme: str) -
         "Warnings: ",
     ):
         assert word in text, word
-    assert figure.axes[0].get_title(loc="left") == r"$\mu$ = 0.3   $\rho$ = 0.01   $\varepsilon$ = 0.0001"
+    assert figure.axes[0].get_title(loc="left") == r"$\mu$ = 0.3   $\rho$ = 0.01   $\varepsilon$ = 0.0001   total law"
     assert figure.axes[0].get_ylabel() == r"normal stress  $\sigma_n$"
     assert figure.get_figwidth() == pytest.approx({"column": 88, "page": 160, "slide": 254}[size] / 25.4)
 
@@ -493,7 +493,7 @@ def test_several_jobs_are_told_apart_by_what_differs(client: sg.Client) -> None:
     assert len({line.get_linestyle() for line in dashes}) == 3, "not by colour alone"
     legend = figure.axes[1].get_legend()
     assert legend is not None and len(legend.get_texts()) == 3
-    assert figure.axes[0].get_title(loc="left") == r"$\varepsilon$ = 0.0001", "what all have in common"
+    assert figure.axes[0].get_title(loc="left") == r"$\varepsilon$ = 0.0001   total law", "what all have in common"
     assert "(MPa)" in figure.axes[0].get_ylabel() and "verdict: " in words(figure)
     assert not overlapping(figure)
     # jobs and profiles will do, and labels of one's own

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use solver::problem::{Contact, Problem};
+use solver::problem::{Contact, History, Problem};
 use solver::solution::{Outcome, Severity, Summary, Verdict};
 
 use super::numbers::number;
@@ -100,7 +100,7 @@ fn length(problem: &Problem) -> &str {
         .unwrap_or_default()
 }
 
-/// The parameters of a law of friction by their symbols, with the unit of length.
+/// The parameters of a law of friction by their symbols, with the unit of length, and whether it depends on the load path.
 fn law(contact: &Contact, unit: &str) -> String {
     let Some(friction) = &contact.friction else {
         return "no friction".to_owned();
@@ -123,10 +123,15 @@ fn law(contact: &Contact, unit: &str) -> String {
         .bound
         .as_ref()
         .map(|_| "prescribed bound".to_owned());
+    let path = match friction.history {
+        History::Total => "total law",
+        History::Incremental => "incremental law",
+    };
     let all: Vec<String> = coefficient
         .into_iter()
         .chain(bound)
         .chain(lengths)
+        .chain([path.to_owned()])
         .collect();
     all.join(", ")
 }
@@ -140,7 +145,10 @@ mod tests {
     fn figures_of_a_study_show_their_parameters() {
         let mut problem = problem();
         let of = |problem: &Problem| Caption::of_problem(problem, "Contact").parameters;
-        assert_eq!(of(&problem), ["μ = 0.3, ρ = 0.01 mm, ε = 1e−4 mm"]);
+        assert_eq!(
+            of(&problem),
+            ["μ = 0.3, ρ = 0.01 mm, ε = 1e−4 mm, total law"]
+        );
         let mut second = problem.contacts[0].clone();
         second.boundary = "left".into();
         second.friction = None;

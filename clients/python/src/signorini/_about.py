@@ -10,7 +10,7 @@ from ._style import parameters
 
 
 def about(result: Summary, problem: Mapping[str, Any], step: int | str | None = None) -> dict[str, Any]:
-    """Title, parameters of friction (μ, ρ, ε by contact), verdict, warnings without notes, units, kind of analysis,
+    """Title, the law of friction (μ, ρ, ε by contact), verdict, warnings without notes, units, kind of analysis,
     the problem itself, extents; at the end of a step."""
     contacts = {contact["boundary"]: contact for contact in problem.get("contacts") or []}
     said = {

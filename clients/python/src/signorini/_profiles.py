@@ -244,7 +244,8 @@ def _common(abouts: Sequence[Mapping[str, Any]], boundary: str) -> dict[str, Any
     return {
         **abouts[0],
         "title": titles.pop() if len(titles) == 1 else "",
-        "parameters": {boundary: same},
+        # without those that differ, nothing is left of some laws
+        "parameters": {boundary: same} if same or not any(each) else {},
         "step": None,
         "verdict": worst,
         "of": "worst verdict" if len(set(verdicts)) > 1 else "verdict",

@@ -210,11 +210,12 @@ def settings(theme: Theme, points: float) -> dict[str, Any]:
     }
 
 
-def parameters(contact: Mapping[str, Any]) -> dict[str, float]:
-    """The numbers of the friction law by their symbols; empty without friction."""
+def parameters(contact: Mapping[str, Any]) -> dict[str, float | str]:
+    """The numbers of the friction law by their symbols, and which law it is; empty without friction."""
     friction = contact.get("friction") or {}
     symbols = {"μ": "coefficient", "ρ": "nonlocal_radius", "ε": "elastic_slip"}
-    return {symbol: friction[name] for symbol, name in symbols.items() if friction.get(name) is not None}
+    found = {symbol: friction[name] for symbol, name in symbols.items() if friction.get(name) is not None}
+    return {**found, "law": friction.get("history") or "total"} if friction else {}
 
 
 def subtitle(about: Mapping[str, Any], boundary: str | None = None) -> str:
@@ -223,7 +224,9 @@ def subtitle(about: Mapping[str, Any], boundary: str | None = None) -> str:
     shown = {name: found for name, found in contacts.items() if boundary in (None, "", name)}
     parts = []
     for name, found in shown.items():
-        text = "   ".join(f"{SYMBOLS[symbol]} = {value:.4g}" for symbol, value in found.items()) or "no friction"
+        law = [f"{found['law']} law"] if "law" in found else []
+        numbers = [f"{SYMBOLS[symbol]} = {value:.4g}" for symbol, value in found.items() if symbol != "law"]
+        text = "   ".join([*numbers, *law]) or "no friction"
         parts.append(f"{name}:  {text}" if len(contacts) > 1 else text)
     if about.get("step") is not None:
         parts[-1:] = ["      ".join([*parts[-1:], f"load step {about['step']}"])]
