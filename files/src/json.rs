@@ -512,11 +512,14 @@ mod tests {
             "nodal",
             "force",
             "body_force",
+            "gravity",
+            "rotation",
         ];
         let value = |name: &str| match name {
             "boundary" | "nodes" => serde_json::json!("top"),
             "pressure" | "normal" | "tangential" => serde_json::json!(1.0),
             "nodal" => serde_json::json!([[0.0, 1.0]]),
+            "rotation" => serde_json::json!({"angular_velocity": 1.0}),
             _ => serde_json::json!([0.0, 1.0]),
         };
         let subsets = |names: &[&str], value: &dyn Fn(&str) -> Value| -> Vec<Value> {

@@ -127,6 +127,8 @@ const FORMS: &[(&str, &[&[&str]])] = &[
             &["boundary", "nodal"],
             &["nodes", "force"],
             &["body_force"],
+            &["gravity"],
+            &["rotation"],
         ],
     ),
 ];

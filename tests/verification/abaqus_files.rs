@@ -210,8 +210,8 @@ fn unsupported_parts_of_a_deck_are_errors_with_their_line() {
         ("*STEP", "*STEP, NLGEOM", "*STEP, NLGEOM".to_owned()),
         (
             "INNER, P1, 5.",
-            "INNER, GRAV, 9.81, 0., -1.",
-            "`INNER, GRAV, 9.81, 0., -1.`".to_owned(),
+            "INNER, NEWTON, 9.81, 0., -1.",
+            "`INNER, NEWTON, 9.81, 0., -1.`".to_owned(),
         ),
         (
             "Fixed, 1, 2",

@@ -3,7 +3,7 @@
 
 use files::{ReadError, abaqus};
 use solver::mesh::Mesh;
-use solver::problem::Problem;
+use solver::problem::{Load, Problem, Rotation};
 use solver::solution::{Solution, WarningCode};
 
 use crate::support::{close, solve};
@@ -610,9 +610,9 @@ fn messages_say_what_to_do() {
         ),
         (
             "",
-            "*DLOAD\nE, GRAV, 9.81, 0., -1.\n",
-            "5 fields, with the kind of load `GRAV`",
-            "`body_force`",
+            "*DLOAD\nE, NEWTON, 9.81, 0., -1.\n",
+            "5 fields, with the kind of load `NEWTON`",
+            "Gravity is GRAV",
         ),
         (
             "",
@@ -829,6 +829,82 @@ fn decimal_commas_are_told() {
         assert!(
             found.iter().any(|text| text.contains(got)),
             "{to}: {found:?}"
+        );
+    }
+}
+
+/// GRAV and CENTRIF act on the mass, the direction without regard to its length; rows for parts of the body count together.
+#[test]
+fn gravity_and_rotation_of_a_deck_are_loads_of_the_mass() {
+    let dense = format!("{MATERIAL}*DENSITY\n2., 20.\n2., 100.\n");
+    let deck = |rows: &str| block(HELD, &format!("*DLOAD\n{rows}")).replace(MATERIAL, &dense);
+    let gravity = Load::Gravity([6.0, -8.0]);
+    let rotation = Load::Rotation(Rotation {
+        angular_velocity: 2.0,
+        about: Some([1.0, -0.5]),
+    });
+    let both = "E, GRAV, 10., 3., -4.\nE, CENTRIF, 4., 1., -.5, 0., 0., 0., 2.\n";
+    let found = problem(&deck(both));
+    assert_eq!(found.materials[0].density, Some(2.0));
+    assert_eq!(found.loads, [rotation.clone(), gravity.clone()]);
+    let parts = "1, GRAV, 10., 3., -4.\n2, grav, 10., 3., -4., 0.\n";
+    assert_eq!(problem(&deck(parts)).loads, [gravity.clone()]);
+    let twice = "E, GRAV, 10., 3., -4.\nE, GRAV, 10., 3., -4.\n";
+    assert_eq!(problem(&deck(twice)).loads, [gravity.clone(), gravity]);
+    for (row, got) in [
+        ("1, GRAV, 10., 3., -4.", "of `1` alone"),
+        ("E, GRAV, 10., 0., 0., 1.", "the direction 0, 0, 1"),
+        ("E, GRAV, 10.", "the kind of load `GRAV`"),
+        ("E, GRAV, x, 0., -1.", "with the kind of load `GRAV`"),
+        (
+            "E, CENTRIF, 4., 0., 0., 0., 1.",
+            "with the direction 1, 0, 0",
+        ),
+        (
+            "E, CENTRIF, -4., 0., 0., 0., 0., 0., 1.",
+            "-4 for the square",
+        ),
+        ("F, GRAV, 10., 0., -1.", "`F`"),
+    ] {
+        let found = refused(&deck(&format!("{row}\n")));
+        assert!(
+            found.len() == 1 && found[0].contains(got),
+            "{row}: {found:?}"
+        );
+    }
+    for (from, to, got) in [
+        ("*DENSITY\n2., 20.\n2., 100.\n", "", "without *DENSITY"),
+        ("2., 100.", "3., 100.", "depends on temperature"),
+    ] {
+        let found = refused(&deck(both).replace(from, to));
+        assert!(found.len() == 1 && found[0].contains(got), "{found:?}");
+    }
+    // a body of revolution rotates about its own axis, and hangs along it
+    let revolved = |rows: &str| deck(rows).replace("CPE8", "CAX8");
+    let about = Load::Rotation(Rotation {
+        angular_velocity: 2.0,
+        about: None,
+    });
+    let rows = "E, CENTRIF, 4., 0., 0., 0., 0., 1., 0.\nE, GRAV, 10., 0., 1., 0.\n";
+    assert_eq!(
+        problem(&revolved(rows)).loads,
+        [about, Load::Gravity([0.0, 10.0])]
+    );
+    for (row, got) in [
+        (
+            "E, CENTRIF, 4., 0., 0., 0., 0., 0., 1.",
+            "with the direction 0, 0, 1",
+        ),
+        (
+            "E, CENTRIF, 4., 1., 0., 0., 0., 1., 0.",
+            "an axis through 1, 0",
+        ),
+        ("E, GRAV, 10., 1., 0., 0.", "the direction 1, 0, 0"),
+    ] {
+        let found = refused(&revolved(&format!("{row}\n")));
+        assert!(
+            found.len() == 1 && found[0].contains(got),
+            "{row}: {found:?}"
         );
     }
 }

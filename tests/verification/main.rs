@@ -39,6 +39,7 @@ mod invariance;
 mod lift_off;
 mod loads;
 mod manufactured;
+mod mass;
 mod measured;
 mod misuse;
 mod nearly_incompressible;

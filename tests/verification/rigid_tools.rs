@@ -337,7 +337,7 @@ fn op_new_in_a_later_step_states_everything_again() {
         ),
         ("8, 1, 1.\n", "", "force 1 on `8`"),
         ("BODYHIGH, 1, .25\n", "", "force 1 on `BODYHIGH`"),
-        ("7, P1, 2.\n", "8, P1, 2.\n", "the pressure on `7 P1`"),
+        ("7, P1, 2.\n", "8, P1, 2.\n", "the load on `7 P1`"),
     ] {
         let second = format!("{again}{loads}");
         assert!(second.contains(from), "{from}");

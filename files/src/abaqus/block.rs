@@ -5,8 +5,8 @@ use super::deck::Deck;
 use super::element::Shape;
 use super::part::Numbered;
 use super::written::{
-    DECIMAL_POINT, Elastic, Force, MOST_CONSTANTS, Name, Prescribed, Pressure, Sides, Target,
-    fields, number,
+    DECIMAL_POINT, Distributed, Elastic, Force, LOAD_OF_MASS, MOST_CONSTANTS, MassLoad, Name, On,
+    Prescribed, Sides, Target, fields, number,
 };
 use solver::element::{Element, Family};
 use solver::error::Reason;
@@ -42,6 +42,7 @@ pub(super) enum Block {
     Surface(Name),
     NodeSurface(Name),
     Elastic(Elastic),
+    Density,
     Orientation(Name),
     Amplitude(Name),
     Thickness,
@@ -116,6 +117,7 @@ impl Deck {
             }
             Block::Surface(name) => self.side(name, line, text),
             Block::Elastic(elastic) => self.elastic_constants(elastic, line, text),
+            Block::Density => self.density(line, text),
             Block::Orientation(name) => {
                 let values = self.numbers(line, text);
                 if let Some(known) = self.orientations.get_mut(name)
@@ -316,7 +318,7 @@ impl Deck {
     }
 
     /// The numbers of a line of text; a blank field is 0.
-    fn numbers(&mut self, line: u64, text: &str) -> Vec<f64> {
+    pub(super) fn numbers(&mut self, line: u64, text: &str) -> Vec<f64> {
         let mut values = Vec::new();
         for word in fields(text) {
             match number(word) {
@@ -689,14 +691,18 @@ impl Deck {
             "" => Some(0.0),
             word => number(word),
         };
-        let value = value.filter(|_| words.len() <= 3 && !word(0).is_empty());
+        let of_mass = rows == Rows::Sides && MassLoad::is_kind(word(1));
+        let value = value.filter(|_| (of_mass || words.len() <= 3) && !word(0).is_empty());
         let amplitude = amplitude.clone();
         let component = word(1).parse().ok().filter(|c| (1..=2).contains(c));
-        let side = match rows {
-            Rows::Surfaces => word(1).eq_ignore_ascii_case("P").then_some(None),
-            _ => side_number(word(1), &['P']).map(Some),
+        let on = match rows {
+            Rows::Surfaces => word(1).eq_ignore_ascii_case("P").then_some(On::Surface),
+            _ if of_mass => {
+                MassLoad::read(word(1), words.get(3..).unwrap_or_default()).map(On::Mass)
+            }
+            _ => side_number(word(1), &['P']).map(On::Side),
         };
-        match (rows, value, side, component) {
+        match (rows, value, on, component) {
             (Rows::Nodes, Some(value), _, Some(component)) => {
                 let target = self.target(word(0));
                 self.here.forces.push(Force {
@@ -713,20 +719,21 @@ impl Deck {
                 "a force: node or set, 1 (x) or 2 (y), value",
                 "A blank value is 0; the node and the component have no default. Moments and forces out of the plane have no meaning here.",
             ),
-            (_, Some(value), Some(side), _) => {
+            (_, Some(value), Some(on), _) => {
                 let target = self.target(word(0));
-                self.here.pressures.push(Pressure {
+                self.here.pressures.push(Distributed {
                     line,
                     target,
-                    side,
+                    on,
                     value,
                     amplitude,
                 });
             }
             _ => {
                 let (expected, hint) = match rows {
+                    _ if of_mass => (LOAD_OF_MASS, "All numbers after the value are the direction, or a point and the direction; a blank one is 0, and the direction must not be 0."),
                     Rows::Surfaces => ("a pressure: surface, P, value", "A blank value is 0; the surface and P have no default. Give shear as `tangential` of a load in a problem as JSON, with this deck as its mesh."),
-                    _ => ("a pressure: element or set, P1 … P4, value", "A blank value is 0; the element and P1 … P4 have no default. Gravity is `body_force` (density times acceleration) of a problem as JSON, with this deck as its mesh; other loads are not computed."),
+                    _ => ("a pressure: element or set, P1 … P4, value", "A blank value is 0; the element and P1 … P4 have no default. Gravity is GRAV, rotation CENTRIF; other loads are not computed."),
                 };
                 self.doubt(
                     line,

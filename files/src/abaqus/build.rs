@@ -12,7 +12,7 @@ use super::rigid::{Search, Tools};
 use super::scope::{Kind, Scope};
 use super::supported::{UnknownKeyword, report_unknown};
 use super::written::{
-    Force, Incomplete, Name, Prescribed, Pressure, Section, Sides, Target, numbered, on_line,
+    Distributed, Force, Incomplete, Name, On, Prescribed, Section, Sides, Target, numbered, on_line,
 };
 use crate::source::Plane;
 use solver::error::{Findings, Reason, Violation};
@@ -41,7 +41,7 @@ pub(super) struct Built {
     pub(super) types: Vec<Typed>,
     pub(super) sections: Vec<Row<Section>>,
     pub(super) prescribed: Vec<Row<Prescribed>>,
-    pub(super) pressures: Vec<Row<Pressure>>,
+    pub(super) pressures: Vec<Row<Distributed>>,
     pub(super) forces: Vec<Row<Force>>,
     /// Whether each node belongs to a plane element.
     pub(super) used: Vec<bool>,
@@ -110,7 +110,7 @@ impl Deck {
 struct Rows {
     sections: Vec<(usize, Section)>,
     prescribed: Vec<(usize, Prescribed)>,
-    pressures: Vec<(usize, Pressure)>,
+    pressures: Vec<(usize, Distributed)>,
     forces: Vec<(usize, Force)>,
     held: Vec<(usize, Held)>,
     rigid_bodies: Vec<(usize, RigidBody)>,
@@ -565,8 +565,30 @@ impl Merged {
         );
     }
 
+    /// The elements that a row of `*DLOAD` acts on; otherwise it is reported.
+    fn elements_meant(
+        &mut self,
+        names: &Names<'_>,
+        scope: usize,
+        row: &Distributed,
+    ) -> Option<Meant> {
+        let meant = names.meant(Kind::Elements, scope, &row.target);
+        let label = matches!(row.target, Target::Label(_));
+        if meant.is_none() && !(self.incomplete.names || label && self.incomplete.elements) {
+            let hint = names.remedy(Kind::Elements, scope, &row.target);
+            self.unknown_target(
+                row.line,
+                &word(&row.target),
+                "an element or a set of elements",
+                || names.known(Kind::Elements, &row.target),
+                &hint,
+            );
+        }
+        meant
+    }
+
     /// Adds the surfaces of the deck, and the sides that the deck loads, to the mesh; returns the rows of pressures.
-    fn surfaces(&mut self, names: &Names<'_>, sets: &mut Sets) -> Vec<Row<Pressure>> {
+    fn surfaces(&mut self, names: &Names<'_>, sets: &mut Sets) -> Vec<Row<Distributed>> {
         let mut building = Building {
             names,
             sets,
@@ -602,7 +624,7 @@ impl Merged {
         let mut found = Vec::new();
         let mut loaded = BTreeSet::new();
         for (scope, row) in rows {
-            let Some(side) = row.side else {
+            if row.on == On::Surface {
                 let Target::Set(name) = &row.target else {
                     self.unknown_target(
                         row.line,
@@ -641,21 +663,16 @@ impl Merged {
                     ),
                 }
                 continue;
-            };
-            let Some(meant) = names.meant(Kind::Elements, scope, &row.target) else {
-                let label = matches!(row.target, Target::Label(_));
-                if !(self.incomplete.names || label && self.incomplete.elements) {
-                    let hint = names.remedy(Kind::Elements, scope, &row.target);
-                    self.unknown_target(
-                        row.line,
-                        &word(&row.target),
-                        "an element or a set of elements",
-                        || names.known(Kind::Elements, &row.target),
-                        &hint,
-                    );
-                }
+            }
+            let Some(meant) = self.elements_meant(names, scope, &row) else {
                 continue;
             };
+            if let On::Mass(load) = &row.on {
+                let name = format!("{} {load}", names.of(&meant));
+                found.push(Row { row, name });
+                continue;
+            }
+            let On::Side(side) = row.on else { continue };
             let name = format!("{} P{side}", names.of(&meant));
             // a deck may load the same side many times
             if loaded.insert(name.clone()) {

@@ -123,6 +123,7 @@ impl Deck {
                 }
                 Block::Skip
             }
+            "DENSITY" => Block::Density,
             "TEMPERATURE" => self.temperature_block(keyword, line),
             "INITIAL CONDITIONS" => self.initial_conditions(keyword, line),
             "ORIENTATION" => self.orientation_block(keyword),

@@ -23,6 +23,7 @@
 //! | one mesh from all parts | `build` |
 //! | a deck as a problem | `problem` |
 //! | supports of a deck | `supports` |
+//! | gravity, rotation and densities of a deck | `mass` |
 //! | temperatures of a deck | `temperature` |
 //! | contact: reading its keywords | `interaction` |
 //! | contact: rigid bodies, their shapes, their motion | `rigid`, `tool`, `steps` |
@@ -37,6 +38,7 @@ mod deck;
 mod element;
 mod interaction;
 mod keyword;
+mod mass;
 mod names;
 mod part;
 mod problem;

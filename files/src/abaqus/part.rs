@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::contact_parts::{Analytical, Held, RigidBody};
 use super::element::Typed;
 use super::supported::UnknownKeyword;
-use super::written::{Force, Incomplete, Name, Prescribed, Pressure, Section, Set, Surface};
+use super::written::{Distributed, Force, Incomplete, Name, Prescribed, Section, Set, Surface};
 use crate::source::Labels;
 use solver::element::Element;
 use solver::error::{Findings, Violation};
@@ -62,7 +62,7 @@ pub(super) struct Part {
     pub(super) surfaces: BTreeMap<Name, Surface>,
     pub(super) sections: Vec<Section>,
     pub(super) prescribed: Vec<Prescribed>,
-    pub(super) pressures: Vec<Pressure>,
+    pub(super) pressures: Vec<Distributed>,
     pub(super) forces: Vec<Force>,
     pub(super) rigid_bodies: Vec<RigidBody>,
     pub(super) analytical: BTreeMap<Name, Analytical>,

@@ -11,7 +11,8 @@ use super::rigid::Body;
 use super::steps::Motion;
 use super::supports::supports;
 use super::written::{
-    DECIMAL_POINT, Elastic, MOST_CONSTANTS, Name, Orientation, Section, numbered, on_line,
+    DECIMAL_POINT, Distributed, Elastic, MOST_CONSTANTS, Name, On, Orientation, Section, numbered,
+    on_line,
 };
 use crate::source::ReadError;
 use solver::element::Element;
@@ -117,6 +118,7 @@ impl Built {
                 "Name nodes of the mesh. A rigid tool is moved by its reference node (REF NODE of *RIGID BODY), or by the `indentation` of a contact in a problem as JSON.",
             );
         }
+        let loads = loads(built, &analysis, thickness);
         ElasticPart {
             analysis,
             quadrature,
@@ -125,7 +127,7 @@ impl Built {
             thickness,
             materials,
             supports: supports.list,
-            loads: loads(built, thickness),
+            loads,
         }
     }
 
@@ -327,6 +329,8 @@ fn quadrature(built: &mut Built) -> u32 {
 
 fn materials(built: &mut Built) -> Vec<Material> {
     let mut materials = Vec::new();
+    let load_of_mass = built.first_mass_load();
+    let mut densities: BTreeSet<&Name> = BTreeSet::new();
     let sections = std::mem::take(&mut built.sections);
     let known = std::mem::take(&mut built.deck.materials);
     // a material is reported once, however many sections have it
@@ -382,6 +386,8 @@ fn materials(built: &mut Built) -> Vec<Material> {
                 "Thermal strains are not computed. Remove the change of temperature or *EXPANSION if they may be neglected.",
             );
         }
+        let load = load_of_mass.filter(|_| densities.insert(&row.material));
+        let density = built.density_of(&row.material, definition, load);
         for (line, got) in &definition.other {
             told.insert(&row.material);
             built.doubt(
@@ -397,6 +403,7 @@ fn materials(built: &mut Built) -> Vec<Material> {
                     constants.angle = angle(built, row);
                 }
                 materials.push(Material {
+                    density,
                     elasticity,
                     group: Some(name.clone()),
                     name: Some(row.material.to_string()),
@@ -536,17 +543,18 @@ fn elements_at(raw: &RawMesh, sides: &[[u32; 2]], inner: &[(u32, u32)]) -> Strin
 
 /// Translates the loads. Forces are divided by `thickness`, the thickness of a body in plane strain: in a problem they
 /// are per unit of thickness. On a body of revolution a force acts on the whole ring, as in Abaqus and CalculiX.
-fn loads(built: &mut Built, thickness: f64) -> Vec<Load> {
-    let mut loads = Vec::new();
+fn loads(built: &mut Built, analysis: &Analysis, thickness: f64) -> Vec<Load> {
     let pressures = std::mem::take(&mut built.pressures);
-    let inner = if pressures.is_empty() {
+    let mut loads = built.mass_loads(&pressures, analysis);
+    let of_mass = |row: &Row<Distributed>| matches!(row.row.on, On::Mass(_));
+    let inner = if pressures.iter().all(of_mass) {
         Vec::new()
     } else {
         sides_of_two(&built.raw)
     };
     // a deck may load the same sides many times
     let mut counted: BTreeMap<String, (usize, usize)> = BTreeMap::new();
-    for Row { row, name } in pressures {
+    for Row { row, name } in pressures.into_iter().filter(|row| !of_mass(row)) {
         let count = || {
             let sides = built.raw.lines.get(&name).map_or(&[][..], |sides| sides);
             let is_inside = |ends: &&[u32; 2]| inner.binary_search(&key(**ends)).is_ok();

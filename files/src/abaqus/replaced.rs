@@ -189,7 +189,7 @@ fn listed(ended: &[(&Key, u64)], what: Replaces) -> String {
                 format!("displacement {component} of `{name:.120}` (line {line})")
             }
             Replaces::Forces => format!("force {component} on `{name:.60}` (line {line})"),
-            Replaces::Pressures => format!("the pressure on `{name:.60}` (line {line})"),
+            Replaces::Pressures => format!("the load on `{name:.60}` (line {line})"),
         })
         .collect();
     match ended.len() - names.len() {

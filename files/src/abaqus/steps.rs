@@ -6,7 +6,7 @@ use super::build::{Built, Row};
 use super::contact_parts::WRITTEN_INSTEAD;
 use super::rigid::{Body, Moving};
 use super::tool::Point;
-use super::written::{Force, Prescribed, Pressure, on_line};
+use super::written::{Distributed, Force, Prescribed, on_line};
 use solver::error::{Reason, Violation};
 
 /// The motion of a reference node.
@@ -285,7 +285,7 @@ impl Built {
     pub(super) fn keep_last_loads(&mut self) {
         let steps = &self.deck.contact;
         let mut last: BTreeMap<String, usize> = BTreeMap::new();
-        let pressure = |row: &Row<Pressure>| format!("p {}", row.name);
+        let pressure = |row: &Row<Distributed>| format!("p {}", row.name);
         let force = |row: &Row<Force>| format!("f{} {}", row.row.component, row.name);
         for row in &self.pressures {
             last.insert(pressure(row), steps.step_of(row.row.line));

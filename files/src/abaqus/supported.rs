@@ -20,6 +20,7 @@ pub(super) const READ: &[&str] = &[
     "MATERIAL",
     "ELASTIC",
     "EXPANSION",
+    "DENSITY",
     "ORIENTATION",
     "SOLID SECTION",
     "AMPLITUDE",
@@ -68,7 +69,6 @@ pub(super) const NOT_WRITTEN_OUT: &[&str] = &[
 /// other kinds of steps.
 pub(super) const IDLE: &[&str] = &[
     "END STEP",
-    "DENSITY",
     "DAMPING",
     "CONDUCTIVITY",
     "SPECIFIC HEAT",

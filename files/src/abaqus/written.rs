@@ -1,6 +1,7 @@
 //! The data of a deck as written: rows, sets, sections and materials, with their lines. Also reads the values of a
 //! line.
 
+use std::fmt;
 use std::rc::Rc;
 
 use solver::error::{Reason, Violation};
@@ -52,6 +53,8 @@ pub(super) struct MaterialDefinition {
     pub(super) other: Vec<(u64, String)>,
     /// The first line of `*EXPANSION`.
     pub(super) expansion: Option<u64>,
+    /// The different densities of `*DENSITY`, at most two.
+    pub(super) densities: Vec<f64>,
 }
 
 /// The material of some elements, `*SOLID SECTION`.
@@ -91,15 +94,93 @@ pub(super) struct Prescribed {
     pub(super) amplitude: Option<Name>,
 }
 
-/// A row of `*DLOAD` or `*DSLOAD`: a pressure on sides, or on a surface.
+/// A row of `*DLOAD` or `*DSLOAD`: a pressure, or a load of the mass.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Pressure {
+pub(super) struct Distributed {
     pub(super) line: u64,
     pub(super) target: Target,
-    /// The number of the side from 1; none if `target` is a surface.
-    pub(super) side: Option<usize>,
+    pub(super) on: On,
     pub(super) value: f64,
     pub(super) amplitude: Option<Name>,
+}
+
+/// What the value of a row of `*DLOAD` or `*DSLOAD` acts on.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum On {
+    /// The sides of a surface.
+    Surface,
+    /// The side of this number, from 1, of elements.
+    Side(usize),
+    /// The mass of elements.
+    Mass(MassLoad),
+}
+
+/// A load on the mass of elements, whose size is the value of its row.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum MassLoad {
+    /// GRAV: the direction of the acceleration.
+    Gravity([f64; 3]),
+    /// CENTRIF: a point of the axis, and its direction.
+    Rotation([f64; 3], [f64; 3]),
+}
+
+impl fmt::Display for MassLoad {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            MassLoad::Gravity([x, y, z]) => write!(f, "GRAV {x} {y} {z}"),
+            MassLoad::Rotation([x, y, z], [a, b, c]) => {
+                write!(f, "CENTRIF {x} {y} {z} {a} {b} {c}")
+            }
+        }
+    }
+}
+
+/// What the row of a load of the mass has to be.
+pub(super) const LOAD_OF_MASS: &str = "a load of the mass: element set, GRAV, acceleration, direction (3 numbers); or element set, CENTRIF, square of the angular velocity, a point of the axis, its direction (3 numbers each)";
+
+impl MassLoad {
+    /// Whether a word is the kind of a load of the mass.
+    pub(super) fn is_kind(word: &str) -> bool {
+        ["GRAV", "CENTRIF"]
+            .iter()
+            .any(|kind| word.eq_ignore_ascii_case(kind))
+    }
+
+    /// Reads the numbers after the value of a row of this kind.
+    pub(super) fn read(kind: &str, words: &[&str]) -> Option<MassLoad> {
+        let numbers: Option<Vec<f64>> = words
+            .iter()
+            .map(|word| {
+                if word.is_empty() {
+                    Some(0.0)
+                } else {
+                    number(word)
+                }
+            })
+            .collect();
+        let mut numbers = numbers?;
+        let count = if kind.eq_ignore_ascii_case("GRAV") {
+            3
+        } else {
+            6
+        };
+        if numbers.len() > count {
+            return None;
+        }
+        numbers.resize(count, 0.0);
+        let load = match numbers[..] {
+            [x, y, z] => MassLoad::Gravity([x, y, z]),
+            [x, y, z, a, b, c] => MassLoad::Rotation([x, y, z], [a, b, c]),
+            _ => return None,
+        };
+        Some(load).filter(|load| load.size() > 0.0)
+    }
+
+    /// The length of the direction.
+    pub(super) fn size(&self) -> f64 {
+        let (MassLoad::Gravity([x, y, z]) | MassLoad::Rotation(_, [x, y, z])) = self;
+        x.hypot(*y).hypot(*z)
+    }
 }
 
 /// A force, a row of `*CLOAD`.

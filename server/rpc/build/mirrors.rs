@@ -67,6 +67,7 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     fields("Orthotropic", "problem::Orthotropic"),
     fields("Support", "problem::Support"),
     fields("Load", "problem::LoadFields"),
+    fields("Rotation", "problem::Rotation"),
     array("Traction", "[problem::BoundaryValue; 2]"),
     content("NodalForces", "Vec<[f64; 2]>"),
     fields("Contact", "problem::Contact"),

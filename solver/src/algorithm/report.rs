@@ -336,7 +336,7 @@ impl Inside {
         let elements = body.elements(model);
         let body_force = model.body_force(&system.level);
         let interrupt = &mut *state.questions.interrupt.borrow_mut();
-        let recovered = recover(elements, &displacements, body_force, interrupt)?;
+        let recovered = recover(elements, &displacements, &body_force, interrupt)?;
         let difference = StressDifference::new(elements, &recovered, interrupt)?;
         let errors = difference.norms(elements, interrupt)?;
         let inside = Inside {

@@ -5,8 +5,9 @@ use std::collections::HashMap;
 use serde::Serialize;
 
 use crate::elasticity::Section;
+use crate::elasticity::body_force::BodyForce;
 use crate::elasticity::geometry::{Elements, Masters};
-use crate::elasticity::mixed::Mixed;
+use crate::elasticity::mixed::{Mixed, position};
 use crate::elasticity::shapes::Shape;
 use crate::element::gauss::GAUSS_3;
 use crate::element::{Element, Family, edge3};
@@ -274,8 +275,8 @@ fn rotate(k: &mut [[f64; 16]; 16], i: usize, [n, t]: [[f64; 2]; 2]) {
 pub struct Loads {
     /// Stresses on edges.
     pub edges: Vec<EdgeLoad>,
-    /// Force per volume along x and y.
-    pub body_force: [f64; 2],
+    /// Forces per volume.
+    pub body_force: BodyForce,
     /// Forces at nodes along x and y (without 2π).
     pub nodal: Vec<(u32, [f64; 2])>,
 }
@@ -311,19 +312,21 @@ pub fn assemble_loads(
     for load in &loads.edges {
         add_edge_load(mesh, section, load, &mut forces);
     }
-    if loads.body_force != [0.0; 2] {
+    if !loads.body_force.is_zero() {
         for (e, element) in mesh.elements.iter().enumerate() {
             let (family, nodes) = (element.family(), mesh.element_nodes(element));
-            let rule = match section.split(section.material_of(e)) {
+            let material = section.material_of(e);
+            let rule = match section.split(material) {
                 Some(_) => Mixed::rule(family),
                 None => family.rule(quadrature),
             };
             for point in rule {
                 let m = family.map(&nodes, point.place);
                 let weight = point.weight * m.det * section.depth(m.x);
+                let force = loads.body_force.at(material, position(&m, &nodes));
                 for (i, &node) in element.iter().enumerate() {
                     for a in 0..2 {
-                        forces[node as usize][a] += weight * m.shape[i] * loads.body_force[a];
+                        forces[node as usize][a] += weight * m.shape[i] * force[a];
                     }
                 }
             }
@@ -340,11 +343,12 @@ pub fn assemble_loads(
 /// `forces` of [`assemble_loads`] add up to the load, and become the right-hand side of the stiffness, from which the
 /// bubbles are eliminated.
 pub fn condense_body_force(mesh: &Mesh, section: &Section, loads: &Loads, forces: &mut [[f64; 2]]) {
-    if loads.body_force == [0.0; 2] || !section.has_split() {
+    if loads.body_force.is_zero() || !section.has_split() {
         return;
     }
     for (e, element) in mesh.elements.iter().enumerate() {
-        let Some(split) = section.split(section.material_of(e)) else {
+        let material = section.material_of(e);
+        let Some(split) = section.split(material) else {
             continue;
         };
         let mixed = Mixed::new(
@@ -353,7 +357,8 @@ pub fn condense_body_force(mesh: &Mesh, section: &Section, loads: &Loads, forces
             element.family(),
             &mesh.element_nodes(element),
         );
-        let passed_on = mixed.passed_on(&mixed.force_on_bubble(loads.body_force));
+        let force = mixed.force_on_bubble(&loads.body_force, material);
+        let passed_on = mixed.passed_on(&force);
         for (&node, force) in element.iter().zip(passed_on) {
             (0..2).for_each(|a| forces[node as usize][a] += force[a]);
         }
@@ -459,7 +464,10 @@ mod tests {
             ..Mesh::default()
         };
         let loads = Loads {
-            body_force: [0.0, -3.0],
+            body_force: BodyForce {
+                constant: [0.0, -3.0],
+                ..BodyForce::default()
+            },
             nodal: vec![(2, [7.0, 0.0])],
             ..Loads::default()
         };

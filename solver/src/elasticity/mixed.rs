@@ -10,6 +10,7 @@
 //!   k_ij − k_ib k_bb⁻¹ k_bj,    f_i − k_ib k_bb⁻¹ f_b,    a = k_bb⁻¹ (f_b − k_bi u_i)
 
 use crate::elasticity::Section;
+use crate::elasticity::body_force::BodyForce;
 use crate::elasticity::material::{COMPONENTS, Split, stress};
 use crate::element::{AtNodes, Family, GaussPoint, Mapped};
 
@@ -33,6 +34,8 @@ pub struct Mixed<'a> {
     flexibility: [[f64; 2]; 2],
     /// The integral ∫ b of the bubble function.
     volume: f64,
+    /// The integrals ∫ b x and ∫ b y.
+    moment: [f64; 2],
 }
 
 /// The strain matrix B of every node and of the bubble at an integration point.
@@ -107,6 +110,7 @@ impl<'a> Mixed<'a> {
             bubble: [[0.0; SIZE]; 2],
             flexibility: [[0.0; 2]; 2],
             volume: 0.0,
+            moment: [0.0; 2],
         };
         // of 1, ξ and η instead of the ψ_k, which follow from them
         let (mut mass, mut moments) = ([[0.0; 3]; 3], [[0.0; SIZE]; 3]);
@@ -133,6 +137,8 @@ impl<'a> Mixed<'a> {
                 add_row(split, weight, &strains, count, p, &mut element.bubble[p]);
             }
             element.volume += weight * shape;
+            let place = position(&m, nodes);
+            (0..2).for_each(|a| element.moment[a] += weight * shape * place[a]);
             visit(weight, &strains);
         }
         element.frame.orthonormal = inverse_of_root(&mass);
@@ -194,9 +200,9 @@ impl<'a> Mixed<'a> {
             .map(|row| row[0] * force[0] + row[1] * force[1])
     }
 
-    /// The force on the bubble by a body force (force/volume).
-    pub fn force_on_bubble(&self, body_force: [f64; 2]) -> [f64; 2] {
-        body_force.map(|f| f * self.volume)
+    /// The force on the bubble by forces per volume, of an element of this material.
+    pub fn force_on_bubble(&self, body_force: &BodyForce, material: usize) -> [f64; 2] {
+        body_force.over(material, self.volume, self.moment)
     }
 
     /// The forces on the nodes equivalent to a force on the bubble: −k_ib k_bb⁻¹ f_b.
@@ -501,7 +507,11 @@ mod tests {
         let section = section(Analysis::PlaneStrain {}, 0.4999);
         let element = Mixed::new(&section, section.split(0).unwrap(), Family::Quad, &QUAD);
         let u = QUAD.map(|[x, y]| [0.01 * x * y + 0.003 * y * y, -0.02 * x * x]);
-        let force = element.force_on_bubble([3.0, -5.0]);
+        let body_force = BodyForce {
+            constant: [3.0, -5.0],
+            ..BodyForce::default()
+        };
+        let force = element.force_on_bubble(&body_force, 0);
         let inside = element.inside(&u, &force);
         for p in 0..2 {
             let mut residual = force[p]

@@ -6,6 +6,7 @@
 //! |---|---|
 //! | Hooke's law and its matrix | `material` |
 //! | element stiffness, loads, numbering of unknowns | `assembly` |
+//! | forces per volume | `body_force` |
 //! | integrals shared by elements of one shape | `geometry`, `shapes` |
 //! | elements that do not lock | `mixed` |
 //! | stresses, nodal forces and energy | `recovery` |
@@ -13,6 +14,7 @@
 //! | how stresses grow where materials meet at the surface | `wedges` |
 
 mod assembly;
+mod body_force;
 mod geometry;
 mod material;
 mod mixed;
@@ -25,6 +27,7 @@ pub use assembly::{
     Axes, Dof, DofMap, EdgeLoad, ElementStiffness, LoadAxes, Loads, assemble_element,
     assemble_loads, condense_body_force,
 };
+pub use body_force::BodyForce;
 pub use geometry::{ElementTables, Elements};
 pub use material::{COMPONENTS, Moduli, Section, inverse, isotropic, orthotropic, stress};
 pub use mixed::Mixed;

@@ -1,6 +1,7 @@
 //! From displacements to stresses, nodal forces and energy.
 
 use crate::elasticity::Section;
+use crate::elasticity::body_force::BodyForce;
 use crate::elasticity::geometry::{Elements, MeshStations, Points, Station};
 use crate::elasticity::material::{COMPONENTS, Moduli, stress};
 use crate::elasticity::mixed::{Inside, Mixed, OfNodes, dilatation, position};
@@ -49,11 +50,11 @@ impl Recovered {
 /// Recovers stresses at nodes: taken at the superconvergent points of each element (2 × 2 of a quadrilateral),
 /// extrapolated to its nodes linearly, and averaged over the elements that meet there.
 ///
-/// `body_force`: the body force (force/volume) under which the displacements occur.
+/// `body_force`: the forces per volume under which the displacements occur.
 pub fn recover(
     elements: Elements<'_>,
     displacements: &[[f64; 2]],
-    body_force: [f64; 2],
+    body_force: &BodyForce,
     interrupt: &mut Interrupt<'_>,
 ) -> Result<Recovered, Stopped> {
     let Elements { mesh, section, .. } = elements;
@@ -146,7 +147,7 @@ impl Recovered {
         (section, material): (&Section, usize),
         (element, u): (&Element, &AtNodes<[f64; 2]>),
         quadrature: u32,
-        body_force: [f64; 2],
+        body_force: &BodyForce,
     ) -> [[f64; COMPONENTS]; 8] {
         let (family, nodes) = (element.family(), mesh.element_nodes(element));
         let deformed = Deformed::new(section, material, family, &nodes, u, body_force);
@@ -386,20 +387,20 @@ struct DeformedAt {
 }
 
 impl<'a> Deformed<'a> {
-    /// An element with displaced nodes. `material`: the number of its material in the section; `body_force`: the body
-    /// force (force/volume) under which the displacements occur.
+    /// An element with displaced nodes. `material`: the number of its material in the section; `body_force`: the
+    /// forces per volume under which the displacements occur.
     pub fn new(
         section: &'a Section,
         material: usize,
         family: Family,
         nodes: &'a AtNodes<[f64; 2]>,
         u: &'a AtNodes<[f64; 2]>,
-        body_force: [f64; 2],
+        body_force: &BodyForce,
     ) -> Self {
         let (mut inside, mut work_on_bubble) = (None, 0.0);
         if let Some(split) = section.split(material) {
             let mixed = Mixed::new(section, split, family, nodes);
-            let force = mixed.force_on_bubble(body_force);
+            let force = mixed.force_on_bubble(body_force, material);
             let state = mixed.inside(u, &force);
             work_on_bubble = force[0] * state.bubble[0] + force[1] * state.bubble[1];
             inside = Some(state);

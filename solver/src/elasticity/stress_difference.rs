@@ -378,7 +378,13 @@ mod tests {
             let never = &mut || false;
             let interrupt = &mut Interrupt::new(never);
             let difference = |u: &[[f64; 2]], interrupt: &mut Interrupt<'_>| {
-                let recovered = recover(elements, u, [0.0; 2], interrupt).unwrap();
+                let recovered = recover(
+                    elements,
+                    u,
+                    &crate::elasticity::BodyForce::default(),
+                    interrupt,
+                )
+                .unwrap();
                 StressDifference::new(elements, &recovered, interrupt).unwrap()
             };
             let own = difference(&field(0), interrupt);

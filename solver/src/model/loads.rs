@@ -5,7 +5,7 @@ use super::nodes::{FirstSides, Forces};
 use crate::elasticity::{EdgeLoad, LoadAxes, Loads, Section};
 use crate::error::{AllChecks, Checked, Reason};
 use crate::mesh::{Edge, Mesh};
-use crate::problem::{BoundaryValue, Load};
+use crate::problem::{BoundaryValue, Load, Material, Rotation};
 
 /// A stress on a boundary.
 struct Stress {
@@ -23,6 +23,7 @@ impl Checks {
         mesh: &Mesh,
         sides: &FirstSides<'_>,
         section: &Section,
+        materials: &[Material],
         loads: &[Load],
     ) -> Checked<Loads> {
         let mut all = AllChecks::default();
@@ -33,6 +34,11 @@ impl Checks {
             all.check(self.load(mesh, section, load, &pointer, &mut found, &mut at_nodes));
         }
         found.nodal.extend(sides.carried(at_nodes));
+        let of_mass = |load: &Load| matches!(load, Load::Gravity(_) | Load::Rotation(_));
+        if let Some(first) = loads.iter().position(of_mass) {
+            let densities = all.check(self.densities(materials, first));
+            found.body_force.densities = densities.unwrap_or_default();
+        }
         all.finish(found)
     }
 
@@ -49,11 +55,13 @@ impl Checks {
         let ring = section.circumference();
         let zero = BoundaryValue::Constant(0.0);
         let (boundary, stress) = match load {
-            Load::BodyForce([x, y]) => {
-                found.body_force[0] += x;
-                found.body_force[1] += y;
+            Load::BodyForce(force) => {
+                let sum = &mut found.body_force.constant;
+                (0..2).for_each(|a| sum[a] += force[a]);
                 return Ok(());
             }
+            Load::Gravity(gravity) => return self.gravity(section, *gravity, pointer, found),
+            Load::Rotation(rotation) => return self.rotation(section, rotation, pointer, found),
             Load::Force(nodes, force) => {
                 let pointer = format!("{pointer}/nodes");
                 if let Some(count) = mesh.nodes_left_out.get(nodes) {
@@ -122,6 +130,77 @@ impl Checks {
             ),
         };
         self.stress(mesh, boundary, &stress, pointer, found)
+    }
+
+    /// Adds the acceleration of gravity.
+    fn gravity(
+        &mut self,
+        section: &Section,
+        acceleration: [f64; 2],
+        pointer: &str,
+        found: &mut Loads,
+    ) -> Checked {
+        let sum = &mut found.body_force.acceleration;
+        (0..2).for_each(|a| sum[a] += acceleration[a]);
+        if section.axisymmetric() && acceleration[0] != 0.0 {
+            return Err(self.report(
+                format!("{pointer}/gravity/0"),
+                Reason::NotUsed,
+                acceleration[0],
+                "0 in axisymmetry",
+                "Gravity across its axis bends a body of revolution, which is no axisymmetric state. A force along r is a `body_force`, the centrifugal force a `rotation`.",
+            ));
+        }
+        Ok(())
+    }
+
+    /// Adds the acceleration ω² (place − axis) of a rotation.
+    fn rotation(
+        &mut self,
+        section: &Section,
+        rotation: &Rotation,
+        pointer: &str,
+        found: &mut Loads,
+    ) -> Checked {
+        let squared = rotation.angular_velocity * rotation.angular_velocity;
+        let force = &mut found.body_force;
+        if !section.axisymmetric() {
+            for (a, about) in rotation.about.unwrap_or_default().into_iter().enumerate() {
+                force.growth[a] += squared;
+                force.acceleration[a] -= squared * about;
+            }
+            return Ok(());
+        }
+        force.growth[0] += squared;
+        match rotation.about {
+            None => Ok(()),
+            Some([x, y]) => Err(self.report(
+                format!("{pointer}/rotation/about"),
+                Reason::NotUsed,
+                format!("[{x}, {y}]"),
+                "nothing in axisymmetry",
+                "A body of revolution rotates about its own axis: remove `about`.",
+            )),
+        }
+    }
+
+    /// The densities of all materials. `first`: the number of the first load that acts on the mass.
+    fn densities(&mut self, materials: &[Material], first: usize) -> Checked<Vec<f64>> {
+        let mut all = AllChecks::default();
+        let mut densities = Vec::new();
+        for (i, material) in materials.iter().enumerate() {
+            if material.density.is_none() {
+                all.fail(self.report(
+                    format!("/materials/{i}/density"),
+                    Reason::Missing,
+                    "nothing",
+                    "the mass per volume of the material",
+                    format!("/loads/{first} acts on the mass of the body. With N, mm and s a density is in t/mm³: 7.85e-9 for steel. A material without mass has the density 0."),
+                ));
+            }
+            densities.extend(material.density);
+        }
+        all.finish(densities)
     }
 
     /// Adds a stress on a boundary.

@@ -26,6 +26,15 @@ impl Checks {
         }
         let mut moduli = Vec::new();
         for (i, material) in materials.iter().enumerate() {
+            if let Some(density) = material.density {
+                all.check(self.require(
+                    density >= 0.0,
+                    format!("/materials/{i}/density"),
+                    density,
+                    "a density ≥ 0",
+                    "Mass per volume.",
+                ));
+            }
             moduli.extend(all.check(self.moduli(&analysis, material, &format!("/materials/{i}"))));
         }
         let material_of = self.elements_of(materials, mesh);

@@ -64,7 +64,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use checks::Checks;
 use nodes::FirstSides;
 
-use crate::elasticity::{self, Loads, Section};
+use crate::elasticity::{self, BodyForce, Loads, Section};
 use crate::error::{AllChecks, Checked, Violation};
 use crate::mesh::{External, ExternalMesh, Mesh};
 use crate::problem::{Algorithm, Condition, History, Problem, SolverControls, Step};
@@ -136,9 +136,9 @@ impl Model {
         checks.found.conclude(model)
     }
 
-    /// Force per volume along x and y at a load level.
-    pub fn body_force(&self, level: &Level) -> [f64; 2] {
-        self.loads.body_force.map(|f| level.loads * f)
+    /// The forces per volume at a load level.
+    pub fn body_force(&self, level: &Level) -> BodyForce {
+        self.loads.body_force.times(level.loads)
     }
 
     /// The nodes that belong to two contacts, with the indices of both in `contacts`; without supported nodes, which
@@ -255,7 +255,7 @@ impl Checks {
         let sides = FirstSides::new(&mesh, problem);
         let (fixed, supported) = self.supports(&mesh, &sides, &axis, &problem.supports);
         all.check(supported);
-        let loads = self.loads(&mesh, &sides, &section, &problem.loads);
+        let loads = self.loads(&mesh, &sides, &section, &problem.materials, &problem.loads);
         let (contacts, sound) = self.contacts(&mesh, &section, &axis, problem, numbers, &fixed);
         all.check(sound);
         let held_by_contact = self.freedom(&mesh, &section, &fixed, &contacts);

@@ -9,7 +9,7 @@ use super::support::BoundaryValue;
 use crate::error::{Reason, Violation, either};
 
 /// A load in exactly one form: on a boundary `pressure`, or `traction`, or `normal` and `tangential`
-/// (or one of them), or `nodal`; on a set of nodes `force`; on the whole body `body_force`.
+/// (or one of them), or `nodal`; on a set of nodes `force`; on the whole body `body_force`, `gravity` or `rotation`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "LoadFields", into = "LoadFields")]
 #[schemars(extend("oneOf" = forms()))]
@@ -30,6 +30,23 @@ pub enum Load {
     Force(String, [f64; 2]),
     /// A force per volume on the whole body.
     BodyForce([f64; 2]),
+    /// An acceleration along x and y: the force per volume is the density of the material times it.
+    Gravity([f64; 2]),
+    /// The centrifugal force of a body that rotates.
+    Rotation(Rotation),
+}
+
+/// A rotation at constant speed, seen from the rotating body: the force per volume is density · ω² · (distance from the
+/// axis), away from the axis. The axis is perpendicular to the plane, or that of a body of revolution. In load steps the
+/// factor of `loads` multiplies the force, and so ω².
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Rotation {
+    /// Angular velocity ω (radians per time), of either sign.
+    pub angular_velocity: f64,
+    /// A point `[x, y]` of the axis; absent: the origin. A body of revolution rotates about its own axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub about: Option<[f64; 2]>,
 }
 
 impl Load {
@@ -41,20 +58,22 @@ impl Load {
             | Load::Normal(boundary, _, _)
             | Load::Tangential(boundary, _)
             | Load::Nodal(boundary, _) => Some(boundary),
-            Load::Force(..) | Load::BodyForce(_) => None,
+            Load::Force(..) | Load::BodyForce(_) | Load::Gravity(_) | Load::Rotation(_) => None,
         }
     }
 }
 
 /// The allowed forms as JSON Schema: each requires its own fields and excludes the fields of the others.
-fn forms() -> [Schema; 6] {
-    const FORMS: [(Option<&str>, &[&str]); 6] = [
+fn forms() -> [Schema; 8] {
+    const FORMS: [(Option<&str>, &[&str]); 8] = [
         (Some("boundary"), &["pressure"]),
         (Some("boundary"), &["traction"]),
         (Some("boundary"), &["normal", "tangential"]),
         (Some("boundary"), &["nodal"]),
         (Some("nodes"), &["force"]),
         (None, &["body_force"]),
+        (None, &["gravity"]),
+        (None, &["rotation"]),
     ];
     FORMS.map(|(place, values)| {
         let own = |name: &&str| place == Some(*name) || values.contains(name);
@@ -86,7 +105,7 @@ fn forms() -> [Schema; 6] {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LoadFields {
-    /// Name of the boundary; absent for `force` and `body_force`.
+    /// Name of the boundary; absent for `force` and for loads on the whole body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub boundary: Option<String>,
     /// Name of a set of nodes, for `force`.
@@ -115,6 +134,12 @@ pub struct LoadFields {
     /// Force per volume along x and y.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_force: Option<[f64; 2]>,
+    /// Acceleration `[gx, gy]` along x and y: the force per volume is the `density` of the material times it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gravity: Option<[f64; 2]>,
+    /// The centrifugal force of a body that rotates, by the `density` of its materials.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotation: Option<Rotation>,
 }
 
 impl TryFrom<LoadFields> for Load {
@@ -122,7 +147,7 @@ impl TryFrom<LoadFields> for Load {
 
     #[rustfmt::skip] // a form in a row
     fn try_from(fields: LoadFields) -> Result<Load, Violation> {
-        let LoadFields { boundary, nodes, pressure, traction, normal, tangential, nodal, force, body_force } = fields;
+        let LoadFields { boundary, nodes, pressure, traction, normal, tangential, nodal, force, body_force, gravity, rotation } = fields;
         let given = [
             ("pressure", pressure.is_some()),
             ("traction", traction.is_some()),
@@ -131,24 +156,26 @@ impl TryFrom<LoadFields> for Load {
             ("nodal", nodal.is_some()),
             ("force", force.is_some()),
             ("body_force", body_force.is_some()),
+            ("gravity", gravity.is_some()),
+            ("rotation", rotation.is_some()),
         ];
         let on = || on_boundary(&boundary, &nodes);
-        match (pressure, traction, normal, tangential, nodal, force, body_force) {
-            (Some(p), None,    None,    None,    None,    None,    None)    => Ok(Load::Pressure(on()?, p)),
-            (None,    Some(t), None,    None,    None,    None,    None)    => Ok(Load::Traction(on()?, t)),
-            (None,    None,    Some(n), t,       None,    None,    None)    => Ok(Load::Normal(on()?, n, t)),
-            (None,    None,    None,    Some(t), None,    None,    None)    => Ok(Load::Tangential(on()?, t)),
-            (None,    None,    None,    None,    Some(f), None,    None)    => Ok(Load::Nodal(on()?, f)),
-            (None,    None,    None,    None,    None,    Some(f), None)    => Ok(Load::Force(on_nodes(&boundary, &nodes)?, f)),
-            (None,    None,    None,    None,    None,    None,    Some(f)) => {
-                nowhere(&boundary, &nodes)?;
-                Ok(Load::BodyForce(f))
-            }
+        let whole = || nowhere(&boundary, &nodes);
+        match (pressure, traction, normal, tangential, nodal, force, body_force, gravity, rotation) {
+            (Some(p), None,    None,    None,    None,    None,    None,    None,    None)    => Ok(Load::Pressure(on()?, p)),
+            (None,    Some(t), None,    None,    None,    None,    None,    None,    None)    => Ok(Load::Traction(on()?, t)),
+            (None,    None,    Some(n), t,       None,    None,    None,    None,    None)    => Ok(Load::Normal(on()?, n, t)),
+            (None,    None,    None,    Some(t), None,    None,    None,    None,    None)    => Ok(Load::Tangential(on()?, t)),
+            (None,    None,    None,    None,    Some(f), None,    None,    None,    None)    => Ok(Load::Nodal(on()?, f)),
+            (None,    None,    None,    None,    None,    Some(f), None,    None,    None)    => Ok(Load::Force(on_nodes(&boundary, &nodes)?, f)),
+            (None,    None,    None,    None,    None,    None,    Some(f), None,    None)    => whole().map(|()| Load::BodyForce(f)),
+            (None,    None,    None,    None,    None,    None,    None,    Some(g), None)    => whole().map(|()| Load::Gravity(g)),
+            (None,    None,    None,    None,    None,    None,    None,    None,    Some(r)) => whole().map(|()| Load::Rotation(r)),
             _ => Err(Violation::new(
                 "",
                 Reason::WrongCount,
                 either(&given),
-                "exactly one of `pressure`, `traction`, `normal` and `tangential`, `nodal`, `force`, `body_force`",
+                "exactly one of `pressure`, `traction`, `normal` and `tangential`, `nodal`, `force`, `body_force`, `gravity`, `rotation`",
                 "Give each of them a load of its own.",
             )),
         }
@@ -156,7 +183,8 @@ impl TryFrom<LoadFields> for Load {
 }
 
 fn on_boundary(boundary: &Option<String>, nodes: &Option<String>) -> Result<String, Violation> {
-    let hint = "Stresses act on a boundary, a `force` on `nodes`, a body force on the whole body.";
+    let hint =
+        "Stresses act on a boundary, a `force` on `nodes`, the other loads on the whole body.";
     let (place, reason, got) = match (boundary, nodes) {
         (Some(boundary), None) => return Ok(boundary.clone()),
         (_, Some(_)) => (
@@ -192,8 +220,8 @@ fn nowhere(boundary: &Option<String>, nodes: &Option<String>) -> Result<(), Viol
     Err(Violation::new(
         place,
         Reason::NotUsed,
-        "a place for a body force",
-        "no place: a body force acts on the whole body",
+        "a place for a load on the whole body",
+        "no place: `body_force`, `gravity` and `rotation` act on the whole body",
         "Remove the place, or give a traction.",
     ))
 }
@@ -234,6 +262,14 @@ impl From<Load> for LoadFields {
             },
             Load::BodyForce(body_force) => LoadFields {
                 body_force: Some(body_force),
+                ..empty
+            },
+            Load::Gravity(gravity) => LoadFields {
+                gravity: Some(gravity),
+                ..empty
+            },
+            Load::Rotation(rotation) => LoadFields {
+                rotation: Some(rotation),
                 ..empty
             },
         }

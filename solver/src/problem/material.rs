@@ -20,6 +20,9 @@ pub struct Material {
     pub group: Option<String>,
     /// A name for readers.
     pub name: Option<String>,
+    /// Mass per volume ≥ 0, in units that belong to those of force, length and time; required where a load is `gravity`
+    /// or `rotation`.
+    pub density: Option<f64>,
 }
 
 /// Constants of linear elasticity.
@@ -56,6 +59,10 @@ pub struct MaterialFields {
     /// A name for readers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
+    /// Mass per volume ≥ 0; required where a load is `gravity` or `rotation`. Its unit belongs to those of force, length
+    /// and time: with N, mm and s it is t/mm³, and that of steel is 7.85e-9.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub density: Option<f64>,
 }
 
 impl TryFrom<MaterialFields> for Material {
@@ -68,6 +75,7 @@ impl TryFrom<MaterialFields> for Material {
             orthotropic,
             group,
             name,
+            density,
         } = fields;
         let elasticity = match (youngs_modulus, poissons_ratio, orthotropic) {
             (Some(youngs_modulus), Some(poissons_ratio), None) => Elasticity::Isotropic {
@@ -84,6 +92,7 @@ impl TryFrom<MaterialFields> for Material {
             elasticity,
             group,
             name,
+            density,
         })
     }
 }
@@ -114,10 +123,12 @@ impl From<Material> for MaterialFields {
             elasticity,
             group,
             name,
+            density,
         } = material;
         let named = MaterialFields {
             group,
             name,
+            density,
             ..MaterialFields::default()
         };
         match elasticity {

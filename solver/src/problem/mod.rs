@@ -16,7 +16,7 @@ pub use contact::{
     Kernel, Measure, NormalOf, Normalization, Obstacle, PrescribedBound, SLIP_PART, Smoothing,
     Transition, elastic_slip_rule,
 };
-pub use load::{Load, LoadFields};
+pub use load::{Load, LoadFields, Rotation};
 pub use material::{Elasticity, Material, MaterialFields, Orthotropic};
 pub use mesh::{
     AdaptiveRefine, BoundaryPart, Curve, CurveKind, ElementRange, Grid, InlineMesh, MeshInput,

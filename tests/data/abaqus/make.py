@@ -1,5 +1,5 @@
 """Writes the decks of this folder: a quarter ring held at one end, pressed inside and pulled at the
-other, in every theory and family that CalculiX and we share. CalculiX runs them as they are."""
+other, in every theory and family that CalculiX and we share; and one that hangs and rotates. CalculiX runs them as they are."""
 
 import math
 import pathlib
@@ -8,8 +8,9 @@ HERE = pathlib.Path(__file__).parent
 ROUND, THICK = 6, 3  # elements along the quarter and across the wall
 
 
-def deck(name, kind, step, thickness=None):
-    """step 2: midside nodes lie on the arcs; triangles are quadrilaterals cut in two."""
+def deck(name, kind, step, thickness=None, mass=()):
+    """step 2: midside nodes lie on the arcs; triangles are quadrilaterals cut in two. mass: rows of *DLOAD instead of the
+    other loads."""
     triangles, axisymmetric = kind[3] == "6", kind.startswith("CAX")
     number, nodes = {}, []
     for j in range(2 * THICK + 1):
@@ -55,9 +56,13 @@ def deck(name, kind, step, thickness=None):
     lines += ["*ELSET, ELSET=inner"] + [f"{e}," for e in inner]
     lines += ["*MATERIAL, NAME=steel", "*ELASTIC", "2.1D3, .3", "*SOLID SECTION, ELSET=EALL, MATERIAL=STEEL"]
     lines += [f"{thickness}," if thickness else ","]
+    if mass:
+        lines[-2:-2] = ["*DENSITY", "2.5D-3"]
     lines += ["*BOUNDARY", "Fixed, 1, 2" if not axisymmetric else "fixed, 2, 2"]
-    lines += ["*STEP", "*STATIC", "*DLOAD", "INNER, P1, 5."]
-    if axisymmetric:
+    lines += ["*STEP", "*STATIC", "*DLOAD", *(mass or ["INNER, P1, 5."])]
+    if mass:
+        pass
+    elif axisymmetric:
         lines += ["*BOUNDARY", "end, 2, 2, -.01"]
     else:
         lines += ["*BOUNDARY", "end, 1, 1, .02", "*CLOAD", f"{number[ROUND - ROUND % 2, 2 * THICK]}, 2, -1.5"]
@@ -71,3 +76,5 @@ deck("ring-cps8", "CPS8", 2, thickness=0.25)
 deck("ring-cax8", "CAX8", 2)
 deck("ring-cpe6", "CPE6", 2)
 deck("ring-cps6", "CPS6", 2, thickness=0.25)
+deck("mass-cpe8", "CPE8", 2, mass=["EALL, GRAV, 3., .6, -.8, 0.", "eall, CENTRIF, 40., 1., -.5, 0., 0., 0., 1."])
+deck("mass-cax8", "CAX8", 2, mass=["EALL, GRAV, 3., 0., -1., 0.", "eall, CENTRIF, 40., 0., 0., 0., 0., 1., 0."])

@@ -148,7 +148,7 @@ impl Rows {
             Family::Quad,
             &nodes,
             &u,
-            model.body_force(&system.level),
+            &model.body_force(&system.level),
         );
         let (mut stress, mut phi) = ([vec![], vec![]], [vec![], vec![]]);
         for (row, depth) in depths(self.rule).into_iter().enumerate() {
