@@ -848,7 +848,7 @@ fn gravity_and_rotation_of_a_deck_are_loads_of_the_mass() {
     assert_eq!(found.materials[0].density, Some(2.0));
     assert_eq!(found.loads, [rotation.clone(), gravity.clone()]);
     let parts = "1, GRAV, 10., 3., -4.\n2, grav, 10., 3., -4., 0.\n";
-    assert_eq!(problem(&deck(parts)).loads, [gravity.clone()]);
+    assert_eq!(problem(&deck(parts)).loads, std::slice::from_ref(&gravity));
     let twice = "E, GRAV, 10., 3., -4.\nE, GRAV, 10., 3., -4.\n";
     assert_eq!(problem(&deck(twice)).loads, [gravity.clone(), gravity]);
     for (row, got) in [
