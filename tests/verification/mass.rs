@@ -3,10 +3,10 @@
 
 use serde_json::{Value, json};
 use solver::problem::Problem;
-use solver::solution::{Fields, Solution};
+use solver::solution::Solution;
 
 use crate::record::held;
-use crate::support::{Lattice, close, problem, solve};
+use crate::support::{Lattice, close, node, problem, solve};
 
 const E: f64 = 1000.0;
 const DENSITY: f64 = 2.5;
@@ -188,14 +188,6 @@ fn quarter(nu: f64, omega: f64, centre: [f64; 2]) -> Problem {
         })
         .to_string(),
     )
-}
-
-/// The node nearest to (x, y).
-fn node(fields: &Fields, x: f64, y: f64) -> usize {
-    let distance = |k: &usize| (fields.x[*k] - x).hypot(fields.y[*k] - y);
-    (0..fields.x.len())
-        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-        .unwrap()
 }
 
 /// Displacements within 1e-5 at eight elements, as under Lamé's pressure, and 1e-3 with ν = .4999: there the force is balanced

@@ -2,7 +2,7 @@
 
 use solver::observer::{Observer, Progress};
 use solver::problem::Problem;
-use solver::solution::Solution;
+use solver::solution::{Fields, Solution};
 
 /// One of the five problems on meshes of the thesis's size.
 pub(crate) fn example(name: &str) -> Problem {
@@ -69,6 +69,14 @@ pub(crate) fn close(got: f64, expected: f64, tolerance: f64) {
         error <= tolerance,
         "got {got}, expected {expected}: off by {error:.2e}, allowed {tolerance:.0e}"
     );
+}
+
+/// The node nearest to (x, y).
+pub(crate) fn node(fields: &Fields, x: f64, y: f64) -> usize {
+    let distance = |k: &usize| (fields.x[*k] - x).hypot(fields.y[*k] - y);
+    (0..fields.x.len())
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        .unwrap()
 }
 
 /// Grid lines from `from` to `to`: the first step is `first`, each next one `growth` times the one

@@ -6,7 +6,7 @@ use solver::problem::Problem;
 use solver::solution::Fields;
 
 use crate::record::{Line, held};
-use crate::support::{Lattice, problem, solve};
+use crate::support::{Lattice, node, problem, solve};
 
 const MATERIAL: &str = r#"[{"youngs_modulus": 1000, "poissons_ratio": 0.3}]"#;
 
@@ -48,14 +48,6 @@ fn wall(radial: usize) -> Problem {
         })
         .to_string(),
     )
-}
-
-/// The node nearest to (x, y).
-fn node(fields: &Fields, x: f64, y: f64) -> usize {
-    let distance = |k: &usize| (fields.x[*k] - x).hypot(fields.y[*k] - y);
-    (0..fields.x.len())
-        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-        .unwrap()
 }
 
 /// Displacements converge with the third power of h or better and are within 1e-5 at eight
