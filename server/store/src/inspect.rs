@@ -124,6 +124,8 @@ impl Report {
     fn complete(mut self, folder: &Path, target: Option<&Writer<'_>>) -> Result<Report> {
         match open(&folder.join(DATABASE), Mode::Read) {
             Ok(source) => {
+                // else SQLite reads nothing of a file that has lost its end
+                source.execute_batch("pragma writable_schema = on")?;
                 // damage to the list of steps is found below, as damage
                 if let Err(error @ StoreError::Schema(_)) = migrations::are_current(&source) {
                     return Err(error);

@@ -685,6 +685,32 @@ async fn nothing_is_written_to_a_damaged_database() {
     assert_eq!(jobs.await.unwrap().len(), 3);
 }
 
+/// Of a file that has lost its end everything is saved that the end had no part of.
+#[tokio::test]
+async fn a_database_that_was_cut_short_is_saved_up_to_its_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    for number in 0..20 {
+        solved(&store, new(&number.to_string())).await;
+    }
+    store.close().await;
+    drop(store);
+    let file = fs::File::options()
+        .write(true)
+        .open(folder.path().join("signorini.db"));
+    let file = file.unwrap();
+    file.set_len(file.metadata().unwrap().len() - 4096).unwrap();
+    let saved = tempfile::tempdir().unwrap();
+    let report = inspect(folder.path(), Some(saved.path())).await.unwrap();
+    assert!(!report.findings.is_empty());
+    assert!(report.intact >= 10, "{report:?}");
+    let new_store = Store::open(saved.path()).await.unwrap();
+    let filter = Filter::default();
+    let all = new_store.jobs(Owners::All, &filter, Order::NEWEST_FIRST, None, 50);
+    assert_eq!(all.await.unwrap().len() as u64, report.intact);
+    new_store.close().await;
+}
+
 /// Overwrites a page that is filled with this character, and is not the last of its value.
 fn erase_page_of(folder: &Path, character: u8) {
     const PAGE: usize = 4096;
