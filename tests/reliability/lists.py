@@ -97,7 +97,7 @@ def measure(server, asked):
 
 
 def main():
-    arguments = ["--trusted-proxy", "127.0.0.1", "--proxy-admin", "root", "--max-queued", "200000", "--max-queued-per-owner", "200000",
+    arguments = ["--trusted-proxy", "127.0.0.1", "--proxy-user-header", "x-remote-user", "--proxy-admin", "root", "--max-queued", "200000", "--max-queued-per-owner", "200000",
                  "--retain-days", "0", "--retain-bytes", "0"]
     with Attacked(*arguments) as server:
         equal(server.call("POST", "/v1/queue/pause", x_remote_user="root").status, 200, "pause")

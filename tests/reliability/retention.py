@@ -52,7 +52,7 @@ def slope(rows, name):
 
 
 def main():
-    arguments = ["--trusted-proxy", "127.0.0.1", "--proxy-admin", "root", "--retain-days", repr(KEPT_S / 86400)]
+    arguments = ["--trusted-proxy", "127.0.0.1", "--proxy-user-header", "x-remote-user", "--proxy-admin", "root", "--retain-days", repr(KEPT_S / 86400)]
     with Attacked(*arguments) as server:
         solved, answered = ({"problem": example(), "cache": cache} for cache in ("refresh", "use"))
         jobs = [answered if SOAK and n % 20 else solved for n in range(BATCH)]

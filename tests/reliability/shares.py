@@ -63,7 +63,7 @@ def ended(server, names, statuses):
 
 
 def main():
-    arguments = ["--trusted-proxy", "127.0.0.1", "--proxy-admin", "root", "--max-queued-per-owner", str(JOBS)]
+    arguments = ["--trusted-proxy", "127.0.0.1", "--proxy-user-header", "x-remote-user", "--proxy-admin", "root", "--max-queued-per-owner", str(JOBS)]
     with Attacked(*arguments) as server:
         switch(server, "pause")
         submit(server, "ada", JOBS)

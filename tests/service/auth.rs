@@ -741,7 +741,8 @@ async fn a_service_that_others_reach_needs_tokens_or_says_so() {
     let serve = |more: &[&str]| at("0.0.0.0:0", more);
     // the name is for clients of a proxy, which are other machines, too
     let behind_a_proxy = at("127.0.0.1:0", &["--allowed-host", "lab.example"]);
-    for mut open in [serve(&[]), behind_a_proxy] {
+    let unnamed = at("127.0.0.1:0", &["--trusted-proxy", "127.0.0.1"]);
+    for mut open in [serve(&[]), behind_a_proxy, unnamed] {
         let refused = open.output().unwrap();
         let told = String::from_utf8(refused.stderr).unwrap();
         assert!(
@@ -757,7 +758,12 @@ async fn a_service_that_others_reach_needs_tokens_or_says_so() {
     );
     for more in [
         &["--allow-unauthenticated"][..],
-        &["--trusted-proxy", "10.0.0.1"],
+        &[
+            "--trusted-proxy",
+            "10.0.0.1",
+            "--proxy-user-header",
+            "x-remote-user",
+        ],
     ] {
         let mut child = serve(more)
             .stdout(std::process::Stdio::piped())
@@ -877,11 +883,13 @@ async fn foreign_hosts_and_origins_are_refused() {
 /// A proxy that is trusted names the user; nobody else can.
 #[tokio::test]
 async fn users_are_those_that_a_trusted_proxy_names() {
-    let arguments = ["--trusted-proxy", "127.0.0.0/8", "--proxy-admin", "root"];
-    let server = Server::start(SIGNORINI, &arguments).await;
+    const NAMED: [&str; 2] = ["--proxy-user-header", "x-remote-user"];
+    let proxy = ["--trusted-proxy", "127.0.0.0/8", "--proxy-admin", "root"];
+    let server = Server::start(SIGNORINI, &[&proxy[..], &NAMED].concat()).await;
     // as a proxy that listens for both protocols is written, alone and with others
     for proxies in ["::ffff:127.0.0.1", "::ffff:127.0.0.0/104"] {
-        let mapped = Server::start(SIGNORINI, &["--trusted-proxy", proxies]).await;
+        let arguments = [&["--trusted-proxy", proxies][..], &NAMED].concat();
+        let mapped = Server::start(SIGNORINI, &arguments).await;
         let me = mapped.get("/v1/me").header("x-remote-user", "ada");
         assert_eq!(
             me.send().await.unwrap().status(),
@@ -917,12 +925,26 @@ async fn users_are_those_that_a_trusted_proxy_names() {
         detail.contains("ada, whom the proxy names") && detail.contains("--proxy-scopes"),
         "{detail}"
     );
-    let elsewhere = Server::start(SIGNORINI, &["--trusted-proxy", "10.0.0.1"]).await;
-    let forged = elsewhere
-        .get("/v1/me")
-        .header("x-remote-user", "root")
-        .send()
-        .await
-        .unwrap();
-    assert_eq!(forged.status(), StatusCode::UNAUTHORIZED);
+    // from elsewhere, and where the proxy is trusted for the address of clients only
+    let elsewhere = [&["--trusted-proxy", "10.0.0.1"][..], &NAMED].concat();
+    let elsewhere = Server::start(SIGNORINI, &elsewhere).await;
+    let of_addresses = Server::start(
+        SIGNORINI,
+        &["--allow-unauthenticated", "--trusted-proxy", "127.0.0.1"],
+    )
+    .await;
+    let forge = async |server: &Server| {
+        let me = server.get("/v1/me").header("x-remote-user", "root");
+        me.send().await.unwrap()
+    };
+    assert_eq!(forge(&elsewhere).await.status(), StatusCode::UNAUTHORIZED);
+    let everybody: Value = forge(&of_addresses).await.json().await.unwrap();
+    assert_eq!(everybody["owner"], "local");
+    let first = json!({"name": "first", "owner": "boss", "scopes": ["admin"]});
+    let created = of_addresses.post("/v1/tokens").json(&first).send().await;
+    assert_eq!(created.unwrap().status(), StatusCode::CREATED);
+    assert_eq!(
+        forge(&of_addresses).await.status(),
+        StatusCode::UNAUTHORIZED
+    );
 }

@@ -18,7 +18,9 @@ use crate::SIGNORINI;
 
 /// A server that takes the user from a header, so that tests need no tokens.
 async fn shared(more: &[&str]) -> Server {
-    let mut arguments = vec!["--trusted-proxy", "127.0.0.1", "--proxy-admin", "root"];
+    let proxy = ["--trusted-proxy", "127.0.0.1", "--proxy-admin", "root"];
+    let mut arguments = proxy.to_vec();
+    arguments.extend(["--proxy-user-header", "x-remote-user"]);
     arguments.extend(more);
     Server::start(SIGNORINI, &arguments).await
 }

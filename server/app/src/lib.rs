@@ -149,9 +149,10 @@ fn retention(config: &Config) -> Retention {
 /// The error that everybody could use the service from other machines, because it has no authentication.
 #[derive(Clone, Copy, Debug, thiserror::Error)]
 #[error(
-    "{0} can be reached from other machines, directly or through the proxy that --allowed-host is for, and there is no token: \
+    "{0} can be reached from other machines, directly or through the proxy that --allowed-host or --trusted-proxy is for, and there is no token: \
      anyone who reaches it could do everything. Create a token first (`signorini token create --help`), or name a proxy that \
-     identifies users (--trusted-proxy), or listen on 127.0.0.1 without --allowed-host; --allow-unauthenticated starts it anyway"
+     identifies users (--trusted-proxy with --proxy-user-header), or listen on 127.0.0.1 without --allowed-host and --trusted-proxy; \
+     --allow-unauthenticated starts it anyway"
 )]
 pub struct OpenToAll(SocketAddr);
 
@@ -166,10 +167,11 @@ enum OpenTo {
 }
 
 fn open_to(config: &Config, store: &Store) -> OpenTo {
-    // a name for other machines means that a proxy passes their requests on
-    let local =
-        config.listen.ip().to_canonical().is_loopback() && config.web.allowed_hosts.is_empty();
-    if store.has_tokens() || config.trust.is_on() {
+    // a name for other machines, or a proxy, means that their requests are passed on
+    let local = config.listen.ip().to_canonical().is_loopback()
+        && config.web.allowed_hosts.is_empty()
+        && !config.trust.is_on();
+    if store.has_tokens() || config.trust.names_users() {
         OpenTo::Nobody
     } else if local {
         OpenTo::Machine
@@ -239,6 +241,10 @@ impl App {
              memory for jobs"
         );
         match open_to {
+            OpenTo::Nobody if tls.is_none() && !address.ip().to_canonical().is_loopback() => warn!(
+                %address, "tokens sent to {address} can be read on the way: it is plain http. Give it a certificate \
+                 (--tls-cert), or a proxy that has one"
+            ),
             OpenTo::Nobody => {}
             OpenTo::Machine => info!(
                 %address, "every account of this machine can do everything: there is no token"

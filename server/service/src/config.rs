@@ -362,23 +362,23 @@ pub struct Web {
     pub allowed_origins: Vec<String>,
 }
 
-/// A proxy that identifies users, and the scopes of these users.
+/// A proxy in front of the service, and the scopes of the users whom it names, if it identifies users.
 #[derive(Clone, Debug, Args)]
 pub struct ProxyTrust {
-    /// Address of a proxy that identifies users, or a network such as 10.0.0.0/8: its user header is trusted. Requests
-    /// from elsewhere need a token. Can be repeated, or a list with commas
+    /// Address of a proxy, or a network such as 10.0.0.0/8: it is believed which host, scheme and address its clients have,
+    /// and with --proxy-user-header who they are. Can be repeated, or a list with commas
     #[arg(long = "trusted-proxy", env = "SIGNORINI_TRUSTED_PROXIES", value_name = "ADDRESS", value_delimiter = ',',
           value_parser = network)]
     proxies: Vec<IpNet>,
 
-    /// The header in which the proxy names the user
+    /// The header in which a trusted proxy names the user, who then needs no token: every program at the address of the
+    /// proxy can be any user. Without it all users need tokens
     #[arg(
         long = "proxy-user-header",
         env = "SIGNORINI_PROXY_USER_HEADER",
-        value_name = "NAME",
-        default_value = "x-remote-user"
+        value_name = "NAME"
     )]
-    pub user_header: HeaderName,
+    pub user_header: Option<HeaderName>,
 
     /// The scopes of users whom the proxy names
     #[arg(long = "proxy-scopes", env = "SIGNORINI_PROXY_SCOPES", value_name = "SCOPES", value_delimiter = ',',
@@ -400,7 +400,7 @@ impl Default for ProxyTrust {
     fn default() -> Self {
         ProxyTrust {
             proxies: vec![],
-            user_header: HeaderName::from_static("x-remote-user"),
+            user_header: None,
             scopes: vec![Scope::Read, Scope::Submit, Scope::Cancel],
             admins: vec![],
         }
@@ -408,7 +408,7 @@ impl Default for ProxyTrust {
 }
 
 impl ProxyTrust {
-    /// Trusts these proxies, with the default header and scopes; texts that are not networks are left out.
+    /// Trusts these proxies, which name no users; texts that are not networks are left out.
     pub fn of(proxies: &[&str]) -> ProxyTrust {
         let proxies = proxies.iter().filter_map(|text| network(text).ok());
         ProxyTrust {
@@ -420,6 +420,11 @@ impl ProxyTrust {
     /// Whether any proxy is trusted.
     pub fn is_on(&self) -> bool {
         !self.proxies.is_empty()
+    }
+
+    /// Whether a trusted proxy names users.
+    pub fn names_users(&self) -> bool {
+        self.is_on() && self.user_header.is_some()
     }
 
     /// Whether this is the address of a trusted proxy.

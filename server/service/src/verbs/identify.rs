@@ -95,7 +95,7 @@ pub fn identify(
     if credentials.token.is_some() {
         return Err(ApiError::Unauthenticated(UNKNOWN));
     }
-    if store.has_tokens() || trust.is_on() {
+    if store.has_tokens() || trust.names_users() {
         Err(ApiError::Unauthenticated(
             "this service needs a token: send it as `Authorization: Bearer TOKEN`",
         ))

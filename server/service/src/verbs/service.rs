@@ -116,7 +116,7 @@ impl Service {
 
     /// Whether the service distinguishes owners.
     fn is_shared(&self) -> bool {
-        self.store.has_tokens() || self.config.trust.is_on()
+        self.store.has_tokens() || self.config.trust.names_users()
     }
 
     /// How many bytes one owner may store; `None`: no limit.

@@ -66,7 +66,8 @@ fn identified(
     access: Access,
 ) -> Result<Identified, ApiError> {
     let peer = request.extensions().get::<Peer>().copied();
-    let credentials = credentials(request.headers(), &service.config.trust.user_header);
+    let user_header = service.config.trust.user_header.as_ref();
+    let credentials = credentials(request.headers(), user_header);
     match identify(&service.store, &service.config.trust, peer, &credentials) {
         // also with a token that is no longer valid, as a monitor may have it
         Err(_) if access == Access::Open => Ok(Identified {
@@ -147,7 +148,7 @@ fn access(request: &Request) -> Access {
 
 /// The credentials of a request: a bearer token, or a token as the password that a browser asks for, and the users
 /// named in `user_header`.
-fn credentials(headers: &HeaderMap, user_header: &header::HeaderName) -> Credentials {
+fn credentials(headers: &HeaderMap, user_header: Option<&header::HeaderName>) -> Credentials {
     let mut sent = headers.get_all(header::AUTHORIZATION).iter();
     let token = sent.next().map(|value| {
         if sent.next().is_some() {
@@ -167,10 +168,12 @@ fn credentials(headers: &HeaderMap, user_header: &header::HeaderName) -> Credent
         };
         Presented::parse(&token).ok_or(())
     });
-    let users = headers.get_all(user_header).iter();
+    let users = user_header.map(|name| headers.get_all(name).iter());
     Credentials {
         token,
         users: users
+            .into_iter()
+            .flatten()
             .map(|value| String::from_utf8_lossy(value.as_bytes()).into_owned())
             .collect(),
     }
