@@ -1,5 +1,5 @@
-//! The problems, decks and meshes that the documentation uses, compiled into the program: a machine that has only the
-//! program can follow it too.
+//! The problems, decks and meshes that the documentation uses, and the files for administrators, compiled into the program:
+//! a machine that has only the program can follow it too.
 
 use std::{fs, io::Write, path::PathBuf};
 
@@ -60,6 +60,12 @@ const FILES: &[(&str, &[u8])] = files! {
     "tests/data/gmsh/hertz-tri6-msh41-binary.msh"
     "tests/data/gmsh/fillet.geo"
     "tests/data/gmsh/fillet-mixed-msh41-binary.msh"
+    "contrib/Caddyfile"
+    "contrib/compose.yaml"
+    "contrib/nginx.conf"
+    "contrib/grafana/signorini.json"
+    "contrib/prometheus/alerts.yml"
+    "contrib/systemd/signorini.service"
 };
 
 #[derive(Debug, Args)]

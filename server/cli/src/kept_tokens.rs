@@ -33,6 +33,13 @@ pub(super) fn token_for(url: &str) -> anyhow::Result<Option<String>> {
     Ok(kept(&path)?.remove(&wanted))
 }
 
+/// The addresses for which tokens are kept, with commas; at most three of them.
+pub(super) fn addresses() -> String {
+    let all = file().and_then(|path| kept(&path)).unwrap_or_default();
+    let some: Vec<String> = all.into_keys().take(3).collect();
+    some.join(", ")
+}
+
 /// The address of a service in the form that its token is kept under, whichever way it was written: the host in lower case,
 /// without the port that its scheme has anyway, and without a slash at the end.
 pub(super) fn address(url: &str) -> String {

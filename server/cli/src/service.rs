@@ -114,6 +114,13 @@ impl Display for Refusal {
         if !code.is_empty() {
             write!(f, " ({code}; `signorini explain {code}` says more)")?;
         }
+        let others = OTHER_ADDRESSES.get().map_or("", |text| text);
+        if self.status == 401 && !others.is_empty() {
+            write!(
+                f,
+                ". No token is kept for this address; `signorini login` has kept one for {others}"
+            )?;
+        }
         match OTHER_VERSION.get() {
             // only one of the two may know it; everything else both do
             Some(other) if matches!(self.status, 400 | 404..=406 | 415 | 422) => {
@@ -132,7 +139,13 @@ impl Service {
     pub(super) fn at(url: &str, trust: &Trust) -> anyhow::Result<Service> {
         let given = std::env::var("SIGNORINI_TOKEN").unwrap_or_default();
         let token = match given.trim() {
-            "" => kept_tokens::token_for(url)?,
+            "" => {
+                let kept = kept_tokens::token_for(url)?;
+                if kept.is_none() {
+                    let _ = OTHER_ADDRESSES.set(kept_tokens::addresses());
+                }
+                kept
+            }
             // no header can carry it
             token if !token.bytes().all(|byte| byte.is_ascii_graphic()) => {
                 bail!(
@@ -331,6 +344,9 @@ pub(super) fn segment(name: &str) -> String {
     // a plus is a space in a query only
     escaped.replace('+', "%20")
 }
+
+/// The addresses for which tokens are kept, if there is none for the address that was asked.
+static OTHER_ADDRESSES: OnceLock<String> = OnceLock::new();
 
 /// The remark that the service has another version than this program, once a service of another version has answered.
 static OTHER_VERSION: OnceLock<String> = OnceLock::new();
