@@ -159,6 +159,39 @@ pub fn scatter(x: &[f64], y: &[f64]) -> Option<[f64; 2]> {
     Some([variance.sqrt(), (2.6 / (2.0 * count)).sqrt()])
 }
 
+/// The step to which the ordinates of a curve through points are rounded, a power of ten, if rounding changes its curvature by
+/// more than a tenth from point to point. `x` increases strictly.
+///
+/// The distance c of a point from the chord of its neighbours is the curvature there. Rounding scatters c by a part of the
+/// step, however smooth the curve is; points on straight pieces, where c is 0, do not count.
+pub fn rounding(x: &[f64], y: &[f64]) -> Option<f64> {
+    const FEWEST: usize = 8;
+    const MOST_DIGITS: i32 = 9;
+    const LEAST: f64 = 0.1;
+    /// Rounding scatters c by about half a step; what scatters it more is another shape, or noise.
+    const MOST: f64 = 1.5;
+    let whole = |factor: f64| {
+        y.iter()
+            .all(|y| (y * factor - (y * factor).round()).abs() <= 1e-6)
+    };
+    let step = (0..=MOST_DIGITS)
+        .map(|digits| 10f64.powi(digits))
+        .find(|factor| whole(*factor))?
+        .recip();
+    let from_chord = |(x, y): (&[f64], &[f64])| {
+        let chord = y[0] + (y[2] - y[0]) * (x[1] - x[0]) / (x[2] - x[0]);
+        y[1] - chord
+    };
+    let triples = x.windows(3).zip(y.windows(3));
+    let all: Vec<f64> = triples.map(from_chord).collect();
+    let bent = all.iter().filter(|c| c.abs() > 1e-3 * step).count();
+    let mean = all.iter().sum::<f64>().abs() / all.len().max(1) as f64;
+    let changes = all.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let scatter = changes.sum::<f64>() / all.len().max(2) as f64;
+    let rounded = scatter > LEAST * step.max(mean) && scatter < MOST * step;
+    (bent >= FEWEST && rounded).then_some(step)
+}
+
 /// The standard deviation of values that look like measured ones: their distances from cubics through neighbours change
 /// sign from place to place, as 7 of 10 do of noise, while those of a shape keep it, and those of single kinks are few.
 pub fn noise(x: &[f64], y: &[f64]) -> Option<f64> {
@@ -307,6 +340,42 @@ fn insert(triangle: &mut [[f64; 5]; 4], mut row: [f64; 5]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A parabola of radius 8, its ordinates rounded: told where the step is a large part of what a point lies off the chord,
+    /// spacing²/16; and neither where it is small, nor of straight pieces, nor of exact whole numbers.
+    #[test]
+    fn rounded_points_are_told_where_rounding_bends_their_curve() {
+        let parabola = |spacing: f64, digits: i32| {
+            let x: Vec<f64> = (-60..=60).map(|k| spacing * f64::from(k)).collect();
+            let factor = 10f64.powi(digits);
+            let y: Vec<f64> = x
+                .iter()
+                .map(|x| (factor * x * x / 16.0).round() / factor)
+                .collect();
+            rounding(&x, &y)
+        };
+        for spacing in [0.05, 0.03, 0.025, 0.02, 0.015, 0.01, 0.005] {
+            for digits in [3, 4] {
+                let step = parabola(spacing, digits);
+                let expected = 10f64.powi(-digits);
+                assert!(
+                    step.is_some_and(|step| (step / expected - 1.0).abs() < 1e-12),
+                    "{spacing} {digits}: {step:?}"
+                );
+            }
+        }
+        assert_eq!(
+            [0.05, 0.03, 0.02].map(|spacing| parabola(spacing, 7)),
+            [None; 3]
+        );
+        let whole: Vec<f64> = (0..20).map(f64::from).collect();
+        let squares: Vec<f64> = whole.iter().map(|x| x * x).collect();
+        let roof: Vec<f64> = whole.iter().map(|x| (x - 7.3).abs()).collect();
+        assert_eq!(
+            [rounding(&whole, &squares), rounding(&whole, &roof)],
+            [None; 2]
+        );
+    }
 
     #[test]
     fn a_spline_reproduces_cubics_also_at_its_ends() {

@@ -50,7 +50,7 @@ fn peak(solution: &Solution) -> (f64, ErrorMethod) {
 fn kinks(solution: &Solution) -> Vec<&str> {
     let warnings = solution.summary.warnings.iter();
     warnings
-        .filter(|w| w.code == WarningCode::KinkInContact)
+        .filter(|w| [WarningCode::KinkInContact, WarningCode::PolygonInContact].contains(&w.code))
         .map(|w| &w.message[..])
         .collect()
 }

@@ -524,3 +524,72 @@ fn factors_of_steps_that_look_like_lengths_are_told() {
         assert_eq!(codes(sound), None);
     }
 }
+
+/// A range that ends inside an edge or inside elements names whole ones only, which is told; one that ends at nodes, or beside a
+/// corner of the body, is not told of.
+#[test]
+fn a_range_that_cuts_the_mesh_is_told() {
+    let told_of = |foot: serde_json::Value, soft: serde_json::Value| {
+        let text = json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {"grid": {"x": [0, 0.1, 0.2, 0.3, 0.4, 1], "y": [0, 0.25, 0.5, 1]},
+                "boundaries": {"foot": foot}, "groups": {"soft": soft}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3},
+                {"youngs_modulus": 10, "poissons_ratio": 0.3, "group": "soft"}],
+            "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
+            "loads": [{"boundary": "foot", "pressure": 1}],
+        });
+        let model = Model::new(&problem(&text.to_string()), None).unwrap();
+        let found = model.warnings.iter();
+        let found = found.filter(|w| w.code == WarningCode::RangeCutsMesh);
+        found.map(|w| w.pointer.clone()).collect::<Vec<_>>()
+    };
+    let whole = json!({"y": [0.25, 0.5]});
+    for foot in [
+        json!({"box": [[0, 0.9], [0.3, 1.1]]}),
+        json!({"y": [0.9, 1.1]}),
+        json!({"side": "top", "x": [0.1, 1]}),
+        json!({"normal": [0, 1]}),
+    ] {
+        assert_eq!(told_of(foot, whole.clone()), [""; 0]);
+    }
+    let cut = json!({"box": [[0, 0.9], [0.349, 1.1]]});
+    assert_eq!(told_of(cut, whole), ["/mesh/boundaries/foot"]);
+    let upper = json!({"side": "top", "x": [0.15, 0.4]});
+    assert_eq!(
+        told_of(upper, json!({"y": [0.2, 0.6]})),
+        ["/mesh/boundaries/foot", "/mesh/groups/soft"]
+    );
+}
+
+/// A quarter of a ring on a rigid pin with interference: the pressure is uniform, N = p π/2, and the force is p along x and y.
+#[test]
+fn the_force_of_a_curved_contact_is_told_as_a_vector() {
+    let (radial, round) = (4, 16);
+    let lattice = crate::support::Lattice::new(radial, round, |i, j| {
+        let (sin, cos) = (std::f64::consts::FRAC_PI_2 * j as f64 / (2 * round) as f64).sin_cos();
+        let r = 1.0 + i as f64 / (2 * radial) as f64;
+        [r * cos, r * sin]
+    });
+    let text = json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"inline": {"nodes": lattice.nodes, "elements": lattice.elements, "boundaries": {
+            "below": lattice.edges(radial, |k| (k, 0)), "side": lattice.edges(radial, |k| (k, 2 * round)),
+            "bore": lattice.edges(round, |k| (0, k)),
+        }}},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "below", "uy": 0}, {"boundary": "side", "ux": 0}],
+        "contacts": [{"boundary": "bore", "obstacle": {"kind": "flat", "along": "arc_length"}, "indentation": 0.001}],
+    });
+    let summary = solve(&problem(&text.to_string())).summary;
+    let text = told(&summary.warnings, WarningCode::NormalsDiffer).unwrap();
+    let numbers = &text[text.find('[').unwrap() + 1..text.find(']').unwrap()];
+    let expected = summary.normal_force / std::f64::consts::FRAC_PI_2;
+    for number in numbers.split(", ") {
+        let force: f64 = number.parse().unwrap();
+        assert!(
+            (force / expected - 1.0).abs() < 1e-3,
+            "{force}, not {expected}"
+        );
+    }
+}

@@ -541,6 +541,19 @@ fn an_amplitude_that_turns_back_is_refused_with_friction() {
         abaqus::problem(&deck(friction, rises)).is_ok(),
         "it falls after the end of the step"
     );
+    // a jump has no way; nor have displacements that do not rise together a common one
+    let found = doubts(&deck(friction, "0., 1., 1., 1."));
+    assert!(found[0].contains("begins at 1 and not at 0"), "{found:#?}");
+    assert!(abaqus::problem(&deck("", "0., 1., 1., 1.")).is_ok());
+    let beside = |amplitude: &str| {
+        deck(friction, amplitude).replace("*END STEP", "*CLOAD\n8, 1, .1\n*END STEP")
+    };
+    let found = doubts(&beside(rises));
+    assert!(
+        found[0].contains("which is not a straight line"),
+        "{found:#?}"
+    );
+    assert!(abaqus::problem(&beside("0., 0., 0.5, 0.5, 1., 1.")).is_ok());
 }
 
 /// Friction with a stick slope, or by Lagrange multipliers, acts at once: its elastic slip is a part of the way, and not of
@@ -566,8 +579,8 @@ fn the_elastic_slip_of_friction_that_acts_at_once_is_a_part_of_the_way() {
 /// A half model of a deck, whose rigid surface ends its way beside the line of symmetry, and is no longer level there.
 #[test]
 fn a_dragged_half_model_is_told_whatever_the_obstacle_is() {
-    let obstacle = |at: f64| {
-        let points: Vec<[f64; 2]> = (-60..=60)
+    let obstacle = |at: f64, first: i32| {
+        let points: Vec<[f64; 2]> = (first..=60)
             .map(|k| {
                 let x = 0.05 * f64::from(k);
                 [x + at, x * x / 16.0]
@@ -575,13 +588,14 @@ fn a_dragged_half_model_is_told_whatever_the_obstacle_is() {
             .collect();
         json!({"kind": "polyline", "points": points, "interpolation": "cubic"})
     };
-    for at in [0.0, 0.02] {
+    // the last one ended on the line before it was dragged
+    for (at, first) in [(0.0, -60), (0.02, -60), (0.02, 0)] {
         let problem = json!({
             "analysis": {"kind": "plane_strain"},
             "mesh": {"grid": {"x": [0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 1, 2, 3], "y": [-3, -1, -0.4, -0.1, 0]}},
             "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
             "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}, {"boundary": "left", "ux": 0}],
-            "contacts": [{"boundary": "top", "obstacle": obstacle(at), "normal": "obstacle", "indentation": 0.01,
+            "contacts": [{"boundary": "top", "obstacle": obstacle(at, first), "normal": "obstacle", "indentation": 0.01,
                 "tangential_displacement": 0.02,
                 "friction": {"coefficient": 0.3, "nonlocal_radius": 0, "elastic_slip": 1e-4}}],
         });
@@ -747,4 +761,12 @@ fn a_contact_that_is_not_with_a_rigid_obstacle_is_refused() {
     assert!(abaqus::problem(&curved).is_ok());
     let turned = curved.clone() + &step("9000, 1, 1, 0.002\n");
     assert!(doubts(&turned)[0].contains("different directions"));
+    // free where the tool is pressed, and moved in a later step only
+    let drag = "*END STEP\n*STEP\n*STATIC\n*BOUNDARY\n9000, 1, 1, 0.001\n*END STEP";
+    let free = good.replacen("9000, 1, 1, 0\n", "", 1);
+    let found = doubts(&free.replacen("*END STEP", drag, 1));
+    assert!(
+        found[0].contains("free in 1 in the first step"),
+        "{found:?}"
+    );
 }

@@ -134,13 +134,15 @@ pub(super) fn conclude(
 /// Warnings that make stated errors unreliable, or that say that the result may belong to another problem than was meant;
 /// the best verdict that each permits, and the reason in words.
 #[rustfmt::skip] // a table
-const DOUBTFUL: [(WarningCode, Verdict, &str); 5] = [
+const DOUBTFUL: [(WarningCode, Verdict, &str); 6] = [
     (WarningCode::NoContact, Verdict::Fair,
         "A contact never touches its obstacle (`no_contact`): unless that was intended, this is the result of another problem than was meant."),
     (WarningCode::NotUnique, Verdict::Poor,
         "There is a second solution with other forces; the errors do not tell which of the two occurs."),
     (WarningCode::NoiseUndeclared, Verdict::Fair,
         "The points of an obstacle scatter as measured ones do, and have no standard deviation (`noise_undeclared`): the stated errors do not contain that."),
+    (WarningCode::PolygonInContact, Verdict::Fair,
+        "The surface in contact has several corners (`polygon_in_contact`): if it is a polygon in place of a curve, the stated errors are those of the polygon."),
     (WarningCode::MeshTooCoarseForContact, Verdict::Fair,
         "The mesh is too coarse for a contact (`mesh_too_coarse_for_contact`), so that the stated errors may be too small."),
     (WarningCode::MeshTooCoarseForRadius, Verdict::Fair,

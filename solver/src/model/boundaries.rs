@@ -170,6 +170,20 @@ impl Checks {
                     "Put grid lines on the edges of the group.",
                 ));
             }
+            let cut = (0..mesh.elements.len() as u32).find(|e| {
+                let mut nodes = mesh.elements[*e as usize].iter();
+                !holds(e)
+                    && nodes
+                        .any(|n| well_within(&[range.x, range.y], &mesh.nodes[*n as usize], size))
+            });
+            if let Some(e) = cut {
+                let [x, y] = mesh.nodes[mesh.elements[e as usize][0] as usize];
+                self.warn(
+                    WarningCode::RangeCutsMesh,
+                    &pointer,
+                    format!("The range ends inside elements, such as the one with a corner at ({x}, {y}): only elements that lie in it as a whole, before the mesh is refined, belong to the group. Put grid lines on the ends of the range."),
+                );
+            }
             mesh.groups.insert(name.clone(), elements);
         }
         all.finish(())
@@ -284,8 +298,8 @@ impl Checks {
                         && ranges.is_none_or(|ranges| within(&ranges, place, size))
                 }) && faces(part, &nodes)
             };
-            let part: Vec<Edge> = edges.iter().filter(holds).copied().collect();
-            if part.is_empty() {
+            let own: Vec<Edge> = edges.iter().filter(holds).copied().collect();
+            if own.is_empty() {
                 all.fail(self.report(
                     &pointer,
                     Reason::EmptyBoundary,
@@ -294,7 +308,30 @@ impl Checks {
                     "Put grid lines on the ends of the part; check the direction of the normal.",
                 ));
             }
-            mesh.boundaries.insert(name.clone(), part);
+            let given = [part.x, part.y];
+            let cut = edges.iter().find_map(|edge| {
+                let nodes = mesh.edge_nodes(edge);
+                if own.contains(edge) || !faces(part, &nodes) {
+                    return None;
+                }
+                let meets = |corner: &u32| {
+                    let place = &mesh.nodes[*corner as usize];
+                    let inside = well_within(&given, place, size)
+                        && ranges.is_none_or(|ranges| well_within(&ranges, place, size));
+                    let mut beside = own.iter().filter(|other| other[..2].contains(corner));
+                    inside && beside.any(|other| goes_on(&nodes, &mesh.edge_nodes(other)))
+                };
+                let corner = edge[..2].iter().find(|corner| meets(corner))?;
+                Some(mesh.nodes[*corner as usize])
+            });
+            if let Some([x, y]) = cut {
+                self.warn(
+                    WarningCode::RangeCutsMesh,
+                    &pointer,
+                    format!("The range ends inside an edge, beyond the corner at ({x}, {y}): only edges that lie in it as a whole, before the mesh is refined, belong to the boundary, which ends there. Put a grid line on the end of the range."),
+                );
+            }
+            mesh.boundaries.insert(name.clone(), own);
         }
         all.finish(())
     }
@@ -404,6 +441,24 @@ impl Checks {
         let on_edge = |k: usize| crate::contact::edge_nodes(k).map(at);
         Ok((0..edges.len()).map(on_edge).collect())
     }
+}
+
+/// Whether a place lies in the ranges, and not at their ends; `size`: that of the body.
+fn well_within(ranges: &[Option<[f64; 2]>; 2], place: &[f64; 2], size: f64) -> bool {
+    const MARGIN: f64 = 1e-6;
+    let mut pairs = ranges.iter().zip(place);
+    pairs.all(|(range, x)| {
+        range.is_none_or(|[least, most]| least + MARGIN * size < *x && *x < most - MARGIN * size)
+    })
+}
+
+/// Whether two edges that share a corner have nearly the same direction, given by their nodes.
+fn goes_on(one: &[[f64; 2]; 3], other: &[[f64; 2]; 3]) -> bool {
+    /// The cosine of 20°.
+    const STRAIGHT_ON: f64 = 0.94;
+    let [a, b] = [one, other].map(|[[x0, y0], [x1, y1], _]| [x1 - x0, y1 - y0]);
+    let cosine = (a[0] * b[0] + a[1] * b[1]) / (a[0].hypot(a[1]) * b[0].hypot(b[1]));
+    cosine.abs() > STRAIGHT_ON
 }
 
 /// Whether a place lies in the ranges of x and y, ends included.

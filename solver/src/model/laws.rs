@@ -9,7 +9,7 @@ use crate::problem::{
     Obstacle, PrescribedBound, Smoothing, Transition, elastic_slip_rule,
 };
 use crate::solution::WarningCode;
-use crate::spline::{noise, scatter};
+use crate::spline::{noise, rounding, scatter};
 
 /// The largest number of points of a table.
 const MOST_TABLE_POINTS: usize = 100_000;
@@ -271,6 +271,15 @@ impl Checks {
             pushed => pushed,
         };
         let Some(deviation) = noise(&x, &y).filter(|noise| *noise > LEAST_NOISE * size) else {
+            if let Some(step) = rounding(&x, &y) {
+                // that of a number anywhere between two steps
+                let deviation = step / 12f64.sqrt();
+                self.warn(
+                    WarningCode::NoiseUndeclared,
+                    pointer,
+                    format!("The points are rounded to {step:e}, which changes the curvature of their curve from point to point: the pressure follows that, and no stated error contains it. Give more digits; or, if they are measured, a `table` with \"interpolation\": \"cubic\" and \"smoothing\": {{\"standard_deviation\": {deviation:.1e}}}, or what is known of the instrument."),
+                );
+            }
             return;
         };
         self.warn(

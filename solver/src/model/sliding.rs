@@ -19,10 +19,11 @@ const STRAIGHT_ON: f64 = 0.94;
 const STRAIGHT: f64 = 1e-3;
 
 impl Checks {
-    /// Warns of an obstacle that is dragged along a contact with a line of symmetry at its end: the other half, which
-    /// is not modelled, would be dragged the opposite way.
+    /// Warns of an obstacle that is dragged along a contact with a line of symmetry at its end, or which ended there before it
+    /// was dragged: the other half, which is not modelled, would be dragged the opposite way.
     pub(super) fn warn_of_dragged_symmetry(
         &mut self,
+        mesh: &Mesh,
         contacts: &[ContactModel],
         fixed: &BTreeMap<u32, Held>,
         axis: &Axis,
@@ -32,8 +33,13 @@ impl Checks {
         let dragged = steps.is_empty() || steps.iter().any(drags);
         for contact in contacts {
             let boundary = &contact.boundary;
+            let own = if dragged {
+                contact.tangential_displacement
+            } else {
+                0.0
+            };
             let on_axis = |i: usize| axis.holds(boundary.positions[i]);
-            let held = |i: usize| match fixed.get(&boundary.nodes[i]) {
+            let held_at = |i: usize, node: u32| match fixed.get(&node) {
                 Some(held @ Held::Along { .. }) => {
                     // along the body: normals of the obstacle need not be upright at the line of symmetry
                     let [x, y] = contact.outward[i];
@@ -41,14 +47,22 @@ impl Checks {
                 }
                 _ => false,
             };
-            let mut ends = [0, boundary.nodes.len() - 1].into_iter();
-            let Some(end) = ends.find(|&i| on_axis(i) || held(i)) else {
-                continue;
+            let ends = [0, boundary.nodes.len() - 1];
+            // where the obstacle was dragged away from the line, the contact ends beside it
+            let named = mesh.boundaries.get(&contact.name);
+            let named = named.and_then(|edges| Some([edges.first()?[0], edges.last()?[1]]));
+            let held = |i: usize| {
+                let before = named.filter(|_| i == 0).map(|[start, _]| start);
+                let after = named.filter(|_| i > 0).map(|[_, end]| end);
+                let near = |node: &u32| {
+                    let ([x, y], [u, v]) = (mesh.nodes[*node as usize], boundary.positions[i]);
+                    (u - x).hypot(v - y) <= own.abs() * (1.0 + ALIGNED)
+                };
+                let beside = before.or(after).filter(near);
+                held_at(i, boundary.nodes[i]) || beside.is_some_and(|node| held_at(i, node))
             };
-            let own = if dragged {
-                contact.tangential_displacement
-            } else {
-                0.0
+            let Some(end) = ends.into_iter().find(|&i| on_axis(i) || held(i)) else {
+                continue;
             };
             let pushed = contact.pushed_along_body(end);
             let (field, d) = match own != 0.0 {

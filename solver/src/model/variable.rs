@@ -85,7 +85,13 @@ impl VariableModel {
 fn warnings(model: &Model) -> Vec<Warning> {
     let mut checks = Checks::default();
     checks.warn_about_contacts(&model.contacts);
-    checks.warn_of_dragged_symmetry(&model.contacts, &model.fixed, &model.axis, &model.steps);
+    checks.warn_of_dragged_symmetry(
+        &model.mesh,
+        &model.contacts,
+        &model.fixed,
+        &model.axis,
+        &model.steps,
+    );
     checks.warnings
 }
 

@@ -428,6 +428,12 @@ pub enum WarningCode {
     DirectionIsLinear,
     /// A kink of the obstacle, or a corner of the body, in the contact.
     KinkInContact,
+    /// A boundary or group by a range that ends inside edges or elements, which do not belong to it.
+    RangeCutsMesh,
+    /// Several corners of the body in the contact, as of straight sides of elements on a curve.
+    PolygonInContact,
+    /// A contact so curved that the sum of its pressures is not its force.
+    NormalsDiffer,
     /// A nonlocal radius larger than the contact.
     RadiusExceedsContact,
     /// A part of the friction that acts where the body does not touch, within a nonlocal radius of the contact.
@@ -510,6 +516,8 @@ impl WarningCode {
             | ObstacleCutsEdge
             | RadiusExceedsContact
             | OscillatingStick
+            | PolygonInContact
+            | RangeCutsMesh
             | MeshTooCoarseForContact
             | MeshTooCoarseForRadius => Severity::Warning,
             CentreNodesDropped
@@ -518,6 +526,7 @@ impl WarningCode {
             | RigidElementsLeftOut
             | ContactTurns
             | KinkInContact
+            | NormalsDiffer
             | SharpEdge
             | MaterialJunction
             | CohesionJumps

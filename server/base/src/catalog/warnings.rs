@@ -152,6 +152,15 @@ fn reasons(code: WarningCode) -> (&'static str, &'static str) {
         KinkInContact => (
             "At a kink of the obstacle, or at a corner of the body, the pressure grows without limit as the mesh is refined, slowly (as a logarithm) or fast.",
             "Quote forces and averages, not the peak. Where the real shape is smooth, give more points or \"interpolation\": \"cubic\"."),
+        RangeCutsMesh => (
+            "A boundary or a group that is given by a range has the edges or elements that lie in the range as a whole. Where the range ends inside one, the load, the contact or the material ends before it, on each finer mesh too.",
+            "Put a grid line on each end of the range, or choose the range by the lines that there are."),
+        PolygonInContact => (
+            "The surface of the body has several corners in the contact, as straight sides of elements on a curve make them. Refinement keeps the corners: the result then is that of a polygon, whose force may be off by tens of per cent from that of the curve.",
+            "Mesh the curve with elements of second order whose midside nodes lie on it, or name the curve under mesh.curves. If the corners are real, the stated errors hold."),
+        NormalsDiffer => (
+            "normal_force is the integral of the pressure along the surface, whichever way it faces. Where the surface turns within the contact, as a hole around a pin does, that is more than the force by which the obstacle is pushed.",
+            "Take the force of the message where a force on the tool or a reaction is meant."),
         RadiusExceedsContact => (
             "S_ρ averages over a length that is larger than the contact: the friction bound is spread beyond the contact and nearly uniform in it.",
             "Check nonlocal_radius and its unit. It is a length of the surface's texture, which is usually much smaller than a contact."),

@@ -344,8 +344,13 @@ impl PatchView<'_> {
                 "The body has a corner in the contact, at s = {s:.4}: {size}{count}. The pressure is unbounded at a corner: {growth}. Friction differs between its two sides. If the corners only come from straight sides of elements on a curve, mesh it with elements of second order, or name the curve under /mesh/curves; else round the corner."
             ),
         };
+        let corners = kinks.iter().filter(|kink| kink.turn != 0.0).count();
+        let code = match corners {
+            0 | 1 => WarningCode::KinkInContact,
+            _ => WarningCode::PolygonInContact,
+        };
         warnings.push(Warning {
-            code: WarningCode::KinkInContact,
+            code,
             pointer: self.patch.contact.pointer.clone(),
             message,
         });

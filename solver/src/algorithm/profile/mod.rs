@@ -9,6 +9,7 @@
 //! | what nodes do not see of an obstacle | `between` |
 //! | what the distances between nodes leave open | `resolution` |
 //! | what a push along a direction leaves open | `displaced` |
+//! | the force as a vector | `resultant` |
 //! | materials that meet under the contact | `junction` |
 //! | warnings about a contact | `warnings` |
 
@@ -18,6 +19,7 @@ mod extents;
 mod junction;
 mod quantities;
 mod resolution;
+mod resultant;
 mod warnings;
 
 pub use extents::PART_OF_SPACING;

@@ -50,6 +50,7 @@ impl PatchView<'_> {
         self.warn_of_displaced(warnings);
         self.warn_of_kinks(warnings);
         self.warn_of_junction(warnings);
+        self.warn_of_turning_normals(warnings);
         self.forget_far_ends(warnings);
         self.warn_of_contact(warnings);
     }
