@@ -514,10 +514,15 @@ mod tests {
             "body_force",
             "gravity",
             "rotation",
+            "group",
+            "temperature",
+            "nodal_temperature",
         ];
         let value = |name: &str| match name {
-            "boundary" | "nodes" => serde_json::json!("top"),
-            "pressure" | "normal" | "tangential" => serde_json::json!(1.0),
+            "boundary" | "nodes" | "group" => serde_json::json!("top"),
+            "pressure" | "normal" | "tangential" | "temperature" | "nodal_temperature" => {
+                serde_json::json!(1.0)
+            }
             "nodal" => serde_json::json!([[0.0, 1.0]]),
             "rotation" => serde_json::json!({"angular_velocity": 1.0}),
             _ => serde_json::json!([0.0, 1.0]),

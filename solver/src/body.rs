@@ -102,7 +102,13 @@ impl ElasticBody {
         let nodal_loads =
             elasticity::assemble_loads(&model.mesh, &model.section, model.quadrature, &model.loads);
         let mut condensed = nodal_loads.clone();
-        elasticity::condense_body_force(&model.mesh, &model.section, &model.loads, &mut condensed);
+        elasticity::add_inner_forces(
+            &model.mesh,
+            &model.section,
+            model.quadrature,
+            &model.loads,
+            &mut condensed,
+        );
 
         notify(observer, Progress::Phase(Phase::Order))?;
         let tables = ElementTables::new(&model.mesh, &model.section, model.quadrature);

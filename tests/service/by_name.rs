@@ -87,7 +87,7 @@ enum Shape {
 
 fn shape(message: &MessageDescriptor) -> Shape {
     match message.name() {
-        "Point" | "Range" | "Vector" | "Box" | "Traction" => Shape::Array,
+        "Point" | "Range" | "Vector" | "Expansion" | "Box" | "Traction" => Shape::Array,
         "Edge3" | "EdgeList" | "Element" | "ElementList" | "NodeList" | "NodalForces" => {
             Shape::Content
         }

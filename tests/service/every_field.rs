@@ -129,6 +129,8 @@ const FORMS: &[(&str, &[&[&str]])] = &[
             &["body_force"],
             &["gravity"],
             &["rotation"],
+            &["group", "temperature"],
+            &["nodal_temperature"],
         ],
     ),
 ];

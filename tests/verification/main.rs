@@ -63,6 +63,7 @@ mod smooth;
 mod stick;
 mod stick_ends;
 mod support;
+mod thermal;
 mod thesis;
 mod thick_cylinder;
 mod tolerance;

@@ -241,7 +241,7 @@ fn errors(analysis: Analysis, mesh: &Mesh, points: u32, ratio: f64, exact: Exact
     };
     for element in &mesh.elements {
         let own = element.gather(|n| u[n as usize]);
-        let inside = inner(element).map(|(mixed, force)| mixed.inside(&own, &force));
+        let inside = inner(element).map(|(mixed, force)| mixed.inside(&own, &force, &[0.0; 3]));
         for p in points_of(element) {
             let At {
                 u: u_exact,

@@ -50,6 +50,7 @@ from ._whole import WholeProblem
 LISTS = {
     ("float", 0, None): ("Numbers", "A list of numbers."),
     ("float", 2, 2): ("Pair", "Two numbers: a point `[x, y]`, a vector, a range."),
+    ("float", 3, 3): ("Triple", "Three numbers, along three axes."),
     ("Pair", 0, None): ("Pairs", "Points or vectors."),
     ("Pair", 2, 2): ("Box", "Two opposite corners `[[x, y], [x, y]]`."),
     ("int", 0, None): ("Integers", "Numbers of nodes or elements, from 0."),

@@ -5,8 +5,8 @@ use super::deck::Deck;
 use super::element::Shape;
 use super::part::Numbered;
 use super::written::{
-    DECIMAL_POINT, Distributed, Elastic, Force, LOAD_OF_MASS, MOST_CONSTANTS, MassLoad, Name, On,
-    Prescribed, Sides, Target, fields, number,
+    DECIMAL_POINT, Distributed, Elastic, Expansion, Force, LOAD_OF_MASS, MOST_CONSTANTS, MassLoad,
+    Name, On, Prescribed, Sides, Target, fields, number,
 };
 use solver::element::{Element, Family};
 use solver::error::Reason;
@@ -46,8 +46,9 @@ pub(super) enum Block {
     Orientation(Name),
     Amplitude(Name),
     Thickness,
-    InitialTemperatures,
-    Temperatures,
+    Expansion(Expansion),
+    /// Temperatures of a step with their amplitude, if they have one; without the outer value initial ones.
+    Temperatures(Option<Option<Name>>),
     Period,
     Contact(ContactBlock),
     /// Rows of `*BOUNDARY`, and the name of their amplitude.
@@ -140,8 +141,8 @@ impl Deck {
                 self.thickness(line, text);
                 *block = Block::Skip;
             }
-            Block::InitialTemperatures => self.temperature(true, line, text),
-            Block::Temperatures => self.temperature(false, line, text),
+            Block::Expansion(expansion) => self.expansion(expansion, line, text),
+            Block::Temperatures(amplitude) => self.temperature(amplitude, line, text),
             Block::Period => {
                 self.period(text);
                 *block = Block::Skip;
@@ -252,6 +253,13 @@ impl Deck {
                     &expected,
                     "The last element before this line is not complete: write its other nodes, or correct TYPE= of *ELEMENT.",
                 );
+            }
+            Block::Expansion(mut expansion) => {
+                expansion.unreadable |= expansion.values.is_empty();
+                if let Some(material) = self.material() {
+                    let first = material.expansion.get_or_insert_with(|| expansion.clone());
+                    first.depends_on_temperature |= first.values != expansion.values;
+                }
             }
             Block::Elastic(elastic) => {
                 let at = elastic.line;

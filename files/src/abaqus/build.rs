@@ -11,8 +11,10 @@ use super::part::{Numbered, Part, RigidLines};
 use super::rigid::{Search, Tools};
 use super::scope::{Kind, Scope};
 use super::supported::{UnknownKeyword, report_unknown};
+use super::warming::{Warming, give_temperatures};
 use super::written::{
-    Distributed, Force, Incomplete, Name, On, Prescribed, Section, Sides, Target, numbered, on_line,
+    Distributed, Force, Incomplete, Name, On, Prescribed, Section, Sides, Target, Temperature,
+    numbered, on_line,
 };
 use crate::source::Plane;
 use solver::error::{Findings, Reason, Violation};
@@ -43,6 +45,7 @@ pub(super) struct Built {
     pub(super) prescribed: Vec<Row<Prescribed>>,
     pub(super) pressures: Vec<Row<Distributed>>,
     pub(super) forces: Vec<Row<Force>>,
+    pub(super) warming: Warming,
     /// Whether each node belongs to a plane element.
     pub(super) used: Vec<bool>,
     pub(super) tools: Tools,
@@ -76,6 +79,8 @@ impl Deck {
             |rows| &mut rows.forces,
             |row| (&row.target, row.line),
         );
+        let temperatures = std::mem::take(&mut merged.rows.temperatures);
+        let warming = give_temperatures(&names, temperatures, &used, &mut merged.raw);
         let pressures = merged.surfaces(&names, &mut sets);
         merged.groups(&names, sets.elements);
         merged.raw.sets_span_boundaries = true;
@@ -98,6 +103,7 @@ impl Deck {
             prescribed,
             pressures,
             forces,
+            warming,
             used,
             tools,
             pairs,
@@ -112,6 +118,7 @@ struct Rows {
     prescribed: Vec<(usize, Prescribed)>,
     pressures: Vec<(usize, Distributed)>,
     forces: Vec<(usize, Force)>,
+    temperatures: Vec<(usize, Temperature)>,
     held: Vec<(usize, Held)>,
     rigid_bodies: Vec<(usize, RigidBody)>,
     analytical: Vec<(usize, Name, Analytical)>,
@@ -250,6 +257,8 @@ impl Merged {
             .extend(part.pressures.into_iter().map(|row| (place, row)));
         rows.forces
             .extend(part.forces.into_iter().map(|row| (place, row)));
+        rows.temperatures
+            .extend(part.temperatures.into_iter().map(|row| (place, row)));
         rows.held
             .extend(part.held.into_iter().map(|row| (place, row)));
         rows.rigid_bodies
@@ -462,8 +471,26 @@ impl Merged {
         let pressures = pressures.map(|(_, row)| (row.line, &row.amplitude, &mut row.value));
         let forces = rows.forces.iter_mut();
         let forces = forces.map(|(_, row)| (row.line, &row.amplitude, &mut row.value));
-        for (line, amplitude, value) in prescribed.chain(pressures).chain(forces) {
+        let temperatures = rows.temperatures.iter_mut();
+        let temperatures = temperatures.map(|(_, row)| (row.line, &row.amplitude, &mut row.value));
+        let others = pressures.chain(forces).chain(temperatures);
+        let all: Vec<_> = prescribed.chain(others).collect();
+        // the amplitudes of what acts in each step
+        let mut acting: BTreeMap<usize, BTreeSet<Option<Name>>> = BTreeMap::new();
+        for (line, amplitude, value) in &all {
+            if **value != 0.0 {
+                let step = deck.contact.step_of(*line);
+                acting.entry(step).or_default().insert((*amplitude).clone());
+            }
+        }
+        for (line, amplitude, value) in all {
             let Some(name) = amplitude else { continue };
+            let in_step = acting.get(&deck.contact.step_of(line));
+            let alone = in_step.is_none_or(|others| others.len() == 1);
+            let off = || {
+                deck.off_the_way(name, line, alone)
+                    .filter(|_| *value != 0.0)
+            };
             match deck.factor(name) {
                 Ok(_) if deck.has_friction() && deck.turns(name, line) => self.doubts.add(on_line(
                     line,
@@ -471,6 +498,13 @@ impl Merged {
                     format!("the amplitude `{name:.60}`, which rises and falls within the step, in a deck with friction"),
                     "an amplitude that only rises, or only falls",
                     "Friction depends on the way to the end: write a *STEP for each part of the amplitude.",
+                )),
+                Ok(_) if deck.has_friction() && off().is_some() => self.doubts.add(on_line(
+                    line,
+                    Reason::NotUnderstood,
+                    format!("the amplitude `{name:.60}`, {}, in a deck with friction", off().unwrap_or_default()),
+                    "amplitudes that begin at 0 and rise together: all loads and displacements of a step are increased in proportion",
+                    "Friction depends on the way to the end: leave the amplitude out, so that the load rises over the step, or write a *STEP for each part of the way.",
                 )),
                 Ok(factor) => *value *= factor,
                 Err(got) => self.doubts.add(on_line(

@@ -6,7 +6,7 @@ use super::contact_parts::DeckContact;
 use super::part::Part;
 use super::written::{
     Amplitude, LONGEST_NAME, MOST_NAMES, MaterialDefinition, Name, Orientation, Replacement, Set,
-    Sides, Surface, Target, Temperatures, on_line,
+    Sides, Surface, Target, on_line,
 };
 use solver::error::Reason;
 
@@ -46,7 +46,8 @@ pub(super) struct Deck {
     pub(super) materials: BTreeMap<Name, MaterialDefinition>,
     pub(super) orientations: BTreeMap<Name, Orientation>,
     pub(super) amplitudes: BTreeMap<Name, Amplitude>,
-    pub(super) temperatures: Temperatures,
+    /// The first line by which temperatures are other than the rows say, and what it has.
+    pub(super) other_temperatures: Option<(u64, String)>,
     pub(super) steps: usize,
     /// The position of the instance that is being read.
     pub(super) placement: Option<Placement>,
@@ -218,6 +219,27 @@ impl Deck {
             falls |= pair[1] < pair[0];
         }
         rises && falls
+    }
+
+    /// What keeps an amplitude from being followed on the way to the end of its step, in words: that it jumps at the
+    /// beginning, or, if `alone` is false, that other loads of the step do not rise and fall with it.
+    pub(super) fn off_the_way(&self, name: &Name, line: u64, alone: bool) -> Option<String> {
+        let (amplitude, last) = (self.amplitudes.get(name)?, self.factor(name).ok()?);
+        let (times, _) = amplitude.values.as_chunks::<2>();
+        let end = self.period.unwrap_or(1.0);
+        let [from, first] = *times.first()?;
+        if self.contact.step_of(line) == 0 && from <= 0.0 && first != 0.0 {
+            return Some(format!("which begins at {first} and not at 0"));
+        }
+        let straight = |[time, factor]: &[f64; 2]| {
+            let expected = first + (last - first) * (time - from) / (end - from);
+            (factor - expected).abs() <= 1e-6 * last.abs().max(first.abs())
+        };
+        let within = times.iter().filter(|[time, _]| *time < end);
+        let is_straight = from <= 0.0 && within.clone().all(straight);
+        (!alone && !is_straight).then(|| {
+            "which is not a straight line, beside loads or displacements without it".to_owned()
+        })
     }
 
     /// Whether a contact has friction, so that the way to the end of a step matters.

@@ -8,8 +8,8 @@ use super::supported::{
     IDLE, MOST_UNKNOWN, NOT_ELASTIC, NOT_WRITTEN_OUT, PARAMETERS, READ, UnknownKeyword,
 };
 use super::written::{
-    Amplitude, Elastic, Incomplete, MOST_NAMES, Name, Orientation, Replacement, Replaces, Section,
-    fields,
+    Amplitude, Elastic, Expansion, Incomplete, MOST_NAMES, Name, Orientation, Replacement,
+    Replaces, Section, fields,
 };
 use solver::error::Reason;
 
@@ -118,10 +118,13 @@ impl Deck {
                 unreadable: false,
             }),
             "EXPANSION" => {
-                if let Some(material) = self.material() {
-                    material.expansion.get_or_insert(line);
-                }
-                Block::Skip
+                let kind = keyword.get("TYPE").unwrap_or("ISO").to_uppercase();
+                Block::Expansion(Expansion {
+                    line,
+                    along_axes: kind.starts_with("ORTHO"),
+                    unreadable: !(kind.starts_with("ISO") || kind.starts_with("ORTHO")),
+                    ..Expansion::default()
+                })
             }
             "DENSITY" => Block::Density,
             "TEMPERATURE" => self.temperature_block(keyword, line),

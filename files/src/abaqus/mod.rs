@@ -24,7 +24,8 @@
 //! | a deck as a problem | `problem` |
 //! | supports of a deck | `supports` |
 //! | gravity, rotation and densities of a deck | `mass` |
-//! | temperatures of a deck | `temperature` |
+//! | temperatures of a deck, and the expansion of materials | `temperature` |
+//! | the changes of temperature at its nodes | `warming` |
 //! | contact: reading its keywords | `interaction` |
 //! | contact: rigid bodies, their shapes, their motion | `rigid`, `tool`, `steps` |
 //! | contact: the contacts made of them | `contact` |
@@ -51,6 +52,7 @@ mod supported;
 mod supports;
 mod temperature;
 mod tool;
+mod warming;
 mod written;
 
 pub use problem::{has_step, problem, problem_with_warnings};

@@ -6,7 +6,9 @@ use std::ops::Range;
 use super::contact_parts::{Analytical, Held, RigidBody};
 use super::element::Typed;
 use super::supported::UnknownKeyword;
-use super::written::{Distributed, Force, Incomplete, Name, Prescribed, Section, Set, Surface};
+use super::written::{
+    Distributed, Force, Incomplete, Name, Prescribed, Section, Set, Surface, Temperature,
+};
 use crate::source::Labels;
 use solver::element::Element;
 use solver::error::{Findings, Violation};
@@ -64,6 +66,7 @@ pub(super) struct Part {
     pub(super) prescribed: Vec<Prescribed>,
     pub(super) pressures: Vec<Distributed>,
     pub(super) forces: Vec<Force>,
+    pub(super) temperatures: Vec<Temperature>,
     pub(super) rigid_bodies: Vec<RigidBody>,
     pub(super) analytical: BTreeMap<Name, Analytical>,
     /// Every row of `*BOUNDARY`, with all its components.
@@ -111,7 +114,7 @@ impl Part {
         let sides: usize = self.surfaces.values().map(|s| s.sides.len()).sum();
         let names = self.node_sets.len() + self.element_sets.len() + self.surfaces.len();
         let pieces: usize = self.analytical.values().map(|s| 1 + s.pieces.len()).sum();
-        let loads = self.pressures.len() + self.forces.len();
+        let loads = self.pressures.len() + self.forces.len() + self.temperatures.len();
         let rows = self.sections.len() + self.prescribed.len() + self.held.len() + loads;
         let rigid = self.rigid_bodies.len() + self.rigid_lines.len() + pieces;
         let mesh = self.nodes.len() + self.numbered.len() + members + sides + names;

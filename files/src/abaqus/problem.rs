@@ -100,14 +100,16 @@ impl Built {
         let analysis = analysis(built);
         let quadrature = quadrature(built);
         let motions = built.take_motions(matches!(analysis, Analysis::Axisymmetric {}));
-        let factors = built.factors_of_steps();
+        let of_temperatures = built.load_of_temperatures();
+        let warms = of_temperatures.is_some();
+        let factors = built.factors_of_steps(warms);
         built.keep_last_loads();
         let thickness = match analysis {
             Analysis::PlaneStrain {} => built.sections.first().and_then(|s| s.row.thickness),
             _ => None,
         };
         let thickness = thickness.unwrap_or(1.0);
-        let materials = materials(built);
+        let materials = materials(built, warms);
         let supports = supports(built);
         for (line, name) in supports.of_no_element {
             let (what, ..) = built.not_meshed(&name);
@@ -118,7 +120,8 @@ impl Built {
                 "Name nodes of the mesh. A rigid tool is moved by its reference node (REF NODE of *RIGID BODY), or by the `indentation` of a contact in a problem as JSON.",
             );
         }
-        let loads = loads(built, &analysis, thickness);
+        let mut loads = loads(built, &analysis, thickness);
+        loads.extend(of_temperatures);
         ElasticPart {
             analysis,
             quadrature,
@@ -222,7 +225,7 @@ impl Built {
                     body.line
                 ),
                 "a rigid body that *BOUNDARY moves",
-                "A rigid body is moved here by a given displacement, not by a force. Prescribe the displacement, read `normal_force` of the result, and repeat with another displacement until that is the force.",
+                "A rigid body is moved here by a given displacement, not by a force. Prescribe the displacement, read `normal_force` of the result (of a curved contact, the force in its note `normals_differ`), and repeat with another displacement until that is the force.",
             );
         }
         let label = self.raw.node_labels[*first as usize];
@@ -240,11 +243,12 @@ impl Built {
     }
 
     /// The factors of loads and of supports at the end of each step; a deck with several steps must have contacts.
-    fn factors_of_steps(&mut self) -> Vec<[f64; 2]> {
+    /// `warms`: whether temperatures are one of the loads.
+    fn factors_of_steps(&mut self, warms: bool) -> Vec<[f64; 2]> {
         let steps = self.deck.steps;
         if steps == 1 || steps > 1 && !self.pairs.is_empty() {
             self.check_replaced();
-            return self.factors();
+            return self.factors(warms);
         }
         if let Some((second, _)) = self.deck.contact.steps.get(1).copied() {
             self.doubt(
@@ -327,7 +331,8 @@ fn quadrature(built: &mut Built) -> u32 {
     if reduced { 2 } else { 3 }
 }
 
-fn materials(built: &mut Built) -> Vec<Material> {
+/// The materials of the body; `warms`: whether its temperature changes.
+fn materials(built: &mut Built, warms: bool) -> Vec<Material> {
     let mut materials = Vec::new();
     let load_of_mass = built.first_mass_load();
     let mut densities: BTreeSet<&Name> = BTreeSet::new();
@@ -372,20 +377,6 @@ fn materials(built: &mut Built) -> Vec<Material> {
         if told.contains(&row.material) {
             continue;
         }
-        if let Some(expansion) = definition.expansion
-            && let Some((line, got)) = built.deck.temperatures.changed.take()
-        {
-            let got = format!(
-                "{got}, and the material `{:.60}` of the body has *EXPANSION (line {expansion})",
-                row.material
-            );
-            built.doubt(
-                line,
-                got,
-                "temperatures that stay as *INITIAL CONDITIONS give them, 0 where they give none, or a material without *EXPANSION",
-                "Thermal strains are not computed. Remove the change of temperature or *EXPANSION if they may be neglected.",
-            );
-        }
         let load = load_of_mass.filter(|_| densities.insert(&row.material));
         let density = built.density_of(&row.material, definition, load);
         for (line, got) in &definition.other {
@@ -402,12 +393,15 @@ fn materials(built: &mut Built) -> Vec<Material> {
                 if let Elasticity::Orthotropic(constants) = &mut elasticity {
                     constants.angle = angle(built, row);
                 }
-                materials.push(Material {
+                let mut material = Material {
                     density,
+                    expansion: None,
                     elasticity,
                     group: Some(name.clone()),
                     name: Some(row.material.to_string()),
-                });
+                };
+                built.expand(definition, warms, &mut material);
+                materials.push(material);
             }
             None if elastic.unreadable || !told.insert(&row.material) => {}
             None => {
@@ -494,6 +488,7 @@ fn elasticity(elastic: &Elastic) -> Option<Elasticity> {
             e3: Some(*e3),
             nu13: Some(*nu13),
             nu23: Some(*nu23),
+            expansion: None,
         })),
         _ => None,
     }

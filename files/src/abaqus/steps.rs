@@ -86,7 +86,6 @@ impl Built {
         held: &[[Option<f64>; 3]],
         axisymmetric: bool,
     ) -> Option<Motion> {
-        let last = held[held.len() - 1];
         if body.reference.is_none() {
             self.doubt(
                 body.line,
@@ -106,13 +105,18 @@ impl Built {
             );
             return None;
         }
-        let components = ["1", "2", "6"].into_iter().zip(last);
+        // what the first step holds stays held
+        let components = ["1", "2", "6"].into_iter().zip(held[0]);
         let free =
             components.filter(|(name, value)| value.is_none() && !(axisymmetric && *name != "2"));
         let free: Vec<&str> = free.map(|(name, _)| name).collect();
         if !free.is_empty() {
+            let when = match held.len() {
+                1 => "",
+                _ => " in the first step",
+            };
             let got = format!(
-                "a rigid body whose reference node is free in {}",
+                "a rigid body whose reference node is free in {}{when}",
                 free.join(", ")
             );
             self.doubt(body.line, got, "displacements 1 and 2 and rotation 6 of its reference node prescribed by *BOUNDARY", WRITTEN_INSTEAD);
@@ -176,8 +180,8 @@ impl Built {
 
     /// The factors of loads and of prescribed displacements at the end of each step; in the last step both are 1 (0 if
     /// all values are 0). The values of each step must be in proportion to those of the last step, and are reported if
-    /// they are not.
-    pub(super) fn factors(&mut self) -> Vec<[f64; 2]> {
+    /// they are not. `warms`: whether temperatures, which the first step changes, are one of the loads.
+    pub(super) fn factors(&mut self, warms: bool) -> Vec<[f64; 2]> {
         let count = self.deck.contact.steps.len().max(1);
         if let Some((line, got)) = self.late_support() {
             self.doubt(
@@ -217,7 +221,20 @@ impl Built {
                 vec![1.0; count]
             })
         });
-        let [loads, supports] = found;
+        let [mut loads, supports] = found;
+        if warms && loads.iter().all(|factor| *factor == 0.0) {
+            loads = vec![1.0; count];
+        }
+        let other = loads.iter().position(|factor| (factor - 1.0).abs() > SAME);
+        if let Some(step) = other.filter(|_| warms) {
+            let line = self.deck.contact.steps.get(step).map_or(0, |step| step.0);
+            self.doubt(
+                line,
+                "a step with other loads than the last one, in a deck whose temperatures change",
+                "loads that stay as the first step leaves them, as the temperatures do",
+                WRITTEN_INSTEAD,
+            );
+        }
         loads
             .into_iter()
             .zip(supports)

@@ -51,8 +51,8 @@ pub(super) struct MaterialDefinition {
     pub(super) elastic: Option<Elastic>,
     /// Properties that a linear elastic material does not have: their lines, and their keywords in words.
     pub(super) other: Vec<(u64, String)>,
-    /// The first line of `*EXPANSION`.
-    pub(super) expansion: Option<u64>,
+    /// The first `*EXPANSION`.
+    pub(super) expansion: Option<Expansion>,
     /// The different densities of `*DENSITY`, at most two.
     pub(super) densities: Vec<f64>,
 }
@@ -193,30 +193,28 @@ pub(super) struct Force {
     pub(super) amplitude: Option<Name>,
 }
 
-/// The temperatures of a deck.
-#[derive(Default)]
-pub(super) struct Temperatures {
-    /// The initial temperature of each target.
-    pub(super) initial: Vec<(Target, f64)>,
-    /// Whether some of the initial temperatures are unknown, so that no row is known to leave a temperature as it is.
-    pub(super) others: bool,
-    /// The first line that changes a temperature, and what it changes, in words.
-    pub(super) changed: Option<(u64, String)>,
+/// A row of `*INITIAL CONDITIONS` or `*TEMPERATURE`: the temperature of nodes.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Temperature {
+    pub(super) line: u64,
+    pub(super) target: Target,
+    pub(super) value: f64,
+    /// Whether it is that before the first step.
+    pub(super) is_initial: bool,
+    pub(super) amplitude: Option<Name>,
 }
 
-impl Temperatures {
-    /// Whether the temperature `value` of a target equals the initial one; false if that is uncertain.
-    pub(super) fn is_initial(&self, target: &Target, value: f64) -> bool {
-        let mut all = self.initial.iter();
-        let same = all.clone().all(|(_, initial)| *initial == value);
-        // what is given no temperature begins at 0
-        let named = if self.initial.is_empty() {
-            value == 0.0
-        } else {
-            all.any(|(of, _)| of == target)
-        };
-        same && named && !self.others
-    }
+/// The strains of a material by one unit of temperature, `*EXPANSION`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Expansion {
+    pub(super) line: u64,
+    /// Whether the material has three strains, along its axes.
+    pub(super) along_axes: bool,
+    pub(super) values: Vec<f64>,
+    /// Whether a line could not be read, or the type is another one.
+    pub(super) unreadable: bool,
+    /// Whether there are several rows with different strains.
+    pub(super) depends_on_temperature: bool,
 }
 
 /// The kind of supports or loads that `OP=NEW` replaces. `*DLOAD` and `*DSLOAD` replace each other's pressures in

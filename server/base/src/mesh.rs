@@ -48,20 +48,33 @@ pub struct MeshInfo {
     pub created_at: Time,
 }
 
-/// Writes the stored form of a mesh: the mesh, followed by the list of added midsides and the number of nodes that the
-/// node sets lost.
+/// Writes the stored form of a mesh: the mesh, followed by the list of added midsides, the number of nodes that the node
+/// sets lost, and the temperatures at the nodes.
 pub fn write_stored<W: std::io::Write>(mesh: &Mesh, to: W) -> postcard::Result<W> {
-    postcard::to_io(&(mesh, mesh.added_midsides, &mesh.nodes_left_out), to)
+    postcard::to_io(
+        &(
+            mesh,
+            mesh.added_midsides,
+            &mesh.nodes_left_out,
+            &mesh.temperatures,
+        ),
+        to,
+    )
 }
 
-/// Reads a mesh from its stored form; the form of earlier versions ends after the mesh, or after the midsides.
+/// Reads a mesh from its stored form; the forms of earlier versions end earlier: after the mesh, the midsides or the
+/// nodes left out.
 pub fn read_stored(bytes: &[u8]) -> postcard::Result<Mesh> {
     let (mut mesh, rest): (Mesh, &[u8]) = postcard::take_from_bytes(bytes)?;
     if !rest.is_empty() {
         let (added, rest): (_, &[u8]) = postcard::take_from_bytes(rest)?;
         mesh.added_midsides = added;
         if !rest.is_empty() {
-            mesh.nodes_left_out = postcard::from_bytes(rest)?;
+            let (left_out, rest): (_, &[u8]) = postcard::take_from_bytes(rest)?;
+            mesh.nodes_left_out = left_out;
+            if !rest.is_empty() {
+                mesh.temperatures = postcard::from_bytes(rest)?;
+            }
         }
     }
     Ok(mesh)
@@ -159,10 +172,14 @@ mod tests {
             node_sets: BTreeMap::from([("top".to_owned(), vec![2, 3])]),
             added_midsides: Some(4),
             nodes_left_out: BTreeMap::from([("top".to_owned(), 1)]),
+            temperatures: vec![20.0; 9],
             ..Mesh::default()
         };
         let stored = write_stored(&mesh, Vec::new()).unwrap();
         assert_eq!(read_stored(&stored).unwrap(), mesh);
+        let left_out = (&mesh, mesh.added_midsides, &mesh.nodes_left_out);
+        let read = read_stored(&postcard::to_io(&left_out, Vec::new()).unwrap()).unwrap();
+        assert_eq!((read.nodes_left_out.len(), read.temperatures.len()), (1, 0));
         let with_midsides = postcard::to_io(&(&mesh, mesh.added_midsides), Vec::new()).unwrap();
         let read = read_stored(&with_midsides).unwrap();
         assert_eq!(

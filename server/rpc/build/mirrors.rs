@@ -65,6 +65,7 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     content("NodeList", "Vec<u32>"),
     fields("Material", "problem::MaterialFields"),
     fields("Orthotropic", "problem::Orthotropic"),
+    array("Expansion", "[f64; 3]"),
     fields("Support", "problem::Support"),
     fields("Load", "problem::LoadFields"),
     fields("Rotation", "problem::Rotation"),

@@ -334,9 +334,9 @@ impl Inside {
         let (model, body) = (system.model, system.body);
         let displacements = body.displacements_on(system.threads, v, &system.level);
         let elements = body.elements(model);
-        let body_force = model.body_force(&system.level);
+        let inner = model.inner(&system.level);
         let interrupt = &mut *state.questions.interrupt.borrow_mut();
-        let recovered = recover(elements, &displacements, &body_force, interrupt)?;
+        let recovered = recover(elements, &displacements, &inner, interrupt)?;
         let difference = StressDifference::new(elements, &recovered, interrupt)?;
         let errors = difference.norms(elements, interrupt)?;
         let inside = Inside {

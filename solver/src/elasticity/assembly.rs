@@ -7,10 +7,12 @@ use serde::Serialize;
 use crate::elasticity::Section;
 use crate::elasticity::body_force::BodyForce;
 use crate::elasticity::geometry::{Elements, Masters};
+use crate::elasticity::material::{COMPONENTS, stress};
 use crate::elasticity::mixed::{Mixed, position};
 use crate::elasticity::shapes::Shape;
+use crate::elasticity::thermal::{Thermal, ThermalStrain};
 use crate::element::gauss::GAUSS_3;
-use crate::element::{Element, Family, edge3};
+use crate::element::{AtNodes, Element, Family, edge3};
 use crate::linear::ElementMatrix;
 use crate::mesh::{Edge, Mesh};
 
@@ -277,6 +279,8 @@ pub struct Loads {
     pub edges: Vec<EdgeLoad>,
     /// Forces per volume.
     pub body_force: BodyForce,
+    /// Thermal strains.
+    pub thermal: Thermal,
     /// Forces at nodes along x and y (without 2π).
     pub nodal: Vec<(u32, [f64; 2])>,
 }
@@ -339,30 +343,64 @@ pub fn assemble_loads(
     forces
 }
 
-/// Adds the effect of the body force on the bubbles of nearly incompressible elements to the forces on the nodes: the
-/// `forces` of [`assemble_loads`] add up to the load, and become the right-hand side of the stiffness, from which the
-/// bubbles are eliminated.
-pub fn condense_body_force(mesh: &Mesh, section: &Section, loads: &Loads, forces: &mut [[f64; 2]]) {
-    if loads.body_force.is_zero() || !section.has_split() {
+/// Adds the forces of thermal strains, ∫ Bᵀ D ε₀, to those on the nodes, and the effect of these strains and of the body
+/// force on the bubbles of nearly incompressible elements: the `forces` of [`assemble_loads`] add up to the load, and
+/// become the right-hand side of the stiffness, from which the bubbles are eliminated.
+pub fn add_inner_forces(
+    mesh: &Mesh,
+    section: &Section,
+    quadrature: u32,
+    loads: &Loads,
+    forces: &mut [[f64; 2]],
+) {
+    let on_bubbles = section.has_split() && !loads.body_force.is_zero();
+    if loads.thermal.is_zero() && !on_bubbles {
         return;
     }
     for (e, element) in mesh.elements.iter().enumerate() {
         let material = section.material_of(e);
-        let Some(split) = section.split(material) else {
-            continue;
+        let (family, nodes) = (element.family(), mesh.element_nodes(element));
+        let thermal = loads.thermal.of_element(element, material, 1.0);
+        let own = match (section.split(material), &thermal) {
+            (Some(split), _) => {
+                let mixed = Mixed::new(section, split, family, &nodes);
+                let strain = mixed.thermal(section, family, &nodes, thermal.as_ref());
+                mixed.inner_forces(&loads.body_force, material, &strain)
+            }
+            (None, Some(thermal)) => {
+                forces_of_strain(section, material, family, &nodes, quadrature, thermal)
+            }
+            (None, None) => continue,
         };
-        let mixed = Mixed::new(
-            section,
-            split,
-            element.family(),
-            &mesh.element_nodes(element),
-        );
-        let force = mixed.force_on_bubble(&loads.body_force, material);
-        let passed_on = mixed.passed_on(&force);
-        for (&node, force) in element.iter().zip(passed_on) {
-            (0..2).for_each(|a| forces[node as usize][a] += force[a]);
+        for (&node, own) in element.iter().zip(own) {
+            (0..2).for_each(|a| forces[node as usize][a] += own[a]);
         }
     }
+}
+
+/// The forces on the nodes of an element that is not nearly incompressible by thermal strains, ∫ Bᵀ D ε₀.
+fn forces_of_strain(
+    section: &Section,
+    material: usize,
+    family: Family,
+    nodes: &AtNodes<[f64; 2]>,
+    quadrature: u32,
+    thermal: &ThermalStrain,
+) -> AtNodes<[f64; 2]> {
+    let mut forces = [[0.0; 2]; 8];
+    // the rule of the stiffness: a free body that expands has no stress with any rule
+    for point in family.rule(quadrature) {
+        let m = family.map(nodes, point.place);
+        let weight = point.weight * m.det * section.depth(m.x);
+        let stress = stress(&section.materials()[material], &thermal.at(&m.shape));
+        for (i, force) in forces.iter_mut().enumerate().take(family.nodes()) {
+            let b = section.strain(m.shape[i], m.gradient[i], m.x);
+            for (c, s) in stress.iter().enumerate().take(COMPONENTS) {
+                (0..2).for_each(|a| force[a] += weight * b[c][a] * s);
+            }
+        }
+    }
+    forces
 }
 
 fn add_edge_load(mesh: &Mesh, section: &Section, load: &EdgeLoad, forces: &mut [[f64; 2]]) {

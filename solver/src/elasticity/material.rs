@@ -74,6 +74,11 @@ impl Section {
         }
     }
 
+    /// The theory of the body.
+    pub fn analysis(&self) -> Analysis {
+        self.analysis
+    }
+
     /// Number of an element's material.
     pub fn material_of(&self, element: usize) -> usize {
         self.material_of.get(element).map_or(0, |&m| usize::from(m))
@@ -189,7 +194,7 @@ pub fn isotropic(analysis: &Analysis, youngs_modulus: f64, poissons_ratio: f64) 
 /// plane are required unless the analysis is plane stress.
 #[rustfmt::skip]
 pub fn orthotropic(analysis: &Analysis, material: &Orthotropic) -> Option<Moduli> {
-    let Orthotropic { e1, e2, nu12, g12, angle, e3, nu13, nu23 } = *material;
+    let Orthotropic { e1, e2, nu12, g12, angle, e3, nu13, nu23, .. } = *material;
     let sheet = matches!(analysis, Analysis::PlaneStress { .. });
     let (e3, nu13, nu23) = if sheet {
 (0.0, 0.0, 0.0)
@@ -270,6 +275,7 @@ mod tests {
             e3: Some(8.0),
             nu13: Some(0.25),
             nu23: Some(0.4),
+            expansion: None,
         }
     }
 
@@ -285,6 +291,7 @@ mod tests {
             e3: Some(e),
             nu13: Some(nu),
             nu23: Some(nu),
+            expansion: None,
         };
         for analysis in [
             Analysis::PlaneStrain {},
@@ -364,6 +371,7 @@ mod tests {
                 e3: Some(e),
                 nu13: Some(nu),
                 nu23: Some(nu),
+                expansion: None,
             };
             let split = Split::new(&orthotropic(&strain, &material).unwrap());
             assert_eq!(split.is_some(), nearly, "{nu}");
@@ -378,6 +386,7 @@ mod tests {
             e3: Some(1.0),
             nu13: Some(0.4999),
             nu23: Some(0.7499),
+            expansion: None,
         };
         let split = Split::new(&orthotropic(&strain, &matrix).unwrap()).unwrap();
         assert!(split.bulk > 1000.0, "{}", split.bulk);

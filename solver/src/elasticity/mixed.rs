@@ -8,10 +8,15 @@
 //! displacements, so that k stays positive; with the bubble's rows b it is reduced to the nodes,
 //!
 //!   k_ij − k_ib k_bb⁻¹ k_bj,    f_i − k_ib k_bb⁻¹ f_b,    a = k_bb⁻¹ (f_b − k_bi u_i)
+//!
+//! Thermal strains ε₀ are taken off both parts: their dilatation is projected too, t_k = ∫ ψ_k mᵀε₀, and
+//!
+//!   f = ∫ Bᵀ R ε₀ + κ Σ_k g_k t_k
 
 use crate::elasticity::Section;
 use crate::elasticity::body_force::BodyForce;
 use crate::elasticity::material::{COMPONENTS, Split, stress};
+use crate::elasticity::thermal::ThermalStrain;
 use crate::element::{AtNodes, Family, GaussPoint, Mapped};
 
 /// The displacement components of the largest element with its bubble; the bubble comes after the nodes.
@@ -205,6 +210,67 @@ impl<'a> Mixed<'a> {
         body_force.over(material, self.volume, self.moment)
     }
 
+    /// The thermal strains of the element; all 0 without `strain`.
+    pub(super) fn thermal(
+        &self,
+        section: &Section,
+        family: Family,
+        nodes: &AtNodes<[f64; 2]>,
+        strain: Option<&ThermalStrain>,
+    ) -> ThermalPart {
+        let mut found = ThermalPart::default();
+        let Some(thermal) = strain else { return found };
+        for point in Self::rule(family) {
+            let m = family.map(nodes, point.place);
+            let weight = point.weight * m.det * section.depth(m.x);
+            let strain = thermal.at(&m.shape).map(|strain| weight * strain);
+            let psi = self.frame.functions(position(&m, nodes));
+            (0..3).for_each(|k| found.dilatation[k] += psi[k] * dilatation(&strain));
+            let stress = stress(&self.split.rest, &strain);
+            let mut add = |i: usize, b: [[f64; 2]; COMPONENTS]| {
+                for (b, s) in b.iter().zip(&stress) {
+                    (0..2).for_each(|p| found.force[2 * i + p] += b[p] * s);
+                }
+            };
+            for i in 0..self.nodes {
+                add(i, section.strain(m.shape[i], m.gradient[i], m.x));
+            }
+            let (shape, gradient) = bubble(family, &m, point.place);
+            add(self.nodes, section.strain(shape, gradient, m.x));
+        }
+        for (g, t) in self.dilatation.iter().zip(found.dilatation) {
+            let factor = self.split.bulk * t;
+            (0..SIZE).for_each(|j| found.force[j] += factor * g[j]);
+        }
+        found
+    }
+
+    /// The force on the bubble by forces per volume and thermal strains.
+    pub(super) fn on_bubble(
+        &self,
+        body_force: &BodyForce,
+        material: usize,
+        thermal: &ThermalPart,
+    ) -> [f64; 2] {
+        let [x, y] = self.force_on_bubble(body_force, material);
+        let b = 2 * self.nodes;
+        [x + thermal.force[b], y + thermal.force[b + 1]]
+    }
+
+    /// The forces on the nodes by thermal strains, and by what acts on the bubble.
+    pub(super) fn inner_forces(
+        &self,
+        body_force: &BodyForce,
+        material: usize,
+        thermal: &ThermalPart,
+    ) -> AtNodes<[f64; 2]> {
+        let mut forces = self.passed_on(&self.on_bubble(body_force, material, thermal));
+        for (i, force) in forces.iter_mut().enumerate().take(self.nodes) {
+            (0..2).for_each(|p| force[p] += thermal.force[2 * i + p]);
+        }
+        forces
+    }
+
     /// The forces on the nodes equivalent to a force on the bubble: −k_ib k_bb⁻¹ f_b.
     pub fn passed_on(&self, force_on_bubble: &[f64; 2]) -> AtNodes<[f64; 2]> {
         let a = self.bubble_from(force_on_bubble);
@@ -218,8 +284,14 @@ impl<'a> Mixed<'a> {
         forces
     }
 
-    /// The state inside the element, from the displacements of its nodes and a force on the bubble.
-    pub fn inside(&self, u: &AtNodes<[f64; 2]>, force_on_bubble: &[f64; 2]) -> Inside<'a> {
+    /// The state inside the element, from the displacements of its nodes, a force on the bubble and the projected
+    /// dilatation t_k of thermal strains.
+    pub fn inside(
+        &self,
+        u: &AtNodes<[f64; 2]>,
+        force_on_bubble: &[f64; 2],
+        thermal: &[f64; 3],
+    ) -> Inside<'a> {
         let nodal = |row: &[f64; SIZE]| -> f64 {
             let nodes = u.iter().take(self.nodes).enumerate();
             nodes
@@ -234,9 +306,18 @@ impl<'a> Mixed<'a> {
             split: self.split,
             frame: self.frame,
             bubble,
-            dilatation: self.dilatation.each_ref().map(dilatation),
+            dilatation: std::array::from_fn(|k| dilatation(&self.dilatation[k]) - thermal[k]),
         }
     }
+}
+
+/// The thermal strains of an element.
+#[derive(Default)]
+pub(super) struct ThermalPart {
+    /// The forces on the nodes and on the bubble.
+    force: [f64; SIZE],
+    /// The projected dilatation t_k.
+    pub(super) dilatation: [f64; 3],
 }
 
 /// The state inside an element whose nodes are displaced.
@@ -245,7 +326,7 @@ pub struct Inside<'a> {
     frame: Frame,
     /// The displacement a of the bubble.
     pub bubble: [f64; 2],
-    /// The coefficients of the projected dilatation θ̄.
+    /// The coefficients of the projected dilatation θ̄, without that of thermal strains.
     dilatation: [f64; 3],
 }
 
@@ -264,7 +345,7 @@ impl Inside<'_> {
         (0..COMPONENTS).for_each(|c| strain[c] += dot2(&b[c], &self.bubble));
     }
 
-    /// The projected dilatation θ̄ and the stress at a position, where `strain` is the whole strain.
+    /// The projected dilatation θ̄ and the stress at a position, where `strain` is the elastic strain.
     pub fn stress(
         &self,
         strain: &[f64; COMPONENTS],
@@ -512,7 +593,7 @@ mod tests {
             ..BodyForce::default()
         };
         let force = element.force_on_bubble(&body_force, 0);
-        let inside = element.inside(&u, &force);
+        let inside = element.inside(&u, &force, &[0.0; 3]);
         for p in 0..2 {
             let mut residual = force[p]
                 - dot2(

@@ -7,6 +7,7 @@
 //! | Hooke's law and its matrix | `material` |
 //! | element stiffness, loads, numbering of unknowns | `assembly` |
 //! | forces per volume | `body_force` |
+//! | thermal strains | `thermal` |
 //! | integrals shared by elements of one shape | `geometry`, `shapes` |
 //! | elements that do not lock | `mixed` |
 //! | stresses, nodal forces and energy | `recovery` |
@@ -21,11 +22,12 @@ mod mixed;
 mod recovery;
 mod shapes;
 mod stress_difference;
+mod thermal;
 mod wedges;
 
 pub use assembly::{
-    Axes, Dof, DofMap, EdgeLoad, ElementStiffness, LoadAxes, Loads, assemble_element,
-    assemble_loads, condense_body_force,
+    Axes, Dof, DofMap, EdgeLoad, ElementStiffness, LoadAxes, Loads, add_inner_forces,
+    assemble_element, assemble_loads,
 };
 pub use body_force::BodyForce;
 pub use geometry::{ElementTables, Elements};
@@ -33,4 +35,5 @@ pub use material::{COMPONENTS, Moduli, Section, inverse, isotropic, orthotropic,
 pub use mixed::Mixed;
 pub use recovery::{Deformed, Recovered, recover};
 pub use stress_difference::StressDifference;
+pub use thermal::{Inner, Thermal};
 pub use wedges::{Growth, Side, Wedge, growth};

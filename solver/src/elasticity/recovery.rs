@@ -1,10 +1,10 @@
 //! From displacements to stresses, nodal forces and energy.
 
 use crate::elasticity::Section;
-use crate::elasticity::body_force::BodyForce;
 use crate::elasticity::geometry::{Elements, MeshStations, Points, Station};
 use crate::elasticity::material::{COMPONENTS, Moduli, stress};
 use crate::elasticity::mixed::{Inside, Mixed, OfNodes, dilatation, position};
+use crate::elasticity::thermal::{Inner, ThermalStrain};
 use crate::element::{AtNodes, Element, Family, Mapped};
 use crate::linear::{Interrupt, Stopped};
 use crate::mesh::Mesh;
@@ -25,7 +25,7 @@ pub struct Recovered {
     pub dilatation_gap: Vec<f64>,
     /// The force of the stresses on every node along x and y, ∫ Bᵀ σ (without 2π).
     pub internal_force: Vec<[f64; 2]>,
-    /// The strain energy ½ ∫ σ : ε (without 2π).
+    /// The strain energy ½ ∫ σ : ε of the elastic strains (without 2π).
     pub strain_energy: f64,
     /// The work of the body force on the bubbles of nearly incompressible elements (without 2π).
     pub work_on_bubbles: f64,
@@ -50,11 +50,11 @@ impl Recovered {
 /// Recovers stresses at nodes: taken at the superconvergent points of each element (2 × 2 of a quadrilateral),
 /// extrapolated to its nodes linearly, and averaged over the elements that meet there.
 ///
-/// `body_force`: the forces per volume under which the displacements occur.
+/// `inner`: the forces per volume and thermal strains under which the displacements occur.
 pub fn recover(
     elements: Elements<'_>,
     displacements: &[[f64; 2]],
-    body_force: &BodyForce,
+    inner: &Inner<'_>,
     interrupt: &mut Interrupt<'_>,
 ) -> Result<Recovered, Stopped> {
     let Elements { mesh, section, .. } = elements;
@@ -85,20 +85,26 @@ pub fn recover(
                 let material = section.material_of(e);
                 if section.split(material).is_some() {
                     let body = (section, material);
-                    let own = found.add_mixed(mesh, body, (element, &u), quadrature, body_force);
+                    let own = found.add_mixed(mesh, body, (element, &u), quadrature, inner);
                     at_nodes.push(own);
                     continue;
                 }
                 let (ux, uy) = (u.map(|u| u[0]), u.map(|u| u[1]));
                 let moduli = &section.materials()[material];
+                let thermal = inner.thermal_strain(element, material);
+                let elastic = |station: &Station| {
+                    let strain = station.strain(&ux, &uy);
+                    let of = thermal.as_ref();
+                    of.map_or(strain, |thermal| thermal.elastic(&strain, &station.shape))
+                };
                 let rule = stations.of(e, Points::Rule);
-                found.add(mesh, (element, rule), moduli, (&ux, &uy));
+                found.add(mesh, (element, rule), moduli, elastic);
                 if section.has_split() {
                     found.dilatation_gap.resize(found.points[0].len(), 0.0);
                 }
                 let mut stresses = [[0.0; COMPONENTS]; 4];
                 for (own, station) in stresses.iter_mut().zip(stations.of(e, Points::Stress)) {
-                    *own = stress(moduli, &station.strain(&ux, &uy));
+                    *own = stress(moduli, &elastic(station));
                 }
                 let to_nodes = elements.tables.masters.to_nodes(element.family());
                 at_nodes.push(carried(to_nodes, &stresses));
@@ -111,19 +117,19 @@ pub fn recover(
 }
 
 impl Recovered {
-    /// Adds the contribution of an element at its integration points.
+    /// Adds the contribution of an element at its integration points; `elastic`: its elastic strain there.
     #[inline(always)]
     fn add(
         &mut self,
         mesh: &Mesh,
         (element, rule): (&Element, &[Station]),
         moduli: &Moduli,
-        (ux, uy): (&AtNodes<f64>, &AtNodes<f64>),
+        elastic: impl Fn(&Station) -> [f64; COMPONENTS],
     ) {
         let nodes = mesh.element_nodes(element);
         let (mut fx, mut fy) = ([0.0; 8], [0.0; 8]);
         for station in rule {
-            let strain = station.strain(ux, uy);
+            let strain = elastic(station);
             let stress = stress(moduli, &strain);
             let density: f64 = (0..COMPONENTS).map(|c| stress[c] * strain[c]).sum();
             self.strain_energy += 0.5 * station.weight * density;
@@ -147,10 +153,10 @@ impl Recovered {
         (section, material): (&Section, usize),
         (element, u): (&Element, &AtNodes<[f64; 2]>),
         quadrature: u32,
-        body_force: &BodyForce,
+        inner: &Inner<'_>,
     ) -> [[f64; COMPONENTS]; 8] {
         let (family, nodes) = (element.family(), mesh.element_nodes(element));
-        let deformed = Deformed::new(section, material, family, &nodes, u, body_force);
+        let deformed = Deformed::new(section, material, (element, &nodes), u, inner);
         self.work_on_bubbles += deformed.work_on_bubble;
         for point in Mixed::rule(family) {
             let m = family.map(&nodes, point.place);
@@ -372,37 +378,41 @@ pub struct Deformed<'a> {
     family: Family,
     nodes: &'a AtNodes<[f64; 2]>,
     u: &'a AtNodes<[f64; 2]>,
+    thermal: Option<ThermalStrain>,
     /// The state inside an element of a nearly incompressible material; `None` for other materials.
     inside: Option<Inside<'a>>,
     work_on_bubble: f64,
 }
 
-/// Strain and stress at a place of an element.
+/// Elastic strain and stress at a place of an element.
 #[derive(Clone, Copy, Debug)]
 struct DeformedAt {
     strain: [f64; COMPONENTS],
     stress: [f64; COMPONENTS],
-    /// The difference θ̄ − div u; 0 in materials that are not nearly incompressible.
+    /// The difference θ̄ − div u, both without thermal strains; 0 in materials that are not nearly incompressible.
     dilatation_gap: f64,
 }
 
 impl<'a> Deformed<'a> {
-    /// An element with displaced nodes. `material`: the number of its material in the section; `body_force`: the
-    /// forces per volume under which the displacements occur.
+    /// An element with the positions of its nodes, which are displaced. `material`: the number of its material in the
+    /// section; `inner`: the forces per volume and thermal strains under which the displacements occur.
     pub fn new(
         section: &'a Section,
         material: usize,
-        family: Family,
-        nodes: &'a AtNodes<[f64; 2]>,
+        (element, nodes): (&Element, &'a AtNodes<[f64; 2]>),
         u: &'a AtNodes<[f64; 2]>,
-        body_force: &BodyForce,
+        inner: &Inner<'_>,
     ) -> Self {
+        let family = element.family();
+        let thermal = inner.thermal_strain(element, material);
         let (mut inside, mut work_on_bubble) = (None, 0.0);
         if let Some(split) = section.split(material) {
             let mixed = Mixed::new(section, split, family, nodes);
-            let force = mixed.force_on_bubble(body_force, material);
-            let state = mixed.inside(u, &force);
-            work_on_bubble = force[0] * state.bubble[0] + force[1] * state.bubble[1];
+            let strains = mixed.thermal(section, family, nodes, thermal.as_ref());
+            let force = mixed.on_bubble(&inner.body_force, material, &strains);
+            let state = mixed.inside(u, &force, &strains.dilatation);
+            let applied = mixed.force_on_bubble(&inner.body_force, material);
+            work_on_bubble = applied[0] * state.bubble[0] + applied[1] * state.bubble[1];
             inside = Some(state);
         }
         Deformed {
@@ -411,6 +421,7 @@ impl<'a> Deformed<'a> {
             family,
             nodes,
             u,
+            thermal,
             inside,
             work_on_bubble,
         }
@@ -422,10 +433,11 @@ impl<'a> Deformed<'a> {
         self.at(&m, place).stress
     }
 
-    /// Strain and stress at a place in master coordinates, which is mapped to `m`.
+    /// Elastic strain and stress at a place in master coordinates, which is mapped to `m`.
     fn at(&self, m: &Mapped, place: [f64; 2]) -> DeformedAt {
         let mut strain = self.strain_of_nodes(m);
         let Some(inside) = &self.inside else {
+            let strain = self.elastic(&strain, m);
             return DeformedAt {
                 strain,
                 stress: stress(&self.section.materials()[self.material], &strain),
@@ -433,12 +445,19 @@ impl<'a> Deformed<'a> {
             };
         };
         inside.add_strain(self.section, self.family, m, place, &mut strain);
+        let strain = self.elastic(&strain, m);
         let (projected, stress) = inside.stress(&strain, position(m, self.nodes));
         DeformedAt {
             strain,
             stress,
             dilatation_gap: projected - dilatation(&strain),
         }
+    }
+
+    /// The elastic part of a strain.
+    fn elastic(&self, strain: &[f64; COMPONENTS], m: &Mapped) -> [f64; COMPONENTS] {
+        let thermal = self.thermal.as_ref();
+        thermal.map_or(*strain, |thermal| thermal.elastic(strain, &m.shape))
     }
 
     fn strain_of_nodes(&self, m: &Mapped) -> [f64; COMPONENTS] {

@@ -377,14 +377,9 @@ mod tests {
             };
             let never = &mut || false;
             let interrupt = &mut Interrupt::new(never);
+            let inner = model.inner(&crate::model::Level::FULL);
             let difference = |u: &[[f64; 2]], interrupt: &mut Interrupt<'_>| {
-                let recovered = recover(
-                    elements,
-                    u,
-                    &crate::elasticity::BodyForce::default(),
-                    interrupt,
-                )
-                .unwrap();
+                let recovered = recover(elements, u, &inner, interrupt).unwrap();
                 StressDifference::new(elements, &recovered, interrupt).unwrap()
             };
             let own = difference(&field(0), interrupt);

@@ -27,6 +27,8 @@ pub struct RawMesh {
     pub groups: BTreeMap<String, Vec<u32>>,
     /// Named sets of nodes.
     pub node_sets: BTreeMap<String, Vec<u32>>,
+    /// Change of temperature at each node; empty if there is none.
+    pub temperatures: Vec<f64>,
     /// Number of 9-node quadrilaterals whose centre node was dropped.
     pub without_centre: usize,
     /// A set of nodes that contains whole sides of the surface is a boundary too.
@@ -60,11 +62,15 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
     let mut notes = Vec::new();
     let of_file = raw.nodes.len();
     let raised = normalize(&mut raw, &mut notes);
+    if !raw.temperatures.is_empty() {
+        raw.temperatures.resize(raw.nodes.len(), 0.0);
+    }
     let (of_file, nodes_left_out) = drop_unused(&mut raw, of_file);
     let surface = Surface::new(&raw, found)?;
     let boundaries = surface.boundaries(&mut raw, &mut notes);
-    let mesh = Mesh {
+    let mut mesh = Mesh {
         nodes: raw.nodes,
+        temperatures: raw.temperatures,
         elements: raw.elements,
         boundaries,
         groups: raw.groups,
@@ -73,6 +79,7 @@ fn assemble(mut raw: RawMesh, found: &mut Findings) -> Checked<(Mesh, Vec<Warnin
         nodes_left_out,
         ..Mesh::default()
     };
+    mesh.add_temperatures();
     let mut all = AllChecks::default();
     for (e, place, det) in mesh.inverted_elements(true) {
         all.fail(found.report(
@@ -249,10 +256,14 @@ fn drop_unused(raw: &mut RawMesh, of_file: usize) -> (u32, BTreeMap<String, u32>
         if number[node] != NO_NODE {
             number[node] = used;
             raw.nodes[used as usize] = raw.nodes[node];
+            if !raw.temperatures.is_empty() {
+                raw.temperatures[used as usize] = raw.temperatures[node];
+            }
             used += 1;
         }
     }
     raw.nodes.truncate(used as usize);
+    raw.temperatures.truncate(used as usize);
     for element in &mut raw.elements {
         *element = element.map_nodes(|n| number[n as usize]);
     }

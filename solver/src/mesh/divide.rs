@@ -56,6 +56,8 @@ impl Mesh {
         let mut new = vec![on_side(0.5 * (xi - 1.0)), on_side(0.5 * (xi + 1.0))];
         new.extend((2..count).map(inside));
         let at_p = on_side(xi);
+        let temperatures = self
+            .temperatures_when_divided(&element, &ends, xi, |k| along(p, places[corner(k)], 0.5));
         let added = self.nodes.len() as u32;
         // A–P, P–B, and from P to the corners across: C and D
         let (before, after, to) = (added, added + 1, |k: usize| added + k as u32);
@@ -96,6 +98,10 @@ impl Mesh {
         self.lineage.split_at(&ends, xi, [before, after]);
         self.nodes[mid as usize] = at_p;
         self.nodes.extend(new);
+        if let Some((at_p, new)) = temperatures {
+            self.temperatures[mid as usize] = at_p;
+            self.temperatures.extend(new);
+        }
         let (kept, more) = (triangles[0], &triangles[1..]);
         let parts = self.elements.len() as u32..(self.elements.len() + more.len()) as u32;
         self.elements[number] = Element::Triangle(kept);
@@ -123,6 +129,30 @@ impl Mesh {
             }
         }
         true
+    }
+
+    /// The temperature at a place ξ of a side, and those at the nodes that dividing the element there adds; `None` if no
+    /// temperatures are given at nodes. `to_corner`: the place half-way to a corner of the element.
+    fn temperatures_when_divided(
+        &self,
+        element: &Element,
+        side: &Edge,
+        xi: f64,
+        to_corner: impl Fn(usize) -> [f64; 2],
+    ) -> Option<(f64, Vec<f64>)> {
+        if self.temperatures.is_empty() {
+            return None;
+        }
+        let at = |node: u32| self.temperatures[node as usize];
+        let on_side = |xi: f64| edge3::interpolate(&edge3::shape(xi), &side.map(at));
+        let family = element.family();
+        let inside = |k: usize| {
+            let nodes = element.iter().zip(family.shape(to_corner(k)));
+            nodes.map(|(node, h)| h * at(*node)).sum::<f64>()
+        };
+        let mut new = vec![on_side(0.5 * (xi - 1.0)), on_side(0.5 * (xi + 1.0))];
+        new.extend((2..family.corners()).map(inside));
+        Some((on_side(xi), new))
     }
 
     /// Whether a set names the midside of a side without its ends: then a force or support of the set must not move

@@ -8,6 +8,21 @@ use super::lineage::Part;
 use crate::element::Element;
 
 impl Mesh {
+    /// Gives midsides that the mesh's file did not have the mean of the temperatures at the ends.
+    pub(super) fn add_temperatures(&mut self) {
+        let Some(first) = self
+            .added_midsides
+            .filter(|_| !self.temperatures.is_empty())
+        else {
+            return;
+        };
+        let sides = self.elements.iter().flat_map(Element::sides);
+        for [a, b, mid] in sides.filter(|[_, _, mid]| *mid >= first) {
+            let [a, b] = [a, b].map(|node| self.temperatures[node as usize]);
+            self.temperatures[mid as usize] = 0.5 * (a + b);
+        }
+    }
+
     /// The number of nodes of the first mesh, which come first.
     pub fn first_nodes(&self) -> u32 {
         let all = self.nodes.len() as u32;

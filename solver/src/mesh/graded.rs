@@ -170,6 +170,7 @@ impl GradedMesh {
             node_sets: finer.sets.into_named(self.set_names.iter()),
             added_midsides: self.added_midsides,
             nodes_left_out: self.nodes_left_out.clone(),
+            temperatures: finer.temperatures,
             lineage: finer.lineage,
         };
         (mesh, parts)

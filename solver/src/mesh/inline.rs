@@ -36,8 +36,20 @@ fn check(input: InlineMesh, found: &mut Findings) -> Checked<Mesh> {
         Some((name.clone(), directed))
     });
     let boundaries = boundaries.collect();
-    all.finish(Mesh {
+    let temperatures = input.temperatures.len();
+    if temperatures > 0 && temperatures != input.nodes.len() {
+        all.fail(found.report(
+            "/temperatures",
+            Reason::WrongLength,
+            format!("{temperatures} temperatures"),
+            format!("{}, one for each node", input.nodes.len()),
+            "Give 0 where the temperature does not change.",
+        ));
+    }
+    all.finish(())?;
+    Ok(Mesh {
         nodes: input.nodes,
+        temperatures: input.temperatures,
         elements: input.elements,
         boundaries,
         groups: input.groups,
@@ -243,6 +255,7 @@ mod tests {
 
     fn square() -> InlineMesh {
         InlineMesh {
+            temperatures: Vec::new(),
             nodes: vec![
                 [0.0, 0.0],
                 [1.0, 0.0],

@@ -72,6 +72,10 @@ pub struct Mesh {
     /// after the others.
     #[serde(skip)]
     pub nodes_left_out: BTreeMap<String, u32>,
+    /// The change of temperature at each node, interpolated by the shape functions; empty if none is given at nodes.
+    /// In a stored mesh this field comes after the others.
+    #[serde(skip)]
+    pub temperatures: Vec<f64>,
     /// The relation to the first mesh. It is not stored, since every stored mesh is a first one.
     #[serde(skip)]
     pub lineage: Lineage,

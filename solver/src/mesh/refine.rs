@@ -40,6 +40,7 @@ pub fn refine(mesh: &Mesh) -> Mesh {
         node_sets: finer.sets.into_named(mesh.node_sets.keys()),
         added_midsides: mesh.added_midsides,
         nodes_left_out: mesh.nodes_left_out.clone(),
+        temperatures: finer.temperatures,
         lineage: finer.lineage,
     }
 }
@@ -48,6 +49,8 @@ pub fn refine(mesh: &Mesh) -> Mesh {
 #[derive(Clone)]
 pub(super) struct Finer {
     pub(super) nodes: Vec<[f64; 2]>,
+    /// The change of temperature at each node; empty where there is none.
+    pub(super) temperatures: Vec<f64>,
     /// The halves of each side, by its midside node: start corner, midside of the first half, midside of the second.
     halves: Vec<Option<(u32, u32, u32)>>,
     pub(super) sets: Sets,
@@ -58,6 +61,7 @@ impl Finer {
     pub(super) fn new(mesh: &Mesh) -> Self {
         Finer {
             nodes: mesh.nodes.clone(),
+            temperatures: mesh.temperatures.clone(),
             halves: vec![None; mesh.nodes.len()],
             sets: Sets::new(mesh),
             lineage: mesh.lineage.of_finer(mesh.nodes.len()),
@@ -87,6 +91,11 @@ impl Finer {
                 let number = self.nodes.len() as u32;
                 self.nodes.push(edge3::map(&ends, -STEP).0);
                 self.nodes.push(edge3::map(&ends, STEP).0);
+                if !self.temperatures.is_empty() {
+                    let ends = [a, b, mid].map(|n| self.temperatures[n as usize]);
+                    let at = |xi: f64| edge3::interpolate(&edge3::shape(xi), &ends);
+                    self.temperatures.extend([at(-STEP), at(STEP)]);
+                }
                 self.sets.inherit(&[a, b, mid], number..number + 2);
                 self.lineage.split(&[a, b, mid], [number, number + 1]);
                 *self.halves[mid as usize].insert((a, number, number + 1))
@@ -111,6 +120,12 @@ impl Finer {
             let h = family.shape(place);
             let at = |a: usize| (0..family.nodes()).map(|i| h[i] * positions[i][a]).sum();
             self.nodes.push([at(0), at(1)]);
+            if !self.temperatures.is_empty() {
+                let own = parent.iter().zip(h);
+                let own = own.map(|(node, h)| h * self.temperatures[*node as usize]);
+                let sum = own.sum();
+                self.temperatures.push(sum);
+            }
         }
         self.sets.inherit(parent, first..first + N as u32);
         std::array::from_fn(|i| first + i as u32)

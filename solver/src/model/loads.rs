@@ -62,6 +62,8 @@ impl Checks {
             }
             Load::Gravity(gravity) => return self.gravity(section, *gravity, pointer, found),
             Load::Rotation(rotation) => return self.rotation(section, rotation, pointer, found),
+            // thermal strains are found with the materials
+            Load::Temperature(..) | Load::NodalTemperature(_) => return Ok(()),
             Load::Force(nodes, force) => {
                 let pointer = format!("{pointer}/nodes");
                 if let Some(count) = mesh.nodes_left_out.get(nodes) {

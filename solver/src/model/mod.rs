@@ -11,6 +11,7 @@
 //! | curves of boundaries | `curves` |
 //! | supports | `supports` |
 //! | loads | `loads` |
+//! | changes of temperature | `temperatures` |
 //! | forces at nodes of the first mesh | `nodes` |
 //! | materials | `materials` |
 //! | contacts and the obstacles that they face | `contacts` |
@@ -47,6 +48,7 @@ mod numbers;
 mod path;
 mod sliding;
 mod supports;
+mod temperatures;
 mod units;
 mod unmerged;
 mod variable;
@@ -64,7 +66,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use checks::Checks;
 use nodes::FirstSides;
 
-use crate::elasticity::{self, BodyForce, Loads, Section};
+use crate::elasticity::{self, Inner, Loads, Section};
 use crate::error::{AllChecks, Checked, Violation};
 use crate::mesh::{External, ExternalMesh, Mesh};
 use crate::problem::{Algorithm, Condition, History, Problem, SolverControls, Step};
@@ -136,9 +138,13 @@ impl Model {
         checks.found.conclude(model)
     }
 
-    /// The forces per volume at a load level.
-    pub fn body_force(&self, level: &Level) -> BodyForce {
-        self.loads.body_force.times(level.loads)
+    /// The forces per volume and thermal strains at a load level.
+    pub fn inner(&self, level: &Level) -> Inner<'_> {
+        Inner {
+            body_force: self.loads.body_force.times(level.loads),
+            thermal: &self.loads.thermal,
+            factor: level.loads,
+        }
     }
 
     /// The nodes that belong to two contacts, with the indices of both in `contacts`; without supported nodes, which
@@ -251,11 +257,20 @@ impl Checks {
         let section = all
             .check(self.section(analysis, &problem.materials, &mesh))
             .unwrap_or_else(|| Section::uniform(analysis, Default::default()));
+        let warmed = self.temperatures(&mesh, &section, &problem.materials, &problem.loads);
+        let warmed = all.check(warmed).flatten();
+        let section = warmed
+            .as_ref()
+            .map_or(section, |warmed| warmed.section.clone());
         let axis = Axis::new(&section, &mesh);
         let sides = FirstSides::new(&mesh, problem);
         let (fixed, supported) = self.supports(&mesh, &sides, &axis, &problem.supports);
         all.check(supported);
         let loads = self.loads(&mesh, &sides, &section, &problem.materials, &problem.loads);
+        let loads = loads.map(|loads| match warmed {
+            Some(warmed) => warmed.added_to(loads),
+            None => loads,
+        });
         let (contacts, sound) = self.contacts(&mesh, &section, &axis, problem, numbers, &fixed);
         all.check(sound);
         let held_by_contact = self.freedom(&mesh, &section, &fixed, &contacts);
@@ -266,7 +281,7 @@ impl Checks {
             self.pressed(&mesh, &section, &fixed, &contacts, &nodal)?;
         }
         self.warn_about_contacts(&contacts);
-        self.warn_of_dragged_symmetry(&contacts, &fixed, &axis, &problem.steps);
+        self.warn_of_dragged_symmetry(&mesh, &contacts, &fixed, &axis, &problem.steps);
         if section.axisymmetric() {
             self.warn_of_radial_drag(&contacts, &axis, &problem.steps);
         }

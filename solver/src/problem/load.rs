@@ -9,7 +9,8 @@ use super::support::BoundaryValue;
 use crate::error::{Reason, Violation, either};
 
 /// A load in exactly one form: on a boundary `pressure`, or `traction`, or `normal` and `tangential`
-/// (or one of them), or `nodal`; on a set of nodes `force`; on the whole body `body_force`, `gravity` or `rotation`.
+/// (or one of them), or `nodal`; on a set of nodes `force`; on the whole body `body_force`, `gravity`, `rotation` or
+/// `nodal_temperature`; on the whole body or a group of elements `temperature`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "LoadFields", into = "LoadFields")]
 #[schemars(extend("oneOf" = forms()))]
@@ -34,6 +35,10 @@ pub enum Load {
     Gravity([f64; 2]),
     /// The centrifugal force of a body that rotates.
     Rotation(Rotation),
+    /// A change of temperature of a group of elements, or of the whole body.
+    Temperature(f64, Option<String>),
+    /// The changes of temperature that the mesh has at its nodes, times a factor.
+    NodalTemperature(f64),
 }
 
 /// A rotation at constant speed, seen from the rotating body: the force per volume is density · ω² · (distance from the
@@ -58,36 +63,56 @@ impl Load {
             | Load::Normal(boundary, _, _)
             | Load::Tangential(boundary, _)
             | Load::Nodal(boundary, _) => Some(boundary),
-            Load::Force(..) | Load::BodyForce(_) | Load::Gravity(_) | Load::Rotation(_) => None,
+            Load::Force(..)
+            | Load::BodyForce(_)
+            | Load::Gravity(_)
+            | Load::Rotation(_)
+            | Load::Temperature(..)
+            | Load::NodalTemperature(_) => None,
         }
     }
 }
 
+/// Where a load acts.
+enum Place {
+    /// On what the field names, which is required.
+    On(&'static str),
+    /// On what the field names, or on the whole body without it.
+    Within(&'static str),
+    WholeBody,
+}
+
 /// The allowed forms as JSON Schema: each requires its own fields and excludes the fields of the others.
-fn forms() -> [Schema; 8] {
-    const FORMS: [(Option<&str>, &[&str]); 8] = [
-        (Some("boundary"), &["pressure"]),
-        (Some("boundary"), &["traction"]),
-        (Some("boundary"), &["normal", "tangential"]),
-        (Some("boundary"), &["nodal"]),
-        (Some("nodes"), &["force"]),
-        (None, &["body_force"]),
-        (None, &["gravity"]),
-        (None, &["rotation"]),
+fn forms() -> [Schema; 10] {
+    const FORMS: [(Place, &[&str]); 10] = [
+        (Place::On("boundary"), &["pressure"]),
+        (Place::On("boundary"), &["traction"]),
+        (Place::On("boundary"), &["normal", "tangential"]),
+        (Place::On("boundary"), &["nodal"]),
+        (Place::On("nodes"), &["force"]),
+        (Place::WholeBody, &["body_force"]),
+        (Place::WholeBody, &["gravity"]),
+        (Place::WholeBody, &["rotation"]),
+        (Place::Within("group"), &["temperature"]),
+        (Place::WholeBody, &["nodal_temperature"]),
     ];
     FORMS.map(|(place, values)| {
+        let (place, required): (Option<&str>, &[&str]) = match &place {
+            Place::On(name) => (Some(name), std::slice::from_ref(name)),
+            Place::Within(name) => (Some(name), &[]),
+            Place::WholeBody => (None, &[]),
+        };
         let own = |name: &&str| place == Some(*name) || values.contains(name);
         let names = FORMS.iter().flat_map(|(_, values)| *values).copied();
-        let excluded: BTreeMap<&str, bool> = ["boundary", "nodes"]
+        let excluded: BTreeMap<&str, bool> = ["boundary", "nodes", "group"]
             .into_iter()
             .chain(names)
             .filter(|name| !own(name))
             .map(|name| (name, false))
             .collect();
-        let place: Vec<&str> = place.into_iter().collect();
         match values {
             [only] => {
-                let required = [&place[..], &[only]].concat();
+                let required = [required, &[only]].concat();
                 json_schema!({"required": required, "properties": excluded})
             }
             several => {
@@ -95,7 +120,7 @@ fn forms() -> [Schema; 8] {
                     .iter()
                     .map(|name| json_schema!({"required": [name]}))
                     .collect();
-                json_schema!({"required": place, "anyOf": one, "properties": excluded})
+                json_schema!({"required": required, "anyOf": one, "properties": excluded})
             }
         }
     })
@@ -140,90 +165,171 @@ pub struct LoadFields {
     /// The centrifugal force of a body that rotates, by the `density` of its materials.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation: Option<Rotation>,
+    /// Name of a group of elements, for `temperature`; absent: the whole body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub group: Option<String>,
+    /// Change of temperature: the strain is the `expansion` of the material times it. Several add up.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<f64>,
+    /// Factor of the changes of temperature that the mesh has at its nodes (`temperatures` of an inline mesh, *TEMPERATURE
+    /// of a deck).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nodal_temperature: Option<f64>,
 }
 
 impl TryFrom<LoadFields> for Load {
     type Error = Violation;
 
-    #[rustfmt::skip] // a form in a row
     fn try_from(fields: LoadFields) -> Result<Load, Violation> {
-        let LoadFields { boundary, nodes, pressure, traction, normal, tangential, nodal, force, body_force, gravity, rotation } = fields;
         let given = [
-            ("pressure", pressure.is_some()),
-            ("traction", traction.is_some()),
-            ("normal", normal.is_some()),
-            ("tangential", tangential.is_some()),
-            ("nodal", nodal.is_some()),
-            ("force", force.is_some()),
-            ("body_force", body_force.is_some()),
-            ("gravity", gravity.is_some()),
-            ("rotation", rotation.is_some()),
+            ("pressure", fields.pressure.is_some()),
+            ("traction", fields.traction.is_some()),
+            ("normal", fields.normal.is_some()),
+            ("tangential", fields.tangential.is_some()),
+            ("nodal", fields.nodal.is_some()),
+            ("force", fields.force.is_some()),
+            ("body_force", fields.body_force.is_some()),
+            ("gravity", fields.gravity.is_some()),
+            ("rotation", fields.rotation.is_some()),
+            ("temperature", fields.temperature.is_some()),
+            ("nodal_temperature", fields.nodal_temperature.is_some()),
         ];
-        let on = || on_boundary(&boundary, &nodes);
-        let whole = || nowhere(&boundary, &nodes);
-        match (pressure, traction, normal, tangential, nodal, force, body_force, gravity, rotation) {
-            (Some(p), None,    None,    None,    None,    None,    None,    None,    None)    => Ok(Load::Pressure(on()?, p)),
-            (None,    Some(t), None,    None,    None,    None,    None,    None,    None)    => Ok(Load::Traction(on()?, t)),
-            (None,    None,    Some(n), t,       None,    None,    None,    None,    None)    => Ok(Load::Normal(on()?, n, t)),
-            (None,    None,    None,    Some(t), None,    None,    None,    None,    None)    => Ok(Load::Tangential(on()?, t)),
-            (None,    None,    None,    None,    Some(f), None,    None,    None,    None)    => Ok(Load::Nodal(on()?, f)),
-            (None,    None,    None,    None,    None,    Some(f), None,    None,    None)    => Ok(Load::Force(on_nodes(&boundary, &nodes)?, f)),
-            (None,    None,    None,    None,    None,    None,    Some(f), None,    None)    => whole().map(|()| Load::BodyForce(f)),
-            (None,    None,    None,    None,    None,    None,    None,    Some(g), None)    => whole().map(|()| Load::Gravity(g)),
-            (None,    None,    None,    None,    None,    None,    None,    None,    Some(r)) => whole().map(|()| Load::Rotation(r)),
-            _ => Err(Violation::new(
+        let names = given.iter().filter(|(_, given)| *given);
+        let names: Vec<&str> = names.map(|(name, _)| *name).collect();
+        let place = Named {
+            boundary: fields.boundary.clone(),
+            nodes: fields.nodes.clone(),
+            group: fields.group.clone(),
+        };
+        let one = matches!(names[..], [_] | ["normal", "tangential"]);
+        #[rustfmt::skip] // a form in a row
+        let load = match fields {
+            _ if !one => None,
+            LoadFields { pressure: Some(p), .. } => Some(Load::Pressure(place.boundary()?, p)),
+            LoadFields { traction: Some(t), .. } => Some(Load::Traction(place.boundary()?, t)),
+            LoadFields { normal: Some(n), tangential: t, .. } => Some(Load::Normal(place.boundary()?, n, t)),
+            LoadFields { tangential: Some(t), .. } => Some(Load::Tangential(place.boundary()?, t)),
+            LoadFields { nodal: Some(f), .. } => Some(Load::Nodal(place.boundary()?, f)),
+            LoadFields { force: Some(f), .. } => Some(Load::Force(place.nodes()?, f)),
+            LoadFields { body_force: Some(f), .. } => place.none().map(|()| Some(Load::BodyForce(f)))?,
+            LoadFields { gravity: Some(g), .. } => place.none().map(|()| Some(Load::Gravity(g)))?,
+            LoadFields { rotation: Some(r), .. } => place.none().map(|()| Some(Load::Rotation(r)))?,
+            LoadFields { temperature: Some(t), .. } => Some(Load::Temperature(t, place.group()?)),
+            LoadFields { nodal_temperature: Some(t), .. } => place.none().map(|()| Some(Load::NodalTemperature(t)))?,
+            _ => None,
+        };
+        load.ok_or_else(|| {
+            Violation::new(
                 "",
                 Reason::WrongCount,
                 either(&given),
-                "exactly one of `pressure`, `traction`, `normal` and `tangential`, `nodal`, `force`, `body_force`, `gravity`, `rotation`",
+                "exactly one of `pressure`, `traction`, `normal` and `tangential`, `nodal`, `force`, `body_force`, `gravity`, `rotation`, `temperature`, `nodal_temperature`",
                 "Give each of them a load of its own.",
+            )
+        })
+    }
+}
+
+/// The places that a load names.
+struct Named {
+    boundary: Option<String>,
+    nodes: Option<String>,
+    group: Option<String>,
+}
+
+impl Named {
+    /// The boundary, and nothing else.
+    fn boundary(&self) -> Result<String, Violation> {
+        match self {
+            Named {
+                boundary: Some(boundary),
+                nodes: None,
+                group: None,
+            } => Ok(boundary.clone()),
+            Named { nodes: Some(_), .. } => Err(not_used(
+                "nodes",
+                "a set of nodes for a load other than `force`",
+                "the name of a boundary",
+            )),
+            Named { group: Some(_), .. } => Err(not_used(
+                "group",
+                "a group of elements for a load other than `temperature`",
+                "the name of a boundary",
+            )),
+            _ => Err(Violation::new(
+                "/boundary",
+                Reason::Missing,
+                "nothing",
+                "the name of a boundary",
+                PLACES,
+            )),
+        }
+    }
+
+    /// The set of nodes, and nothing else.
+    fn nodes(&self) -> Result<String, Violation> {
+        match self {
+            Named {
+                boundary: None,
+                nodes: Some(nodes),
+                group: None,
+            } => Ok(nodes.clone()),
+            _ => Err(Violation::new(
+                "/nodes",
+                Reason::Missing,
+                "no set of nodes, or another place in addition",
+                "the name of a set of nodes, and no other place",
+                "A `force` acts on each node of a set; on a boundary give `nodal` forces or a traction.",
+            )),
+        }
+    }
+
+    /// The group of elements, if there is one, and nothing else.
+    fn group(&self) -> Result<Option<String>, Violation> {
+        let expected = "a `group` of elements, or no place: then the whole body is warmed";
+        match self {
+            Named {
+                boundary: None,
+                nodes: None,
+                group,
+            } => Ok(group.clone()),
+            Named {
+                boundary: Some(_), ..
+            } => Err(not_used(
+                "boundary",
+                "a boundary for a temperature",
+                expected,
+            )),
+            _ => Err(not_used(
+                "nodes",
+                "a set of nodes for a temperature",
+                expected,
+            )),
+        }
+    }
+
+    /// Checks that the load names no place.
+    fn none(&self) -> Result<(), Violation> {
+        let named = [
+            ("boundary", &self.boundary),
+            ("nodes", &self.nodes),
+            ("group", &self.group),
+        ];
+        match named.iter().find(|(_, name)| name.is_some()) {
+            None => Ok(()),
+            Some((field, _)) => Err(not_used(
+                field,
+                "a place for a load on the whole body",
+                "no place: `body_force`, `gravity`, `rotation` and `nodal_temperature` act on the whole body",
             )),
         }
     }
 }
 
-fn on_boundary(boundary: &Option<String>, nodes: &Option<String>) -> Result<String, Violation> {
-    let hint =
-        "Stresses act on a boundary, a `force` on `nodes`, the other loads on the whole body.";
-    let (place, reason, got) = match (boundary, nodes) {
-        (Some(boundary), None) => return Ok(boundary.clone()),
-        (_, Some(_)) => (
-            "/nodes",
-            Reason::NotUsed,
-            "a set of nodes for a load other than `force`",
-        ),
-        (None, None) => ("/boundary", Reason::Missing, "nothing"),
-    };
-    let expected = "the name of a boundary";
-    Err(Violation::new(place, reason, got, expected, hint))
-}
+const PLACES: &str = "Stresses act on a boundary, a `force` on `nodes`, a `temperature` on a `group` of elements or on the whole body, the other loads on the whole body.";
 
-fn on_nodes(boundary: &Option<String>, nodes: &Option<String>) -> Result<String, Violation> {
-    match (boundary, nodes) {
-        (None, Some(nodes)) => Ok(nodes.clone()),
-        _ => Err(Violation::new(
-            "/nodes",
-            Reason::Missing,
-            "no set of nodes, or a boundary in addition",
-            "the name of a set of nodes, and no boundary",
-            "A `force` acts on each node of a set; on a boundary give `nodal` forces or a traction.",
-        )),
-    }
-}
-
-fn nowhere(boundary: &Option<String>, nodes: &Option<String>) -> Result<(), Violation> {
-    let place = match (boundary, nodes) {
-        (None, None) => return Ok(()),
-        (Some(_), _) => "/boundary",
-        (None, Some(_)) => "/nodes",
-    };
-    Err(Violation::new(
-        place,
-        Reason::NotUsed,
-        "a place for a load on the whole body",
-        "no place: `body_force`, `gravity` and `rotation` act on the whole body",
-        "Remove the place, or give a traction.",
-    ))
+fn not_used(field: &str, got: &str, expected: &str) -> Violation {
+    Violation::new(format!("/{field}"), Reason::NotUsed, got, expected, PLACES)
 }
 
 impl From<Load> for LoadFields {
@@ -270,6 +376,15 @@ impl From<Load> for LoadFields {
             },
             Load::Rotation(rotation) => LoadFields {
                 rotation: Some(rotation),
+                ..empty
+            },
+            Load::Temperature(temperature, group) => LoadFields {
+                group,
+                temperature: Some(temperature),
+                ..empty
+            },
+            Load::NodalTemperature(factor) => LoadFields {
+                nodal_temperature: Some(factor),
                 ..empty
             },
         }

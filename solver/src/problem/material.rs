@@ -23,6 +23,9 @@ pub struct Material {
     /// Mass per volume ≥ 0, in units that belong to those of force, length and time; required where a load is `gravity`
     /// or `rotation`.
     pub density: Option<f64>,
+    /// Strain by one unit of temperature, the same in all directions; required where a load is a change of temperature,
+    /// unless `orthotropic` has its own.
+    pub expansion: Option<f64>,
 }
 
 /// Constants of linear elasticity.
@@ -63,6 +66,10 @@ pub struct MaterialFields {
     /// and time: with N, mm and s it is t/mm³, and that of steel is 7.85e-9.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub density: Option<f64>,
+    /// Strain by one unit of temperature, the same in all directions; required where a load is `temperature` or
+    /// `nodal_temperature`, unless `orthotropic` has its own. That of steel is 1.2e-5 for each kelvin.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expansion: Option<f64>,
 }
 
 impl TryFrom<MaterialFields> for Material {
@@ -76,6 +83,7 @@ impl TryFrom<MaterialFields> for Material {
             group,
             name,
             density,
+            expansion,
         } = fields;
         let elasticity = match (youngs_modulus, poissons_ratio, orthotropic) {
             (Some(youngs_modulus), Some(poissons_ratio), None) => Elasticity::Isotropic {
@@ -93,6 +101,7 @@ impl TryFrom<MaterialFields> for Material {
             group,
             name,
             density,
+            expansion,
         })
     }
 }
@@ -124,11 +133,13 @@ impl From<Material> for MaterialFields {
             group,
             name,
             density,
+            expansion,
         } = material;
         let named = MaterialFields {
             group,
             name,
             density,
+            expansion,
             ..MaterialFields::default()
         };
         match elasticity {
@@ -173,4 +184,7 @@ pub struct Orthotropic {
     /// Poisson's ratio −ε_3/ε_2 under σ_2 alone; required unless the analysis is plane stress.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nu23: Option<f64>,
+    /// Strains along the axes 1, 2 and 3 by one unit of temperature.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expansion: Option<[f64; 3]>,
 }

@@ -290,6 +290,9 @@ pub struct InlineMesh {
     /// Named sets of nodes, by their numbers from 0.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub node_sets: BTreeMap<String, Vec<u32>>,
+    /// The change of temperature at each node, for the load `nodal_temperature`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub temperatures: Vec<f64>,
 }
 
 /// The sides of the body's surface that meet every given condition, ends included, before the mesh is refined.

@@ -1,5 +1,6 @@
 """Writes the decks of this folder: a quarter ring held at one end, pressed inside and pulled at the
-other, in every theory and family that CalculiX and we share; and one that hangs and rotates. CalculiX runs them as they are."""
+other, in every theory and family that CalculiX and we share; one that hangs and rotates; and one that is heated. CalculiX
+runs them as they are."""
 
 import math
 import pathlib
@@ -8,9 +9,9 @@ HERE = pathlib.Path(__file__).parent
 ROUND, THICK = 6, 3  # elements along the quarter and across the wall
 
 
-def deck(name, kind, step, thickness=None, mass=()):
+def deck(name, kind, step, thickness=None, mass=(), heat=None):
     """step 2: midside nodes lie on the arcs; triangles are quadrilaterals cut in two. mass: rows of *DLOAD instead of the
-    other loads."""
+    other loads. heat: the temperature at a place, instead of them; 20 at first."""
     triangles, axisymmetric = kind[3] == "6", kind.startswith("CAX")
     number, nodes = {}, []
     for j in range(2 * THICK + 1):
@@ -58,9 +59,16 @@ def deck(name, kind, step, thickness=None, mass=()):
     lines += [f"{thickness}," if thickness else ","]
     if mass:
         lines[-2:-2] = ["*DENSITY", "2.5D-3"]
+    if heat:
+        lines[-2:-2] = ["*EXPANSION, ZERO=20.", "1.2D-3"]
+        lines += ["*INITIAL CONDITIONS, TYPE=TEMPERATURE", "NALL, 20."]
     lines += ["*BOUNDARY", "Fixed, 1, 2" if not axisymmetric else "fixed, 2, 2"]
-    lines += ["*STEP", "*STATIC", "*DLOAD", *(mass or ["INNER, P1, 5."])]
-    if mass:
+    lines += ["*STEP", "*STATIC"]
+    if heat:
+        lines += ["*TEMPERATURE"] + [f"{label}, {heat(x, y):.9g}" for label, x, y in nodes]
+    else:
+        lines += ["*DLOAD", *(mass or ["INNER, P1, 5."])]
+    if mass or heat:
         pass
     elif axisymmetric:
         lines += ["*BOUNDARY", "end, 2, 2, -.01"]
@@ -78,3 +86,13 @@ deck("ring-cpe6", "CPE6", 2)
 deck("ring-cps6", "CPS6", 2, thickness=0.25)
 deck("mass-cpe8", "CPE8", 2, mass=["EALL, GRAV, 3., .6, -.8, 0.", "eall, CENTRIF, 40., 1., -.5, 0., 0., 0., 1."])
 deck("mass-cax8", "CAX8", 2, mass=["EALL, GRAV, 3., 0., -1., 0.", "eall, CENTRIF, 40., 0., 0., 0., 0., 1., 0."])
+
+
+def warm(x, y):
+    return 50 + 20 * x - 8 * y
+
+
+deck("heat-cpe8", "CPE8", 2, heat=warm)
+deck("heat-cpe8r", "CPE8R", 2, heat=warm)
+deck("heat-cps6", "CPS6", 2, thickness=0.25, heat=warm)
+deck("heat-cax8", "CAX8", 2, heat=warm)

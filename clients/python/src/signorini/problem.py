@@ -81,6 +81,7 @@ __all__ = [
     "Tilted",
     "Traction",
     "Transition",
+    "Triple",
     "Units",
     "Wedge",
 ]
@@ -140,6 +141,10 @@ Analysis = Union[PlaneStrain, PlaneStress, Axisymmetric]
 """The two-dimensional theory of the body."""
 
 
+Triple = Annotated[Union[Sequence[float], NDArray[Any]], ListOf(float, 3, 3)]
+"""Three numbers, along three axes."""
+
+
 @dataclass(kw_only=True, repr=False)
 class Orthotropic(Part):
     """Orthotropic elasticity with the axes 1 and 2 in the plane and 3 across it (the hoop direction in axisymmetry).
@@ -151,6 +156,7 @@ class Orthotropic(Part):
     nu12: Poisson's ratio −ε_2/ε_1 under σ_1 alone.
     angle: Angle from x to axis 1, counter-clockwise (degrees).
     e3: Modulus along axis 3, > 0 (stress); required unless the analysis is plane stress.
+    expansion: Strains along the axes 1, 2 and 3 by one unit of temperature.
     nu13: Poisson's ratio −ε_3/ε_1 under σ_1 alone; required unless the analysis is plane stress.
     nu23: Poisson's ratio −ε_3/ε_2 under σ_2 alone; required unless the analysis is plane stress.
     """
@@ -161,6 +167,7 @@ class Orthotropic(Part):
     nu12: float
     angle: float = 0.0
     e3: float | None = None
+    expansion: Triple | None = None
     nu13: float | None = None
     nu23: float | None = None
 
@@ -175,6 +182,7 @@ class Orthotropic(Part):
             nu12: Real,
             angle: Real = ...,
             e3: Real | None = ...,
+            expansion: Triple | None = ...,
             nu13: Real | None = ...,
             nu23: Real | None = ...,
         ) -> None: ...
@@ -186,6 +194,8 @@ class Material(Part):
 
     density: Mass per volume ≥ 0; required where a load is `gravity` or `rotation`. Its unit belongs to those of
         force, length and time: with N, mm and s it is t/mm³, and that of steel is 7.85e-9.
+    expansion: Strain by one unit of temperature, the same in all directions; required where a load is `temperature`
+        or `nodal_temperature`, unless `orthotropic` has its own. That of steel is 1.2e-5 for each kelvin.
     group: The group of elements with this material; absent: all elements without another material.
     name: A name for readers.
     orthotropic: Elastic constants with three axes of symmetry, two of them in the plane.
@@ -195,6 +205,7 @@ class Material(Part):
     """
 
     density: float | None = None
+    expansion: float | None = None
     group: str | None = None
     name: str | None = None
     orthotropic: Orthotropic | None = None
@@ -207,6 +218,7 @@ class Material(Part):
             self,
             *,
             density: Real | None = ...,
+            expansion: Real | None = ...,
             group: str | None = ...,
             name: str | None = ...,
             orthotropic: Orthotropic | JSON | None = ...,
@@ -376,6 +388,7 @@ class InlineMesh(Part):
     boundaries: Named boundaries: element sides as `[corner, corner, midside]`.
     groups: Named groups of elements, by their numbers from 0.
     node_sets: Named sets of nodes, by their numbers from 0.
+    temperatures: The change of temperature at each node, for the load `nodal_temperature`.
     """
 
     elements: Elements
@@ -383,6 +396,7 @@ class InlineMesh(Part):
     boundaries: dict[str, Sides] = field(default_factory=dict)
     groups: dict[str, Integers] | None = None
     node_sets: dict[str, Integers] | None = None
+    temperatures: Numbers | None = None
 
     if TYPE_CHECKING:
 
@@ -394,6 +408,7 @@ class InlineMesh(Part):
             boundaries: dict[str, Sides] = ...,
             groups: dict[str, Integers] | None = ...,
             node_sets: dict[str, Integers] | None = ...,
+            temperatures: Numbers | None = ...,
         ) -> None: ...
 
 
@@ -1103,20 +1118,25 @@ Traction = Annotated[Union[Sequence[BoundaryValue], NDArray[Any]], ListOf(Bounda
 @dataclass(kw_only=True, repr=False)
 class Load(Part):
     """A load in exactly one form: on a boundary `pressure`, or `traction`, or `normal` and `tangential` (or one of
-    them), or `nodal`; on a set of nodes `force`; on the whole body `body_force`, `gravity` or `rotation`.
+    them), or `nodal`; on a set of nodes `force`; on the whole body `body_force`, `gravity`, `rotation` or
+    `nodal_temperature`; on the whole body or a group of elements `temperature`.
 
     body_force: Force per volume along x and y.
     boundary: Name of the boundary; absent for `force` and for loads on the whole body.
     force: Force `[fx, fy]` on each node of the set, before the mesh is refined: forces on all nodes of a side
         become a traction on it; in axisymmetry the force on the whole ring.
     gravity: Acceleration `[gx, gy]` along x and y: the force per volume is the `density` of the material times it.
+    group: Name of a group of elements, for `temperature`; absent: the whole body.
     nodal: Forces `[fx, fy]` on the boundary's nodes (corner, midside, corner, …) from its start, before it is
         refined; in axisymmetry forces on the whole ring.
+    nodal_temperature: Factor of the changes of temperature that the mesh has at its nodes (`temperatures` of an
+        inline mesh, *TEMPERATURE of a deck).
     nodes: Name of a set of nodes, for `force`.
     normal: Stress along the outward normal: positive pulls.
     pressure: Stress against the outward normal: positive pushes into the body.
     rotation: The centrifugal force of a body that rotates, by the `density` of its materials.
     tangential: Stress along t, the outward normal turned clockwise.
+    temperature: Change of temperature: the strain is the `expansion` of the material times it. Several add up.
     traction: Stress along x and along y.
     """
 
@@ -1124,12 +1144,15 @@ class Load(Part):
     boundary: str | None = None
     force: Pair | None = None
     gravity: Pair | None = None
+    group: str | None = None
     nodal: Pairs | None = None
+    nodal_temperature: float | None = None
     nodes: str | None = None
     normal: BoundaryValue | None = None
     pressure: BoundaryValue | None = None
     rotation: Rotation | None = None
     tangential: BoundaryValue | None = None
+    temperature: float | None = None
     traction: Traction | None = None
 
     if TYPE_CHECKING:
@@ -1141,12 +1164,15 @@ class Load(Part):
             boundary: str | None = ...,
             force: Pair | None = ...,
             gravity: Pair | None = ...,
+            group: str | None = ...,
             nodal: Pairs | None = ...,
+            nodal_temperature: Real | None = ...,
             nodes: str | None = ...,
             normal: BoundaryValue | None = ...,
             pressure: BoundaryValue | None = ...,
             rotation: Rotation | JSON | None = ...,
             tangential: BoundaryValue | None = ...,
+            temperature: Real | None = ...,
             traction: Traction | None = ...,
         ) -> None: ...
 

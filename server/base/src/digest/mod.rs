@@ -255,6 +255,7 @@ impl Hash {
             groups,
             node_sets,
             nodes,
+            temperatures,
         } = inline;
         self.text_of(r#""inline":{"boundaries":"#)
             .json(boundaries)?;
@@ -271,6 +272,9 @@ impl Hash {
         self.list(nodes, |hash, place| {
             hash.list(place, Self::coordinate);
         });
+        if !temperatures.is_empty() {
+            self.text_of(r#","temperatures":"#).json(temperatures)?;
+        }
         self.text_of(r#"},"refine":"#).json(refine)?;
         self.text_of("}");
         Ok(())
@@ -531,6 +535,7 @@ mod tests {
         problem.title = Some("of people".into());
         problem.units = Some(solver::problem::Units::default());
         let mut inline = InlineMesh {
+            temperatures: Vec::new(),
             nodes: (0..3000).map(|k| [0.1 * f64::from(k), -1e-7]).collect(),
             elements: vec![Element::Quad([7; 8]), Element::Triangle([3; 6])],
             boundaries: BTreeMap::from([("é\n\"".into(), vec![[0, 1, 2]])]),
@@ -553,6 +558,7 @@ mod tests {
             assert_eq!(input_hash(&problem).unwrap(), canonical(&problem));
             inline.groups.insert("group".into(), vec![0, 1]);
             inline.node_sets.insert("set".into(), vec![2]);
+            inline.temperatures = vec![20.0, -1e-7];
         }
         inline.nodes[1][1] = f64::INFINITY;
         problem.mesh = MeshInput::new(MeshSource::Inline(inline));

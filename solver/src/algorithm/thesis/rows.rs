@@ -19,7 +19,7 @@ use super::friction::{Friction, signed_ratio};
 use crate::algorithm::system::{State, System};
 use crate::contact::edge_nodes;
 use crate::elasticity::Deformed;
-use crate::element::{Family, edge3, gauss, quad8};
+use crate::element::{edge3, gauss, quad8};
 use crate::problem::{ThesisOptions, ThesisPressure};
 
 /// The two rows of Gauss points nearest to Γ_C, in the elements along it.
@@ -145,10 +145,9 @@ impl Rows {
         let deformed = Deformed::new(
             &model.section,
             model.section.material_of(rows.element),
-            Family::Quad,
-            &nodes,
+            (element, &nodes),
             &u,
-            &model.body_force(&system.level),
+            &model.inner(&system.level),
         );
         let (mut stress, mut phi) = ([vec![], vec![]], [vec![], vec![]]);
         for (row, depth) in depths(self.rule).into_iter().enumerate() {
