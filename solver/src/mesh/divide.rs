@@ -117,6 +117,13 @@ impl Mesh {
                 set.extend([before, after]);
             }
         }
+        self.divide_in_boundaries(a, mid, [before, after]);
+        true
+    }
+
+    /// Puts the two halves in place of the side with the midside `mid`: that from its end `a` on has the first of `halves`
+    /// as its midside.
+    fn divide_in_boundaries(&mut self, a: u32, mid: u32, [before, after]: [u32; 2]) {
         for edges in self.boundaries.values_mut() {
             if let Some(k) = edges.iter().position(|edge| edge[2] == mid) {
                 let [start, end, _] = edges[k];
@@ -128,7 +135,6 @@ impl Mesh {
                 edges.splice(k..=k, [[start, mid, halves[0]], [mid, end, halves[1]]]);
             }
         }
-        true
     }
 
     /// The temperature at a place ξ of a side, and those at the nodes that dividing the element there adds; `None` if no
