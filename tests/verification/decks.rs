@@ -849,7 +849,9 @@ fn gravity_and_rotation_of_a_deck_are_loads_of_the_mass() {
     assert_eq!(found.loads, [rotation.clone(), gravity.clone()]);
     let parts = "1, GRAV, 10., 3., -4.\n2, grav, 10., 3., -4., 0.\n";
     assert_eq!(problem(&deck(parts)).loads, std::slice::from_ref(&gravity));
-    let twice = "E, GRAV, 10., 3., -4.\nE, GRAV, 10., 3., -4.\n";
+    let all = ", GRAV, 10., 3., -4.\n";
+    assert_eq!(problem(&deck(all)).loads, std::slice::from_ref(&gravity));
+    let twice = "E, GRAV, 10., 3., -4.\n, GRAV, 10., 3., -4.\n";
     assert_eq!(problem(&deck(twice)).loads, [gravity.clone(), gravity]);
     for (row, got) in [
         ("1, GRAV, 10., 3., -4.", "of `1` alone"),

@@ -770,3 +770,73 @@ fn a_contact_that_is_not_with_a_rigid_obstacle_is_refused() {
         "{found:?}"
     );
 }
+
+/// In a step of perturbation contact does not change: a deck with contact that has one is not what it seems.
+#[test]
+fn a_perturbation_with_contact_is_refused() {
+    let deck = block(0.0) + &touching(ROLLER, "") + &pressed([0.0, -0.05]);
+    read(&deck);
+    let found = doubts(&deck.replace("*STEP\n", "*STEP, PERTURBATION\n"));
+    assert!(
+        found.len() == 1 && found[0].contains("*STEP, PERTURBATION"),
+        "{found:?}"
+    );
+}
+
+/// What a deck says of its friction is told with the most that it can be, and stays told where a value of the problem is
+/// changed; not where another obstacle takes its place.
+#[test]
+fn deviations_of_a_deck_stay_told_after_a_change() {
+    let friction = "*FRICTION\n0.3, 100.\n";
+    let deck = block(0.0) + &touching(ROLLER, friction) + &pressed([0.0, -0.05]);
+    let messages = |problem: &Problem| {
+        let model = solver::checked(
+            problem,
+            files::external_mesh(problem, None),
+            &mut crate::support::quiet,
+        );
+        let warnings = model.unwrap().warnings.into_iter();
+        let own = warnings.filter(|w| w.code == WarningCode::DeckDiffers);
+        own.map(|w| w.message).collect::<Vec<_>>()
+    };
+    let mut problem = read(&deck);
+    let as_read = messages(&problem);
+    // 100 × 0.05
+    assert!(
+        as_read.len() == 1 && as_read[0].contains("at most 5.0000e0 (stress)"),
+        "{as_read:?}"
+    );
+    problem.contacts[0].indentation = 0.02;
+    let changed = messages(&problem);
+    assert_eq!(
+        changed,
+        [format!(
+            "Of the deck, before it was changed: {}",
+            as_read[0]
+        )]
+    );
+    problem.contacts[0].obstacle =
+        serde_json::from_value(json!({"kind": "circle", "radius": 3.0})).unwrap();
+    assert_eq!(messages(&problem), [""; 0]);
+}
+
+/// Lines of a rigid tool are not lines inside the body.
+#[test]
+fn the_lines_of_a_rigid_tool_are_no_boundary_of_the_body() {
+    let tool = "*NODE\n9000, 0., 1.\n8001, -2., 0.\n8002, 2., 0.\n*ELEMENT, TYPE=R2D2, ELSET=TOOLLINES\n8001, 8001, 8002\n\
+        *SURFACE, NAME=TOOL, TYPE=ELEMENT\nTOOLLINES, SNEG\n*RIGID BODY, ELSET=TOOLLINES, REF NODE=9000\n";
+    let deck = block(0.0) + tool + &pair("") + &pressed([0.0, -0.05]);
+    let problem = read(&deck);
+    let model = solver::checked(
+        &problem,
+        files::external_mesh(&problem, None),
+        &mut crate::support::quiet,
+    )
+    .unwrap();
+    let codes: Vec<WarningCode> = model.warnings.iter().map(|w| w.code).collect();
+    assert!(
+        !codes.contains(&WarningCode::LinesInside),
+        "{:#?}",
+        model.warnings
+    );
+}

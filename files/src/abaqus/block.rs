@@ -700,7 +700,8 @@ impl Deck {
             word => number(word),
         };
         let of_mass = rows == Rows::Sides && MassLoad::is_kind(word(1));
-        let value = value.filter(|_| (of_mass || words.len() <= 3) && !word(0).is_empty());
+        // a load of the mass without a target acts on all elements
+        let value = value.filter(|_| of_mass || words.len() <= 3 && !word(0).is_empty());
         let amplitude = amplitude.clone();
         let component = word(1).parse().ok().filter(|c| (1..=2).contains(c));
         let on = match rows {
@@ -739,7 +740,7 @@ impl Deck {
             }
             _ => {
                 let (expected, hint) = match rows {
-                    _ if of_mass => (LOAD_OF_MASS, "All numbers after the value are the direction, or a point and the direction; a blank one is 0, and the direction must not be 0."),
+                    _ if of_mass => (LOAD_OF_MASS, "A blank set is that of all elements. All numbers after the value are the direction, or a point and the direction; a blank one is 0, and the direction must not be 0."),
                     Rows::Surfaces => ("a pressure: surface, P, value", "A blank value is 0; the surface and P have no default. Give shear as `tangential` of a load in a problem as JSON, with this deck as its mesh."),
                     _ => ("a pressure: element or set, P1 … P4, value", "A blank value is 0; the element and P1 … P4 have no default. Gravity is GRAV, rotation CENTRIF; other loads are not computed."),
                 };

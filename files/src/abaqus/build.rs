@@ -82,7 +82,7 @@ impl Deck {
         let temperatures = std::mem::take(&mut merged.rows.temperatures);
         let warming = give_temperatures(&names, temperatures, &used, &mut merged.raw);
         let pressures = merged.surfaces(&names, &mut sets);
-        merged.groups(&names, sets.elements);
+        merged.groups(&names, sets.elements, &tools.members);
         merged.raw.sets_span_boundaries = true;
         let Merged {
             raw,
@@ -410,7 +410,14 @@ impl Merged {
 
     /// Adds the sets of elements to the mesh under their names: as groups, and as boundaries where they contain line
     /// elements.
-    fn groups(&mut self, names: &Names<'_>, elements: BTreeMap<Key, Vec<u32>>) {
+    ///
+    /// `rigid`: places of the elements of rigid bodies, whose lines are no boundary of the elastic body.
+    fn groups(
+        &mut self,
+        names: &Names<'_>,
+        elements: BTreeMap<Key, Vec<u32>>,
+        rigid: &BTreeSet<u32>,
+    ) {
         for (name, set) in exported(names, elements, &mut self.faults) {
             let plane = |element: &u32| match self.numbered[*element as usize] {
                 Numbered::Plane(place) => Some(place),
@@ -419,6 +426,7 @@ impl Merged {
             let group: Vec<u32> = set.iter().filter_map(plane).collect();
             let lines: Vec<[u32; 2]> = set
                 .iter()
+                .filter(|element| !rigid.contains(element))
                 .filter_map(|element| self.ends(*element))
                 .collect();
             // a surface of the same name is another thing, and comes first
@@ -698,16 +706,21 @@ impl Merged {
                 }
                 continue;
             }
-            let Some(meant) = self.elements_meant(names, scope, &row) else {
-                continue;
+            let meant = match &row.on {
+                On::Mass(_) if row.is_of_all() => None,
+                _ => match self.elements_meant(names, scope, &row) {
+                    None => continue,
+                    meant => meant,
+                },
             };
+            let of = meant.map_or_else(String::new, |meant| names.of(&meant));
             if let On::Mass(load) = &row.on {
-                let name = format!("{} {load}", names.of(&meant));
+                let name = format!("{of} {load}");
                 found.push(Row { row, name });
                 continue;
             }
             let On::Side(side) = row.on else { continue };
-            let name = format!("{} P{side}", names.of(&meant));
+            let name = format!("{of} P{side}");
             // a deck may load the same side many times
             if loaded.insert(name.clone()) {
                 let sides = [(row.target.clone(), Sides::Number(side))];

@@ -105,6 +105,14 @@ impl Source<'_> {
         if self.report_shared_sides(&mut found.remarks) {
             return found;
         }
+        if let Some(line) = self.said.perturbation {
+            found.remarks.doubt(
+                line,
+                "*STEP, PERTURBATION in a deck with contact",
+                "general steps",
+                "A perturbation is linear: contact does not change in it. Remove PERTURBATION if the surfaces are to touch and to slip in this step.",
+            );
+        }
         let mut all = Vec::new();
         for (pair, surfaces) in self.said.pairs.iter().zip(self.pairs) {
             all.extend(self.contact(pair, surfaces, others, &mut found.remarks));
@@ -429,7 +437,7 @@ impl Source<'_> {
         if let Some(rule) = rule {
             let ours = format!("the elastic slip is {elastic_slip:.4e} here, {rule}");
             remarks.differs(match (said.stick_slope, said.lagrange) {
-                (Some(slope), _) => format!("*FRICTION on line {line}: the stick slope of {slope:e} makes the slip at which friction is reached proportional to the pressure; {ours}. SLIP TOLERANCE or ELASTIC SLIP sets it."),
+                (Some(slope), _) => format!("*FRICTION on line {line}: friction of the deck is a spring of {slope:e} until it reaches the coefficient times the pressure: at most {:.4e} (stress) over the way of the rigid surface. Where the coefficient times the pressure is more, the deck has less friction than this result: {ours}, whatever the pressure. SLIP TOLERANCE or ELASTIC SLIP sets it.", slope * way),
                 (None, true) => format!("*FRICTION on line {line}: LAGRANGE sticks without slip; {ours}."),
                 (None, false) => format!("*FRICTION on line {line} gives no elastic slip: {ours}. SLIP TOLERANCE or ELASTIC SLIP sets it."),
             });

@@ -17,6 +17,8 @@ pub(super) struct DeckContact {
     pub(super) current: Option<Name>,
     /// By step: the line of `*STEP`, and the number of increments that `*STATIC` begins with.
     pub(super) steps: Vec<(u64, Option<f64>)>,
+    /// The line of the first `*STEP, PERTURBATION`.
+    pub(super) perturbation: Option<u64>,
 }
 
 impl DeckContact {

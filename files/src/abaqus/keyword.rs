@@ -409,6 +409,9 @@ impl Deck {
                 "Displacements are assumed small; remove NLGEOM.",
             );
         }
+        if keyword.has("PERTURBATION") {
+            self.contact.perturbation.get_or_insert(line);
+        }
         Block::Skip
     }
 

@@ -166,6 +166,11 @@ impl Built {
     fn times_of_all(&self, sets: &BTreeMap<&str, usize>) -> Option<usize> {
         let mut times = vec![0; self.raw.elements.len()];
         for (name, count) in sets {
+            if name.is_empty() {
+                // all elements
+                times.iter_mut().for_each(|time| *time += count);
+                continue;
+            }
             let single: Option<usize>;
             let group: &[u32] = match self.raw.groups.get(*name) {
                 Some(group) => {

@@ -62,7 +62,7 @@ use std::io::BufRead;
 
 use crate::source::ReadError;
 use solver::mesh::{self, Mesh};
-use solver::problem::Problem;
+use solver::problem::{Contact, Problem};
 use solver::solution::{Warning, WarningCode};
 
 /// Reads the mesh of a deck, with warnings of what was changed. The analysis of the deck is not used, except that the
@@ -106,9 +106,15 @@ pub(crate) fn read_for(
         pointer: String::new(),
         message,
     }));
-    if let Some(Ok((deck, deviations))) = elastic.map(|part| built.problem(part, Some(&mesh)))
-        && is_of_deck(problem, &deck)
+    if let Some(Ok((deck, mut deviations))) = elastic.map(|part| built.problem(part, Some(&mesh)))
+        && is_from_deck(problem, &deck)
     {
+        if !is_of_deck(problem, &deck) {
+            for deviation in &mut deviations {
+                let message = &mut deviation.message;
+                *message = format!("Of the deck, before it was changed: {message}");
+            }
+        }
         warnings.extend(deviations);
     }
     Ok((mesh, warnings))
@@ -120,4 +126,18 @@ fn is_of_deck(problem: &Problem, deck: &Problem) -> bool {
         && deck.materials == problem.materials
         && deck.supports == problem.supports
         && deck.loads == problem.loads
+}
+
+/// Whether a problem was made from that of a deck, with some values changed: it has a contact of the same surface with
+/// the same obstacle or, where the deck has no contact, the same supports and loads.
+fn is_from_deck(problem: &Problem, deck: &Problem) -> bool {
+    if deck.contacts.is_empty() {
+        return deck.supports == problem.supports && deck.loads == problem.loads;
+    }
+    let of_deck = |own: &Contact| {
+        let same =
+            |other: &Contact| (&other.boundary, &other.obstacle) == (&own.boundary, &own.obstacle);
+        deck.contacts.iter().any(same)
+    };
+    problem.contacts.iter().any(of_deck)
 }

@@ -104,6 +104,13 @@ pub(super) struct Distributed {
     pub(super) amplitude: Option<Name>,
 }
 
+impl Distributed {
+    /// Whether the row has no target and, as a load of the mass, acts on all elements.
+    pub(super) fn is_of_all(&self) -> bool {
+        matches!(&self.target, Target::Set(name) if name.is_empty())
+    }
+}
+
 /// What the value of a row of `*DLOAD` or `*DSLOAD` acts on.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum On {
