@@ -402,3 +402,30 @@ async fn time_limits_end_a_job_with_reasons_of_their_own() {
     let run_s = done["run_s"].as_f64().unwrap();
     assert!((1.0..4.0).contains(&run_s), "{run_s}");
 }
+
+/// An administrator's limit holds for jobs, sweeps and retries; what gives no time of its own has less.
+#[tokio::test]
+async fn no_submission_may_run_longer_than_the_administrator_allows() {
+    let server = Server::start(SIGNORINI, &["--max-timeout-s", "900"]).await;
+    let problem = example_json("rectangular_punch");
+    let refused = |(status, answer): (StatusCode, Value)| {
+        assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY, "{answer:#}");
+        let first = &answer["errors"][0];
+        assert_eq!(first["pointer"], "/limits/timeout_s", "{answer:#}");
+        assert_eq!(first["expected"], "more than 0, at most 900 seconds");
+    };
+    let long = json!({ "timeout_s": 901 });
+    let job = json!({ "problem": problem, "limits": long });
+    refused(answer(server.post("/v1/jobs").json(&job)).await);
+    let axis = json!({ "path": "/contacts/0/friction/coefficient", "values": [0.1, 0.2] });
+    let sweep = json!({ "base": problem, "axes": [axis], "limits": long });
+    refused(answer(server.post("/v1/sweeps").json(&sweep)).await);
+    let done = server
+        .solve(&json!({ "problem": problem, "limits": { "timeout_s": 900 } }))
+        .await;
+    assert_eq!(done["status"], "succeeded");
+    let usual = server.solve(&json!({ "problem": problem })).await;
+    assert_eq!(usual["limits"]["timeout_s"], 600.0);
+    let retry = format!("/v1/jobs/{}/retry", usual["id"].as_str().unwrap());
+    refused(answer(server.post(&retry).json(&json!({ "limits": long }))).await);
+}

@@ -10,7 +10,8 @@ use reqwest::Method;
 use rpc::pb::{self, job_service_client::JobServiceClient};
 use serde_json::{Value, json};
 use service::config::{
-    Config, Isolation, MemoryBudget, ProxyTrust, RetentionLimits, StoreFolder, Telemetry, Tls, Web,
+    Config, Isolation, MemoryBudget, ProxyTrust, RetentionLimits, StoreFolder, Telemetry, Tls,
+    WEEK_S, Web,
 };
 use tonic::transport::Channel;
 
@@ -35,6 +36,7 @@ pub(super) async fn run() -> anyhow::Result<Exit> {
         max_queued: 100,
         max_queued_per_owner: 100,
         max_running_per_owner: None,
+        max_timeout_s: WEEK_S,
         max_bytes_per_owner: None,
         max_submissions_per_owner_per_minute: None,
         retention: RetentionLimits::default(),

@@ -15,6 +15,9 @@ use serde::Serialize;
 use strum::Display;
 use tracing_subscriber::filter::{LevelFilter, Targets};
 
+/// The longest time that any job may run, in seconds: a week.
+pub const WEEK_S: u32 = 7 * 86_400;
+
 /// The settings of the service. A flag takes precedence over its environment variable, and the variable over the file
 /// of settings.
 #[derive(Clone, Debug, Args)]
@@ -83,6 +86,12 @@ pub struct Config {
     #[arg(long, env = "SIGNORINI_MAX_RUNNING_PER_OWNER", value_name = "N",
           value_parser = clap::value_parser!(u16).range(1..))]
     pub max_running_per_owner: Option<u16>,
+
+    /// Longest time that a submission may give its job to run (`limits.timeout_s`), in seconds: from 600, the time of a job that
+    /// gives none, to a week
+    #[arg(long, env = "SIGNORINI_MAX_TIMEOUT_S", default_value_t = WEEK_S, value_name = "SECONDS",
+          value_parser = clap::value_parser!(u32).range(600..=i64::from(WEEK_S)))]
+    pub max_timeout_s: u32,
 
     /// Bytes that one owner may store, jobs and meshes together. An owner with more can submit and upload nothing until
     /// they delete some. It applies only where there are tokens or a trusted proxy [default: no limit]

@@ -40,12 +40,13 @@ pub(super) struct Prepared {
 
 impl Prepared {
     /// Computes the fingerprints of a job and of its problem once, since fingerprinting a large mesh takes half a
-    /// second: call this on a blocking thread.
+    /// second: call this on a blocking thread. `max_timeout_s`: the longest time that a job may run, in seconds.
     pub(super) fn new(
         JobRequest { envelope, problem }: JobRequest,
         id: Option<JobId>,
+        max_timeout_s: u32,
     ) -> Result<Prepared, ApiError> {
-        let violations = envelope.violations();
+        let violations = envelope.violations(max_timeout_s);
         let mut payload = String::new();
         let problem = match problem {
             Ok(problem) => {
@@ -139,7 +140,9 @@ pub(super) async fn prepare(
     request: JobRequest,
     id: Option<JobId>,
 ) -> Result<Prepared, ApiError> {
-    service.work(move || Prepared::new(request, id)).await?
+    let max_timeout_s = service.config.max_timeout_s;
+    let prepared = move || Prepared::new(request, id, max_timeout_s);
+    service.work(prepared).await?
 }
 
 /// The jobs that this caller has submitted before with this idempotency key and the same request; `None` if there are

@@ -20,8 +20,6 @@ pub const MAX_LABELS: usize = 64;
 pub const MAX_LABEL: usize = 256;
 /// All allowed priorities.
 pub const PRIORITIES: Integers = Integers(MIN_PRIORITY as i64..=MAX_PRIORITY as i64);
-/// The longest time that a job may run, in seconds: a week.
-const MAX_TIMEOUT_S: f64 = 7.0 * 86_400.0;
 /// The longest time that a job may wait, in seconds: thirty days.
 const MAX_QUEUE_TTL_S: f64 = 30.0 * 86_400.0;
 
@@ -50,8 +48,8 @@ pub struct JobRequest {
 }
 
 impl Envelope {
-    /// The violations of the fields of this envelope.
-    pub(super) fn violations(&self) -> Findings {
+    /// The violations of the fields of this envelope. `max_timeout_s`: the longest time that a job may run, in seconds.
+    pub(super) fn violations(&self, max_timeout_s: u32) -> Findings {
         let mut found = Findings::default();
         found.extend(self.name.as_deref().and_then(name_violation));
         found.extend(priority_violation(self.priority));
@@ -61,7 +59,7 @@ impl Envelope {
             queue_ttl_s,
         } = self.limits;
         for (name, seconds, most) in [
-            ("timeout_s", timeout_s, MAX_TIMEOUT_S),
+            ("timeout_s", timeout_s, f64::from(max_timeout_s)),
             ("queue_ttl_s", queue_ttl_s, MAX_QUEUE_TTL_S),
         ] {
             if !(seconds > 0.0 && seconds <= most) {

@@ -53,8 +53,9 @@ pub fn create<'a>(
                 has_share(&service, &caller, 1).await?;
                 (admit_new(&service, &caller, request).await?, None)
             } else {
+                let max_timeout_s = service.config.max_timeout_s;
                 let prepared = service
-                    .work(move || Prepared::new(request()?, id))
+                    .work(move || Prepared::new(request()?, id, max_timeout_s))
                     .await??;
                 let payload = prepared.payload.clone();
                 let key = key.map(|Key(key)| RequestKey { key, payload });
@@ -82,8 +83,9 @@ async fn admit_new(
         OnStoredMesh(Box<Prepared>),
     }
     let budget_bytes = service.memory_budget_bytes;
+    let max_timeout_s = service.config.max_timeout_s;
     let read = move || {
-        let prepared = Prepared::new(request()?, None)?;
+        let prepared = Prepared::new(request()?, None, max_timeout_s)?;
         Ok::<_, ApiError>(if prepared.has_stored_mesh() {
             Read::OnStoredMesh(Box::new(prepared))
         } else {

@@ -127,7 +127,7 @@ pub fn create<'a>(
                 limits,
                 definition,
             } = request;
-            let mut found = envelope.violations();
+            let mut found = envelope.violations(service.config.max_timeout_s);
             let definition = match definition {
                 Ok(definition) => definition,
                 Err(more) => {

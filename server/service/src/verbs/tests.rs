@@ -29,7 +29,7 @@ use super::{
 use crate::{
     config::{
         Config, Isolation, MemoryBudget, ProxyTrust, RetentionLimits, StoreFolder, Telemetry, Tls,
-        Web,
+        WEEK_S, Web,
     },
     error::ApiError,
     formats::Format,
@@ -52,6 +52,7 @@ pub(super) async fn service(folder: &Path) -> Arc<Service> {
         max_queued: 10,
         max_queued_per_owner: 10,
         max_running_per_owner: None,
+        max_timeout_s: WEEK_S,
         max_bytes_per_owner: None,
         max_submissions_per_owner_per_minute: None,
         retention: RetentionLimits::default(),
