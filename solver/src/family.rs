@@ -11,7 +11,7 @@ use crate::observer::Observer;
 use crate::prepared::{Prepared, prepare};
 use crate::problem::Problem;
 use crate::solution::{
-    ContactSummary, Outcome, Peak, Residuals, Solution, Summary, Warning, WarningCode,
+    ContactSummary, Outcome, Peak, Residuals, Solution, Summary, Verdict, Warning, WarningCode,
 };
 use crate::steps::{self, Numbers, Shared};
 pub use crate::steps::{End, Start};
@@ -39,8 +39,8 @@ pub struct Member {
     /// Length of all contacts together, along the boundaries; the ends of contact are interpolated between nodes, for this
     /// and the other lengths: [`Widths`](crate::solution::Widths).
     pub contact_width: f64,
-    /// The error of `contact_width` due to the distances between the nodes at the ends of contact: 0.75 of each distance, the
-    /// part that a job states for each end. It contains no error of forces; absent where an end is unknown.
+    /// The error of `contact_width` due to the distances between the nodes at the ends of contact: the sum of them, each of
+    /// which a job states for its end. It contains no error of forces; absent where an end is unknown.
     pub contact_width_error: Option<f64>,
     /// The length of contact that sticks, |u_t − d| < ε.
     pub stick_width: f64,
@@ -56,6 +56,8 @@ pub struct Member {
     pub residuals: Residuals,
     /// What to consider before relying on the numbers.
     pub warnings: Vec<WarningCode>,
+    /// Whether the solution can be relied on; only of a member that was solved whole, since the others have no stated errors.
+    pub verdict: Option<Verdict>,
 }
 
 impl Family {
@@ -134,8 +136,8 @@ impl Family {
     }
 
     /// Solves a problem on this body with all its displacements, whose balance of forces shows whether the body is
-    /// sound. Use it for the first of the problems that share the body. The numbers are those of the problem's own
-    /// solution, bit for bit.
+    /// sound, and with stated errors, from which its verdict follows. Use it for the first of the problems that share the
+    /// body. The numbers are those of the problem's own solution, bit for bit.
     ///
     /// # Errors
     ///
@@ -145,15 +147,8 @@ impl Family {
         problem: &Problem,
         observer: &mut dyn Observer,
     ) -> Result<Member, SolveError> {
-        let controls = &problem.solver;
-        if controls.check_uniqueness || !problem.steps.is_empty() {
-            let solution = self.solution(problem, observer)?;
-            return Ok(Member::of(&solution.summary));
-        }
-        // the errors of its numbers are no part of a member
-        let model = self.other_model(problem)?;
-        let reported = steps::run_to_compare(&model, &self.body, observer)?;
-        Ok(Member::of(&reported.summary))
+        let solution = self.solution(problem, observer)?;
+        Ok(Member::of(&solution.summary))
     }
 
     /// Returns the whole solution of a problem on this body, bit for bit as [`solve`](crate::solve) gives it.
@@ -203,6 +198,7 @@ impl Member {
             outcome: summary.outcome,
             iterations: summary.iterations,
             residuals: summary.residuals,
+            verdict: summary.accuracy.as_ref().map(|accuracy| accuracy.verdict),
             ..Member::of_contacts(&summary.contacts, &summary.warnings)
         }
     }
@@ -239,6 +235,7 @@ impl Member {
             iterations: 0,
             residuals: Residuals::default(),
             warnings: warnings.iter().map(|warning| warning.code).collect(),
+            verdict: None,
         }
     }
 }

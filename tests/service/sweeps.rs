@@ -160,6 +160,14 @@ async fn a_sweep_has_the_numbers_of_separate_jobs() {
             "{number}: {own} {peak}"
         );
         assert_eq!(row["status"], "succeeded");
+        // the first and the last are solved with stated errors
+        let verdict = &summary["accuracy"]["verdict"];
+        let expected = if [0, 5].contains(&number) {
+            verdict
+        } else {
+            &Value::Null
+        };
+        assert_eq!(&row["verdict"], expected, "{number}");
     }
 
     // a member as a job of its own, with everything that a job has
@@ -188,6 +196,11 @@ async fn a_sweep_has_the_numbers_of_separate_jobs() {
         (&jobs[0]["status"], &jobs[0]["name"]),
         (&json!("succeeded"), &json!("punch"))
     );
+    // the worst of its members
+    let verdicts = rows.iter().filter_map(|row| row["verdict"].as_str());
+    let worst =
+        verdicts.max_by_key(|verdict| ["good", "fair", "poor"].iter().position(|v| v == verdict));
+    assert_eq!(jobs[0]["verdict"].as_str(), worst);
     let events = events(&server, &id, 0).await;
     assert!(events.iter().map(|e| e["seq"].as_i64().unwrap()).eq(1..=7));
     assert_eq!(

@@ -9,7 +9,7 @@ use serde_json::{Value, value::RawValue};
 use solver::{
     error::Violation,
     family::Member,
-    solution::{Outcome, Residuals, WarningCode},
+    solution::{Outcome, Residuals, Verdict, WarningCode},
 };
 
 use crate::{
@@ -80,6 +80,11 @@ pub struct MemberRow {
     pub status: Status,
     /// Why the member failed or was canceled.
     pub reason: Option<Reason>,
+    /// The verdict on the member's own solution: whether its numbers can be relied on. Of the members on one body the
+    /// first and the last have it, and so has each member with a mesh of its own; the others are solved without stated
+    /// errors.
+    #[serde(default)]
+    pub verdict: Option<Verdict>,
     /// What went wrong, if the member failed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub detail: Option<String>,
@@ -96,8 +101,8 @@ pub struct MemberRow {
     /// Length of all contacts together. Its ends, and those of the lengths of stick and slip, are interpolated between
     /// the outermost nodes in contact and the nodes beside them.
     pub contact_width: Option<f64>,
-    /// The error of `contact_width` due to the distances between nodes: for each end of contact 0.75 of the distance to the
-    /// next node, as in the `accuracy` of a job. Errors of the forces are not in it, and lengths of stick and slip have no stated
+    /// The error of `contact_width` due to the distances between nodes: for each end of contact the distance to the next
+    /// node, as in the `accuracy` of a job. Errors of the forces are not in it, and lengths of stick and slip have no stated
     /// error. Absent where an end is unknown, and in rows of older versions, whose lengths end at nodes.
     #[serde(default)]
     pub contact_width_error: Option<f64>,
@@ -209,6 +214,7 @@ impl MemberRow {
             iterations,
             residuals,
             warnings,
+            verdict,
         } = member;
         let (status, reason) = match outcome {
             Outcome::Converged => (Status::Succeeded, None),
@@ -236,6 +242,7 @@ impl MemberRow {
             iterations,
             residuals: Some(residuals),
             warnings,
+            verdict,
             ..MemberRow::default()
         }
         .tidied()

@@ -138,6 +138,13 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<Exit> {
             output::print(&String::from_utf8_lossy(&bytes))?;
         }
     }
+    let worst = rows.iter().filter(|row| row.verdict.is_some());
+    if let Some(row) = worst.max_by_key(|row| row.verdict)
+        && let Some(verdict) = row.verdict
+    {
+        // of the first and the last member on each body, and of those with meshes of their own
+        eprintln!("member {}: {}", row.number, verdict.in_words());
+    }
     let failed = rows.iter().filter(|row| row.status != Status::Succeeded);
     let failed: Vec<&MemberRow> = failed.collect();
     for row in failed.iter().take(10) {

@@ -203,6 +203,7 @@ pub fn members_table(paths: &[String], rows: &[MemberRow]) -> Table {
     columns.extend([
         text("status",                  |row| <&str>::from(row.status).into()),
         text("reason",                  |row| row.reason.map_or("", <&str>::from).into()),
+        text("verdict",                 |row| row.verdict.map_or("", <&str>::from).into()),
         real("normal_force",            |row| row.normal_force),
         real("tangential_force",        |row| row.tangential_force),
         real("friction_force",          |row| row.friction_force),
@@ -357,13 +358,13 @@ mod tests {
         let csv = String::from_utf8(written(Format::Csv)).unwrap();
         let lines: Vec<&str> = csv.lines().collect();
         assert!(lines[0].starts_with(
-            "number,/contacts/0/indentation,/contacts/0/obstacle,status,reason,normal_force"
+            "number,/contacts/0/indentation,/contacts/0/obstacle,status,reason,verdict,normal_force"
         ));
         assert!(
-            lines[1].starts_with(r#"0,0.5,"{""kind"":""flat"",""to"":1}",queued,,,"#),
+            lines[1].starts_with(r#"0,0.5,"{""kind"":""flat"",""to"":1}",queued,,,,"#),
             "{csv}"
         );
-        assert!(lines[2].starts_with("1,,,queued,,7.5,"), "{csv}");
+        assert!(lines[2].starts_with("1,,,queued,,,7.5,"), "{csv}");
         assert!(
             lines[2].ends_with(r#","after 3 iterations, and ""so on""""#),
             "{csv}"

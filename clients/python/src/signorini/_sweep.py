@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 TABLE_S = 5.0
 """Seconds for which a table is asked for that is only told about."""
-SHOWN_COLUMNS = ("status", "normal_force", "tangential_force", "stick_width", "peak_tangential_stress", "warnings")
+SHOWN_COLUMNS = ("status", "verdict", "normal_force", "tangential_force", "stick_width", "peak_tangential_stress", "warnings")
 """What it shows besides the parameters."""
 
 
@@ -96,8 +96,8 @@ class SweepView:
 
 
 class SweepTable(Table):
-    """A row for each member: its parameters and what came of it. NaN where a member is not solved; the numbers of one
-    that failed to converge (column `status`) are those of its last state.
+    """A row for each member: its parameters and what came of it. NaN where a member is not solved, or has no
+    solution (column `status`). `verdict` has the verdict on the first and the last member of each body, "" elsewhere.
 
     columns: arrays by name. A parameter is named by the last part of its pointer, `nonlocal_radius`, or by all of it
         where several end alike, or like the name of a result.

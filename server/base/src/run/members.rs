@@ -10,7 +10,7 @@ use solver::{
     mesh::External,
     observer::Observer,
     problem::{MeshInput, Problem},
-    solution::Outcome,
+    solution::{Outcome, Verdict},
 };
 
 use crate::{job::Reason, sweep::MemberRow};
@@ -76,10 +76,35 @@ impl<'a> Members<'a> {
         }
         match self.member(number, observer) {
             Ok(member) if member.outcome == Outcome::Canceled => Err(SolveError::Stopped),
-            Ok(member) => Ok(MemberRow::solved(number, member)),
+            Ok(mut member) => {
+                if member.verdict.is_none() && self.group.last() == Some(&number) {
+                    member.verdict = self.verdict(number, observer)?;
+                }
+                Ok(MemberRow::solved(number, member))
+            }
             Err(Failed::Member(error)) => row_of(number, error),
             // the others have the same body
             Err(Failed::Body(error)) => row_of(number, self.unsound.insert(error).clone()),
+        }
+    }
+
+    /// The verdict on a member's own solution on the common body; an error if the solver was stopped.
+    fn verdict(
+        &self,
+        number: usize,
+        observer: &mut dyn Observer,
+    ) -> Result<Option<Verdict>, SolveError> {
+        let problem = self.plan.whole_problem(number, self.mesh);
+        let (Some(family), Ok(problem)) = (&self.family, problem) else {
+            return Ok(None);
+        };
+        match family.solution(&problem, observer) {
+            Err(SolveError::Stopped) => Err(SolveError::Stopped),
+            Err(_) => Ok(None),
+            Ok(solution) if solution.summary.outcome == Outcome::Canceled => {
+                Err(SolveError::Stopped)
+            }
+            Ok(solution) => Ok(Member::of(&solution.summary).verdict),
         }
     }
 

@@ -23,7 +23,7 @@ use solver::{
     mesh::{External, Mesh},
     observer::{Observer, Progress},
     problem::{Problem, Refine, Step},
-    solution::{Outcome, Phase, Solution},
+    solution::{Outcome, Phase, Solution, Verdict},
 };
 use store::{MembersTask, Overview, Parts, Store};
 
@@ -150,6 +150,7 @@ fn solve_metered(
         }
     };
     let document = run.solve(solve, metered);
+    let mut verdict = None;
     if let (Err(SolveError::ResourceExhausted { .. }), Some(bodies)) = (&document, bodies) {
         meter.hand_over(|| bodies.drop_bodies());
     }
@@ -166,7 +167,7 @@ fn solve_metered(
             Err(error) => Some(row_of(task.first, error.clone())?),
         };
         if let Some(first) = first {
-            solve_others(problem, stored, (task, first), family, bodies, metered)?;
+            verdict = solve_others(problem, stored, (task, first), family, bodies, metered)?;
         }
     }
     let document = document?;
@@ -175,7 +176,10 @@ fn solve_metered(
     let mut ending = ending_of_solution(&document, metered.outgrown);
     if members.is_some() {
         // the document is that of the first member: the row of the job would have its numbers under the sweep's name
-        ending.overview = Overview::default();
+        ending.overview = Overview {
+            verdict,
+            ..Overview::default()
+        };
     }
     let iterations = document.history.len();
     let mut go_on = run::patient(|| metered.is_to_stop());
@@ -297,7 +301,8 @@ pub(super) fn prepare(
     Ok(prepared)
 }
 
-/// Reports the result of the first member of a sweep, and solves the other members; an error if the solver was stopped.
+/// Reports the result of the first member of a sweep, and solves the other members. Returns the worst verdict on a member;
+/// an error if the solver was stopped.
 fn solve_others(
     problem: &Problem,
     mesh: Option<Mesh>,
@@ -305,7 +310,7 @@ fn solve_others(
     family: Option<Family>,
     bodies: Option<&Budget>,
     metered: &mut Metered<'_>,
-) -> Result<(), SolveError> {
+) -> Result<Option<Verdict>, SolveError> {
     let MembersTask {
         definition,
         first: number,
@@ -321,14 +326,16 @@ fn solve_others(
     let mesh = &problem.mesh;
     let mut members = Members::new(&plan, group, mesh, &external, &prepare, family);
     (metered.run, metered.verifying) = (None, false);
+    let mut worst = first.verdict;
     if numbers.contains(number) {
         metered.member(first)?;
     }
     for other in numbers.iter().filter(|other| *other != number) {
         let row = members.row(*other, metered)?;
+        worst = worst.max(row.verdict);
         metered.member(row)?;
     }
-    Ok(())
+    Ok(worst)
 }
 
 /// Decides when the results of finished load steps are stored as a partial result: not after each step, since all of
