@@ -11,6 +11,7 @@ import math
 import pathlib
 import pickle
 import threading
+import warnings
 from collections.abc import Iterator
 from typing import Any
 
@@ -66,6 +67,22 @@ def test_an_evaluation_is_a_job(client: sg.Client, model: umbridge.Model) -> Non
     jobs = list(client.jobs(labels={"model": "flat"}))
     assert {job.name for job in jobs} == {"model flat"} and jobs[0].cached_from
     assert {job.input_hash for job in jobs} == {result.job.input_hash}
+
+
+def test_a_poor_verdict_is_told_once(client: sg.Client) -> None:
+    def model(layers: int) -> umbridge.Model:
+        problem = sg.examples.cylinder(refine=0)
+        problem.mesh.grid.y = np.linspace(min(problem.mesh.grid.y), max(problem.mesh.grid.y), layers + 1).tolist()
+        outputs = [{"scalars": ["normal_force"]}]
+        return umbridge.Model("layers", {"problem": problem, "inputs": [[DEPTH]], "outputs": outputs}, client)
+
+    poor = model(1)
+    with pytest.warns(UserWarning, match="the verdict on job_.* is poor: .*label.model=layers&verdict=poor"):
+        (first,) = poor([[0.5]])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        (second,) = poor([[0.4]])
+    assert first[0] > second[0] > 0
 
 
 def test_derivatives_are_those_that_are_known(model: umbridge.Model) -> None:

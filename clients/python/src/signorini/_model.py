@@ -8,6 +8,7 @@ import math
 import os
 import pathlib
 import re
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -73,6 +74,8 @@ class Model:
         title: for people; may be left out
     client: sends the jobs
 
+    Vectors have no place for a verdict: the first evaluation whose verdict is `poor` gives a Python warning with its reason.
+
     Raises `InvalidProblem` with everything that is wrong. Its methods raise `ModelError`, where a job has no solution
     `JobFailed`, and whatever else a client raises.
     """
@@ -81,6 +84,7 @@ class Model:
         self.name = name
         self._client = client
         self._of = _checked(name, definition, client)
+        self._told = False  # that the verdict on an evaluation is poor
 
     @property
     def title(self) -> str | None:
@@ -203,6 +207,11 @@ class Model:
         result = job.wait(progress=False)
         if not result.converged:
             raise ModelError("InvalidOutput", f"{job.id} did not converge")
+        if result.verdict == "poor" and not self._told:
+            self._told = True
+            why = next(iter(result.reasons), "see its result")
+            text = f"model {self.name}: the verdict on {job.id} is poor: {why} Later ones are not reported: see GET /v1/jobs"
+            warnings.warn(f"{text}?label.model={self.name}&verdict=poor", stacklevel=2)
         outputs = [self._vector(n, result) for n in range(len(self._of.outputs))]
         summary = result.summary
         residuals = [float(summary["residuals"][name]) for name in ("kkt", "friction", "monolithic")]
