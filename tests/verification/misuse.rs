@@ -593,3 +593,111 @@ fn the_force_of_a_curved_contact_is_told_as_a_vector() {
         );
     }
 }
+
+/// A cylinder with friction, pressed into a block; where `edge` is given, a flat punch up to it instead.
+fn pressed(modulus: f64, friction: &Value, edge: Option<f64>) -> Summary {
+    let x: Vec<f64> = (0..=30)
+        .map(|k| 0.05 * f64::from(k))
+        .chain([2.0, 3.0, 5.0, 9.0, 20.0, 40.0])
+        .collect();
+    let y = [-40.0, -20.0, -9.0, -4.0, -2.0, -1.0, -0.5, -0.25, -0.1, 0.0];
+    let obstacle = match edge {
+        Some(to) => json!({"kind": "flat", "from": -to, "to": to}),
+        None => json!({"kind": "circle", "radius": 10}),
+    };
+    let mut law = json!({"coefficient": 0.3, "nonlocal_radius": 0.05, "elastic_slip": 1e-4});
+    law.as_object_mut()
+        .unwrap()
+        .extend(friction.as_object().unwrap().clone());
+    let text = json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grid": {"x": x, "y": y}},
+        "materials": [{"youngs_modulus": modulus, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "left", "ux": 0}, {"boundary": "bottom", "ux": 0, "uy": 0}],
+        "contacts": [{"boundary": "top", "obstacle": obstacle, "indentation": 0.1, "friction": law}],
+    });
+    solve(&problem(&text.to_string())).summary
+}
+
+/// σ_t is largest where stick ends. On which side of that place rounding puts the peak changes nothing: the stated error is
+/// that of the same problem in another unit of stress.
+#[test]
+fn the_error_of_a_peak_where_stick_ends_is_not_made_by_rounding() {
+    let relative = |modulus: f64| {
+        let accuracy = pressed(modulus, &json!({}), None).accuracy.unwrap();
+        let mut peaks = accuracy.quantities.into_iter();
+        let peak =
+            peaks.find(|q| q.quantity == solver::solution::QuantityName::PeakTangentialStress);
+        peak.unwrap().relative.unwrap()
+    };
+    let expected = relative(1000.0);
+    for modulus in [999.0, 1001.0, 1.0, 1e6, 2.1e11, 1e-3] {
+        let found = relative(modulus);
+        assert!(
+            (found / expected - 1.0).abs() < 1e-3,
+            "{modulus}: {found}, not {expected}"
+        );
+    }
+}
+
+/// The total law is no law of the way to the end: it is told where the contact grows and sticks, and nowhere else.
+#[test]
+fn the_total_law_is_told_where_the_way_matters() {
+    let told_of = |friction: Value, edge: Option<f64>| {
+        let summary = pressed(1000.0, &friction, edge);
+        told(&summary.warnings, WarningCode::TotalLaw).map(str::to_owned)
+    };
+    says(
+        told_of(json!({}), None).as_deref(),
+        &["the contact grows", "\"history\": \"incremental\""],
+    );
+    // a contact that is there from the beginning, the other law, none
+    assert_eq!(told_of(json!({}), Some(1.0)), None);
+    assert_eq!(told_of(json!({"history": "incremental"}), None), None);
+    assert_eq!(told_of(json!({"coefficient": 0}), None), None);
+}
+
+/// Half of a block under half of an obstacle: without its line of symmetry, and with it; an obstacle beside the end, and one
+/// that is flat.
+#[test]
+fn a_half_model_without_its_line_of_symmetry_is_told() {
+    let told_of = |supports: Value, obstacle: Value| {
+        let x: Vec<f64> = (0..=20)
+            .map(|k| 0.05 * f64::from(k))
+            .chain([1.3, 2.0, 4.0])
+            .collect();
+        let text = json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {"grid": {"x": x, "y": [-4, -2, -1, -0.5, -0.2, -0.1, 0]}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "supports": supports,
+            "contacts": [{"boundary": "top", "obstacle": obstacle, "indentation": 0.01}],
+        });
+        let summary = solve(&problem(&text.to_string())).summary;
+        let verdict = summary.accuracy.unwrap().verdict;
+        let told = told(&summary.warnings, WarningCode::SymmetryMissing).map(str::to_owned);
+        assert!(told.is_none() || verdict >= solver::solution::Verdict::Fair);
+        told
+    };
+    let free = json!([{"boundary": "bottom", "ux": 0, "uy": 0}]);
+    let half = json!([{"boundary": "bottom", "ux": 0, "uy": 0}, {"boundary": "left", "ux": 0}]);
+    for kind in ["circle", "parabola"] {
+        let obstacle = json!({"kind": kind, "radius": 8});
+        says(
+            told_of(free.clone(), obstacle.clone()).as_deref(),
+            &["s = 0.0000", "`center`"],
+        );
+        assert_eq!(told_of(half.clone(), obstacle.clone()), None);
+        for center in [-0.05, 0.05, 2.0] {
+            let beside = json!({"kind": kind, "radius": 8, "center": center});
+            assert_eq!(told_of(free.clone(), beside), None, "{center}");
+        }
+    }
+    assert_eq!(
+        told_of(free.clone(), json!({"kind": "flat", "to": 0.5})),
+        None
+    );
+    // at the other end
+    let right = json!({"kind": "circle", "radius": 8, "center": 4});
+    says(told_of(free, right).as_deref(), &["s = 4.0000"]);
+}

@@ -705,3 +705,18 @@ fn a_standard_deviation_in_another_unit_gives_a_warning() {
         );
     }
 }
+
+/// A profile that was shifted by its lowest point is displaced by the error of that point.
+#[test]
+fn a_profile_whose_lowest_point_is_zero_gives_a_warning() {
+    for (shift, told) in [(0.0, true), (1e-6, false)] {
+        let mut obstacle = cubic(table(points(|x| circle(x) + shift, 21)));
+        obstacle["smoothing"] = json!({"standard_deviation": 1e-3});
+        let checked = solver::check(&block(&lines(0.1, &[]), obstacle.clone(), 0.01), None);
+        let mut codes = checked.unwrap().warnings.into_iter().map(|w| w.code);
+        assert_eq!(
+            codes.any(|code| code == WarningCode::LowestPointIsZero),
+            told
+        );
+    }
+}

@@ -21,7 +21,7 @@ pub use measurement::{add_measurement, without_measurement};
 pub use verdict::limit_by;
 
 use crate::algorithm::{
-    DisplacedNode, Estimable, Finished, PART_OF_SPACING, Quantity, Reported, System, influences,
+    DisplacedNode, Estimable, Finished, Quantity, Reported, System, influences,
 };
 use crate::body::AXIS_SHARE;
 use crate::contact::edge_nodes;
@@ -117,7 +117,8 @@ fn factors(name: QuantityName) -> [f64; 9] {
         FrictionForce            => [1.85, 2.1,  0.0, 0.17, 0.2,  0.14, 0.68,  0.21,  1e-4],
         PeakNormalStress         => [1.6,  0.0,  0.5, 0.0,  0.0,  0.0,  1.9,   0.02,  1e-4],
         PeakTangentialStress     => [0.0,  1.65, 0.0, 1.1,  0.0,  0.0,  0.76,  0.185, 1e-4],
-        ContactStart | ContactEnd => [0.0, 0.0,  0.0, 0.0,  0.0,  0.0,  PART_OF_SPACING, 0.0, 0.0],
+        // the contact ends somewhere between the outermost node in contact and the next one
+        ContactStart | ContactEnd => [0.0, 0.0,  0.0, 0.0,  0.0,  0.0,  1.0,   0.0,   0.0],
         StickEnd                 => [0.0,  2.05, 0.0, 0.0,  0.0,  0.0,  0.42,  0.0,   0.0],
     };
     factors

@@ -15,6 +15,9 @@ const FORCES: [f64; 2] = [0.0075, 0.05];
 /// (`tests/verification/calibration.rs`).
 const OTHERS: [f64; 2] = [0.03, 0.2];
 
+/// The same of ends of contact, whose stated error, the distance of the nodes, is seldom too small.
+const ENDS_OF_CONTACT: [f64; 2] = [0.04, 0.2];
+
 /// The reason why a quantity has no error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Doubt {
@@ -134,9 +137,11 @@ pub(super) fn conclude(
 /// Warnings that make stated errors unreliable, or that say that the result may belong to another problem than was meant;
 /// the best verdict that each permits, and the reason in words.
 #[rustfmt::skip] // a table
-const DOUBTFUL: [(WarningCode, Verdict, &str); 6] = [
+const DOUBTFUL: [(WarningCode, Verdict, &str); 7] = [
     (WarningCode::NoContact, Verdict::Fair,
         "A contact never touches its obstacle (`no_contact`): unless that was intended, this is the result of another problem than was meant."),
+    (WarningCode::SymmetryMissing, Verdict::Fair,
+        "The middle of an obstacle lies at a free side of the body (`symmetry_missing`): unless that was intended, this is the result of another problem than was meant."),
     (WarningCode::NotUnique, Verdict::Poor,
         "There is a second solution with other forces; the errors do not tell which of the two occurs."),
     (WarningCode::NoiseUndeclared, Verdict::Fair,
@@ -179,6 +184,7 @@ pub(super) fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<Fi
         QuantityName::NormalForce | QuantityName::TangentialForce | QuantityName::FrictionForce => {
             FORCES
         }
+        QuantityName::ContactStart | QuantityName::ContactEnd => ENDS_OF_CONTACT,
         _ => OTHERS,
     };
     if q.error.is_some() && q.relative.is_some_and(|relative| relative <= good) {

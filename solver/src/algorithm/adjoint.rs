@@ -50,6 +50,19 @@ impl Gradient {
     ) {
         let (law, slip) = (system.law(point), system.slip(&state.v, point));
         self.add_slip(system, point, -factor * bound * law.phi_slope(slip));
+        self.add_bound(system, state, pressures, point, factor);
+    }
+
+    /// Adds `factor` times the derivatives of σ_t = −τ φ at a point by the pressures on which the bound τ depends.
+    pub(super) fn add_bound(
+        &mut self,
+        system: &System<'_>,
+        state: &State,
+        pressures: &[f64],
+        point: &Point,
+        factor: f64,
+    ) {
+        let (law, slip) = (system.law(point), system.slip(&state.v, point));
         let slope = law.bound.slope(point.source.nonlocal_pressure(pressures));
         let factor = -factor * law.phi(slip) * slope;
         if factor != 0.0 {

@@ -49,7 +49,7 @@ pub use convex::{Minimum, minimise};
 pub use corners::{better, closed_on_axis, open_on_axis, touched_by_both};
 pub use finished::Finished;
 pub use may_touch::{Extent, Region, follow_neighbour, run_reduced};
-pub use profile::{DisplacedNode, Estimable, Missed, PART_OF_SPACING, Quantity};
+pub use profile::{DisplacedNode, Estimable, Missed, Quantity};
 pub use recorder::{Cycle, Place};
 pub use report::{AlongContacts, Reported, numbers, quantities, report};
 pub use rounding::Rounding;

@@ -227,6 +227,13 @@ impl Checks {
             );
             return;
         }
+        if least == 0.0 {
+            self.warn(
+                WarningCode::LowestPointIsZero,
+                &format!("{pointer}/gap"),
+                format!("The lowest measured point is exactly 0. If the profile was shifted by that point, the point's own error, of one to three standard deviations ({deviation:.3e}), shifts the whole obstacle against the indentation, which no stated error contains. Shift it by the lowest point of a smooth curve through the points, or apply a known load."),
+            );
+        }
         let Some([scatter, uncertainty]) = scatter(x, gap) else {
             return;
         };

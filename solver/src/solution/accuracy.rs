@@ -38,8 +38,8 @@ pub struct Accuracy {
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Verdict {
-    /// Every force is accurate to 1 %, every extent and every peak that has a limit to 5 %. Stated errors are at most
-    /// three quarters of these limits, since one stated error in twenty is too small.
+    /// Every force is accurate to 1 %, every extent and every peak that has a limit to 5 %. Stated errors are below these
+    /// limits, since one stated error in twenty is too small.
     Good,
     /// Forces are accurate to 5 %, extents and peaks to 20 %. Also the verdict where a contact has too many ends of
     /// stick to state their errors, or another number of ends on the refined mesh, or a warning says that the mesh is

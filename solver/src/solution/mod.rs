@@ -398,10 +398,14 @@ pub enum WarningCode {
     DragReturns,
     /// Load steps that turn back under the total law, which depends on the end alone.
     PathForgotten,
+    /// A measured profile whose lowest point is exactly 0.
+    LowestPointIsZero,
     /// Points of an obstacle that scatter as measured ones do, without a standard deviation.
     NoiseUndeclared,
     /// A contact boundary with a corner between two edges.
     ContactTurns,
+    /// The middle of an obstacle at an end of the contact, where the body's side is free.
+    SymmetryMissing,
     /// An obstacle that is dragged along a contact with a line of symmetry at its end.
     SymmetricDrag,
     /// A rigid obstacle of revolution that is dragged away from the axis or towards it.
@@ -434,6 +438,8 @@ pub enum WarningCode {
     PolygonInContact,
     /// A contact so curved that the sum of its pressures is not its force.
     NormalsDiffer,
+    /// Friction by the displacements at the end alone, where the way there matters.
+    TotalLaw,
     /// A nonlocal radius larger than the contact.
     RadiusExceedsContact,
     /// A part of the friction that acts where the body does not touch, within a nonlocal radius of the contact.
@@ -495,6 +501,7 @@ impl WarningCode {
             | FrictionLostAtEnd
             | ObstacleBetweenNodes
             | DirectionIsLinear
+            | SymmetryMissing
             | SymmetricDrag
             | RadialDrag
             | BoundBeyondContact
@@ -504,6 +511,7 @@ impl WarningCode {
             | RoundingLimitsResidual
             | SmoothingFlattens
             | DeviationDiffers
+            | LowestPointIsZero
             | NoiseUndeclared
             | NeverApplied
             | DragReturns
@@ -527,6 +535,7 @@ impl WarningCode {
             | ContactTurns
             | KinkInContact
             | NormalsDiffer
+            | TotalLaw
             | SharpEdge
             | MaterialJunction
             | CohesionJumps

@@ -104,6 +104,9 @@ fn reasons(code: WarningCode) -> (&'static str, &'static str) {
         PathForgotten => (
             "The total law, the law of the thesis, gives friction by the present displacement. It has no memory: a loop is no loop, and nothing remains after unloading. It stands for one monotonic load.",
             "Give \"history\": \"incremental\" in friction, and enough increments in the steps. With the total law the steps are states of their own, whatever their order."),
+        LowestPointIsZero => (
+            "The lowest of many measured points is one whose error is large and negative. As the zero of the profile it moves the whole obstacle away by that error, as if it were pushed less far.",
+            "Subtract the lowest point of a smooth curve through the points, or give the load instead of the indentation. If the zero comes from elsewhere, nothing is wrong."),
         NoiseUndeclared => (
             "Without a standard deviation every point is taken as exact: the contact follows the noise, with peaks that the true surface does not have, and the stated errors do not contain it.",
             "Give \"smoothing\": {\"standard_deviation\": …} with \"interpolation\": \"cubic\", where the points are measured; from_points of the client for Python takes it. Where the roughness is real, refine until its peaks are resolved."),
@@ -113,6 +116,9 @@ fn reasons(code: WarningCode) -> (&'static str, &'static str) {
         ContactTurns => (
             "At a corner the normal jumps, and the contact conditions are different on its two sides. Stresses may grow without limit there.",
             "Name the two sides as two contacts, or round the corner."),
+        SymmetryMissing => (
+            "A half of a symmetric problem needs its line of symmetry: without it the side of the body is free, so that it bulges and the contact ends at its edge. Forces are too small, and the peaks have no limit.",
+            "Support the side (ux: 0 for a vertical line of symmetry), or give the obstacle its center if it lies elsewhere. If an edge is really pressed by the middle of the obstacle, nothing is wrong."),
         SymmetricDrag => (
             "A line of symmetry mirrors the drag as well: the half that is not modelled would be dragged the opposite way, which is not what a moving tool does.",
             "Model the whole body, or leave the drag out."),
@@ -161,6 +167,9 @@ fn reasons(code: WarningCode) -> (&'static str, &'static str) {
         NormalsDiffer => (
             "normal_force is the integral of the pressure along the surface, whichever way it faces. Where the surface turns within the contact, as a hole around a pin does, that is more than the force by which the obstacle is pushed.",
             "Take the force of the message where a force on the tool or a reaction is meant."),
+        TotalLaw => (
+            "A point that touches early slips or sticks under the pressure that it has then. The total law, the law of the thesis, lets every point slip as if the whole motion had taken place at the final pressure.",
+            "Nothing, to compare with the thesis. Otherwise give \"history\": \"incremental\" in friction, and `steps` with enough increments: docs/concepts/history.md has both laws in a figure."),
         RadiusExceedsContact => (
             "S_ρ averages over a length that is larger than the contact: the friction bound is spread beyond the contact and nearly uniform in it.",
             "Check nonlocal_radius and its unit. It is a length of the surface's texture, which is usually much smaller than a contact."),

@@ -11,10 +11,6 @@ use crate::friction::BoundLaw;
 use crate::problem::Condition;
 use crate::solution::{ContactSummary, Outcome, Peak, Widths};
 
-/// The error of an end of contact, as a part of the distance between the outermost node in contact and the next one:
-/// calibrated by `tests/verification/calibration.rs`.
-pub const PART_OF_SPACING: f64 = 0.75;
-
 /// The number of samples per edge in the search for a peak, before its place is narrowed down.
 const SAMPLES: usize = 16;
 
@@ -160,9 +156,8 @@ impl PatchView<'_> {
         let known = self.finished.outcome == Outcome::Converged
             && self.missed().is_empty()
             && self.overlap_without_contact() == 0.0;
-        let of_end = |end: &EndOfContact| {
-            PART_OF_SPACING * end.spacing + end.truncation + self.displaced_end(end.node)
-        };
+        let of_end =
+            |end: &EndOfContact| end.spacing + end.truncation + self.displaced_end(end.node);
         known.then(|| self.ends_of_contact().iter().map(of_end).sum())
     }
 

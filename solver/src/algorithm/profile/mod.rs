@@ -22,7 +22,6 @@ mod resolution;
 mod resultant;
 mod warnings;
 
-pub use extents::PART_OF_SPACING;
 pub use quantities::{Estimable, Quantity};
 
 use std::cell::OnceCell;

@@ -86,6 +86,8 @@ pub(super) struct EndOfContact {
 /// of the ends depend on the mesh.
 const MOST_STICK_ENDS: usize = 8;
 
+/// The part of its bound above which friction counts as having reached it: the peak of σ_t is known to less.
+const WHOLE_BOUND: f64 = 1.0 - 1e-6;
 /// The change of slip along an edge, as a part of ε, up to which the slip is constant apart from rounding: if it equals
 /// ε, there is no end of stick. The incremental law leads to such slip where the load rests.
 const STEADY: f64 = 1e-6;
@@ -330,9 +332,12 @@ impl PatchView<'_> {
         {
             let point = self.point(edge, xi);
             let mut gradient = Gradient::zero(system);
-            let bound = stress.abs() / system.law(&point).phi(system.slip(self.v, &point)).abs();
-            if bound.is_finite() {
-                let pressures = &self.forces.pressures;
+            let reached = system.law(&point).phi(system.slip(self.v, &point)).abs();
+            let (bound, pressures) = (stress.abs() / reached, &self.forces.pressures);
+            // where stick ends σ_t is the bound: by rounding the peak may lie on either side of that place
+            if reached >= WHOLE_BOUND {
+                gradient.add_bound(system, state, pressures, &point, 1.0);
+            } else if bound.is_finite() {
                 gradient.add_traction(system, state, pressures, bound, &point, 1.0);
             }
             found.push(Quantity {

@@ -1,10 +1,11 @@
 //! Warnings about a contact.
 
 use super::PatchView;
+use crate::algorithm::system::Point;
 use crate::contact::edge_nodes;
 use crate::elasticity::{Dof, Side, growth};
 use crate::friction::BoundLaw;
-use crate::problem::{Condition, Measure, Normalization};
+use crate::problem::{Condition, History, Measure, Normalization};
 use crate::solution::{Outcome, Warning, WarningCode};
 
 /// The relative error of the peak of a smooth pressure, times the square of the number of elements across the contact.
@@ -36,6 +37,9 @@ const MOST_EARLY: f64 = 0.01;
 
 /// The largest displacement, as a part of the gap, that rounding leaves of a body after unloading.
 const LEFT: f64 = 1e-12;
+
+/// The largest slope of an obstacle at its middle, as a part of its slope over the first edge beside it.
+const LEVEL: f64 = 1e-3;
 
 /// The smallest number of edges across a contact, of which half may be modelled, with which its pressure is reliable.
 const FEWEST_EDGES: usize = 6;
@@ -102,6 +106,7 @@ impl PatchView<'_> {
             );
         }
         self.warn_of_coarse_mesh(warn);
+        self.warn_of_total_law(first, last, warn);
         self.warn_of_ends(first, last, warn);
     }
 
@@ -195,6 +200,41 @@ impl PatchView<'_> {
         }
     }
 
+    /// Notes that the total law is not Coulomb's law along the way to the end: where the contact grows while it is pressed, or
+    /// several load steps lead there, and a part of the contact sticks. `first` and `last`: the outermost nodes in contact.
+    fn warn_of_total_law(&self, first: usize, last: usize, warn: &mut Warn<'_>) {
+        let contact = self.patch.contact;
+        let law = contact.friction.as_ref();
+        if law.is_none_or(|law| law.history != History::Total) {
+            return;
+        }
+        let points = self.system.points.iter().zip(&self.finished.tractions);
+        let mut rubbed =
+            points.filter(|(point, traction)| point.patch == self.p && **traction != 0.0);
+        let sticks = |point: &Point| {
+            let slip = self.system.slip(self.v, point);
+            self.system.law(point).sticks(slip)
+        };
+        if !rubbed.any(|(point, _)| sticks(point)) {
+            return;
+        }
+        // an end that the obstacle, the body or a line of symmetry has is there from the beginning
+        let given = |i: usize| [0, self.count() - 1].contains(&i);
+        let why = if !(given(first) && given(last)) {
+            "the contact grows while it is pressed"
+        } else if self.system.model.steps.len() > 1 {
+            "several load steps lead to this state"
+        } else {
+            return;
+        };
+        warn(
+            WarningCode::TotalLaw,
+            format!(
+                "Friction follows the total law, by the displacements at the end alone, and {why}: with \"history\": \"incremental\", Coulomb's law along the way, stick zones and tangential forces are others, often by tens of per cent."
+            ),
+        );
+    }
+
     /// Warns of contact at the ends of the obstacle, and of averages that reach beyond ends. `first` and `last`: the
     /// outermost nodes in contact.
     fn warn_of_ends(&self, first: usize, last: usize, warn: &mut Warn<'_>) {
@@ -215,6 +255,14 @@ impl PatchView<'_> {
                 warn(
                     WarningCode::SharpEdge,
                     format!("The contact ends at a sharp edge, s = {at:.4}: there {limits}."),
+                );
+            }
+            if self.is_half_of_obstacle(end) {
+                warn(
+                    WarningCode::SymmetryMissing,
+                    format!(
+                        "The middle of the obstacle lies at an end of the contact boundary, s = {at:.4}, where the side of the body is free: it may bulge there, and the edge is pressed without limit. If the body goes on there, symmetric to what is modelled, support that side perpendicular to it (`ux`: 0 for a vertical one); if the obstacle is meant to be elsewhere, give its `center`."
+                    ),
                 );
             }
         }
@@ -251,6 +299,18 @@ impl PatchView<'_> {
                 ),
             );
         }
+    }
+
+    /// Whether the obstacle is level at this end of the boundary and recedes from the body along it, as half of a symmetric
+    /// one does.
+    fn is_half_of_obstacle(&self, end: usize) -> bool {
+        let contact = self.patch.contact;
+        let (s, profile) = (&contact.boundary.s, &contact.profile);
+        // the second node of the first or the last edge that is no midside node
+        let inner = if end == 0 { 2 } else { end - 2 };
+        let rise = (profile[inner] - profile[end]) / (s[inner] - s[end]).abs();
+        let slope = contact.end_slopes[usize::from(end > 0)];
+        rise > 0.0 && slope.abs() <= LEVEL * rise
     }
 
     /// The part of ∫|σ_t| at places without pressure.
