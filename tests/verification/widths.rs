@@ -49,7 +49,7 @@ fn widths_in_a_sweep_change_smoothly_and_agree_with_hertz_and_with_jobs() {
         let (member, own_end) = family.member(&problem, start, quiet).unwrap();
         end = own_end;
         let error = member.contact_width_error.unwrap();
-        assert!(error > 0.0 && error <= SPACING, "{error}");
+        assert!(error > 0.0 && error <= SPACING * (1.0 + 1e-9), "{error}");
         let off = member.contact_width - hertz(member.normal_force);
         assert!(
             off.abs() <= error,

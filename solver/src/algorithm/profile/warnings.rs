@@ -257,14 +257,17 @@ impl PatchView<'_> {
                     format!("The contact ends at a sharp edge, s = {at:.4}: there {limits}."),
                 );
             }
-            if self.is_half_of_obstacle(end) {
-                warn(
-                    WarningCode::SymmetryMissing,
-                    format!(
-                        "The middle of the obstacle lies at an end of the contact boundary, s = {at:.4}, where the side of the body is free: it may bulge there, and the edge is pressed without limit. If the body goes on there, symmetric to what is modelled, support that side perpendicular to it (`ux`: 0 for a vertical one); if the obstacle is meant to be elsewhere, give its `center`."
-                    ),
-                );
-            }
+        }
+        let free = |i: &usize| self.active(*i) && !self.symmetric(*i);
+        let mut ends = [0, self.count() - 1].into_iter().filter(free);
+        if let Some(end) = ends.find(|end| self.is_half_of_obstacle(*end)) {
+            let at = s[end];
+            warn(
+                WarningCode::SymmetryMissing,
+                format!(
+                    "The middle of the obstacle lies at an end of the contact boundary, s = {at:.4}, where the side of the body is free: it may bulge there. If the body goes on there, symmetric to what is modelled, support that side perpendicular to it (`ux`: 0 for a vertical one); if the obstacle is meant to be elsewhere, give its `center`."
+                ),
+            );
         }
         let lost = self.lost_at_ends();
         if lost > MOST_LOST {
