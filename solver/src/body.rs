@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 
 use crate::elasticity::{
-    self, Axes, Dof, DofMap, ElementStiffness, ElementTables, Elements, Loads, Section,
+    self, Axes, Dof, DofMap, ElementStiffness, ElementTables, Elements, Loads, Section, Springs,
 };
 use crate::error::SolveError;
 use crate::linear::{
@@ -57,6 +57,9 @@ pub struct Source<'a> {
     section: &'a Section,
     quadrature: u32,
     fixed: &'a BTreeMap<u32, Held>,
+    /// Skipped where there are none, so that bodies without springs keep their fingerprints.
+    #[serde(skip_serializing_if = "Springs::is_empty")]
+    springs: &'a Springs,
     loads: &'a Loads,
     alone: &'a Alone,
     open_on_axis: &'a BTreeSet<u32>,
@@ -73,6 +76,7 @@ impl<'a> Source<'a> {
             section: &model.section,
             quadrature: model.quadrature,
             fixed: &model.fixed,
+            springs: &model.springs,
             loads: &model.loads,
             alone: &model.alone,
             open_on_axis: &model.open_on_axis,
@@ -112,7 +116,7 @@ impl ElasticBody {
 
         notify(observer, Progress::Phase(Phase::Order))?;
         let tables = ElementTables::new(&model.mesh, &model.section, model.quadrature);
-        let elements = tables.elements(&model.mesh, &model.section);
+        let elements = tables.elements(&model.mesh, &model.section, &model.springs);
         let threads = match model.mesh.elements.len() >= SMALLEST_SHARED {
             true => observer.threads(),
             false => 1,
@@ -204,7 +208,8 @@ impl ElasticBody {
 
     /// The elements of a model that has this body.
     pub fn elements<'a>(&'a self, model: &'a Model) -> Elements<'a> {
-        self.tables.elements(&model.mesh, &model.section)
+        self.tables
+            .elements(&model.mesh, &model.section, &model.springs)
     }
 
     /// Converts forces on the contact unknowns to forces on contact nodes along n and t.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use faer::Side;
 use faer::linalg::solvers::Solve;
 use faer::sparse::{SparseColMat, Triplet};
-use solver::elasticity::{DofMap, ElementStiffness, ElementTables, Section};
+use solver::elasticity::{DofMap, ElementStiffness, ElementTables, Section, Springs};
 use solver::linear::ElementMatrix;
 use solver::mesh::Mesh;
 
@@ -24,7 +24,8 @@ impl Assembled {
     ) -> (Assembled, Vec<f64>) {
         let mut rows = vec![BTreeMap::new(); map.unknowns];
         let tables = &ElementTables::new(mesh, section, quadrature);
-        let elements = tables.elements(mesh, section);
+        let springs = Springs::default();
+        let elements = tables.elements(mesh, section, &springs);
         let elements = ElementStiffness::new(elements, map);
         let mut matrix = ElementMatrix::default();
         for e in 0..mesh.elements.len() as u32 {

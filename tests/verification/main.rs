@@ -60,6 +60,7 @@ mod rounding;
 mod sliding;
 mod small_strain;
 mod smooth;
+mod springs;
 mod stick;
 mod stick_ends;
 mod support;

@@ -67,6 +67,7 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     fields("Orthotropic", "problem::Orthotropic"),
     array("Expansion", "[f64; 3]"),
     fields("Support", "problem::Support"),
+    fields("SpringStiffness", "problem::SpringStiffness"),
     fields("Load", "problem::LoadFields"),
     fields("Rotation", "problem::Rotation"),
     array("Traction", "[problem::BoundaryValue; 2]"),

@@ -382,7 +382,8 @@ impl Inside {
         }
         let total =
             |f: fn(&ContactSummary) -> f64| contacts.values().map(f).fold(0.0, |sum, x| sum + x);
-        let energy = recovered.strain_energy - self.work_of_loads(system)
+        let springs = system.model.springs.energy(&self.displacements);
+        let energy = recovered.strain_energy + springs - self.work_of_loads(system)
             + friction_energy(system, finished);
         Summary {
             outcome,
@@ -446,15 +447,30 @@ impl Inside {
         let first = usize::from(model.section.axisymmetric());
         let (mut sum, mut size) = ([0.0; 2], 0.0);
         let interior = body.map.unknowns - contact_force.len();
+        let mut of_springs = vec![
+            [0.0; 2];
+            if model.springs.is_empty() {
+                0
+            } else {
+                body.map.dofs.len()
+            }
+        ];
+        for (node, [x, y]) in model.springs.forces(&self.displacements) {
+            let sum = &mut of_springs[node as usize];
+            *sum = [sum[0] + x, sum[1] + y];
+        }
         for (node, dofs) in body.map.dofs.iter().enumerate() {
             let load = body
                 .map
                 .to_axes(node, body.nodal_loads[node].map(|f| loads * f));
+            let pull = of_springs
+                .get(node)
+                .map_or([0.0; 2], |pull| body.map.to_axes(node, *pull));
             let internal = body.map.to_axes(node, self.recovered.internal_force[node]);
             let external: [f64; 2] = std::array::from_fn(|a| match dofs[a] {
-                Dof::Free(i) if i >= interior => load[a] + contact_force[i - interior],
-                Dof::Free(_) => load[a],
-                Dof::Fixed(_) => internal[a], // the reaction of the support, load included
+                Dof::Free(i) if i >= interior => load[a] + pull[a] + contact_force[i - interior],
+                Dof::Free(_) => load[a] + pull[a],
+                Dof::Fixed(_) => internal[a], // the reaction of the support, load and springs included
             });
             let [fx, fy] = match body.map.axes[node] {
                 None => external,

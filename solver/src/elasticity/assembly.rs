@@ -180,8 +180,8 @@ impl<'a> ElementStiffness<'a> {
         let Elements {
             mesh,
             section,
+            springs,
             tables,
-            ..
         } = self.elements;
         let (map, element) = (self.map, &mesh.elements[e as usize]);
         matrix.entries = match tables.shapes.of(e as usize) {
@@ -192,6 +192,7 @@ impl<'a> ElementStiffness<'a> {
             }
         };
         let k = &mut matrix.entries;
+        springs.add_to(e as usize, k);
         matrix.unknowns = [None; 16];
         for (i, &node) in element.iter().enumerate() {
             if let Some(axes) = map.axes[node as usize] {
@@ -236,11 +237,11 @@ impl<'a> ElementStiffness<'a> {
 
 impl Elements<'_> {
     /// A number for each element; elements with the same number have the same matrix on the same unknown components of
-    /// their nodes. `None` for an element with a unique shape.
+    /// their nodes. `None` for an element with a unique shape, or with springs.
     pub fn kinds(self, map: &DofMap) -> Vec<Option<u32>> {
         let (mut known, mut turned) = (HashMap::new(), HashMap::new());
         let mut kind = |(e, element): (usize, &Element)| {
-            let shape = self.tables.shapes.of(e)?;
+            let shape = self.tables.shapes.of(e).filter(|_| !self.springs.has(e))?;
             let mut key = [shape as u32; 9];
             for (key, &node) in key[1..].iter_mut().zip(element.iter()) {
                 let axes = map.axes[node as usize].map(|axes| {
@@ -594,7 +595,7 @@ mod tests {
             let model = mixed(kind);
             let (mesh, section, quadrature) = (&model.mesh, &model.section, model.quadrature);
             let tables = &ElementTables::new(mesh, section, quadrature);
-            let elements = tables.elements(mesh, section);
+            let elements = tables.elements(mesh, section, &model.springs);
             let free = |n: usize| [Dof::Free(2 * n), Dof::Free(2 * n + 1)];
             let mut map = DofMap {
                 dofs: (0..mesh.nodes.len()).map(free).collect(),

@@ -1,8 +1,8 @@
 //! The part of element integrals that depends on the shape alone, computed once for all elements of the same shape.
 
-use crate::elasticity::Section;
 use crate::elasticity::material::{COMPONENTS, Moduli};
 use crate::elasticity::shapes::{Shape, Shapes};
+use crate::elasticity::{Section, Springs};
 use crate::element::{AtNodes, Family, GaussPoint, Jacobian, Tabulated};
 use crate::mesh::Mesh;
 
@@ -297,11 +297,17 @@ impl ElementTables {
         }
     }
 
-    /// The elements of the mesh and section that the tables were made for.
-    pub fn elements<'a>(&'a self, mesh: &'a Mesh, section: &'a Section) -> Elements<'a> {
+    /// The elements of the mesh and section that the tables were made for, with the springs of the body.
+    pub fn elements<'a>(
+        &'a self,
+        mesh: &'a Mesh,
+        section: &'a Section,
+        springs: &'a Springs,
+    ) -> Elements<'a> {
         Elements {
             mesh,
             section,
+            springs,
             tables: self,
         }
     }
@@ -314,6 +320,8 @@ pub struct Elements<'a> {
     pub mesh: &'a Mesh,
     /// The materials of the elements.
     pub section: &'a Section,
+    /// The springs between the body and the ground.
+    pub springs: &'a Springs,
     /// The tables for this mesh and section.
     pub tables: &'a ElementTables,
 }

@@ -10,6 +10,7 @@
 //! | thermal strains | `thermal` |
 //! | integrals shared by elements of one shape | `geometry`, `shapes` |
 //! | elements that do not lock | `mixed` |
+//! | springs between the body and the ground | `springs` |
 //! | stresses, nodal forces and energy | `recovery` |
 //! | the error of stresses | `stress_difference` |
 //! | how stresses grow where materials meet at the surface | `wedges` |
@@ -21,6 +22,7 @@ mod material;
 mod mixed;
 mod recovery;
 mod shapes;
+mod springs;
 mod stress_difference;
 mod thermal;
 mod wedges;
@@ -34,6 +36,7 @@ pub use geometry::{ElementTables, Elements};
 pub use material::{COMPONENTS, Moduli, Section, inverse, isotropic, orthotropic, stress};
 pub use mixed::Mixed;
 pub use recovery::{Deformed, Recovered, recover};
+pub use springs::{Carriers, Springs, Stiffness};
 pub use stress_difference::StressDifference;
 pub use thermal::{Inner, Thermal};
 pub use wedges::{Growth, Side, Wedge, growth};

@@ -246,6 +246,7 @@ pub(super) fn recover_nodal_stresses<const FIELDS: usize>(
         mesh,
         section,
         tables,
+        ..
     } = elements;
     let mut sums = vec![[[0.0; FIELDS]; COMPONENTS]; mesh.nodes.len()];
     let mut count = vec![0u32; mesh.nodes.len()];

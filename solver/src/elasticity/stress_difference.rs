@@ -368,7 +368,7 @@ mod tests {
             let model = crate::prepare(&problem, None, &mut ()).unwrap().model;
             let (mesh, section, quadrature) = (&model.mesh, &model.section, model.quadrature);
             let tables = &ElementTables::new(mesh, section, quadrature);
-            let elements = tables.elements(mesh, section);
+            let elements = tables.elements(mesh, section, &model.springs);
             let field = |k: usize| -> Vec<[f64; 2]> {
                 let at = |n: usize, a: usize| ((n * (3 + a) + k) as f64).sin();
                 (0..mesh.nodes.len())

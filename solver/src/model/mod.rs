@@ -10,6 +10,7 @@
 //! | names of boundaries and groups | `boundaries` |
 //! | curves of boundaries | `curves` |
 //! | supports | `supports` |
+//! | springs between the body and the ground | `springs` |
 //! | loads | `loads` |
 //! | changes of temperature | `temperatures` |
 //! | forces at nodes of the first mesh | `nodes` |
@@ -47,6 +48,7 @@ mod nodes;
 mod numbers;
 mod path;
 mod sliding;
+mod springs;
 mod supports;
 mod temperatures;
 mod units;
@@ -66,7 +68,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use checks::Checks;
 use nodes::FirstSides;
 
-use crate::elasticity::{self, Inner, Loads, Section};
+use crate::elasticity::{self, Inner, Loads, Section, Springs};
 use crate::error::{AllChecks, Checked, Violation};
 use crate::mesh::{External, ExternalMesh, Mesh};
 use crate::problem::{Algorithm, Condition, History, Problem, SolverControls, Step};
@@ -88,6 +90,10 @@ pub struct Model {
     pub quadrature: u32,
     /// Prescribed displacements by node.
     pub fixed: BTreeMap<u32, Held>,
+    /// Springs between the body and the ground.
+    pub springs: Springs,
+    /// The nodes that springs hold, with the directions.
+    pub spring_holds: Vec<Hold>,
     /// External forces.
     pub loads: Loads,
     /// Contact boundaries with their obstacles.
@@ -191,15 +197,17 @@ impl Model {
         acting.any(|law| law.history == History::Incremental)
     }
 
-    /// A rigid motion that neither the supports nor the given holds prevent, in words, and a node
+    /// A rigid motion that neither supports, springs nor the given holds prevent, in words, and a node
     /// that moves.
     pub fn free_motion(&self, hindered: &[Hold]) -> Option<(String, u32)> {
-        freedom::motion_left(&self.mesh, &self.section, &self.fixed, hindered)
+        let hindered = [&self.spring_holds[..], hindered].concat();
+        freedom::motion_left(&self.mesh, &self.section, &self.fixed, &hindered)
     }
 
-    /// All rigid motions that neither the supports nor the given holds prevent, except those that bend hinges.
+    /// All rigid motions that neither supports, springs nor the given holds prevent, except those that bend hinges.
     pub fn free_motions(&self, hindered: &[Hold]) -> Vec<RigidMotion> {
-        freedom::free_motions(&self.mesh, &self.section, &self.fixed, hindered)
+        let hindered = [&self.spring_holds[..], hindered].concat();
+        freedom::free_motions(&self.mesh, &self.section, &self.fixed, &hindered)
     }
 }
 
@@ -266,6 +274,7 @@ impl Checks {
         let sides = FirstSides::new(&mesh, problem);
         let (fixed, supported) = self.supports(&mesh, &sides, &axis, &problem.supports);
         all.check(supported);
+        let springs::Held { springs, holds } = springs::springs(&mesh, &section, &problem.supports);
         let loads = self.loads(&mesh, &sides, &section, &problem.materials, &problem.loads);
         let loads = loads.map(|loads| match warmed {
             Some(warmed) => warmed.added_to(loads),
@@ -273,12 +282,12 @@ impl Checks {
         });
         let (contacts, sound) = self.contacts(&mesh, &section, &axis, problem, numbers, &fixed);
         all.check(sound);
-        let held_by_contact = self.freedom(&mesh, &section, &fixed, &contacts);
+        let held_by_contact = self.freedom(&mesh, &section, &fixed, &holds, &contacts);
         all.finish(())?;
         let (loads, held_by_contact) = (loads?, held_by_contact?);
         if held_by_contact {
             let nodal = elasticity::assemble_loads(&mesh, &section, problem.quadrature, &loads);
-            self.pressed(&mesh, &section, &fixed, &contacts, &nodal)?;
+            self.pressed(&mesh, &section, &fixed, &holds, &contacts, &nodal)?;
         }
         self.warn_about_contacts(&contacts);
         self.warn_of_dragged_symmetry(&mesh, &contacts, &fixed, &axis, &problem.steps);
@@ -296,6 +305,8 @@ impl Checks {
             alone,
             open_on_axis: BTreeSet::new(),
             fixed,
+            springs,
+            spring_holds: holds,
             loads,
             contacts,
             held_by_contact,

@@ -164,14 +164,17 @@ impl Checks {
             ("ut", support.ut),
         ];
         let named = fields.map(|(_, value)| value.is_some());
-        if named == [false; 4] {
+        if named == [false; 4] && support.stiffness.is_none() {
             all.fail(self.report(
                 pointer,
                 Reason::TooFew,
-                "neither `ux` nor `uy` nor `un` nor `ut`",
-                "at least one of `ux`, `uy`, `un` and `ut`",
-                "Prescribe a displacement, or remove the support.",
+                "neither `ux` nor `uy` nor `un` nor `ut`, and no `stiffness`",
+                "at least one of `ux`, `uy`, `un`, `ut` and `stiffness`",
+                "Prescribe a displacement or springs, or remove the support.",
             ));
+        }
+        if let Some(stiffness) = &support.stiffness {
+            all.check(self.stiffness(support, stiffness, &format!("{pointer}/stiffness")));
         }
         if (named[0] || named[1]) && (named[2] || named[3]) {
             return Err(self.report(

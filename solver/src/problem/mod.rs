@@ -25,7 +25,7 @@ pub use mesh::{
 pub use solver::{
     AccuracyMode, Algorithm, SolverControls, Spacing, Step, ThesisOptions, ThesisPressure,
 };
-pub use support::{BoundaryValue, Support};
+pub use support::{BoundaryValue, SpringStiffness, Support};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -15,7 +15,7 @@ pub enum BoundaryValue {
 }
 
 /// Prescribed displacements on a boundary or a set of nodes, along x and y or (on a boundary) along
-/// normal and tangent; other displacements stay free.
+/// normal and tangent, and springs; other displacements stay free.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Support {
@@ -38,4 +38,27 @@ pub struct Support {
     /// Displacement along t, the outward normal turned clockwise (length).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ut: Option<BoundaryValue>,
+    /// Springs between the body and the ground: an elastic foundation of a boundary, or springs at nodes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stiffness: Option<SpringStiffness>,
+}
+
+/// The stiffness of springs between the body and the ground: on a boundary per area (stress per length: the foundation
+/// pulls with the stress −c u), at a node of a set per node (force per length; in axisymmetry of the whole circle). Each
+/// is ≥ 0, and one is > 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SpringStiffness {
+    /// Along the outward normal of a boundary; 0 on a set of nodes.
+    #[serde(default)]
+    pub normal: f64,
+    /// Along a boundary; 0 on a set of nodes.
+    #[serde(default)]
+    pub tangential: f64,
+    /// Along x.
+    #[serde(default)]
+    pub x: f64,
+    /// Along y.
+    #[serde(default)]
+    pub y: f64,
 }

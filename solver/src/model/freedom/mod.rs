@@ -18,16 +18,18 @@ use crate::problem::Condition;
 use parts::{Free, MOST_HINGED, MOST_IN_MECHANISMS, Motion, Part, Parts, Unheld};
 
 impl Checks {
-    /// Checks that every part of the body is held against rigid motions, by supports or by contacts (if they touch).
-    /// Returns whether a contact is needed for that.
+    /// Checks that every part of the body is held against rigid motions, by supports, springs or contacts (if they
+    /// touch). Returns whether a contact is needed for that.
     pub(super) fn freedom(
         &mut self,
         mesh: &Mesh,
         section: &Section,
         fixed: &BTreeMap<u32, Held>,
+        springs: &[Hold],
         contacts: &[ContactModel],
     ) -> Checked<bool> {
         let mut held = directions(fixed);
+        held.extend(springs);
         let parts = Parts::new(mesh, section.axisymmetric());
         if parts.unheld(&held).is_empty() {
             return Ok(false);
@@ -47,11 +49,13 @@ impl Checks {
         mesh: &Mesh,
         section: &Section,
         fixed: &BTreeMap<u32, Held>,
+        springs: &[Hold],
         contacts: &[ContactModel],
         loads: &[[f64; 2]],
     ) -> Checked<()> {
         let bonded = |contact: &&ContactModel| contact.condition == Condition::Bonded;
-        let glued: Vec<Hold> = contacts.iter().filter(bonded).flat_map(hindered).collect();
+        let glued = contacts.iter().filter(bonded).flat_map(hindered);
+        let glued: Vec<Hold> = glued.chain(springs.iter().copied()).collect();
         for motion in free_motions(mesh, section, fixed, &glued) {
             let moves: BTreeMap<u32, [f64; 2]> = motion.moves.iter().copied().collect();
             if !held_on_one_side(&moves, contacts) || works(&moves, loads) {
