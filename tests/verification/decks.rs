@@ -1127,3 +1127,55 @@ fn an_orientation_turns_the_material() {
         "{found:?}"
     );
 }
+
+/// SPRING1 and *SPRING: springs between nodes and the ground, which add up where a node has several.
+#[test]
+fn springs_of_a_deck_are_those_of_its_nodes() {
+    let springs =
+        "*ELEMENT, TYPE=SPRING1, ELSET=S\n91, 5\n92, 13\n93, 13\n*SPRING, ELSET=S\n2,\n40.,\n";
+    let deck = |springs: &str| block(&format!("{HELD}{springs}"), "*CLOAD\n13, 1, 2.\n");
+    let found = problem(&deck(springs));
+    let stiffness: Vec<(&str, f64)> = found
+        .supports
+        .iter()
+        .filter_map(|s| Some((s.nodes.as_deref()?, s.stiffness?.y)))
+        .collect();
+    assert_eq!(
+        stiffness,
+        [
+            ("S (springs along y, line 37)", 40.0),
+            ("S (springs along y, line 37, 2 times)", 80.0)
+        ]
+    );
+    let solution = {
+        let external = files::external_mesh(&found, None);
+        solver::solve_on(&found, external, &mut crate::support::quiet).unwrap()
+    };
+    assert!(solution.summary.residuals.equilibrium < 1e-11);
+    for (from, to, got) in [
+        (
+            "*SPRING, ELSET=S\n2,\n40.,\n",
+            "",
+            "SPRING1 without *SPRING",
+        ),
+        ("2,\n40.", "3,\n40.", "`3,`: the direction of a spring"),
+        ("2,\n40.", "1, 2\n40.", "`1, 2`: the direction of a spring"),
+        ("40.,", "-40.,", "`-40.,` for a stiffness"),
+        ("40.,", "40.,,20.\n50.,,100.", "depends on temperature"),
+        ("40.,\n", "", "without its data lines"),
+        ("ELSET=S\n2", "ELSET=E\n2", "*SPRING of `E`"),
+        (
+            "ELSET=S\n2",
+            "ELSET=S, NONLINEAR\n2",
+            "*SPRING with NONLINEAR",
+        ),
+        (
+            "SPRING1, ELSET=S\n91, 5\n92, 13\n93, 13",
+            "SPRINGA, ELSET=S\n91, 5, 13",
+            "elements of type `SPRINGA`",
+        ),
+    ] {
+        let found = refused(&deck(&springs.replace(from, to)));
+        assert!(found.iter().any(|f| f.contains(got)), "{from}: {found:?}");
+    }
+}

@@ -6,7 +6,7 @@ use super::element::Shape;
 use super::part::Numbered;
 use super::written::{
     DECIMAL_POINT, Distributed, Elastic, Expansion, Force, LOAD_OF_MASS, MOST_CONSTANTS, MassLoad,
-    Name, On, Prescribed, Sides, Target, fields, number,
+    Name, On, Prescribed, Sides, Spring, Target, fields, number,
 };
 use solver::element::{Element, Family};
 use solver::error::Reason;
@@ -43,6 +43,7 @@ pub(super) enum Block {
     NodeSurface(Name),
     Elastic(Elastic),
     Density,
+    Spring(Spring),
     Orientation(Name),
     Amplitude(Name),
     Thickness,
@@ -119,6 +120,7 @@ impl Deck {
             Block::Surface(name) => self.side(name, line, text),
             Block::Elastic(elastic) => self.elastic_constants(elastic, line, text),
             Block::Density => self.density(line, text),
+            Block::Spring(spring) => self.spring_data(spring, line, text),
             Block::Orientation(name) => {
                 let values = self.numbers(line, text);
                 if let Some(known) = self.orientations.get_mut(name)
@@ -282,6 +284,7 @@ impl Deck {
                 }
             }
             Block::Instance(lines) => self.place(lines, line),
+            Block::Spring(spring) => self.end_spring(spring),
             _ => {}
         }
     }

@@ -13,8 +13,8 @@ use super::scope::{Kind, Scope};
 use super::supported::{UnknownKeyword, report_unknown};
 use super::warming::{Warming, give_temperatures};
 use super::written::{
-    Distributed, Force, Incomplete, Name, On, Prescribed, Section, Sides, Target, Temperature,
-    numbered, on_line,
+    Distributed, Force, Incomplete, Name, On, PlacedSpring, Prescribed, Section, Sides, Spring,
+    Target, Temperature, numbered, on_line,
 };
 use crate::source::Plane;
 use solver::error::{Findings, Reason, Violation};
@@ -44,6 +44,7 @@ pub(super) struct Built {
     pub(super) sections: Vec<Row<Section>>,
     pub(super) prescribed: Vec<Row<Prescribed>>,
     pub(super) pressures: Vec<Row<Distributed>>,
+    pub(super) springs: Vec<PlacedSpring>,
     pub(super) forces: Vec<Row<Force>>,
     pub(super) warming: Warming,
     /// Whether each node belongs to a plane element.
@@ -81,6 +82,7 @@ impl Deck {
         );
         let temperatures = std::mem::take(&mut merged.rows.temperatures);
         let warming = give_temperatures(&names, temperatures, &used, &mut merged.raw);
+        let springs = merged.placed_springs(&names, &sets, &used);
         let pressures = merged.surfaces(&names, &mut sets);
         merged.groups(&names, sets.elements, &tools.members);
         merged.raw.sets_span_boundaries = true;
@@ -103,6 +105,7 @@ impl Deck {
             prescribed,
             pressures,
             forces,
+            springs,
             warming,
             used,
             tools,
@@ -119,6 +122,7 @@ struct Rows {
     pressures: Vec<(usize, Distributed)>,
     forces: Vec<(usize, Force)>,
     temperatures: Vec<(usize, Temperature)>,
+    springs: Vec<(usize, Spring)>,
     held: Vec<(usize, Held)>,
     rigid_bodies: Vec<(usize, RigidBody)>,
     analytical: Vec<(usize, Name, Analytical)>,
@@ -135,6 +139,8 @@ struct Merged {
     unused_type: Option<(u64, String)>,
     unknown_keywords: Vec<UnknownKeyword>,
     rigid_lines: Vec<RigidLines>,
+    /// The line of the first elements SPRING1.
+    first_spring: Option<u64>,
     rows: Rows,
     incomplete: Incomplete,
     /// The number of members of sets and surfaces as they are written.
@@ -259,6 +265,9 @@ impl Merged {
             .extend(part.forces.into_iter().map(|row| (place, row)));
         rows.temperatures
             .extend(part.temperatures.into_iter().map(|row| (place, row)));
+        rows.springs
+            .extend(part.springs.into_iter().map(|row| (place, row)));
+        self.first_spring = self.first_spring.or(part.first_spring);
         rows.held
             .extend(part.held.into_iter().map(|row| (place, row)));
         rows.rigid_bodies
@@ -460,7 +469,7 @@ impl Merged {
         };
         let [a, b, c] = self.lines[place as usize];
         if c == NO_NODE {
-            return Some([a, b]);
+            return (b != NO_NODE).then_some([a, b]);
         }
         let far = |[p, q]: [u32; 2]| {
             let [p, q] = [p, q].map(|node| self.raw.nodes[node as usize]);
@@ -468,6 +477,64 @@ impl Merged {
         };
         let pairs = [[a, b], [a, c], [b, c]];
         pairs.into_iter().max_by(|p, q| far(*p).total_cmp(&far(*q)))
+    }
+
+    /// The springs at the nodes of their elements; elements SPRING1 without *SPRING are refused.
+    fn placed_springs(
+        &mut self,
+        names: &Names<'_>,
+        sets: &Sets,
+        used: &[bool],
+    ) -> Vec<PlacedSpring> {
+        let is_spring = |merged: &Merged, element: &u32| match merged.numbered[*element as usize] {
+            Numbered::Line(place) => merged.lines[place as usize][1] == NO_NODE,
+            _ => false,
+        };
+        let mut covered: BTreeSet<u32> = BTreeSet::new();
+        let mut found = Vec::new();
+        for (scope, spring) in std::mem::take(&mut self.rows.springs) {
+            let target = Target::Set(spring.elements.clone());
+            let meant = names.meant(Kind::Elements, scope, &target);
+            let elements = match &meant {
+                Some(Meant::Set(key)) => sets.elements.get(key).map_or(&[][..], |set| set),
+                _ => &[],
+            };
+            let nodes: Vec<u32> = elements.iter().flat_map(|e| self.nodes_of(*e)).collect();
+            let springs_only = elements.iter().all(|e| is_spring(self, e));
+            let sound = springs_only && nodes.iter().all(|node| used[*node as usize]);
+            if elements.is_empty() || !sound {
+                if !self.incomplete.names {
+                    self.doubts.add(on_line(
+                        spring.line,
+                        Reason::NotUnderstood,
+                        format!("*SPRING of `{:.60}`", spring.elements),
+                        "a set of elements SPRING1 at nodes of plane elements",
+                        "Springs between two nodes (SPRING2, SPRINGA) are not computed.",
+                    ));
+                }
+                continue;
+            }
+            covered.extend(elements);
+            let name = meant.map_or_else(String::new, |meant| names.of(&meant));
+            found.push(PlacedSpring {
+                spring,
+                name,
+                nodes,
+            });
+        }
+        let all = (0..self.numbered.len() as u32).filter(|e| is_spring(self, e));
+        if let Some(line) = self.first_spring
+            && all.into_iter().any(|e| !covered.contains(&e))
+        {
+            self.doubts.add(on_line(
+                line,
+                Reason::NotUnderstood,
+                "elements SPRING1 without *SPRING".to_owned(),
+                "*SPRING, ELSET=… for each of them",
+                "Give their stiffness, or remove them.",
+            ));
+        }
+        found
     }
 
     /// Multiplies each value of a row by the factor of the row's amplitude at the end of the step.

@@ -143,7 +143,7 @@ impl Source<'_> {
         }
         if friction || others.len() > 1 {
             for (k, (factor, other)) in factors.iter().zip(others).enumerate() {
-                let written = self.said.steps.get(k).and_then(|step| step.1);
+                let written = self.said.steps.get(k).and_then(|step| step.increments);
                 if let Some(more) = written.filter(|n| friction && *n > MOST_INCREMENTS) {
                     found.remarks.differs(format!(
                         "Step {} begins with {more:.0} increments, but is solved in {MOST_INCREMENTS:.0}. Divide it into several steps if more are needed.",
@@ -151,7 +151,7 @@ impl Source<'_> {
                     ));
                 }
                 found.steps.push(Step {
-                    name: Some(format!("Step-{}", k + 1)),
+                    name: Some(self.said.name_of(k)),
                     indentation: factor[0],
                     tangential_displacement: factor[1],
                     loads: if loaded[0] { other[0] } else { 1.0 },

@@ -15,25 +15,46 @@ pub(super) struct DeckContact {
     pub(super) interactions: BTreeMap<Name, Interaction>,
     /// The interaction that `*FRICTION` and `*SURFACE BEHAVIOR` belong to.
     pub(super) current: Option<Name>,
-    /// By step: the line of `*STEP`, and the number of increments that `*STATIC` begins with.
-    pub(super) steps: Vec<(u64, Option<f64>)>,
+    /// The steps in order.
+    pub(super) steps: Vec<DeckStep>,
     /// The line of the first `*STEP, PERTURBATION`.
     pub(super) perturbation: Option<u64>,
 }
 
+/// A step of a deck.
+#[derive(Clone)]
+pub(super) struct DeckStep {
+    /// The line of `*STEP`.
+    pub(super) line: u64,
+    /// The name of the step.
+    pub(super) name: Option<String>,
+    /// The number of increments that `*STATIC` begins with.
+    pub(super) increments: Option<f64>,
+}
+
 impl DeckContact {
+    /// The name of a step: that of the deck, if no other step has it, and otherwise one by its number from 1.
+    pub(super) fn name_of(&self, step: usize) -> String {
+        let own = self.steps.get(step).and_then(|step| step.name.as_deref());
+        let same = |other: &&DeckStep| other.name.as_deref() == own;
+        match own {
+            Some(own) if self.steps.iter().filter(same).count() == 1 => own.to_owned(),
+            _ => format!("Step-{}", step + 1),
+        }
+    }
+
     /// Records the number of increments that the current step begins with, from the first time increment of `*STATIC`
     /// and the length of the step's time.
     pub(super) fn note_increments(&mut self, initial: Option<f64>, period: Option<f64>) {
         let initial = initial.filter(|initial| *initial > 0.0);
         if let (Some(step), Some(initial)) = (self.steps.last_mut(), initial) {
-            step.1 = Some(period.unwrap_or(1.0) / initial);
+            step.increments = Some(period.unwrap_or(1.0) / initial);
         }
     }
 
     /// The step, from 0, that a line of the deck belongs to; a line before the first step belongs to the first step.
     pub(super) fn step_of(&self, line: u64) -> usize {
-        let begun = self.steps.partition_point(|step| step.0 < line);
+        let begun = self.steps.partition_point(|step| step.line < line);
         begun.saturating_sub(1)
     }
 }

@@ -40,7 +40,7 @@ impl Mechanics {
 pub(super) enum Shape {
     /// A triangle or quadrilateral with this number of nodes; a ninth is in the centre.
     Plane(Family, usize),
-    /// A line with 2 or 3 nodes, which may name a part of the boundary.
+    /// A line with 2 or 3 nodes, which may name a part of the boundary; with one node a spring to the ground.
     Line(usize),
     /// Another element, with its number of nodes if the name shows it.
     Other(Option<usize>),
@@ -63,8 +63,10 @@ const PLANE: [&str; 14] = [
     "DS", "S",
 ];
 
-/// The names of line types (trusses, beams, pipes, rigid and other lines), with their numbers of nodes.
-const LINES: [(&str, usize); 32] = [
+/// The names of line types (trusses, beams, pipes, rigid and other lines), with their numbers of nodes; and springs to the
+/// ground, which have one.
+const LINES: [(&str, usize); 33] = [
+    ("SPRING1", 1),
     ("T2D2", 2),
     ("T2D3", 3),
     ("T3D2", 2),

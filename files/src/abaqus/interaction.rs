@@ -2,8 +2,8 @@
 
 use super::block::{Block, named_components};
 use super::contact_parts::{
-    Adjust, Behavior, ContactBlock, DeckFriction, Held, Interaction, MadeOf, Pair, RigidBody,
-    WRITTEN_INSTEAD,
+    Adjust, Behavior, ContactBlock, DeckFriction, DeckStep, Held, Interaction, MadeOf, Pair,
+    RigidBody, WRITTEN_INSTEAD,
 };
 use super::deck::Deck;
 use super::keyword::Keyword;
@@ -13,13 +13,21 @@ use super::written::{DECIMAL_POINT, Name, Target, fields, number};
 /// The largest number of contact pairs, of rigid bodies, and of pieces of an analytical surface.
 const MOST: usize = 1000;
 
+/// The largest number of characters of the name of a step that are kept.
+const LONGEST_STEP: usize = 60;
+
 impl Deck {
     /// Begins the block of a keyword about contact; `None` for other keywords.
     pub(super) fn begin_contact(&mut self, keyword: &Keyword, line: u64) -> Option<Block> {
         let value = |name: &str| keyword.get(name).map(str::to_owned);
         let block = match &keyword.name[..] {
             "STEP" => {
-                self.contact.steps.push((line, None));
+                let name = value("NAME").map(|name| name.chars().take(LONGEST_STEP).collect());
+                self.contact.steps.push(DeckStep {
+                    line,
+                    name,
+                    increments: None,
+                });
                 return None;
             }
             "SURFACE" if value("TYPE").is_some_and(|t| t.eq_ignore_ascii_case("SEGMENTS")) => {

@@ -127,6 +127,7 @@ impl Deck {
                 })
             }
             "DENSITY" => Block::Density,
+            "SPRING" => self.spring_block(keyword, line),
             "TEMPERATURE" => self.temperature_block(keyword, line),
             "INITIAL CONDITIONS" => self.initial_conditions(keyword, line),
             "ORIENTATION" => self.orientation_block(keyword),
@@ -498,6 +499,9 @@ impl Deck {
                 }
             }
             None if kind.idle => {}
+            None if name == "SPRING1" => {
+                self.here.first_spring.get_or_insert(line);
+            }
             None if is_rigid => {
                 let next = self.here.numbered.len() as u32;
                 self.here.rigid_lines.push(RigidLines {

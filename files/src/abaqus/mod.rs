@@ -23,6 +23,7 @@
 //! | one mesh from all parts | `build` |
 //! | a deck as a problem | `problem` |
 //! | supports of a deck | `supports` |
+//! | springs between nodes and the ground | `spring` |
 //! | gravity, rotation and densities of a deck | `mass` |
 //! | temperatures of a deck, and the expansion of materials | `temperature` |
 //! | the changes of temperature at its nodes | `warming` |
@@ -47,6 +48,7 @@ mod read;
 mod replaced;
 mod rigid;
 mod scope;
+mod spring;
 mod steps;
 mod supported;
 mod supports;
@@ -85,9 +87,14 @@ pub(crate) fn read_for(
     let mut built = read::read(reader)?.build();
     let left_out = built.tools.warning();
     let supports = supports::supports(&built);
+    let springs = built.spring_supports(1.0);
     let elastic = (problem.is_some() && built.is_problem()).then(|| built.elastic());
     let mut raw = std::mem::take(&mut built.raw);
     raw.node_sets.extend(supports.sets);
+    for (support, nodes) in springs {
+        raw.node_sets
+            .extend(support.nodes.map(|name| (name, nodes)));
+    }
     let faults = std::mem::take(&mut built.faults);
     let read = faults.into_result(raw).and_then(mesh::build);
     let (mesh, mut warnings) = read.map_err(ReadError::Invalid)?;

@@ -7,7 +7,7 @@ use super::contact_parts::{Analytical, Held, RigidBody};
 use super::element::Typed;
 use super::supported::UnknownKeyword;
 use super::written::{
-    Distributed, Force, Incomplete, Name, Prescribed, Section, Set, Surface, Temperature,
+    Distributed, Force, Incomplete, Name, Prescribed, Section, Set, Spring, Surface, Temperature,
 };
 use crate::source::Labels;
 use solver::element::Element;
@@ -67,6 +67,9 @@ pub(super) struct Part {
     pub(super) pressures: Vec<Distributed>,
     pub(super) forces: Vec<Force>,
     pub(super) temperatures: Vec<Temperature>,
+    pub(super) springs: Vec<Spring>,
+    /// The line of the first elements SPRING1.
+    pub(super) first_spring: Option<u64>,
     pub(super) rigid_bodies: Vec<RigidBody>,
     pub(super) analytical: BTreeMap<Name, Analytical>,
     /// Every row of `*BOUNDARY`, with all its components.
@@ -114,7 +117,8 @@ impl Part {
         let sides: usize = self.surfaces.values().map(|s| s.sides.len()).sum();
         let names = self.node_sets.len() + self.element_sets.len() + self.surfaces.len();
         let pieces: usize = self.analytical.values().map(|s| 1 + s.pieces.len()).sum();
-        let loads = self.pressures.len() + self.forces.len() + self.temperatures.len();
+        let loads =
+            self.pressures.len() + self.forces.len() + self.temperatures.len() + self.springs.len();
         let rows = self.sections.len() + self.prescribed.len() + self.held.len() + loads;
         let rigid = self.rigid_bodies.len() + self.rigid_lines.len() + pieces;
         let mesh = self.nodes.len() + self.numbered.len() + members + sides + names;

@@ -120,6 +120,9 @@ impl Built {
                 "Name nodes of the mesh. A rigid tool is moved by its reference node (REF NODE of *RIGID BODY), or by the `indentation` of a contact in a problem as JSON.",
             );
         }
+        let mut held = supports.list;
+        let springs = built.spring_supports(thickness).into_iter();
+        held.extend(springs.map(|(support, _)| support));
         let mut loads = loads(built, &analysis, thickness);
         loads.extend(of_temperatures);
         ElasticPart {
@@ -129,7 +132,7 @@ impl Built {
             factors,
             thickness,
             materials,
-            supports: supports.list,
+            supports: held,
             loads,
         }
     }
@@ -250,7 +253,7 @@ impl Built {
             self.check_replaced();
             return self.factors(warms);
         }
-        if let Some((second, _)) = self.deck.contact.steps.get(1).copied() {
+        if let Some(second) = self.deck.contact.steps.get(1).map(|step| step.line) {
             self.doubt(
                 second,
                 format!("the second of {steps} steps"),

@@ -133,9 +133,9 @@ impl Built {
     pub(super) fn too_long(&self) -> Option<Violation> {
         let (steps, bodies) = (&self.deck.contact.steps, &self.tools.bodies);
         let beyond_most = steps.get(MOST_STEPS).filter(|_| !self.pairs.is_empty());
-        if let Some((line, _)) = beyond_most {
+        if let Some(step) = beyond_most {
             return Some(on_line(
-                *line,
+                step.line,
                 Reason::TooMany,
                 format!("{} steps", steps.len()),
                 &format!("at most {MOST_STEPS}"),
@@ -211,7 +211,7 @@ impl Built {
         ];
         let found = found.map(|(what, found)| {
             found.unwrap_or_else(|step| {
-                let line = self.deck.contact.steps.get(step).map_or(0, |step| step.0);
+                let line = self.deck.contact.steps.get(step).map_or(0, |step| step.line);
                 self.doubt(
                     line,
                     format!("a step whose {what} are in another proportion to each other than in the last step"),
@@ -227,7 +227,12 @@ impl Built {
         }
         let other = loads.iter().position(|factor| (factor - 1.0).abs() > SAME);
         if let Some(step) = other.filter(|_| warms) {
-            let line = self.deck.contact.steps.get(step).map_or(0, |step| step.0);
+            let line = self
+                .deck
+                .contact
+                .steps
+                .get(step)
+                .map_or(0, |step| step.line);
             self.doubt(
                 line,
                 "a step with other loads than the last one, in a deck whose temperatures change",

@@ -21,6 +21,7 @@ pub(super) const READ: &[&str] = &[
     "ELASTIC",
     "EXPANSION",
     "DENSITY",
+    "SPRING",
     "ORIENTATION",
     "SOLID SECTION",
     "AMPLITUDE",

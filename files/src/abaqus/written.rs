@@ -200,6 +200,29 @@ pub(super) struct Force {
     pub(super) amplitude: Option<Name>,
 }
 
+/// `*SPRING` with its data lines.
+#[derive(Clone, Debug)]
+pub(super) struct Spring {
+    pub(super) line: u64,
+    /// The set of the elements.
+    pub(super) elements: Name,
+    /// The direction: 1 (x) or 2 (y); none if it is another one, or not read.
+    pub(super) component: Option<u64>,
+    /// The stiffnesses (force per length), one for each temperature.
+    pub(super) stiffness: Vec<f64>,
+    /// The number of data lines so far.
+    pub(super) lines: usize,
+}
+
+/// The springs of one `*SPRING` at the nodes of the mesh.
+pub(super) struct PlacedSpring {
+    pub(super) spring: Spring,
+    /// The name of the set of elements in the mesh.
+    pub(super) name: String,
+    /// The nodes of its elements, each as often as elements have it.
+    pub(super) nodes: Vec<u32>,
+}
+
 /// A row of `*INITIAL CONDITIONS` or `*TEMPERATURE`: the temperature of nodes.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Temperature {

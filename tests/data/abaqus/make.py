@@ -1,5 +1,5 @@
 """Writes the decks of this folder: a quarter ring held at one end, pressed inside and pulled at the
-other, in every theory and family that CalculiX and we share; one that hangs and rotates; and one that is heated. CalculiX
+other, in every theory and family that CalculiX and we share; one that hangs and rotates; one that is heated; and one that rests on springs. CalculiX
 runs them as they are."""
 
 import math
@@ -9,9 +9,10 @@ HERE = pathlib.Path(__file__).parent
 ROUND, THICK = 6, 3  # elements along the quarter and across the wall
 
 
-def deck(name, kind, step, thickness=None, mass=(), heat=None):
+def deck(name, kind, step, thickness=None, mass=(), heat=None, springs=None):
     """step 2: midside nodes lie on the arcs; triangles are quadrilaterals cut in two. mass: rows of *DLOAD instead of the
-    other loads. heat: the temperature at a place, instead of them; 20 at first."""
+    other loads. heat: the temperature at a place, instead of them; 20 at first. springs: along x and y at each node of the end,
+    which is not moved then."""
     triangles, axisymmetric = kind[3] == "6", kind.startswith("CAX")
     number, nodes = {}, []
     for j in range(2 * THICK + 1):
@@ -62,13 +63,18 @@ def deck(name, kind, step, thickness=None, mass=(), heat=None):
     if heat:
         lines[-2:-2] = ["*EXPANSION, ZERO=20.", "1.2D-3"]
         lines += ["*INITIAL CONDITIONS, TYPE=TEMPERATURE", "NALL, 20."]
+    if springs:
+        lines += ["*ELEMENT, TYPE=SPRING1, ELSET=feet"] + [f"{9000 + k}, {n}" for k, n in enumerate(end)]
+        lines += ["*ELEMENT, TYPE=SPRING1, ELSET=sides"] + [f"{9500 + k}, {n}" for k, n in enumerate(end)]
+        for component, name_of, stiffness in ((2, "feet", springs[1]), (1, "sides", springs[0])):
+            lines += [f"*SPRING, ELSET={name_of}", f"{component},", f"{stiffness},"]
     lines += ["*BOUNDARY", "Fixed, 1, 2" if not axisymmetric else "fixed, 2, 2"]
     lines += ["*STEP", "*STATIC"]
     if heat:
         lines += ["*TEMPERATURE"] + [f"{label}, {heat(x, y):.9g}" for label, x, y in nodes]
     else:
         lines += ["*DLOAD", *(mass or ["INNER, P1, 5."])]
-    if mass or heat:
+    if mass or heat or springs:
         pass
     elif axisymmetric:
         lines += ["*BOUNDARY", "end, 2, 2, -.01"]
@@ -96,3 +102,6 @@ deck("heat-cpe8", "CPE8", 2, heat=warm)
 deck("heat-cpe8r", "CPE8R", 2, heat=warm)
 deck("heat-cps6", "CPS6", 2, thickness=0.25, heat=warm)
 deck("heat-cax8", "CAX8", 2, heat=warm)
+deck("spring-cpe8", "CPE8", 2, springs=(40.0, 90.0))
+deck("spring-cps8", "CPS8", 2, thickness=0.25, springs=(40.0, 90.0))
+deck("spring-cax8", "CAX8", 2, springs=(40.0, 900.0))
