@@ -1,6 +1,6 @@
 //! Errors where stick is so small, or alternates so often, that a mesh cannot show it.
 
-use serde_json::json;
+use serde_json::{Value, json};
 use solver::problem::{AccuracyMode, AdaptiveRefine, Elasticity, Problem, Refine};
 use solver::solution::{
     EstimatedQuantity, NodeState, QuantityName, Solution, Verdict, WarningCode,
@@ -138,6 +138,98 @@ fn what_slips_in_the_profile_slips_in_the_intervals() {
         assert!(
             !contact.stick.is_empty() && !contact.slip.is_empty(),
             "{coefficient}"
+        );
+    }
+}
+
+/// The values and stated errors of a kind of quantity.
+fn stated(problem: &Value, name: QuantityName) -> Vec<(f64, Option<f64>)> {
+    let summary = solve(&problem_of(&problem.to_string())).summary;
+    let all = summary.accuracy.unwrap().quantities.into_iter();
+    all.filter(|q| q.quantity == name)
+        .map(|q| (q.value, q.error))
+        .collect()
+}
+
+/// A roller on a block that is symmetric about x = 0.
+fn roller(refine: u32, indentation: f64, x: &[f64], y: &[f64], friction: &Value) -> Value {
+    json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grid": {"x": x, "y": y}, "refine": refine},
+        "materials": [{"youngs_modulus": 210_000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "left", "ux": 0}, {"boundary": "bottom", "ux": 0, "uy": 0}],
+        "contacts": [{"boundary": "top", "obstacle": {"kind": "circle", "radius": 10}, "indentation": indentation, "friction": friction}],
+    })
+}
+
+/// At small friction only a part beside the line of symmetry sticks, shorter than an edge: there σ_t jumps, and the pressure
+/// has a peak of its own, which a mesh four times as fine shows.
+#[test]
+fn a_part_that_sticks_within_an_edge_is_in_the_stated_errors() {
+    let fine: Vec<f64> = (0..=20).map(|k| 0.02 * f64::from(k)).collect();
+    let x = [&fine[..], &[0.46, 0.56, 0.75, 1.1, 1.8, 3.0, 5.0, 8.0]].concat();
+    let y = [
+        -8.0, -5.0, -3.0, -1.8, -1.1, -0.75, -0.5, -0.35, -0.24, -0.16, -0.1, -0.06, -0.03, 0.0,
+    ];
+    for (refine, indentation, coefficient) in
+        [(1, 0.00935, 0.05), (2, 0.0043, 0.056), (1, 0.0007, 0.1)]
+    {
+        let friction =
+            json!({"coefficient": coefficient, "nonlocal_radius": 0, "elastic_slip": 1e-6});
+        let at = |refine: u32, name: QuantityName| {
+            stated(&roller(refine, indentation, &x, &y, &friction), name)[0]
+        };
+        for name in [
+            QuantityName::PeakNormalStress,
+            QuantityName::PeakTangentialStress,
+            QuantityName::TangentialForce,
+        ] {
+            let ((value, error), (finer, _)) = (at(refine, name), at(refine + 2, name));
+            let (off, error) = ((value - finer).abs(), error.unwrap());
+            assert!(
+                off <= error,
+                "{coefficient} {name:?}: {value} ± {error}, finer {finer}"
+            );
+            assert!(
+                error <= 0.1 * value.abs(),
+                "{coefficient} {name:?}: {value} ± {error}"
+            );
+        }
+    }
+}
+
+/// The contact grows from node to node: without averaging σ_t at the integration points has a ripple where the body sticks, and
+/// its peak is not that of the curve. By a code for half-spaces, and with points at the nodes, it is 255.3.
+#[test]
+fn the_ripple_of_an_incremental_solution_is_in_the_error_of_its_peak() {
+    let x = [
+        0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.1, 0.11, 0.12, 0.14, 0.16,
+        0.2, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0,
+    ];
+    let y = [
+        -8.0, -4.0, -2.0, -1.0, -0.5, -0.25, -0.15, -0.1, -0.06, -0.03, 0.0,
+    ];
+    let solved = |radius: f64, increments: u32, name: QuantityName| {
+        let friction = json!({"coefficient": 0.3, "nonlocal_radius": radius, "elastic_slip": 2.5e-6, "history": "incremental"});
+        let mut problem = roller(2, 0.0025, &x, &y, &friction);
+        problem["steps"] = json!([{"increments": increments, "spacing": "contact_width"}]);
+        stated(&problem, name)
+    };
+    for increments in [32, 48] {
+        let (value, error) = solved(0.0, increments, QuantityName::PeakTangentialStress)[0];
+        assert!(
+            (value - 255.3).abs() <= error.unwrap(),
+            "{increments}: {value} ± {error:?}"
+        );
+    }
+    // friction may reach its bound at a node: that end has an error, too
+    for (radius, increments, end) in [(0.01, 64, 0.0690), (0.01, 128, 0.0690), (0.2, 32, 0.0506)] {
+        let ends = solved(radius, increments, QuantityName::StickEnd);
+        assert_eq!(ends.len(), 1, "{radius} {increments}: {ends:?}");
+        let (value, error) = (ends[0].0, ends[0].1.unwrap());
+        assert!(
+            (value - end).abs() <= error && error < 0.01,
+            "{radius} {increments}: {value} ± {error}"
         );
     }
 }

@@ -58,6 +58,8 @@ struct Parts {
     spacing: f64,
     /// The error because the law is evaluated at its points only, [`Quantity::between`].
     between: f64,
+    /// What the mesh does not resolve, [`Quantity::unresolved`].
+    unresolved: f64,
     /// The error due to the end of an obstacle inside an edge, which is left out, [`Quantity::truncation`].
     truncation: f64,
     /// The pressure of a shape of the obstacle that the nodes miss, [`Quantity::unseen`].
@@ -91,6 +93,7 @@ impl Parts {
             + ends * self.ends
             + spacing * self.spacing
             + between * self.between
+            + self.unresolved
             + truncation_factor(name) * self.truncation
             + value * self.value;
         // the shape of the obstacle between the nodes is in the other parts as far as the nodes see it; its mean, which moves
@@ -277,6 +280,7 @@ fn bounds(
             ends: quantity.value.abs() * end_spacing(quantity, quantities).powi(2),
             spacing: quantity.spacing,
             between: quantity.between,
+            unresolved: quantity.unresolved,
             truncation: quantity.truncation,
             unseen: quantity.unseen,
             value: quantity.value.abs(),
@@ -433,7 +437,10 @@ fn by_spacing(quantity: &Quantity, all: &[Quantity], parts: &Parts, added: &mut 
         .collect();
     added.spread(gap * parts.gap.abs() + ends * parts.ends, &at_ends);
     added.spread(spacing * parts.spacing, &quantity.spacing_at);
-    added.spread(between * parts.between, &quantity.between_at);
+    added.spread(
+        between * parts.between + parts.unresolved,
+        &quantity.between_at,
+    );
     added.spread(parts.unseen + parts.unseen_mean, &quantity.unseen_at);
 }
 

@@ -108,6 +108,15 @@ impl Section {
         (normal - moduli[0][1]) * (normal + moduli[0][1]) / normal
     }
 
+    /// The share β of a material in the coupling of normal and tangential stress on its surface: where σ_t jumps by q, the
+    /// pressure under a rigid obstacle changes by (β/π) q times the logarithm of the distance. (1 − 2ν)/(2(1 − ν)) in plane
+    /// strain, (1 − ν)/2 in plane stress (Johnson, Contact Mechanics, 2.22 with 2.23).
+    pub fn coupling(&self, material: usize) -> f64 {
+        let moduli = &self.moduli[material];
+        let normal = (moduli[0][0] * moduli[1][1]).sqrt();
+        0.5 * (1.0 - moduli[0][1] / normal)
+    }
+
     /// The two parts of the moduli of a material, if it is nearly incompressible.
     pub fn split(&self, material: usize) -> Option<&Split> {
         self.splits[material].as_ref()

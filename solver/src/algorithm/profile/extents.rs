@@ -137,17 +137,21 @@ impl PatchView<'_> {
 
     /// The modulus E* of the material at a node (stress).
     fn contact_modulus(&self, i: usize) -> f64 {
+        self.system.model.section.contact_modulus(self.material(i))
+    }
+
+    /// The material at a node.
+    pub(super) fn material(&self, i: usize) -> usize {
         let model = self.system.model;
         let node = self.patch.contact.boundary.nodes[i];
-        let material = match model.section.materials() {
+        match model.section.materials() {
             [_] => 0,
             _ => {
                 let mut elements = model.mesh.elements.iter();
                 let there = elements.position(|element| element.contains(&node));
                 there.map_or(0, |element| model.section.material_of(element))
             }
-        };
-        model.section.contact_modulus(material)
+        }
     }
 
     /// The error of the length in contact: of each end what [`PatchView::quantities`] takes for it as a place, so that it

@@ -31,6 +31,10 @@ pub struct Quantity {
     /// the friction by the law between the points. Beside a peak of the pressure: a jump of σ_t. At a peak of σ_t: the
     /// change of the bound τ.
     pub between: f64,
+    /// What the mesh does not resolve, in the unit of the value. Of a peak: the pressure where σ_t jumps beside it, and the
+    /// distance of a peak of σ_t from a smooth curve where the body sticks. Of an end of stick at a node, where friction just
+    /// reaches its bound: the distance to the next node. Else 0.
+    pub unresolved: f64,
     /// The error by truncation, if the obstacle ends inside an edge, which is left out: for extents the length that is
     /// left out, else the quantity times that length divided by the length of the contact.
     pub truncation: f64,
@@ -225,6 +229,7 @@ impl PatchView<'_> {
             factor: 1.0,
             spacing: 0.0,
             between: 0.0,
+            unresolved: 0.0,
             truncation: 0.0,
             displaced: 0.0,
             unseen: 0.0,
@@ -313,13 +318,14 @@ impl PatchView<'_> {
             }
             let jumps: Vec<(usize, f64)> = self
                 .neighbours(edge)
-                .map(|edge| (edge, self.jump_within(edge)))
+                .map(|edge| (edge, self.jump_within(edge).0))
                 .collect();
             found.push(Quantity {
                 spacing: self.off_smooth_pressure(value, edge, xi),
                 spacing_at: vec![(edge, 1.0)],
                 between: jumps.iter().fold(0.0, |most, (_, jump)| most.max(*jump)),
                 between_at: jumps,
+                unresolved: self.pressure_at_jumps(edge),
                 estimable: limited(!self.pressure_without_limit()),
                 ..self.quantity(QuantityName::PeakNormalStress, -value, Some(gradient))
             });
@@ -340,11 +346,16 @@ impl PatchView<'_> {
             } else if bound.is_finite() {
                 gradient.add_traction(system, state, pressures, bound, &point, 1.0);
             }
+            let ripple = match reached < WHOLE_BOUND {
+                true => self.off_smooth_traction(stress, point.s),
+                false => 0.0,
+            };
             found.push(Quantity {
                 spacing: stress.abs() * self.turn_around(edge, xi),
                 spacing_at: vec![(edge, 1.0)],
                 between: self.change_of_bound(edge, xi),
                 between_at: vec![(edge, 1.0)],
+                unresolved: self.bound_at_jumps(edge, xi) + ripple,
                 estimable: limited(!self.averages_nothing() || !self.pressure_without_limit()),
                 ..self.quantity(QuantityName::PeakTangentialStress, stress, Some(gradient))
             });
@@ -410,6 +421,45 @@ impl PatchView<'_> {
                 },
                 ..self.quantity(QuantityName::StickEnd, point.s, few.then_some(gradient))
             });
+        }
+        if few {
+            let at_nodes = self.stick_ends_at_nodes(&found);
+            found.extend(at_nodes);
+        }
+        found
+    }
+
+    /// The ends of stick that are no place where the slip passes ε: at a node the slip reaches ε, and stays there. `known`:
+    /// the other ends.
+    fn stick_ends_at_nodes(&self, known: &[Quantity]) -> Vec<Quantity> {
+        let s = &self.patch.contact.boundary.s;
+        let summary = self.summary();
+        let of_contact = |end: f64| summary.contact.iter().flatten().any(|other| *other == end);
+        let mut found = Vec::new();
+        for end in summary
+            .stick
+            .iter()
+            .flatten()
+            .filter(|end| !of_contact(**end))
+        {
+            let Some(node) = s.iter().position(|s| s == end) else {
+                continue;
+            };
+            let to_next = s.get(node + 1).map_or(0.0, |next| next - end);
+            let spacing = node
+                .checked_sub(1)
+                .map_or(to_next, |before| to_next.max(end - s[before]));
+            let near =
+                |q: &Quantity| q.name == QuantityName::StickEnd && (q.value - end).abs() <= spacing;
+            if !known.iter().any(near) {
+                let edge = (node / 2).min(self.patch.contact.boundary.edge_count() - 1);
+                found.push(Quantity {
+                    unresolved: spacing,
+                    spacing_at: vec![(edge, 1.0)],
+                    between_at: vec![(edge, 1.0)],
+                    ..self.quantity(QuantityName::StickEnd, *end, None)
+                });
+            }
         }
         found
     }

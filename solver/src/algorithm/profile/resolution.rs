@@ -25,6 +25,9 @@ const TURN_REACH: f64 = 0.75;
 /// The part of the change of friction from full slip to opposite slip that friction points resolve; calibrated.
 const FOLLOWED: f64 = 0.3;
 
+/// The largest number of friction points that stick in a row at a turn of the motion, and do not resolve it.
+const FEW_STICK: usize = 3;
+
 /// The error of the friction force at a kink, as a part of the friction force on the edges beside the kink; calibrated.
 const AT_KINKS: f64 = 0.2;
 
@@ -95,6 +98,25 @@ impl PatchView<'_> {
         found
     }
 
+    /// The distance of a peak σ_t = `stress` at s from the highest value of a smooth curve (stress): a cubic by least squares
+    /// through the [`AROUND`] nearest friction points. Where the body sticks, and the contact grows from node to node, σ_t
+    /// may have a ripple.
+    pub(super) fn off_smooth_traction(&self, stress: f64, s: f64) -> f64 {
+        let points = self.system.points.iter().zip(&self.finished.tractions);
+        let own = points.filter(|(point, _)| point.patch == self.p);
+        let mut near: Vec<[f64; 3]> = own
+            .map(|(point, traction)| [point.s - s, traction * stress.signum(), 1.0])
+            .collect();
+        near.sort_by(|a, b| a[0].abs().total_cmp(&b[0].abs()));
+        near.truncate(AROUND);
+        let reach = near.last().map_or(0.0, |point| point[0].abs());
+        if near.len() <= CUBIC || reach == 0.0 {
+            return 0.0;
+        }
+        near.iter_mut().for_each(|point| point[0] /= reach);
+        (stress.abs() - highest_of_cubic(&near)).abs()
+    }
+
     /// The part of the change of friction from full slip to opposite slip that happens around a place, without what the
     /// points there resolve: between them u_t is a parabola, and a peak of σ_t may be due to that parabola.
     pub(super) fn turn_around(&self, edge: usize, xi: f64) -> f64 {
@@ -125,13 +147,14 @@ impl PatchView<'_> {
     /// The jump of σ_t within a small part of an edge, times a logarithm (stress). Beside a jump the pressure grows
     /// like the logarithm of the distance, down to the length over which σ_t changes. Here the changes over the
     /// steepest half, the steepest quarter and so on are added, which gives the jump times the logarithm of the part of
-    /// the edge that it takes.
-    pub(super) fn jump_within(&self, edge: usize) -> f64 {
+    /// the edge that it takes. Also returns that sum without what a steady change has of it.
+    pub(super) fn jump_within(&self, edge: usize) -> (f64, f64) {
         let stress = |xi: f64| self.tangential_stress_at(edge, xi);
         let steepest = |quarter: u32| {
             let start = 0.5 * f64::from(quarter) - 1.0;
             let (mut low, mut high) = ((start, stress(start)), (start + 0.5, stress(start + 0.5)));
-            let mut sum = (high.1 - low.1).abs();
+            let first = (high.1 - low.1).abs();
+            let mut sum = first;
             for _ in 0..HALVINGS {
                 let place = 0.5 * (low.0 + high.0);
                 let middle = (place, stress(place));
@@ -142,9 +165,46 @@ impl PatchView<'_> {
                 }
                 sum += (high.1 - low.1).abs();
             }
-            sum
+            // of a steady change each half has a half
+            (sum, (sum - 2.0 * first).max(0.0))
         };
-        (0..4).map(steepest).fold(0.0, f64::max)
+        let larger = |a: (f64, f64), b: (f64, f64)| (a.0.max(b.0), a.1.max(b.1));
+        (0..4).map(steepest).fold((0.0, 0.0), larger)
+    }
+
+    /// The pressure that jumps of σ_t on an edge and its neighbours add at the jump, and the mesh does not resolve (stress):
+    /// (β/π) q ln 2 for each halving in which the jump q stays whole, twice that where it goes on beyond a line of symmetry.
+    pub(super) fn pressure_at_jumps(&self, edge: usize) -> f64 {
+        let last = self.patch.contact.boundary.edge_count() - 1;
+        let at = |edge: usize| {
+            let node = 2 * edge + 1;
+            let mirrored =
+                edge == 0 && self.symmetric(0) || edge == last && self.symmetric(2 * last + 2);
+            let whole = if mirrored { 2.0 } else { 1.0 };
+            let coupling = self.system.model.section.coupling(self.material(node));
+            whole * coupling * std::f64::consts::LN_2 / std::f64::consts::PI
+                * self.jump_within(edge).1
+        };
+        self.neighbours(edge).map(at).fold(0.0, f64::max)
+    }
+
+    /// What that pressure adds to the bound τ at a place of an edge, averaged over the nonlocal radius (stress).
+    pub(super) fn bound_at_jumps(&self, edge: usize, xi: f64) -> f64 {
+        let Some(BoundLaw::Pressure { average, .. }) =
+            self.patch.law.as_ref().map(|law| &law.bound)
+        else {
+            return 0.0;
+        };
+        let [start, end, _] = self.patch.contact.boundary.edge_arc(edge);
+        let seen = ((end - start) / average.radius()).min(1.0);
+        let arc = self.patch.contact.boundary.edge_arc(edge);
+        let s = edge3::interpolate(&edge3::shape(xi), &arc);
+        let (averaged, bound) = self.averaged_and_bound(s);
+        if averaged > 0.0 {
+            seen * self.pressure_at_jumps(edge) * bound / averaged
+        } else {
+            0.0
+        }
     }
 
     /// The larger change of τ over half an edge on either side of a place (stress): a peak of σ_t is at an end of stick
@@ -197,8 +257,9 @@ impl PatchView<'_> {
         beside.into_iter().map(open).collect()
     }
 
-    /// By edge, the friction on parts that stick where the motion turns, if no friction point is inside (force, without
-    /// 2π): the part lies between two friction points, or between a line of symmetry and the first point.
+    /// By edge, the friction on parts that stick where the motion turns, if few friction points are inside (force, without
+    /// 2π): the part lies between two friction points, or between a line of symmetry and the first point; or it ends
+    /// somewhere between one of few points that stick and the next one.
     fn unseen_stick(&self) -> Vec<(usize, f64)> {
         let Some(law) = &self.patch.law else {
             return Vec::new();
@@ -211,27 +272,48 @@ impl PatchView<'_> {
                 (point.s, *traction, slips)
             })
             .collect();
-        let last = self.count() - 1;
+        let last_node = self.count() - 1;
         let s = &self.patch.contact.boundary.s;
-        if let (true, Some(first)) = (self.symmetric(0), points.first().copied()) {
-            points.insert(0, (2.0 * s[0] - first.0, -first.1, first.2));
-        }
-        if let (true, Some(end)) = (self.symmetric(last), points.last().copied()) {
-            points.push((2.0 * s[last] - end.0, -end.1, end.2));
+        // beyond a line of symmetry: images of the points up to the first one that slips
+        let slips = |point: &(f64, f64, bool)| point.2;
+        for (node, backwards) in [(0, false), (last_node, true)] {
+            if !self.symmetric(node) {
+                continue;
+            }
+            if backwards {
+                points.reverse();
+            }
+            let first = points.iter().position(slips).unwrap_or(points.len());
+            let near = points
+                .iter()
+                .take(first + 1)
+                .filter(|point| point.0 != s[node]);
+            let images: Vec<_> = near.map(|p| (2.0 * s[node] - p.0, -p.1, p.2)).collect();
+            points.splice(0..0, images.into_iter().rev());
+            if backwards {
+                points.reverse();
+            }
         }
         let mut found = Vec::new();
-        for pair in points.windows(2) {
-            let [(from, a, slips), (to, b, slips_too)] = [pair[0], pair[1]];
-            if slips && slips_too && a * b < 0.0 {
-                let (from, to) = (from.max(s[0]), to.min(s[last]));
-                let edge = s
-                    .partition_point(|node| *node < to)
-                    .saturating_sub(1)
-                    .min(last - 1)
-                    / 2;
+        let slipping: Vec<usize> = (0..points.len()).filter(|i| points[*i].2).collect();
+        for pair in slipping.windows(2) {
+            let (first, last) = (points[pair[0]], points[pair[1]]);
+            let inside = pair[1] - pair[0] - 1;
+            if inside > FEW_STICK || first.1 * last.1 >= 0.0 {
+                continue;
+            }
+            let part = 0.5 / (inside + 1) as f64;
+            for steps in points[pair[0]..=pair[1]].windows(2) {
+                let [(from, a, _), (to, b, _)] = [steps[0], steps[1]];
+                let (from, to) = (from.max(s[0]), to.min(s[last_node]));
+                if to <= from {
+                    continue;
+                }
+                let after = s.partition_point(|node| *node < to).saturating_sub(1);
+                let edge = after.min(last_node - 1) / 2;
                 let length = s[2 * edge + 2] - s[2 * edge];
                 let weight = self.weight(edge) * (to - from) / length;
-                found.push((edge, 0.5 * (a - b).abs() * weight));
+                found.push((edge, part * (a - b).abs() * weight));
             }
         }
         found
