@@ -16,7 +16,7 @@ use super::{
     folder::{DATABASE, FILES, Folder, RESTORING, unusable},
     manifest::{Manifest, changed, copy_and_digest, read_manifest},
     migrations,
-    progress::{self, Progress},
+    progress::{self, LastCommit, Progress},
 };
 
 /// The beginning of the name of a folder with a store that a restore has replaced.
@@ -62,7 +62,12 @@ fn write_store(backup: &Path, data: &Path, replace: bool) -> Result<Restored> {
         None
     };
     if let Some(last) = last {
-        Progress::start(data, last).map_err(unusable)?;
+        // a job that ran while the backup was made has not lost its worker: as if the service had been stopped
+        let stopped = LastCommit {
+            stopped: true,
+            ..last
+        };
+        Progress::start(data, stopped).map_err(unusable)?;
     }
     // the last step: until then the service does not start on it
     fs::rename(&new, folder.database()).map_err(unusable)?;
