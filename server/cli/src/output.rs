@@ -290,7 +290,7 @@ fn part(format: Format, stem: &str, contacts: &[&str]) -> Result<Part, String> {
 fn one_of(contacts: &[&str], asked: Option<String>, ending: &str) -> Result<String, String> {
     let known = contacts.join(", ");
     match (asked, contacts) {
-        (_, []) => Err("the problem has no contact, and so no profile".into()),
+        (_, []) => Err("the problem has no contact, and so no profile; displacements and stresses are written as .vtu, .npz and .json".into()),
         (Some(name), _) if contacts.contains(&name.as_str()) => Ok(name),
         (Some(name), _) => Err(format!(
             "the problem has no contact boundary {name:?}; it has: {known}"

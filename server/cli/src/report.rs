@@ -4,9 +4,10 @@ use std::fmt::{Display, Write};
 
 use base::job::Job;
 use base::run::{Document, Summary};
+use files::stress::von_mises;
 use solver::solution::{
-    Accuracy, ContactProfile, ContactSummary, ErrorMethod, EstimatedQuantity, Iteration, NodeState,
-    Outcome, Peak, Phase, QuantityName, Refinement,
+    Accuracy, ContactProfile, ContactSummary, ErrorMethod, EstimatedQuantity, Fields, Iteration,
+    NodeState, Outcome, Peak, Phase, QuantityName, Refinement,
 };
 
 use super::table::harmless;
@@ -66,7 +67,48 @@ pub(super) fn lines(facts: impl Iterator<Item = (impl Display, String)>) -> Stri
 pub(super) fn document(title: Option<&str>, document: &Document) -> String {
     let steps = document.steps.iter();
     let steps = steps.map(|step| (step.name.as_str(), &step.summary));
-    result(title, &document.summary, steps)
+    let mut text = result(title, &document.summary, steps);
+    if document.summary.solution.contacts.is_empty() {
+        text += &lines(largest(&document.fields).into_iter());
+    }
+    text
+}
+
+/// Of a problem without contact: the largest displacement and the largest von Mises stress at a node, and where.
+fn largest(fields: &Fields) -> Vec<(&'static str, String)> {
+    let nodes = 0..fields.x.len();
+    let displacement = |i: usize| fields.ux[i].hypot(fields.uy[i]);
+    let stress = |i: usize| {
+        let [xx, yy] = [fields.stress_xx[i], fields.stress_yy[i]];
+        von_mises([xx, yy, fields.stress_xy[i], fields.stress_zz[i]])
+    };
+    let most = |value: &dyn Fn(usize) -> f64| {
+        let node = nodes
+            .clone()
+            .max_by(|a, b| value(*a).total_cmp(&value(*b)))?;
+        Some((node, value(node)))
+    };
+    let moved = most(&displacement).map(|(i, value)| {
+        let [ux, uy] = [fields.ux[i], fields.uy[i]].map(number);
+        format!(
+            "at most {} ({ux}, {uy}) at ({}, {})",
+            number(value),
+            fields.x[i],
+            fields.y[i]
+        )
+    });
+    let stressed = most(&stress).map(|(i, value)| {
+        format!(
+            "at most {} at ({}, {})",
+            number(value),
+            fields.x[i],
+            fields.y[i]
+        )
+    });
+    let both = [("displacement", moved), ("von Mises stress", stressed)];
+    both.into_iter()
+        .filter_map(|(name, text)| Some((name, text?)))
+        .collect()
 }
 
 /// Writes the forces and how reliable a result is, for readers of its files: verdict and warnings.
@@ -141,6 +183,8 @@ pub(super) fn result<'a>(
     }
     if let Some(accuracy) = &s.accuracy {
         lines.add_accuracy(accuracy);
+    } else if s.contacts.is_empty() {
+        lines.add("accuracy", "not stated: the problem has no contact. Compare with a finer mesh (mesh.refine): where stresses keep growing, as at clamped corners, notches and forces at nodes, they have no limit");
     }
     lines.add_end(s, summary.timings.values().sum());
     for mesh in &s.refinements {
@@ -259,11 +303,17 @@ impl Lines {
             ),
         );
         use QuantityName::{FrictionForce, NormalForce, TangentialForce};
-        for (words, value, name) in [
+        let forces = [
             ("normal force", s.normal_force, NormalForce),
             ("tangential force", s.tangential_force, TangentialForce),
             ("friction force", s.friction_force, FrictionForce),
-        ] {
+        ];
+        let shown = if s.contacts.is_empty() {
+            0
+        } else {
+            forces.len()
+        };
+        for (words, value, name) in forces.into_iter().take(shown) {
             let stated = stated(s.accuracy.as_ref(), name, None);
             self.add(words, number(value) + &stated);
         }
