@@ -136,6 +136,13 @@ class SweepTable(Table):
         if warned:
             words = counted(code for of_member in codes for code in of_member)
             lines.append(f"{warned} of {len(self)} members have warnings: {words}")
+        verdicts = self["verdict"] if "verdict" in self.columns else np.array([""])
+        known = np.flatnonzero(verdicts != "")
+        below = [f"{verdicts[i]} (member {self['number'][i]})" for i in known if verdicts[i] != "good"]
+        if below:
+            rest = "" if len(known) == len(self) else f"; the other {len(self) - len(known)} members have no verdict"
+            shown = ", ".join(below[:3]) + (", …" if len(below) > 3 else "")
+            lines.append(f"verdict {shown}{rest}")
         return lines
 
     def hinted_notes(self) -> list[str]:

@@ -87,7 +87,7 @@ class Client:
         binary: the program; absent: the environment variable SIGNORINI_BINARY, the program that was installed with this
             package, or `signorini` in PATH
         workers: how many jobs it solves at the same time
-        options: further options of `signorini serve`
+        options: further options of `signorini serve`, other than --listen, --data and --workers
         """
         server = LocalServer(data, binary=binary, workers=workers, options=options)
         client = cls(server.start(), token="", ca="")
