@@ -73,6 +73,7 @@ __all__ = [
     "Smoothing",
     "SolverControls",
     "Spacing",
+    "SpringStiffness",
     "Step",
     "Support",
     "Table",
@@ -1325,13 +1326,43 @@ class Step(Part):
 
 
 @dataclass(kw_only=True, repr=False)
+class SpringStiffness(Part):
+    """The stiffness of springs between the body and the ground: on a boundary per area (stress per length: the
+    foundation pulls with the stress −c u), at a node of a set per node (force per length; in axisymmetry of the
+    whole circle). Each is ≥ 0, and one is > 0.
+
+    normal: Along the outward normal of a boundary; 0 on a set of nodes.
+    tangential: Along a boundary; 0 on a set of nodes.
+    x: Along x.
+    y: Along y.
+    """
+
+    normal: float = 0.0
+    tangential: float = 0.0
+    x: float = 0.0
+    y: float = 0.0
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            normal: Real = ...,
+            tangential: Real = ...,
+            x: Real = ...,
+            y: Real = ...,
+        ) -> None: ...
+
+
+@dataclass(kw_only=True, repr=False)
 class Support(Part):
     """Prescribed displacements on a boundary or a set of nodes, along x and y or (on a boundary) along normal and
-    tangent; other displacements stay free.
+    tangent, and springs; other displacements stay free.
 
     boundary: Name of the boundary.
     nodes: Name of a set of nodes, instead of a boundary; a side is held where all its nodes are held, before the
         mesh is refined.
+    stiffness: Springs between the body and the ground: an elastic foundation of a boundary, or springs at nodes.
     un: Displacement along the outward normal (length).
     ut: Displacement along t, the outward normal turned clockwise (length).
     ux: Displacement along x (length).
@@ -1340,6 +1371,7 @@ class Support(Part):
 
     boundary: str | None = None
     nodes: str | None = None
+    stiffness: SpringStiffness | None = None
     un: BoundaryValue | None = None
     ut: BoundaryValue | None = None
     ux: BoundaryValue | None = None
@@ -1352,6 +1384,7 @@ class Support(Part):
             *,
             boundary: str | None = ...,
             nodes: str | None = ...,
+            stiffness: SpringStiffness | JSON | None = ...,
             un: BoundaryValue | None = ...,
             ut: BoundaryValue | None = ...,
             ux: BoundaryValue | None = ...,

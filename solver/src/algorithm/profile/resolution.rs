@@ -98,8 +98,8 @@ impl PatchView<'_> {
         found
     }
 
-    /// The distance of a peak σ_t = `stress` at s from the highest value of a smooth curve (stress): a cubic by least squares
-    /// through the [`AROUND`] nearest friction points. Where the body sticks, and the contact grows from node to node, σ_t
+    /// How far a peak σ_t = `stress` at s is above the highest value of a smooth curve (stress): a cubic by least squares
+    /// through the [`AROUND`] nearest friction points, and the values at the ends of stick. Where the body sticks, and the contact grows from node to node, σ_t
     /// may have a ripple.
     pub(super) fn off_smooth_traction(&self, stress: f64, s: f64) -> f64 {
         let points = self.system.points.iter().zip(&self.finished.tractions);
@@ -114,7 +114,11 @@ impl PatchView<'_> {
             return 0.0;
         }
         near.iter_mut().for_each(|point| point[0] /= reach);
-        (stress.abs() - highest_of_cubic(&near)).abs()
+        // where stick ends, σ_t is the bound, which has no ripple
+        let at_ends = self.turns().into_iter();
+        let at_ends = at_ends.map(|(edge, xi)| self.tangential_stress_at(edge, xi).abs());
+        let highest = at_ends.fold(highest_of_cubic(&near), f64::max);
+        (stress.abs() - highest).max(0.0)
     }
 
     /// The part of the change of friction from full slip to opposite slip that happens around a place, without what the
