@@ -1152,6 +1152,15 @@ fn springs_of_a_deck_are_those_of_its_nodes() {
         solver::solve_on(&found, external, &mut crate::support::quiet).unwrap()
     };
     assert!(solution.summary.residuals.equilibrium < 1e-11);
+    // of the whole ring, unlike in CalculiX
+    let ring = deck(springs).replace("CPE8", "CAX8");
+    let (_, warnings) = abaqus::problem_with_warnings(&ring).unwrap();
+    assert!(
+        warnings
+            .iter()
+            .any(|w| w.message.contains("sector of two degrees")),
+        "{warnings:?}"
+    );
     for (from, to, got) in [
         (
             "*SPRING, ELSET=S\n2,\n40.,\n",

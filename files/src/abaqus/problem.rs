@@ -171,6 +171,12 @@ impl Built {
                 "In plane strain, forces of the result are per unit of thickness: the forces of the deck, for a thickness of {thickness}, are {thickness} times as large."
             )));
         }
+        if !self.springs.is_empty() && matches!(elastic.analysis, Analysis::Axisymmetric {}) {
+            warnings.push(contact::differs(
+                "The stiffness of *SPRING is that of the whole ring, as in Abaqus. CalculiX takes it for that of a sector of two degrees: for the same result give 180 times as much here."
+                    .to_owned(),
+            ));
+        }
         let problem = Problem {
             title: self.deck.title.take(),
             analysis: elastic.analysis,
