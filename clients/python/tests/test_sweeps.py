@@ -119,6 +119,8 @@ def test_a_study_tells_what_to_look_at_and_is_drawn(client: sg.Client, capsys: p
     heights = np.asarray(drawn.lines[0].get_ydata())
     assert len(heights) == 8 and np.isnan(heights[6:].astype(float)).all()
     assert pair.notes()[0] == "2 of 8 members have no solution: not_converged 1, user_cancel 1"
+    pair.columns["verdict"] = np.array(["good", *[""] * 6, "fair"])
+    assert pair.notes()[-1] == f"verdict fair (member {pair['number'][7]}); the other 6 members have no verdict"
     listed = sg.SweepTable({**table.columns, "/b": np.arange(8) // 2 * 1.0, "/a": np.array([1.0, np.nan] * 4)})
     labels = listed.plot("normal_force").axes[0].get_legend_handles_labels()[1]
     assert labels[:2] == ["a = 1", "a = as in the problem"]
