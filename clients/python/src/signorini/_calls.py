@@ -99,8 +99,8 @@ class Submission:
     priority: −10 … 10; higher ones run first
     timeout_s: seconds that solving may take; queue_ttl_s: seconds that the job may wait before it
     cache: `use` (default) a result of the same problem, `refresh` it, or leave it `off`
-    key: two submissions with the same key are one job, also if the program runs again; made up if absent. Jobs of `submit_many`
-        have one key together, an argument of that
+    key: two submissions with the same key are one job, also if the program runs again; made up if absent.
+        Jobs of `submit_many` have one key together, an argument of that
     """
 
     problem: Problem | Mapping[str, Any]

@@ -74,7 +74,8 @@ class Model:
         title: for people; may be left out
     client: sends the jobs
 
-    Vectors have no place for a verdict: the first evaluation whose verdict is `poor` gives a Python warning with its reason.
+    Vectors have no place for a verdict: the first evaluation whose verdict is `poor` gives a Python warning with its
+    reason.
 
     Raises `InvalidProblem` with everything that is wrong. Its methods raise `ModelError`, where a job has no solution
     `JobFailed`, and whatever else a client raises.
@@ -210,8 +211,8 @@ class Model:
         if result.verdict == "poor" and not self._told:
             self._told = True
             why = next(iter(result.reasons), "see its result")
-            text = f"model {self.name}: the verdict on {job.id} is poor: {why} Later ones are not reported: see GET /v1/jobs"
-            warnings.warn(f"{text}?label.model={self.name}&verdict=poor", stacklevel=2)
+            later = f"Later ones are not reported: see GET /v1/jobs?label.model={self.name}&verdict=poor"
+            warnings.warn(f"model {self.name}: the verdict on {job.id} is poor: {why} {later}", stacklevel=2)
         outputs = [self._vector(n, result) for n in range(len(self._of.outputs))]
         summary = result.summary
         residuals = [float(summary["residuals"][name]) for name in ("kkt", "friction", "monolithic")]

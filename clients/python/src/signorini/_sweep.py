@@ -22,7 +22,15 @@ if TYPE_CHECKING:
 
 TABLE_S = 5.0
 """Seconds for which a table is asked for that is only told about."""
-SHOWN_COLUMNS = ("status", "verdict", "normal_force", "tangential_force", "stick_width", "peak_tangential_stress", "warnings")
+SHOWN_COLUMNS = (
+    "status",
+    "verdict",
+    "normal_force",
+    "tangential_force",
+    "stick_width",
+    "peak_tangential_stress",
+    "warnings",
+)
 """What it shows besides the parameters."""
 
 
