@@ -72,7 +72,9 @@ def test_an_evaluation_is_a_job(client: sg.Client, model: umbridge.Model) -> Non
 def test_a_poor_verdict_is_told_once(client: sg.Client) -> None:
     def model(layers: int) -> umbridge.Model:
         problem = sg.examples.cylinder(refine=0)
-        problem.mesh.grid.y = np.linspace(min(problem.mesh.grid.y), max(problem.mesh.grid.y), layers + 1).tolist()
+        grid = problem.mesh.grid
+        assert grid is not None
+        grid.y = np.linspace(min(grid.y), max(grid.y), layers + 1).tolist()
         outputs = [{"scalars": ["normal_force"]}]
         return umbridge.Model("layers", {"problem": problem, "inputs": [[DEPTH]], "outputs": outputs}, client)
 
