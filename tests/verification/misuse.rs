@@ -671,7 +671,8 @@ fn a_half_model_without_its_line_of_symmetry_is_told() {
             "mesh": {"grid": {"x": x, "y": [-4, -2, -1, -0.5, -0.2, -0.1, 0]}},
             "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
             "supports": supports,
-            "contacts": [{"boundary": "top", "obstacle": obstacle, "indentation": 0.01}],
+            "contacts": [{"boundary": "top", "obstacle": obstacle, "indentation": 0.01,
+                "friction": {"coefficient": 0.3, "nonlocal_radius": 0.05, "elastic_slip": 1e-5}}],
         });
         let summary = solve(&problem(&text.to_string())).summary;
         let verdict = summary.accuracy.unwrap().verdict;
