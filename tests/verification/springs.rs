@@ -150,7 +150,7 @@ fn a_turned_column_sinks_as_far() {
         let fields = &solution.fields;
         let ends = lattice.edges(3, |k| (k, 0));
         let mut sunk = 0.0;
-        for node in ends.iter().map(|edge| edge[2] as usize) {
+        for node in ends.iter().map(|edge| edge[2]) {
             sunk += (-sin * fields.ux[node] + cos * fields.uy[node]) / 3.0;
         }
         // held along the bottom, the column bulges above: the mean is that of equilibrium
