@@ -189,7 +189,8 @@ impl PatchView<'_> {
             whole * coupling * std::f64::consts::LN_2 / std::f64::consts::PI
                 * self.jump_within(edge).1
         };
-        self.neighbours(edge).map(at).fold(0.0, f64::max)
+        // where the motion turns at a node, each of the two edges there has half of the jump
+        self.neighbours(edge).map(at).sum()
     }
 
     /// What that pressure adds to the bound τ at a place of an edge, averaged over the nonlocal radius (stress).
