@@ -32,7 +32,7 @@ pub struct Quantity {
     /// change of the bound τ.
     pub between: f64,
     /// What the mesh does not resolve, in the unit of the value. Of a peak: the pressure where σ_t jumps beside it, and the
-    /// distance of a peak of σ_t from a smooth curve where the body sticks. Of an end of stick at a node, where friction just
+    /// height of a peak of σ_t above a smooth curve where the body sticks. Of an end of stick at a node, where friction just
     /// reaches its bound: the distance to the next node. Else 0.
     pub unresolved: f64,
     /// The error by truncation, if the obstacle ends inside an edge, which is left out: for extents the length that is
@@ -90,8 +90,9 @@ pub(super) struct EndOfContact {
 /// of the ends depend on the mesh.
 const MOST_STICK_ENDS: usize = 8;
 
-/// The part of its bound above which friction counts as having reached it: the peak of σ_t is known to less.
+/// The part of its bound above which friction counts as having reached it: no peak of σ_t is known as exactly as that.
 const WHOLE_BOUND: f64 = 1.0 - 1e-6;
+
 /// The change of slip along an edge, as a part of ε, up to which the slip is constant apart from rounding: if it equals
 /// ε, there is no end of stick. The incremental law leads to such slip where the load rests.
 const STEADY: f64 = 1e-6;

@@ -99,8 +99,8 @@ impl PatchView<'_> {
     }
 
     /// How far a peak σ_t = `stress` at s is above the highest value of a smooth curve (stress): a cubic by least squares
-    /// through the [`AROUND`] nearest friction points, and the values at the ends of stick. Where the body sticks, and the contact grows from node to node, σ_t
-    /// may have a ripple.
+    /// through the [`AROUND`] nearest friction points, and the values at the ends of stick. Where the body sticks, and the
+    /// contact grows from node to node, σ_t may have a ripple.
     pub(super) fn off_smooth_traction(&self, stress: f64, s: f64) -> f64 {
         let points = self.system.points.iter().zip(&self.finished.tractions);
         let own = points.filter(|(point, _)| point.patch == self.p);
@@ -200,9 +200,8 @@ impl PatchView<'_> {
         else {
             return 0.0;
         };
-        let [start, end, _] = self.patch.contact.boundary.edge_arc(edge);
-        let seen = ((end - start) / average.radius()).min(1.0);
         let arc = self.patch.contact.boundary.edge_arc(edge);
+        let seen = ((arc[1] - arc[0]) / average.radius()).min(1.0);
         let s = edge3::interpolate(&edge3::shape(xi), &arc);
         let (averaged, bound) = self.averaged_and_bound(s);
         if averaged > 0.0 {
