@@ -433,6 +433,7 @@ async fn stored_bytes_of_an_owner_are_reported_and_limited_and_fields_can_be_del
         if status == StatusCode::TOO_MANY_REQUESTS {
             assert_eq!(answer["quota"]["of"], "stored_bytes", "{answer}");
             assert_eq!(answer["quota"]["limit"], 300000);
+            assert_eq!(answer["retryable"], false, "waiting deletes nothing");
             break;
         }
         ended(&server, "ada", &answer["jobs"][0]).await;

@@ -305,8 +305,8 @@ pub enum QuotaOf {
 }
 
 impl Quota {
-    /// Seconds after which the same request may succeed; `None` if the request exceeds the limit by itself, or would
-    /// store bytes.
+    /// Seconds after which the same request may succeed; `None` if the request exceeds the limit by itself, or the owner
+    /// has to delete something first.
     fn retry_after_s(&self, code: Code) -> Option<u64> {
         match self.of {
             _ if self.asked > self.limit => None,
@@ -314,8 +314,8 @@ impl Quota {
                 let missing = (self.used + self.asked).saturating_sub(self.limit);
                 Some((60 * missing).div_ceil(self.limit.max(1)).max(1))
             }
-            QuotaOf::StoredBytes if self.asked > 0 => None, // it would be sent as a whole again
-            QuotaOf::Queued | QuotaOf::StoredBytes => code.kind().retry_after_s,
+            QuotaOf::StoredBytes => None,
+            QuotaOf::Queued => code.kind().retry_after_s,
         }
     }
 }

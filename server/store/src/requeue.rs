@@ -7,7 +7,7 @@ use base::{
     job::{Job, Reason, Status},
 };
 use rusqlite::{Connection, params};
-use tracing::info;
+use tracing::{info, warn};
 
 use super::{
     change::Change,
@@ -103,7 +103,11 @@ fn requeue_interrupted(writer: &Writer<'_>) -> Result<usize> {
     }
     change.commit()?;
     for Job { id, attempt, .. } in &interrupted {
-        info!(job.id = %id, attempt, "job {id} was interrupted when the service last ended");
+        if writer.store.was_stopped {
+            info!(job.id = %id, attempt, "job {id} was interrupted when the service last ended");
+        } else {
+            warn!(job.id = %id, attempt, "job {id} was interrupted: the service died while it was solved");
+        }
     }
     Ok(interrupted.len())
 }

@@ -185,7 +185,7 @@ impl Supervisor for Worker {
 
 /// Requeues a job whose process died, or ends it if that was its last attempt; retried until it succeeds or is useless.
 async fn requeue_with_retries(queue: &Queue, job: &Job, how: &str) {
-    warn!(job.id = %job.id, job.attempt, "the process that solved job {} died: {how}", job.id);
+    warn!(job.id = %job.id, job.attempt, "the process that solved {} died: {how}", job.id);
     let mut backoff = Backoff::default();
     loop {
         match queue.store.requeue_lost(job.key, job.attempt, how).await {

@@ -172,10 +172,23 @@ pub(super) fn time_violation(run_s: Option<f64>, limits: &Limits) -> Option<Viol
             "/limits/timeout_s",
             Reason::OutOfRange,
             format!("{} s", limits.timeout_s),
-            format!("at least {:.0} s: the job is estimated to take {run_s:.0} s", run_s / MOST_OVER),
+            format!(
+                "at least {} s: the job is estimated to take {} s",
+                rounded_up(run_s / MOST_OVER),
+                rounded_up(run_s)
+            ),
             "Raise this limit to the estimated time, or use a coarser mesh, less refinement or fewer increments.",
         )
     })
+}
+
+/// A positive number as a decimal, rounded up to two significant digits or to an integer: who gives a limit as printed is not
+/// refused again.
+fn rounded_up(number: f64) -> String {
+    let magnitude = number.log10().floor().clamp(-9.0, 1.0);
+    let decimals = (1.0 - magnitude) as usize;
+    let scale = 10_f64.powi(decimals as i32);
+    format!("{:.decimals$}", (number * scale).ceil() / scale)
 }
 
 /// Checks a job in depth, on the stored mesh that its problem refers to, if it does.

@@ -156,7 +156,11 @@ pub fn create<'a>(
                 .await?;
             let Checked { definition, groups } = checked;
             let most = groups.iter().flatten().map(Vec::len).max();
-            let of_base = limits.unwrap_or_else(|| limits_for(most.unwrap_or_default()));
+            let of_base = limits_within(
+                limits,
+                most.unwrap_or_default(),
+                service.config.max_timeout_s,
+            );
             let memory_bytes =
                 admit_base(&service, &caller, &definition.base, of_base, &mut found).await?;
             let groups = groups.map_err(|more| found.extend(more)).ok();
@@ -171,6 +175,18 @@ pub fn create<'a>(
             of_jobs(&service, &caller, &jobs, replayed).await
         })
         .await
+    })
+}
+
+/// The time limits of a job that solves this many members: those that the client has stated, or the usual ones, of which the time to
+/// run is cut to the administrator's limit. Only a stated limit is refused.
+fn limits_within(stated: Option<Limits>, members: usize, max_timeout_s: u32) -> Limits {
+    stated.unwrap_or_else(|| {
+        let usual = limits_for(members);
+        Limits {
+            timeout_s: usual.timeout_s.min(f64::from(max_timeout_s)),
+            ..usual
+        }
     })
 }
 
@@ -225,7 +241,7 @@ async fn admitted(
             .map(|info| info.size()),
         None => None,
     };
-    let budget_bytes = service.memory_budget_bytes;
+    let (budget_bytes, max_timeout_s) = (service.memory_budget_bytes, service.config.max_timeout_s);
     let Envelope {
         name,
         labels,
@@ -251,7 +267,7 @@ None
                 found.add(too_large_at(plan.origin(*first), &estimate, budget_bytes));
                 continue;
             }
-            let of_group = limits.unwrap_or_else(|| limits_for(group.len()));
+            let of_group = limits_within(limits, group.len(), max_timeout_s);
             let run_s = estimate.and_then(|estimate| expected_run_s(&problem, estimate.run_s));
             if let Some(violation) = time_violation(run_s, &of_group) {
                 found.add(violation);

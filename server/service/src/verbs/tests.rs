@@ -5,13 +5,14 @@ use std::{path::Path, sync::Arc};
 
 use base::{
     caller::{Caller, Scope},
-    job::{Cache, Job, JobId, Status},
+    job::{Cache, Job, JobId, Limits, Status},
     sweep::Sweep,
 };
 use futures_util::StreamExt;
 use store::{Edit, Filter, GroupBy, Store};
 
 use super::{
+    admission::time_violation,
     bulk,
     envelope::{Envelope, JobRequest},
     fields, history, jobs,
@@ -293,6 +294,26 @@ async fn a_sweep_of_another_owner_does_not_exist() {
         Err(ApiError::SweepDeleted(_))
     ));
     unknown("get", sweeps::get(service, bob, id).await);
+}
+
+/// The limit that a refusal asks for has enough digits, and is enough.
+#[test]
+fn a_refused_time_limit_is_told_which_one_suffices() {
+    for (run_s, timeout_s, least, run) in [
+        (4.0, 0.3, "0.40", "4.0"),
+        (3.641, 0.3, "0.37", "3.7"),
+        (0.3641, 0.02, "0.037", "0.37"),
+        (12_345.6, 600.0, "1235", "12346"),
+    ] {
+        let limits = |timeout_s| Limits {
+            timeout_s,
+            ..Limits::default()
+        };
+        let violation = time_violation(Some(run_s), &limits(timeout_s)).unwrap();
+        let expected = format!("at least {least} s: the job is estimated to take {run} s");
+        assert_eq!(violation.expected, expected);
+        assert!(time_violation(Some(run_s), &limits(least.parse().unwrap())).is_none());
+    }
 }
 
 /// A sweep may be watched from any event on, since clients choose the number.
