@@ -492,7 +492,7 @@ async fn every_end_has_its_exit_code() {
     let sheet = problem(folder.path(), "sheet");
     let full: Vec<&str> = ["submit", "--cache", "off", "-q"]
         .into_iter()
-        .chain([&*sheet; 3])
+        .chain([&*sheet; 4])
         .collect();
     let (accepted, told) = ends(url, &full, 8).await;
     assert_eq!(
@@ -500,7 +500,11 @@ async fn every_end_has_its_exit_code() {
         2,
         "those that were accepted are printed"
     );
-    assert!(told.contains("queue-full"), "{told}");
+    let named = format!("stopped at {sheet}; not submitted: {sheet}\n");
+    assert!(
+        told.contains("queue-full") && told.contains(&named),
+        "{told}"
+    );
 }
 
 #[tokio::test]

@@ -123,6 +123,16 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         match service.submit(path, Some(submitted.body()?), &key).await {
             Ok(document) => documents.push(document),
             Err(error) => {
+                if let [first, rest @ ..] = &files[documents.len()..]
+                    && files.len() > 1
+                {
+                    let mut told = format!("signorini: stopped at {}", first.display());
+                    if !rest.is_empty() {
+                        let rest = rest.iter().map(|file| file.display().to_string());
+                        told += &format!("; not submitted: {}", rest.collect::<Vec<_>>().join(" "));
+                    }
+                    eprintln!("{told}");
+                }
                 if !documents.is_empty() {
                     // what was accepted is not lost, whatever became of the rest
                     shown.print(&Found::Many(documents))?;
