@@ -28,6 +28,8 @@ def test_a_number_is_shown_as_its_error_allows() -> None:
         (1.5e-9, 2e-11): "1.5e-09 ± 2.0e-11",
         (1.5e9, 2e5): "1.5e+09 ± 2.0e+05",
         (0.5, 0.0): "0.5 ± 0",
+        (-0.0, 0.0): "0 ± 0",
+        (-0.001, 0.5): "0.0 ± 0.5",
         (-186868.8287, None): "-1.8687e+05 (error unknown)",
     }
     for (value, error), text in shown.items():

@@ -55,17 +55,18 @@ class Number(float):
         return None if self.error is None or not self else abs(self.error / float(self))
 
     def __str__(self) -> str:
+        value = float(self) + 0.0  # of −0 it makes 0
         if self.error is None:
             why = {"no_limit": "no limit", "": "error unknown"}.get(self.why, self.why.replace("_", " "))
-            return f"{float(self):.5g} ({why})"
+            return f"{value:.5g} ({why})"
         if self.error == 0 or not math.isfinite(self.error):
-            return f"{float(self):.6g} ± {self.error:g}"
+            return f"{value:.6g} ± {self.error:g}"
         # as many decimals as the error has up to its second digit, one where it begins with 3 or more
         digits = 1 - math.floor(math.log10(self.error)) - (self.error / 10 ** math.floor(math.log10(self.error)) >= 3)
-        if -6 < digits < 12 and abs(float(self)) < 1e7:
+        if -6 < digits < 12 and abs(value) < 1e7:
             decimals = max(digits, 0)
-            return f"{float(self):.{decimals}f} ± {self.error:.{decimals}f}"
-        return f"{float(self):.6g} ± {self.error:.1e}"
+            return f"{round(value, decimals) + 0.0:.{decimals}f} ± {self.error:.{decimals}f}"
+        return f"{value:.6g} ± {self.error:.1e}"
 
     __repr__ = __str__
 
@@ -73,7 +74,7 @@ class Number(float):
         if not spec:
             return str(self)
         error = "?" if self.error is None else format(self.error, spec)
-        return f"{format(float(self), spec)} ± {error}"
+        return f"{format(float(self) + 0.0, spec)} ± {error}"
 
 
 @dataclass(frozen=True)
