@@ -845,6 +845,10 @@ fn line(points: &[Point]) -> Obstacle {
 /// An obstacle through points, and a message that tells its distance from the curves of the deck; no message if that is
 /// 0.
 fn polyline(points: Vec<Point>, joined: Joined) -> (Obstacle, Option<String>) {
+    let nearer = match joined {
+        Joined::Spline(_) => " (that is the distance of straight lines; the spline is nearer)",
+        _ => "",
+    };
     let (interpolation, off) = match joined {
         Joined::Lines => (Interpolation::Linear, 0.0),
         Joined::Polygon(off) => (Interpolation::Linear, off),
@@ -856,7 +860,7 @@ fn polyline(points: Vec<Point>, joined: Joined) -> (Obstacle, Option<String>) {
         Interpolation::Cubic => "a spline",
     };
     let message = (off > 0.0).then(|| {
-        format!("the curves of the rigid surface are replaced by {how} through {} of their points, within {off:.1e}.", points.len())
+        format!("the curves of the rigid surface are replaced by {how} through {} of their points, within {off:.1e}{nearer}.", points.len())
     });
     let obstacle = Obstacle::Polyline {
         points,
