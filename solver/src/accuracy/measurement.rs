@@ -6,8 +6,8 @@ use super::halved::{OnOtherMesh, of_kind};
 use super::verdict::{Finding, by_error, relative, scale};
 use crate::solution::{Accuracy, ErrorMethod, EstimatedQuantity, QuantityName, Verdict};
 
-/// The factor on the scatter of ten pairs within which the truth lies in 95 of 100 cases: Student's t.
-const STUDENT: f64 = 2.23;
+/// The factor on the scatter of twelve pairs within which the truth lies in 95 of 100 cases: Student's t.
+const STUDENT: f64 = 2.18;
 
 /// The factor on the shift of the samples. Smoothing keeps a part k of a feature, so that the solution is off by 1 − k of it;
 /// the samples start from what is left, and shift by k (1 − k). What is kept by less than a half is lost in the noise.

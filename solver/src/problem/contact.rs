@@ -208,7 +208,7 @@ impl Interpolation {
 
 /// How far the points of a measured profile may be from the curve. Among all curves with
 /// Σ((gap − curve)/standard_deviation)² ≤ number of points, the one whose curvature changes least is taken. What the
-/// deviation leaves open of forces, peaks and extents is part of their stated errors: the problem is solved for twenty
+/// deviation leaves open of forces, peaks and extents is part of their stated errors: the problem is solved for 24
 /// more profiles that could have been measured.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -219,7 +219,7 @@ pub struct Smoothing {
 
 impl Smoothing {
     /// The number of profiles for which the problem is solved once more, to find what the deviation leaves open.
-    pub const SAMPLES: u32 = 20;
+    pub const SAMPLES: u32 = 24;
 }
 
 /// The coordinate c along a contact boundary.

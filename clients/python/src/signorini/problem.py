@@ -764,7 +764,7 @@ class Smoothing(Part):
     """How far the points of a measured profile may be from the curve. Among all curves with Σ((gap −
     curve)/standard_deviation)² ≤ number of points, the one whose curvature changes least is taken. What the
     deviation leaves open of forces, peaks and extents is part of their stated errors: the problem is solved for
-    twenty more profiles that could have been measured.
+    24 more profiles that could have been measured.
 
     standard_deviation: Standard deviation of the error of one point, > 0 (length).
     """
