@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 use solver::error::Reason;
 use solver::model::Model;
-use solver::solution::{ErrorMethod, QuantityName, Solution, WarningCode};
+use solver::solution::{ErrorMethod, QuantityName, Solution, Verdict, WarningCode};
 
 use crate::smooth::Sector;
 use crate::support::{close, problem, solve};
@@ -50,7 +50,14 @@ fn peak(solution: &Solution) -> (f64, ErrorMethod) {
 fn kinks(solution: &Solution) -> Vec<&str> {
     let warnings = solution.summary.warnings.iter();
     warnings
-        .filter(|w| [WarningCode::KinkInContact, WarningCode::PolygonInContact].contains(&w.code))
+        .filter(|w| {
+            [
+                WarningCode::KinkInContact,
+                WarningCode::PolygonInContact,
+                WarningCode::PolygonTooCoarse,
+            ]
+            .contains(&w.code)
+        })
         .map(|w| &w.message[..])
         .collect()
 }
@@ -66,7 +73,7 @@ fn the_peak_of_a_body_of_straight_facets_has_no_limit() {
         assert_eq!(method, ErrorMethod::NoLimit);
         let told = kinks(&solution);
         assert!(
-            told.len() == 1 && told[0].contains("its surface turns by 2.00°"),
+            told.len() == 1 && told[0].contains("turns by up to 2.00°"),
             "{told:?}"
         );
         if let Some(before) = before {
@@ -74,6 +81,94 @@ fn the_peak_of_a_body_of_straight_facets_has_no_limit() {
             assert!((3.0..6.5).contains(&growth), "{growth}");
         }
         before = Some(value);
+    }
+}
+
+/// A quarter of a ring, 20 to 40, on a pin of 20.02: in straight sides, or on its circle.
+fn ring(around: usize, refine: &Value, on_circle: bool) -> Value {
+    let mut sector = Sector::new([20.0, 40.0], [0.0, 90.0], around);
+    (sector.across, sector.straight) = (6, true);
+    let pin: Vec<[f64; 2]> = (-5..=185)
+        .map(|k| {
+            let (s, c) = (0.5 * f64::from(k)).to_radians().sin_cos();
+            [20.02 * c, 20.02 * s]
+        })
+        .collect();
+    let mut text = json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": sector.mesh(),
+        "materials": [{"youngs_modulus": 210_000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "start", "uy": 0}, {"boundary": "end", "ux": 0}],
+        "contacts": [{"boundary": "inner", "indentation": 0,
+            "obstacle": {"kind": "polyline", "points": pin, "interpolation": "cubic"}}]
+    });
+    text["mesh"]["refine"] = refine.clone();
+    if on_circle {
+        text["mesh"]["curves"] = json!({
+            "inner": {"kind": "circle", "center": [0, 0], "radius": 20},
+            "outer": {"kind": "circle", "center": [0, 0], "radius": 40}
+        });
+    }
+    text
+}
+
+/// A polygon that stands for a curve is told on every mesh, also where its sides touch one by one and none of its corners does,
+/// and where a small contact has one corner or none. Where forces may be off by more than 5 %, the verdict is `poor`.
+#[test]
+fn a_polygon_in_place_of_a_curve_is_told_however_fine_the_mesh() {
+    let of = |text: &Value| solve(&problem(&text.to_string()));
+    let verdict = |solution: &Solution| solution.summary.accuracy.as_ref().unwrap().verdict;
+    let told = |solution: &Solution, code: WarningCode| {
+        solution.summary.warnings.iter().any(|w| w.code == code)
+    };
+    // Lamé: 3460.15
+    let exact = of(&ring(16, &json!(1), true)).summary.normal_force;
+    close(exact, 3460.15, 1e-3);
+    for (around, refines, coarse) in [
+        (
+            16,
+            &[json!(0), json!(2), json!({"tolerance": 0.005})][..],
+            true,
+        ),
+        (32, &[json!(0), json!(1)], true),
+        (128, &[json!(0), json!(1)], false),
+    ] {
+        for refine in refines {
+            let solution = of(&ring(around, refine, false));
+            let off = (solution.summary.normal_force / exact - 1.0).abs();
+            let code = match coarse {
+                true => WarningCode::PolygonTooCoarse,
+                false => WarningCode::PolygonInContact,
+            };
+            assert!(
+                told(&solution, code),
+                "{around} {refine}: {:?}",
+                solution.summary.warnings
+            );
+            assert_eq!(coarse, off > 0.05, "{around} {refine}: {off}");
+            let most = if coarse { Verdict::Poor } else { Verdict::Fair };
+            assert!(verdict(&solution) >= most, "{around} {refine}");
+        }
+    }
+    let circled = cylinder(
+        facets(12),
+        &[("refine", json!({"tolerance": 0.01})), circle()],
+    );
+    let exact = of(&circled).summary.normal_force;
+    for (around, code) in [
+        (12, WarningCode::PolygonTooCoarse),
+        (60, WarningCode::PolygonInContact),
+    ] {
+        for refine in [json!(0), json!(2), json!({"tolerance": 0.01})] {
+            let solution = of(&cylinder(facets(around), &[("refine", refine.clone())]));
+            let off = (solution.summary.normal_force / exact - 1.0).abs();
+            assert!(
+                told(&solution, code),
+                "{around} {refine}: {:?}",
+                solution.summary.warnings
+            );
+            assert!(around == 12 || off < 0.05, "{around} {refine}: {off}");
+        }
     }
 }
 
@@ -243,7 +338,7 @@ fn reentrant_corners_are_reported() {
     let round = json!({"kind": "polyline", "points": pin, "interpolation": "cubic"});
     let facets = told(round.clone(), 0.05, &[]);
     assert!(
-        facets.contains("has a reentrant corner in the contact") && facets.contains("-4.00°"),
+        facets.contains("is a polygon") && facets.contains("turns by up to 4.00°"),
         "{facets}"
     );
     let circle = json!({"inner": {"kind": "circle", "center": [0, 0], "radius": 4}});

@@ -2,7 +2,7 @@
 //! and δ = a²/R for a = 1: P = 4/3 E* √R δ^1.5 = 4 E* a³/(3R), p = p₀ √(1 − r²/a²), p₀ = 2E* a/(πR).
 
 use serde_json::json;
-use solver::solution::Solution;
+use solver::solution::{EstimatedQuantity, QuantityName, Solution};
 
 use crate::record::Line;
 use crate::support::{graded, problem, solve, union};
@@ -87,4 +87,46 @@ fn a_sphere_has_hertzs_solution() {
         0.0,
         Some(order),
     );
+}
+
+/// Spheres pressed to many depths: as the end of contact moves from node to node, force and peak stay within their stated errors of
+/// those on a mesh four times as fine.
+#[test]
+fn spheres_of_all_depths_are_within_their_stated_errors() {
+    let (mut within, mut all) = (0, 0);
+    for k in 0..16 {
+        let depth = 0.001 + 8e-5 * f64::from(k);
+        let at = |refine: u32| {
+            let text = json!({
+                "analysis": {"kind": "axisymmetric"},
+                "mesh": {"refine": refine, "grid": {
+                    "x": [0, 0.02, 0.04, 0.06, 0.08, 0.1, 0.12, 0.16, 0.25, 0.5, 1, 2, 4, 8, 16],
+                    "y": [-16, -8, -4, -2, -1, -0.5, -0.25, -0.15, -0.1, -0.06, -0.03, 0]}},
+                "materials": [{"youngs_modulus": 175_731, "poissons_ratio": 0.213}],
+                "supports": [{"boundary": "left", "ux": 0}, {"boundary": "bottom", "ux": 0, "uy": 0}],
+                "contacts": [{"boundary": "top", "obstacle": {"kind": "circle", "radius": 19.2}, "indentation": depth}],
+            });
+            solve(&problem(&text.to_string()))
+                .summary
+                .accuracy
+                .unwrap()
+                .quantities
+        };
+        let (own, finer) = (at(2), at(4));
+        for name in [QuantityName::NormalForce, QuantityName::PeakNormalStress] {
+            let of = |all: &[EstimatedQuantity]| {
+                let found = all.iter().find(|q| q.quantity == name).unwrap();
+                (found.value, found.error.unwrap())
+            };
+            let ((value, error), (fine, _)) = (of(&own), of(&finer));
+            let off = (value - fine).abs();
+            all += 1;
+            within += usize::from(off <= error);
+            assert!(
+                off <= 1.2 * error && error < 3e-3 * value.abs(),
+                "{depth}: {value} ± {error}, finer {fine}"
+            );
+        }
+    }
+    assert!(within + 1 >= all, "{within} of {all}");
 }

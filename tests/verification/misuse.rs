@@ -661,7 +661,7 @@ fn the_total_law_is_told_where_the_way_matters() {
 /// that is flat.
 #[test]
 fn a_half_model_without_its_line_of_symmetry_is_told() {
-    let told_of = |supports: Value, obstacle: Value| {
+    let told_with = |supports: Value, obstacle: Value, friction: Value| {
         let x: Vec<f64> = (0..=20)
             .map(|k| 0.05 * f64::from(k))
             .chain([1.3, 2.0, 4.0])
@@ -672,7 +672,7 @@ fn a_half_model_without_its_line_of_symmetry_is_told() {
             "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
             "supports": supports,
             "contacts": [{"boundary": "top", "obstacle": obstacle, "indentation": 0.01,
-                "friction": {"coefficient": 0.3, "nonlocal_radius": 0.05, "elastic_slip": 1e-5}}],
+                "friction": friction}],
         });
         let summary = solve(&problem(&text.to_string())).summary;
         let verdict = summary.accuracy.unwrap().verdict;
@@ -680,12 +680,20 @@ fn a_half_model_without_its_line_of_symmetry_is_told() {
         assert!(told.is_none() || verdict >= solver::solution::Verdict::Fair);
         told
     };
+    let friction = json!({"coefficient": 0.3, "nonlocal_radius": 0.05, "elastic_slip": 1e-5});
+    let told_of =
+        |supports: Value, obstacle: Value| told_with(supports, obstacle, friction.clone());
     let free = json!([{"boundary": "bottom", "ux": 0, "uy": 0}]);
     let half = json!([{"boundary": "bottom", "ux": 0, "uy": 0}, {"boundary": "left", "ux": 0}]);
     for kind in ["circle", "parabola"] {
         let obstacle = json!({"kind": kind, "radius": 8});
         says(
             told_of(free.clone(), obstacle.clone()).as_deref(),
+            &["s = 0.0000", "`center`"],
+        );
+        // without friction the free corner sinks away
+        says(
+            told_with(free.clone(), obstacle.clone(), json!(null)).as_deref(),
             &["s = 0.0000", "`center`"],
         );
         assert_eq!(told_of(half.clone(), obstacle.clone()), None);

@@ -1,5 +1,6 @@
 //! Errors where stick is so small, or alternates so often, that a mesh cannot show it.
 
+use fastrand::Rng;
 use serde_json::{Value, json};
 use solver::problem::{AccuracyMode, AdaptiveRefine, Elasticity, Problem, Refine};
 use solver::solution::{
@@ -188,15 +189,86 @@ fn a_part_that_sticks_within_an_edge_is_in_the_stated_errors() {
             let ((value, error), (finer, _)) = (at(refine, name), at(refine + 2, name));
             let (off, error) = ((value - finer).abs(), error.unwrap());
             assert!(
-                off <= 1.5 * error,
+                off <= error,
                 "{coefficient} {name:?}: {value} ± {error}, finer {finer}"
             );
             assert!(
-                error <= 0.1 * value.abs(),
+                error <= 0.12 * value.abs(),
                 "{coefficient} {name:?}: {value} ± {error}"
             );
         }
     }
+}
+
+/// Rollers and balls pressed, or rollers also dragged, at small friction on random meshes: peaks and forces are within their stated
+/// errors of those on a mesh four times as fine. `SIGNORINI_SMALL_FRICTION`: how many, 16 unless it is set.
+#[test]
+fn random_contacts_at_small_friction_are_within_their_stated_errors() {
+    let count = std::env::var("SIGNORINI_SMALL_FRICTION");
+    let count: u64 = count.map_or(16, |count| count.parse().unwrap());
+    let fine: Vec<f64> = (0..=20).map(|k| 0.02 * f64::from(k)).collect();
+    let half = [&fine[..], &[0.46, 0.56, 0.75, 1.1, 1.8, 3.0, 5.0, 8.0]].concat();
+    let y = [
+        -8.0, -5.0, -3.0, -1.8, -1.1, -0.75, -0.5, -0.35, -0.24, -0.16, -0.1, -0.06, -0.03, 0.0,
+    ];
+    let mirrored = half[1..].iter().rev().map(|x| -x);
+    let whole: Vec<f64> = mirrored.chain(half.iter().copied()).collect();
+    let (mut within, mut all) = (0, 0);
+    for seed in 0..count {
+        let mut dice = Rng::with_seed(seed);
+        let mut between = |a: f64, b: f64| a * (b / a).powf(dice.f64());
+        let (coefficient, elastic_slip) = (between(0.02, 0.2), between(3e-7, 1e-4));
+        let (indentation, drag) = (between(6e-4, 0.011), between(2e-3, 0.2));
+        let radius = [0.0, 0.0, 0.0, 0.01, 0.04][dice.usize(0..5)];
+        let ratio = [0.1, 0.2, 0.3, 0.3, 0.45][dice.usize(0..5)];
+        let friction = json!({"coefficient": coefficient, "nonlocal_radius": radius, "elastic_slip": elastic_slip});
+        let dragged = seed % 3 == 2;
+        let x = if dragged { &whole } else { &half };
+        let refine = if dragged { 1 } else { dice.u32(1..3) };
+        let at = |refine: u32| {
+            let mut problem = roller(refine, indentation, x, &y, &friction);
+            problem["materials"][0]["poissons_ratio"] = json!(ratio);
+            let supports = problem["supports"].as_array_mut().unwrap();
+            if dragged {
+                supports.remove(0);
+                problem["contacts"][0]["tangential_displacement"] = json!(drag * indentation);
+            } else if seed % 2 == 0 {
+                supports.remove(0);
+                problem["analysis"]["kind"] = json!("axisymmetric");
+            }
+            let summary = solve(&problem_of(&problem.to_string())).summary;
+            summary.accuracy.unwrap().quantities
+        };
+        let (own, finer) = (at(refine), at(refine + 2));
+        for name in [
+            QuantityName::PeakNormalStress,
+            QuantityName::PeakTangentialStress,
+            QuantityName::TangentialForce,
+        ] {
+            let first = |all: &[EstimatedQuantity]| {
+                let first = all.iter().find(|q| q.quantity == name).unwrap();
+                (first.value, first.error)
+            };
+            let ((value, Some(error)), (finer, _)) = (first(&own), first(&finer)) else {
+                continue;
+            };
+            // of two equal peaks of opposite sign either may be the larger
+            let off = match name {
+                QuantityName::PeakTangentialStress => (value.abs() - finer.abs()).abs(),
+                _ => (value - finer).abs(),
+            };
+            all += 1;
+            within += usize::from(off <= error);
+            assert!(
+                off <= 1.4 * error,
+                "{seed} {name:?}: {value} ± {error}, finer {finer}"
+            );
+        }
+    }
+    assert!(
+        100 * within >= 95 * all && all > 2 * count as usize,
+        "{within} of {all}"
+    );
 }
 
 /// The contact grows from node to node: without averaging σ_t at the integration points has a ripple where the body sticks, and

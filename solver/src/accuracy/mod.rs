@@ -54,6 +54,8 @@ struct Parts {
     /// The value of the quantity times the square of the distance between the nodes at the ends of contact, in lengths
     /// of the contact: the change of the quantity, nearly stationary there, if an end of contact moves by a node.
     ends: f64,
+    /// The same in a body of revolution, times the factor [`OF_REVOLUTION`]; of a peak of the pressure and of the normal force.
+    ends_of_revolution: f64,
     /// The error due to the distance between nodes, [`Quantity::spacing`].
     spacing: f64,
     /// The error because the law is evaluated at its points only, [`Quantity::between`].
@@ -91,6 +93,7 @@ impl Parts {
             + consistency * self.consistency
             + gap * self.gap.abs()
             + ends * self.ends
+            + self.ends_of_revolution
             + spacing * self.spacing
             + between * self.between
             + self.unresolved
@@ -104,6 +107,11 @@ impl Parts {
         }
     }
 }
+
+/// The factor of [`Parts::ends`] for peaks of the pressure and normal forces of bodies of revolution, where a ring at the end of
+/// contact has a larger part of the force than an end in a plane: spheres of many depths then lie within
+/// (`tests/verification/hertz_sphere.rs`).
+const OF_REVOLUTION: f64 = 0.25;
 
 /// The factor of [`Parts::standing_out`]: large enough for a clamped corner of an orthotropic body
 /// (`tests/verification/far_away.rs`).
@@ -286,6 +294,12 @@ fn bounds(
             value: quantity.value.abs(),
             ..Parts::default()
         };
+        use QuantityName::{NormalForce, PeakNormalStress};
+        if system.model.section.axisymmetric()
+            && matches!(quantity.name, NormalForce | PeakNormalStress)
+        {
+            parts.ends_of_revolution = OF_REVOLUTION * parts.ends;
+        }
         let mut displaced = quantity.displaced;
         let mut added = Added::default();
         if let Some(gradient) = &quantity.gradient {
@@ -435,7 +449,8 @@ fn by_spacing(quantity: &Quantity, all: &[Quantity], parts: &Parts, added: &mut 
         .filter(|q| is_end(q, quantity.patch))
         .flat_map(|q| q.spacing_at.iter().map(|(edge, _)| (*edge, q.spacing)))
         .collect();
-    added.spread(gap * parts.gap.abs() + ends * parts.ends, &at_ends);
+    let of_ends = gap * parts.gap.abs() + ends * parts.ends + parts.ends_of_revolution;
+    added.spread(of_ends, &at_ends);
     added.spread(spacing * parts.spacing, &quantity.spacing_at);
     added.spread(
         between * parts.between + parts.unresolved,

@@ -117,7 +117,13 @@ pub(super) fn conclude(
         found.push(Finding {
             verdict: Verdict::Poor,
             seriousness: f64::INFINITY,
-            reason: "The iterations did not converge, so the errors are unknown.".to_owned(),
+            reason: match outcome {
+                Outcome::FalseConvergence => {
+                    "The iterations ended, but their result does not solve the problem (see the warnings), so the errors are unknown."
+                }
+                _ => "The iterations did not converge, so the errors are unknown.",
+            }
+            .to_owned(),
         });
     }
     let verdicts = found.iter().map(|finding| finding.verdict);
@@ -137,7 +143,7 @@ pub(super) fn conclude(
 /// Warnings that make stated errors unreliable, or that say that the result may belong to another problem than was meant;
 /// the best verdict that each permits, and the reason in words.
 #[rustfmt::skip] // a table
-const DOUBTFUL: [(WarningCode, Verdict, &str); 7] = [
+const DOUBTFUL: [(WarningCode, Verdict, &str); 8] = [
     (WarningCode::NoContact, Verdict::Fair,
         "A contact never touches its obstacle (`no_contact`): unless that was intended, this is the result of another problem than was meant."),
     (WarningCode::SymmetryMissing, Verdict::Fair,
@@ -148,6 +154,8 @@ const DOUBTFUL: [(WarningCode, Verdict, &str); 7] = [
         "The points of an obstacle scatter as measured ones do, and have no standard deviation (`noise_undeclared`): the stated errors do not contain that."),
     (WarningCode::PolygonInContact, Verdict::Fair,
         "The surface in contact has several corners (`polygon_in_contact`): if it is a polygon in place of a curve, the stated errors are those of the polygon."),
+    (WarningCode::PolygonTooCoarse, Verdict::Poor,
+        "The surface in contact is a coarse polygon (`polygon_too_coarse`): if it stands for a curve, forces and peaks are not those of the curve."),
     (WarningCode::MeshTooCoarseForContact, Verdict::Fair,
         "The mesh is too coarse for a contact (`mesh_too_coarse_for_contact`), so that the stated errors may be too small."),
     (WarningCode::MeshTooCoarseForRadius, Verdict::Fair,
@@ -195,7 +203,7 @@ pub(super) fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<Fi
             Verdict::Good,
             0.0,
             format!(
-                "`{name}` at contact `{contact}` grows without limit as the mesh is refined (at an edge, a tip or a kink of the obstacle, at a corner of the body or where materials meet), so its value means nothing. The verdict is about the other quantities: forces converge, and so does the averaged pressure."
+                "`{name}` at contact `{contact}` grows without limit as the mesh is refined (at an edge, a tip or a kink of the obstacle, at a corner of the body or where materials meet), so its value means nothing, unless it lies away from such a place and is the same on two meshes. The verdict is about the other quantities: forces converge, and so does the averaged pressure."
             ),
         ),
         (ErrorMethod::TooMany, _) => (
@@ -280,8 +288,16 @@ fn uncertainty(q: &EstimatedQuantity, error: f64, relative: f64) -> String {
         ErrorMethod::MeshHalved => of_mesh(&format!(
             "on the refined mesh it is {finer:.5e}, and two meshes may agree by chance"
         )),
+        _ if of_several(q, error) => of_mesh(
+            "the mesh, the number of increments and the noise of the obstacle have parts in that, none of them more than half",
+        ),
         _ => of_mesh("the mesh is too coarse for it"),
     }
+}
+
+/// Whether increments and noise together are more than half of an error, and so more than the mesh.
+fn of_several(q: &EstimatedQuantity, error: f64) -> bool {
+    q.increments.unwrap_or_default() + q.measurement.unwrap_or_default() > 0.5 * error
 }
 
 /// The reason, in words, why the error of a quantity is unknown.

@@ -100,14 +100,32 @@ impl EndForces {
 /// accurate: their error is then less than twice that, and `good` promises 1 %.
 const KNOWN: f64 = 0.004;
 
+/// The same for the tangential force and the friction force, as parts of the friction force, as in verdicts: the error is of the
+/// first order of the increments, and about as large as the change.
+const FRICTION_KNOWN: f64 = 0.01;
+
+/// The friction force below which changes are compared with this part of the normal force instead.
+const LEAST_FRICTION: f64 = 1e-3;
+
 /// Adds a warning to a step before the last whose forces depend on the number of increments; for the last step errors
 /// are stated instead. `more`: the forces at the end of the step in at least twice as many increments.
 pub fn warn_of_increments(step: &mut StepSolution, more: &EndForces) {
     let compared = more.compared(&step.summary, KNOWN);
-    if compared.agrees {
+    let own = &step.summary;
+    // friction that is next to nothing may change by any part of itself
+    let friction = own.friction_force.max(LEAST_FRICTION * own.normal_force);
+    let of_friction = relative(own.friction_force, compared.friction_force, friction).max(
+        relative(own.tangential_force, compared.tangential_force, friction),
+    );
+    if compared.agrees && of_friction <= FRICTION_KNOWN {
         return;
     }
-    let found = if compared.converged {
+    let found = if compared.agrees {
+        format!(
+            "more increments change friction by {:.1} % of the friction force",
+            100.0 * of_friction
+        )
+    } else if compared.converged {
         format!(
             "more increments change the forces by {:.1} %",
             100.0 * compared.change

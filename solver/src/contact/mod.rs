@@ -162,12 +162,21 @@ impl ContactBoundary {
     /// The angle by which the body's surface turns at a node between two edges: 0 where it is smooth, positive at a corner
     /// that points at the obstacle.
     pub fn corner(&self, node: usize) -> f64 {
+        self.sides_at(node)
+            .map_or(0.0, |[before, after]| smooth::corner(&before, &after))
+    }
+
+    /// The angle by which the body's surface turns at a node between two edges, also where it is taken as smooth.
+    pub fn turn(&self, node: usize) -> f64 {
+        self.sides_at(node)
+            .map_or(0.0, |[before, after]| smooth::turn(&before, &after))
+    }
+
+    /// The two sides that meet at a node; none at midside nodes and at the ends.
+    fn sides_at(&self, node: usize) -> Option<[smooth::Side; 2]> {
         let side = |edge: usize| edge_nodes(edge).map(|i| self.positions[i]);
-        if node.is_multiple_of(2) && node > 0 && node + 1 < self.nodes.len() {
-            smooth::corner(&side(node / 2 - 1), &side(node / 2))
-        } else {
-            0.0
-        }
+        let between = node.is_multiple_of(2) && node > 0 && node + 1 < self.nodes.len();
+        between.then(|| [side(node / 2 - 1), side(node / 2)])
     }
 
     /// Arc lengths of an edge's nodes (start, end, midside).

@@ -49,9 +49,7 @@ pub fn direction_error(side: &Side) -> f64 {
 /// The angle by which the surface turns from one side to the next: 0 where it is smooth, positive at a corner that
 /// points out of the body, and negative at a corner that points into the body.
 pub fn corner(before: &Side, after: &Side) -> f64 {
-    let [[ax, ay], [bx, by]] = [end_direction(before, 1.0), end_direction(after, -1.0)];
-    // the body lies on the right
-    let turn = (ay * bx - ax * by).atan2(ax * bx + ay * by);
+    let turn = turn(before, after);
     let [a, b] = [before, after].map(SideShape::of);
     let differs = (a.length - b.length).abs() * (a.curvature - b.curvature).abs() / 6.0;
     let error = ERRORS * (a.error + b.error) + DIFFERENCES * differs + 2.0 * PRINTED;
@@ -60,6 +58,13 @@ pub fn corner(before: &Side, after: &Side) -> f64 {
     } else {
         turn
     }
+}
+
+/// The angle by which the surface turns from one side to the next, also where it is taken as smooth; sign as of [`corner`].
+pub fn turn(before: &Side, after: &Side) -> f64 {
+    let [[ax, ay], [bx, by]] = [end_direction(before, 1.0), end_direction(after, -1.0)];
+    // the body lies on the right
+    (ay * bx - ax * by).atan2(ax * bx + ay * by)
 }
 
 /// The unit normals of the sides of the surface beyond the ends of a boundary, by the node where they meet, if the

@@ -147,7 +147,8 @@ pub struct Summary {
     /// Work done against friction (force × length), never negative: ∫τ φ |e| with the slip e of this state, u_t − d in
     /// the total law and u_t − d − g in the incremental one; there the dissipation of earlier increments is added, ∫τ
     /// |Δg|. The elastic slip counts with its final stress, although at most half of that was spent on it: the work is
-    /// too large by up to ε ∫τ.
+    /// too large by up to ε ∫τ. No error is stated for it: with the incremental law it depends on the increments (by some 8 %
+    /// where a contact grows in 32 of them).
     pub friction_work: f64,
     /// Energy of the strains, ½ ∫ σ : ε (force × length); absent in results of older versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -436,6 +437,8 @@ pub enum WarningCode {
     RangeCutsMesh,
     /// Several corners of the body in the contact, as of straight sides of elements on a curve.
     PolygonInContact,
+    /// A polygon in place of a curve in the contact, so coarse that forces may be wrong by more than 5 %.
+    PolygonTooCoarse,
     /// A contact so curved that the sum of its pressures is not its force.
     NormalsDiffer,
     /// Friction by the displacements at the end alone, where the way there matters.
@@ -525,6 +528,7 @@ impl WarningCode {
             | RadiusExceedsContact
             | OscillatingStick
             | PolygonInContact
+            | PolygonTooCoarse
             | RangeCutsMesh
             | MeshTooCoarseForContact
             | MeshTooCoarseForRadius => Severity::Warning,

@@ -164,6 +164,9 @@ fn reasons(code: WarningCode) -> (&'static str, &'static str) {
         PolygonInContact => (
             "The surface of the body has several corners in the contact, as straight sides of elements on a curve make them. Refinement keeps the corners: the result then is that of a polygon, whose force may be off by tens of per cent from that of the curve.",
             "Mesh the curve with elements of second order whose midside nodes lie on it, or name the curve under mesh.curves. If the corners are real, the stated errors hold."),
+        PolygonTooCoarse => (
+            "The surface of the body in the contact has straight sides, as elements without midside nodes on a curve make them, and refinement keeps them. An arc over a side is so high, compared with the overlap of body and obstacle, that the force may be off by more than 5 % from that of the curve.",
+            "Mesh the curve with elements of second order whose midside nodes lie on it, or name the curve under mesh.curves. If the corners are real, the stated errors hold, whatever the verdict."),
         NormalsDiffer => (
             "normal_force is the integral of the pressure along the surface, whichever way it faces. Where the surface turns within the contact, as a hole around a pin does, that is more than the force by which the obstacle is pushed.",
             "Take the force of the message where a force on the tool or a reaction is meant."),

@@ -66,12 +66,12 @@ pub(super) struct Kink {
 }
 
 /// A corner of the body.
-struct Corner {
-    node: usize,
+pub(super) struct Corner {
+    pub(super) node: usize,
     /// The angle by which the body's surface turns at the corner.
-    turn: f64,
+    pub(super) turn: f64,
     /// The change of slope of the gap at the corner; < 0 where the corner points into the body.
-    change: f64,
+    pub(super) change: f64,
 }
 
 impl PatchView<'_> {
@@ -287,8 +287,12 @@ impl PatchView<'_> {
     }
 
     pub(super) fn warn_of_kinks(&self, warnings: &mut Vec<Warning>) {
-        self.warn_of_notches(warnings);
-        let kinks = self.kinks();
+        let polygon = self.warn_of_polygon(warnings);
+        // corners of a polygon are told of with it
+        let alone = |s: f64| polygon.as_ref().is_none_or(|polygon| !polygon.has(s));
+        self.warn_of_notches(alone, warnings);
+        let mut kinks = self.kinks();
+        kinks.retain(|kink| kink.turn == 0.0 || alone(kink.s));
         let Some(sharpest) = kinks.iter().max_by(|a, b| a.growth.total_cmp(&b.growth)) else {
             return;
         };
@@ -341,7 +345,7 @@ impl PatchView<'_> {
                 "The obstacle has a kink in the contact, at s = {s:.4}{mirrored}: {size}{count}. The pressure is unbounded at a kink: {growth}. If the kinks only come from the points of a table or a polyline, choose \"interpolation\": \"cubic\", with `smoothing` if they were measured; else round the edge.{symmetric}"
             ),
             _ => format!(
-                "The body has a corner in the contact, at s = {s:.4}: {size}{count}. The pressure is unbounded at a corner: {growth}. Friction differs between its two sides. If the corners only come from straight sides of elements on a curve, mesh it with elements of second order, or name the curve under /mesh/curves; else round the corner."
+                "The body has a corner in the contact, at s = {s:.4}{mirrored}: {size}{count}. The pressure is unbounded at a corner: {growth}. Friction differs between its two sides. If the corners only come from straight sides of elements on a curve, mesh it with elements of second order, or name the curve under /mesh/curves; else round the corner."
             ),
         };
         let corners = kinks.iter().filter(|kink| kink.turn != 0.0).count();
@@ -356,23 +360,35 @@ impl PatchView<'_> {
         });
     }
 
-    /// Corners of the body in contact or beside it, with the change of slope that the obstacle leaves. An obstacle that
+    /// Corners of the body at the nodes that count, with the change of slope that the obstacle leaves. An obstacle that
     /// follows the body's surface has the same corners, and leaves none.
-    fn body_corners(&self) -> Vec<Corner> {
+    pub(super) fn body_corners(&self, counts: impl Fn(&usize) -> bool) -> Vec<Corner> {
         let contact = self.patch.contact;
         if !contact.in_space || contact.condition != Condition::Unilateral {
             return Vec::new();
         }
-        let near = |i: &usize| (i - 1..=i + 1).any(|i| self.active(i));
         let corner = |node: usize| {
             let turn = contact.boundary.corner(node);
-            let own = contact.places.iter();
+            if turn == 0.0 {
+                return None;
+            }
+            // places are in order
+            let own = contact
+                .places
+                .partition_point(|place| place.edge + 1 < node / 2);
+            let own = contact.places[own..].iter();
+            let own = own.take_while(|place| place.edge <= node / 2);
             let own = own.filter(|place| place.kink != 0.0 && self.beside(place) == [node; 2]);
             let change = 2.0 * (0.5 * turn).tan() + own.map(|place| place.kink).sum::<f64>();
-            (turn != 0.0).then_some(Corner { node, turn, change })
+            Some(Corner { node, turn, change })
         };
-        let corners = (2..self.count() - 1).step_by(2).filter(near);
+        let corners = (2..self.count() - 1).step_by(2).filter(counts);
         corners.filter_map(corner).collect()
+    }
+
+    /// Corners of the body in contact or beside it.
+    fn corners_in_contact(&self) -> Vec<Corner> {
+        self.body_corners(|i| (i - 1..=i + 1).any(|i| self.active(i)))
     }
 
     /// The pressure that each halving of the mesh adds where the slope of the gap changes (stress).
@@ -382,9 +398,10 @@ impl PatchView<'_> {
 
     /// Warns of corners that point into the body: the obstacle does not reach into them, so that the nodes show one
     /// contact where there are two, one on each side of the corner.
-    fn warn_of_notches(&self, warnings: &mut Vec<Warning>) {
-        let mut notches = self.body_corners();
-        notches.retain(|notch| notch.change < 0.0);
+    fn warn_of_notches(&self, alone: impl Fn(f64) -> bool, warnings: &mut Vec<Warning>) {
+        let mut notches = self.corners_in_contact();
+        let s = &self.patch.contact.boundary.s;
+        notches.retain(|notch| notch.change < 0.0 && alone(s[notch.node]));
         let peak = match self.highest_pressure() {
             Some(Highest { value, .. }) if !notches.is_empty() && value > 0.0 => value,
             _ => return,
@@ -424,7 +441,7 @@ impl PatchView<'_> {
         let last = self.count() - 1;
         // each with the turn of the body's surface; its kink is the whole change of slope
         let mut found: Vec<(Place, f64)> = Vec::new();
-        let corners = self.body_corners();
+        let corners = self.corners_in_contact();
         for place in contact.places.iter().filter(|place| place.kink > 0.0) {
             let nodes = self.beside(place);
             let at_end = nodes == [0; 2] || nodes == [last; 2];
@@ -454,7 +471,10 @@ impl PatchView<'_> {
             });
             let change = 2.0 * slope + own.map(|place| place.kink).sum::<f64>();
             if change > 0.0 && self.symmetric(end) && self.active(end) {
-                found.push((at(end, edge, xi, change), 0.0));
+                // the body's corner, if most of the change is its own
+                let turn = self.turn_at_image(end);
+                let own = 2.0 * turn > change;
+                found.push((at(end, edge, xi, change), if own { turn } else { 0.0 }));
             }
         }
         let peak = match self.highest_pressure() {
@@ -544,7 +564,7 @@ impl PatchView<'_> {
     }
 
     /// The contact modulus E* of the material below every edge (stress): E/(1 − ν²), in plane stress E.
-    fn contact_moduli(&self) -> Vec<f64> {
+    pub(super) fn contact_moduli(&self) -> Vec<f64> {
         let boundary = &self.patch.contact.boundary;
         let model = self.system.model;
         // a midside node on the surface belongs to one element

@@ -127,7 +127,7 @@ impl PatchView<'_> {
         slip < law.elastic_slip && self.pressure(i) / modulus * length > law.elastic_slip
     }
 
-    fn on_axis(&self, i: usize) -> bool {
+    pub(super) fn on_axis(&self, i: usize) -> bool {
         self.system.nodes[self.patch.first + i].on_axis
     }
 

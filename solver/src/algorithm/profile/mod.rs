@@ -17,6 +17,7 @@ mod between;
 mod displaced;
 mod extents;
 mod junction;
+mod polygon;
 mod quantities;
 mod resolution;
 mod resultant;

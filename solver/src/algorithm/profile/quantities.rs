@@ -31,8 +31,8 @@ pub struct Quantity {
     /// the friction by the law between the points. Beside a peak of the pressure: a jump of σ_t. At a peak of σ_t: the
     /// change of the bound τ.
     pub between: f64,
-    /// What the mesh does not resolve, in the unit of the value. Of a peak: the pressure where σ_t jumps beside it, and the
-    /// height of a peak of σ_t above a smooth curve where the body sticks. Of an end of stick at a node, where friction just
+    /// What the mesh does not resolve, in the unit of the value. Of a peak: the pressure where σ_t jumps beside it, or where
+    /// sides of a smooth curve meet at an angle, and the height of a peak of σ_t above a smooth curve where the body sticks. Of an end of stick at a node, where friction just
     /// reaches its bound: the distance to the next node. Else 0.
     pub unresolved: f64,
     /// The error by truncation, if the obstacle ends inside an edge, which is left out: for extents the length that is
@@ -312,7 +312,8 @@ impl PatchView<'_> {
     fn peaks(&self) -> Vec<Quantity> {
         let (system, state) = (self.system, &self.finished.state);
         let mut found = Vec::new();
-        if let Some(Highest { value, edge, xi }) = self.highest_pressure() {
+        if let Some(highest) = self.highest_pressure() {
+            let Highest { value, edge, xi } = highest;
             let mut gradient = Gradient::zero(system);
             for (i, shape) in edge_nodes(edge).into_iter().zip(edge3::shape(xi)) {
                 gradient.add_pressure(system, self.patch.first + i, -shape);
@@ -326,17 +327,17 @@ impl PatchView<'_> {
                 spacing_at: vec![(edge, 1.0)],
                 between: jumps.iter().fold(0.0, |most, (_, jump)| most.max(*jump)),
                 between_at: jumps,
-                unresolved: self.pressure_at_jumps(edge),
+                unresolved: self.unresolved_pressure(highest) + self.pressure_of_parabolas(),
                 estimable: limited(!self.pressure_without_limit()),
                 ..self.quantity(QuantityName::PeakNormalStress, -value, Some(gradient))
             });
         }
-        if let Some(Highest {
-            value: stress,
-            edge,
-            xi,
-        }) = self.highest_traction().filter(|_| self.patch.law.is_some())
-        {
+        if let Some(highest) = self.highest_traction().filter(|_| self.patch.law.is_some()) {
+            let Highest {
+                value: stress,
+                edge,
+                xi,
+            } = highest;
             let point = self.point(edge, xi);
             let mut gradient = Gradient::zero(system);
             let reached = system.law(&point).phi(system.slip(self.v, &point)).abs();
@@ -356,7 +357,9 @@ impl PatchView<'_> {
                 spacing_at: vec![(edge, 1.0)],
                 between: self.change_of_bound(edge, xi),
                 between_at: vec![(edge, 1.0)],
-                unresolved: self.bound_at_jumps(edge, xi) + ripple,
+                unresolved: self.unresolved_bound(highest)
+                    + ripple
+                    + self.bound_of_parabolas(stress),
                 estimable: limited(!self.averages_nothing() || !self.pressure_without_limit()),
                 ..self.quantity(QuantityName::PeakTangentialStress, stress, Some(gradient))
             });

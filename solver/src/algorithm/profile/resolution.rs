@@ -3,13 +3,25 @@
 
 use std::collections::BTreeSet;
 
-use super::PatchView;
+use super::{Highest, PatchView};
+use crate::contact::edge_nodes;
 use crate::element::edge3;
 use crate::element::gauss::GAUSS_3;
 use crate::friction::BoundLaw;
 
 /// The number of halvings of a quarter of an edge in the search for a jump: down to 1/256 of the quarter.
 const HALVINGS: u32 = 8;
+
+/// The number of equal parts of an edge between which σ_t is sampled in that search.
+const EDGE_PARTS: usize = 40;
+
+/// The parts at which the quarters of an edge begin in that search. They overlap. The middle of the edge, where a
+/// symmetric problem has its jump, is neither the middle nor an end of any of them: there the jump would be halved.
+const QUARTERS: [usize; 6] = [0, 6, 12, 18, 24, 30];
+
+/// The largest number of edges with ends of stick, those under the largest pressure, at which a peak is looked for that the
+/// mesh does not show: one at every end of a rough obstacle would take long.
+const MOST_TURNS: usize = 4;
 
 /// The number of nodes around the peak of the pressure through which a smooth curve is laid. Of curves through five and
 /// through seven nodes, a cubic through seven agrees best with the errors of random problems
@@ -27,6 +39,10 @@ const FOLLOWED: f64 = 0.3;
 
 /// The largest number of friction points that stick in a row at a turn of the motion, and do not resolve it.
 const FEW_STICK: usize = 3;
+
+/// The error of the friction force where a part sticks between friction points, as a part of the friction between two of them;
+/// calibrated.
+const UNSEEN_STICK: f64 = 1.2;
 
 /// The error of the friction force at a kink, as a part of the friction force on the edges beside the kink; calibrated.
 const AT_KINKS: f64 = 0.2;
@@ -151,17 +167,22 @@ impl PatchView<'_> {
     /// The jump of σ_t within a small part of an edge, times a logarithm (stress). Beside a jump the pressure grows
     /// like the logarithm of the distance, down to the length over which σ_t changes. Here the changes over the
     /// steepest half, the steepest quarter and so on are added, which gives the jump times the logarithm of the part of
-    /// the edge that it takes. Also returns that sum without what a steady change has of it.
+    /// the edge that it takes. Twice: from a quarter of the edge on; and from the whole edge on, without what a steady
+    /// change has of that sum.
     pub(super) fn jump_within(&self, edge: usize) -> (f64, f64) {
         let stress = |xi: f64| self.tangential_stress_at(edge, xi);
-        let steepest = |quarter: u32| {
-            let start = 0.5 * f64::from(quarter) - 1.0;
-            let (mut low, mut high) = ((start, stress(start)), (start + 0.5, stress(start + 0.5)));
-            let first = (high.1 - low.1).abs();
-            let mut sum = first;
+        let place = |k: usize| (2.0 * k as f64 - EDGE_PARTS as f64) / EDGE_PARTS as f64;
+        let sampled: Vec<f64> = (0..=EDGE_PARTS).map(|k| stress(place(k))).collect();
+        let variation = |from: usize, length: usize| -> f64 {
+            let steps = sampled[from..=from + length].windows(2);
+            steps.map(|pair| (pair[1] - pair[0]).abs()).sum()
+        };
+        let steepest = |from: usize| {
+            let [mut low, mut high] = [from, from + EDGE_PARTS / 4].map(|k| (place(k), sampled[k]));
+            let mut sum = (high.1 - low.1).abs();
             for _ in 0..HALVINGS {
-                let place = 0.5 * (low.0 + high.0);
-                let middle = (place, stress(place));
+                let middle = 0.5 * (low.0 + high.0);
+                let middle = (middle, stress(middle));
                 if (middle.1 - low.1).abs() > (high.1 - middle.1).abs() {
                     high = middle;
                 } else {
@@ -169,24 +190,31 @@ impl PatchView<'_> {
                 }
                 sum += (high.1 - low.1).abs();
             }
-            // of a steady change each half has a half
-            (sum, (sum - 2.0 * first).max(0.0))
+            let around = from.saturating_sub(EDGE_PARTS / 8).min(EDGE_PARTS / 2);
+            // the whole edge, a half, a quarter and so on, without twice the whole: a steady change gives nothing
+            let jumps = variation(around, EDGE_PARTS / 2) + sum - variation(0, EDGE_PARTS);
+            (sum, jumps.max(0.0))
         };
         let larger = |a: (f64, f64), b: (f64, f64)| (a.0.max(b.0), a.1.max(b.1));
-        (0..4).map(steepest).fold((0.0, 0.0), larger)
+        QUARTERS.map(steepest).into_iter().fold((0.0, 0.0), larger)
     }
 
     /// The pressure that jumps of σ_t on an edge and its neighbours add at the jump, and the mesh does not resolve (stress):
-    /// (β/π) q ln 2 for each halving in which the jump q stays whole, twice that where it goes on beyond a line of symmetry.
+    /// (β/π) q ln 2 for each halving in which the jump q stays whole. Beyond a line of symmetry the jump goes on, which makes
+    /// it twice that; around an axis it goes on in all directions, which makes it π times that.
     pub(super) fn pressure_at_jumps(&self, edge: usize) -> f64 {
         let last = self.patch.contact.boundary.edge_count() - 1;
         let at = |edge: usize| {
             let node = 2 * edge + 1;
-            let mirrored =
-                edge == 0 && self.symmetric(0) || edge == last && self.symmetric(2 * last + 2);
-            let whole = if mirrored { 2.0 } else { 1.0 };
+            let ends = [(0, 0), (last, 2 * last + 2)].into_iter();
+            let own = ends.filter(|(of, _)| *of == edge);
+            let around = own.map(|(_, end)| match self.symmetric(end) {
+                true if self.on_axis(end) => std::f64::consts::PI,
+                true => 2.0,
+                false => 1.0,
+            });
             let coupling = self.system.model.section.coupling(self.material(node));
-            whole * coupling * std::f64::consts::LN_2 / std::f64::consts::PI
+            around.fold(1.0, f64::max) * coupling * std::f64::consts::LN_2 / std::f64::consts::PI
                 * self.jump_within(edge).1
         };
         // where the motion turns at a node, each of the two edges there has half of the jump
@@ -209,6 +237,46 @@ impl PatchView<'_> {
         } else {
             0.0
         }
+    }
+
+    /// What jumps of σ_t may add to a peak of the pressure (stress): at the peak, or at another place where stick ends, whose
+    /// own peak the mesh does not show.
+    pub(super) fn unresolved_pressure(&self, Highest { value, edge, .. }: Highest) -> f64 {
+        let there = self.turns_under_pressure().into_iter();
+        let there =
+            there.map(|(turn, _, pressure)| pressure + self.pressure_at_jumps(turn) - value);
+        there.fold(self.pressure_at_jumps(edge), f64::max)
+    }
+
+    /// What jumps of σ_t add to the bound τ at the place of a peak of σ_t, or at another place where stick ends, over the peak
+    /// (stress).
+    pub(super) fn unresolved_bound(&self, Highest { value, edge, xi }: Highest) -> f64 {
+        let there = self.turns_under_pressure().into_iter();
+        let there = there.map(|(turn, xi, _)| {
+            let reached = self.tangential_stress_at(turn, xi).abs();
+            reached + self.bound_at_jumps(turn, xi) - value.abs()
+        });
+        there.fold(self.bound_at_jumps(edge, xi), f64::max)
+    }
+
+    /// The edges with ends of stick, each with the place of one on it and the largest pressure at its nodes; if there are
+    /// many, those with the largest pressure.
+    fn turns_under_pressure(&self) -> Vec<(usize, f64, f64)> {
+        let mut turns = self.turns();
+        turns.dedup_by_key(|(edge, _)| *edge);
+        let largest = |edge: usize| {
+            edge_nodes(edge)
+                .map(|i| self.pressure(i))
+                .into_iter()
+                .fold(0.0, f64::max)
+        };
+        let mut turns: Vec<(usize, f64, f64)> = turns
+            .into_iter()
+            .map(|(edge, xi)| (edge, xi, largest(edge)))
+            .collect();
+        turns.sort_by(|a, b| b.2.total_cmp(&a.2));
+        turns.truncate(MOST_TURNS);
+        turns
     }
 
     /// The larger change of τ over half an edge on either side of a place (stress): a peak of σ_t is at an end of stick
@@ -306,7 +374,7 @@ impl PatchView<'_> {
             if inside > FEW_STICK || first.1 * last.1 >= 0.0 {
                 continue;
             }
-            let part = 0.5 / (inside + 1) as f64;
+            let part = UNSEEN_STICK / (inside + 1) as f64;
             for steps in points[pair[0]..=pair[1]].windows(2) {
                 let [(from, a, _), (to, b, _)] = [steps[0], steps[1]];
                 let (from, to) = (from.max(s[0]), to.min(s[last_node]));

@@ -258,7 +258,7 @@ impl PatchView<'_> {
                 );
             }
         }
-        let free = |i: &usize| self.active(*i) && !self.symmetric(*i);
+        let free = |i: &usize| !self.symmetric(*i);
         let mut ends = [0, self.count() - 1].into_iter().filter(free);
         if let Some(end) = ends.find(|end| self.is_half_of_obstacle(*end)) {
             let at = s[end];
@@ -305,10 +305,13 @@ impl PatchView<'_> {
     }
 
     /// Whether the obstacle is level at this end of the boundary and recedes from the body along it, as half of a symmetric
-    /// one does.
+    /// one does. A free corner may sink away from it: then only the obstacle's lowest point counts as its middle.
     fn is_half_of_obstacle(&self, end: usize) -> bool {
         let contact = self.patch.contact;
         let (s, profile) = (&contact.boundary.s, &contact.profile);
+        if !self.active(end) && profile.iter().any(|height| *height < profile[end]) {
+            return false;
+        }
         // the second node of the first or the last edge that is no midside node
         let inner = if end == 0 { 2 } else { end - 2 };
         let rise = (profile[inner] - profile[end]) / (s[inner] - s[end]).abs();

@@ -1,0 +1,297 @@
+//! Surfaces that stand for a curve and are polygons: straight sides of elements, which refinement keeps.
+
+use std::f64::consts::PI;
+
+use super::PatchView;
+use crate::contact::edge_nodes;
+use crate::contact::smooth;
+use crate::problem::Condition;
+use crate::solution::{Warning, WarningCode};
+
+/// The largest ratio of angles, and of lengths, of neighbouring sides of a polygon that stands for a curve.
+const ALIKE: f64 = 3.0;
+
+/// The least number of corners of such a polygon, mirror images included: the two corners of a chamfer are no polygon.
+const CORNERS: usize = 3;
+
+/// The pressure of a corner, as a part of the peak, with which a polygon counts: `good` promises peaks to 5 %.
+const TELLING: f64 = 0.05;
+
+/// The height of a side's arc, as a part of the largest overlap of body and obstacle, above which forces may be wrong by more
+/// than the 5 % of the verdict `fair`. Rings of 60 to 500 straight sides are wrong by 1.1 to 1.7 times that part.
+const COARSE: f64 = 0.03;
+
+/// The part of the peak from which on the angles between parabolic sides are told.
+const SHOWN: f64 = 0.005;
+
+/// A polygon in place of a curve, in contact.
+pub(super) struct Polygon {
+    /// The number of corners on the boundary.
+    count: usize,
+    /// The largest angle by which the surface turns at one of them.
+    turn: f64,
+    /// The length of the longest side.
+    side: f64,
+    /// The height of an arc over a side, as a part of the largest overlap of body and obstacle before deformation; none
+    /// without an overlap.
+    height: Option<f64>,
+    /// The arc lengths of its first and its last corner.
+    ends: [f64; 2],
+}
+
+impl Polygon {
+    /// Whether a place belongs to the polygon.
+    pub(super) fn has(&self, s: f64) -> bool {
+        self.ends[0] <= s && s <= self.ends[1]
+    }
+}
+
+/// The sharpest corner of such a polygon: 20° (angle). Sharper ones are bevels.
+const SHARPEST: f64 = 0.35;
+
+/// The least overlap of body and obstacle that is not rounding, as a part of the length of the boundary.
+const ROUNDING: f64 = 1e-9;
+
+/// A corner of the surface: its arc length, and the angle by which the surface turns there.
+type Turn = (f64, f64);
+
+impl PatchView<'_> {
+    /// The polygon in contact that stands for a curve, if there is one: neighbouring corners that turn alike, at alike
+    /// distances, to which the obstacle does not conform.
+    pub(super) fn polygon(&self) -> Option<Polygon> {
+        let contact = self.patch.contact;
+        let peak = self.highest_pressure().map(|highest| highest.value)?;
+        if !contact.in_space || contact.condition != Condition::Unilateral || peak <= 0.0 {
+            return None;
+        }
+        let s = &contact.boundary.s;
+        let corners = self.corners_with_images();
+        if corners.len() < CORNERS {
+            return None;
+        }
+        let modulus = self.contact_moduli().into_iter().fold(0.0, f64::max);
+        let alike = |pair: &[Turn]| {
+            let turns = pair[1].1 / pair[0].1;
+            (1.0 / ALIKE..ALIKE).contains(&turns)
+        };
+        let mut found: Option<Polygon> = None;
+        let mut start = 0;
+        for end in 1..=corners.len() {
+            let goes_on = end < corners.len() && alike(&corners[end - 1..=end]) && {
+                let length = |k: usize| corners[k].0 - corners[k - 1].0;
+                end - start < 2 || (1.0 / ALIKE..ALIKE).contains(&(length(end) / length(end - 1)))
+            };
+            if goes_on {
+                continue;
+            }
+            let run = &corners[start..end];
+            start = end;
+            if run.len() < CORNERS {
+                continue;
+            }
+            let sides = run.windows(2).map(|pair| pair[1].0 - pair[0].0);
+            let side = sides.fold(0.0, f64::max);
+            let (from, to) = (run[0].0 - side, run[run.len() - 1].0 + side);
+            let near = s.partition_point(|s| *s < from)..s.partition_point(|s| *s <= to);
+            let turn = run
+                .iter()
+                .fold(0.0f64, |most, corner| most.max(corner.1.abs()));
+            // full contact with arcs of height side · turn / 8 takes the pressure π E* height / (2 side)
+            let matters = PI / 16.0 * modulus * turn > TELLING * peak && turn <= SHARPEST;
+            if !matters
+                || !near.into_iter().any(|i| self.active(i))
+                || found.as_ref().is_some_and(|known| known.turn >= turn)
+            {
+                continue;
+            }
+            let inside = |corner: &&Turn| (s[0]..=s[s.len() - 1]).contains(&corner.0);
+            found = Some(Polygon {
+                count: run.iter().filter(inside).count(),
+                turn,
+                side,
+                height: self.part_of_overlap(side * turn / 8.0),
+                ends: [run[0].0, run[run.len() - 1].0],
+            });
+        }
+        found
+    }
+
+    /// What the peak of the pressure may have from places in contact where parabolic sides that stand for a smooth curve meet at
+    /// an angle (stress): half of what full contact with such sides takes. Refinement keeps the parabolas.
+    pub(super) fn pressure_of_parabolas(&self) -> f64 {
+        let contact = self.patch.contact;
+        if !contact.in_space || contact.condition != Condition::Unilateral {
+            return 0.0;
+        }
+        let boundary = &contact.boundary;
+        let touching = (2..self.count() - 1).step_by(2).filter(|i| self.active(*i));
+        let smooth = touching.filter(|i| boundary.corner(*i) == 0.0);
+        let ends = [0, self.count() - 1].into_iter();
+        let ends =
+            ends.filter(|i| self.active(*i) && self.symmetric(*i) && self.turn_at_image(*i) == 0.0);
+        let at_images = ends.map(|end| {
+            let [before, after] = self.sides_at_image(end);
+            smooth::turn(&before, &after)
+        });
+        let turns = smooth.map(|i| boundary.turn(i)).chain(at_images);
+        let turn = turns.fold(0.0f64, |most, turn| most.max(turn.abs()));
+        if turn == 0.0 {
+            return 0.0;
+        }
+        let modulus = self.contact_moduli().into_iter().fold(0.0, f64::max);
+        PI / 32.0 * modulus * turn
+    }
+
+    /// The same of a peak σ_t = `stress` where the bound follows the pressure itself.
+    pub(super) fn bound_of_parabolas(&self, stress: f64) -> f64 {
+        match self.highest_pressure() {
+            Some(highest) if self.averages_nothing() && highest.value > 0.0 => {
+                self.pressure_of_parabolas() * stress.abs() / highest.value
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// The corners of the surface that the obstacle does not have, too, with mirror images of the first and last ones beyond
+    /// lines of symmetry, in order.
+    fn corners_with_images(&self) -> Vec<Turn> {
+        let boundary = &self.patch.contact.boundary;
+        let (s, last) = (&boundary.s, self.count() - 1);
+        let own = self.body_corners(|_| true).into_iter();
+        let mut corners: Vec<Turn> = own
+            .filter(|corner| corner.change.abs() > 0.5 * corner.turn.abs())
+            .map(|corner| (s[corner.node], corner.turn))
+            .collect();
+        let images = |corners: &[Turn], end: usize| -> Vec<Turn> {
+            let image = |(at, turn): Turn| (2.0 * s[end] - at, turn);
+            corners.iter().copied().map(image).collect()
+        };
+        if self.symmetric(0) {
+            let near = corners
+                .iter()
+                .take(CORNERS)
+                .copied()
+                .rev()
+                .collect::<Vec<_>>();
+            let turn = self.turn_at_image(0);
+            let middle = (turn != 0.0).then_some((s[0], turn));
+            let before = images(&near, 0).into_iter().chain(middle);
+            corners.splice(0..0, before);
+        }
+        if self.symmetric(last) {
+            let near = corners
+                .iter()
+                .rev()
+                .take(CORNERS)
+                .copied()
+                .collect::<Vec<_>>();
+            let turn = self.turn_at_image(last);
+            let middle = (turn != 0.0).then_some((s[last], turn));
+            corners.extend(middle.into_iter().chain(images(&near, last)));
+        }
+        corners
+    }
+
+    /// The angle by which the surface turns where it meets its mirror image, at an end of the boundary on a line of symmetry,
+    /// which is perpendicular to the tangent of the contact there; 0 where it is smooth.
+    pub(super) fn turn_at_image(&self, end: usize) -> f64 {
+        let [before, after] = self.sides_at_image(end);
+        smooth::corner(&before, &after)
+    }
+
+    /// The side at an end of the boundary on a line of symmetry, and its mirror image, in order.
+    fn sides_at_image(&self, end: usize) -> [smooth::Side; 2] {
+        let boundary = &self.patch.contact.boundary;
+        let edge = if end == 0 {
+            0
+        } else {
+            boundary.edge_count() - 1
+        };
+        let side = edge_nodes(edge).map(|i| boundary.positions[i]);
+        // on the axis a contact's tangent may be that of a cone
+        let t = if self.on_axis(end) {
+            [1.0, 0.0]
+        } else {
+            boundary.tangent(end)
+        };
+        let place = boundary.positions[end];
+        let mirrored = side.map(|[x, y]| {
+            let along = (x - place[0]) * t[0] + (y - place[1]) * t[1];
+            [x - 2.0 * along * t[0], y - 2.0 * along * t[1]]
+        });
+        // the image runs the other way
+        let image = [mirrored[1], mirrored[0], mirrored[2]];
+        if end == 0 {
+            [image, side]
+        } else {
+            [side, image]
+        }
+    }
+
+    /// A height as a part of the largest overlap of body and obstacle before deformation, or of the deepest displacement of the
+    /// body in contact if that is larger: loads press bodies together without an overlap.
+    fn part_of_overlap(&self, height: f64) -> Option<f64> {
+        let contact = self.patch.contact;
+        let gaps = (0..self.count()).map(|i| contact.gap(i, self.system.level.indentation));
+        let touching = (0..self.count()).filter(|i| self.active(*i));
+        let moved = touching.map(|i| {
+            self.system
+                .normal_displacement(self.v, self.patch.first + i)
+        });
+        let overlap = -gaps.chain(moved).fold(0.0, f64::min);
+        (overlap > ROUNDING * contact.boundary.length()).then_some(height / overlap)
+    }
+
+    /// Tells that the sides of elements are not the curve that they stand for, where the peak shows it.
+    fn warn_of_parabolas(&self, warnings: &mut Vec<Warning>) {
+        let peak = self.highest_pressure().map_or(0.0, |highest| highest.value);
+        let part = self.pressure_of_parabolas() / peak;
+        if part.is_finite() && part > SHOWN {
+            warnings.push(Warning {
+                code: WarningCode::KinkInContact,
+                pointer: self.patch.contact.pointer.clone(),
+                message: format!(
+                    "The sides of elements in contact are parabolas that meet at small angles. The peak of the pressure may be {:.1} % off that of a smooth curve, which its stated error contains. Unless the curve is named under /mesh/curves, refinement keeps the angles: name it, or begin with more elements.",
+                    100.0 * part
+                ),
+            });
+        }
+    }
+
+    /// Tells of a polygon in place of a curve, and returns it.
+    pub(super) fn warn_of_polygon(&self, warnings: &mut Vec<Warning>) -> Option<Polygon> {
+        let Some(polygon) = self.polygon() else {
+            self.warn_of_parabolas(warnings);
+            return None;
+        };
+        let Polygon {
+            count,
+            turn,
+            side,
+            height,
+            ..
+        } = polygon;
+        let coarse = height.is_some_and(|height| height > COARSE);
+        let part = match height {
+            Some(height) => format!(
+                ", which is {:.1} % of the overlap of body and obstacle: forces may be wrong by about as much",
+                100.0 * height
+            ),
+            None => String::new(),
+        };
+        warnings.push(Warning {
+            code: if coarse {
+                WarningCode::PolygonTooCoarse
+            } else {
+                WarningCode::PolygonInContact
+            },
+            pointer: self.patch.contact.pointer.clone(),
+            message: format!(
+                "The surface in contact is a polygon: it turns by up to {:.2}° at {count} corners, between sides of up to {side:.4e}. Refinement keeps the corners, and the stated errors are those of the polygon. If it stands for a curve, that curve is {:.2e} off the middle of a side{part}. Name the curve under /mesh/curves, or mesh it with elements of second order whose midside nodes are on it.",
+                turn.to_degrees(),
+                side * turn / 8.0
+            ),
+        });
+        Some(polygon)
+    }
+}
