@@ -186,6 +186,11 @@ fn run_steps<'a>(
         });
         let mut summary = reported.summary;
         summary.accuracy = accuracy;
+        if assessed && summary.converged && observer.stop() {
+            // its errors would be unknown for no reason of its own, and others would be given them
+            summary.accuracy = None;
+            (summary.outcome, summary.converged) = (Outcome::Canceled, false);
+        }
         if model.controls.check_uniqueness && summary.converged {
             let (system, controls) = (&load_history.system, &model.controls);
             let second = algorithm::other_solution(system, controls, &finished, observer);

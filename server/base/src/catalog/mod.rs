@@ -221,7 +221,7 @@ catalog! {
     NonFinite: of_job("A number is not finite",
         "A NaN or an infinity arose during the solution; the numbers of the problem are too large or too small compared with each other."),
     TimedOut: of_job("The job exceeded its time limit",
-        "The job was stopped after limits.timeout_s. Its results so far are kept as a partial result. Retry it with a higher limit (a body {\"limits\": {\"timeout_s\": …}}), or make the problem smaller."),
+        "The job was stopped after limits.timeout_s. What its load steps had reached is kept as a partial result, if the solver could still report it. Retry it with a higher limit (a body {\"limits\": {\"timeout_s\": …}}), or make the problem smaller."),
     QueueExpired: of_job("The job waited too long in the queue",
         "The job was not started within limits.queue_ttl_s: all workers were busy, or the queue was paused. Retry it with a higher priority or a higher limit (a body {\"priority\": …, \"limits\": {\"queue_ttl_s\": …}})."),
     ResourceExhausted: of_job("The job needs more memory than there is",
