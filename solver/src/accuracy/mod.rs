@@ -73,6 +73,24 @@ struct Parts {
 }
 
 impl Parts {
+    /// The parts that need no dual solution, of a quantity among those of its contact. `of_revolution`: whether the body is one.
+    fn of(quantity: &Quantity, all: &[Quantity], of_revolution: bool) -> Parts {
+        use QuantityName::{NormalForce, PeakNormalStress};
+        let ends = quantity.value.abs() * end_spacing(quantity, all).powi(2);
+        let ring = of_revolution && matches!(quantity.name, NormalForce | PeakNormalStress);
+        Parts {
+            ends,
+            ends_of_revolution: if ring { OF_REVOLUTION * ends } else { 0.0 },
+            spacing: quantity.spacing,
+            between: quantity.between,
+            unresolved: quantity.unresolved,
+            truncation: quantity.truncation,
+            unseen: quantity.unseen,
+            value: quantity.value.abs(),
+            ..Parts::default()
+        }
+    }
+
     /// The bound of the error: the sum of the parts, each with its factor.
     fn bound(&self, name: QuantityName) -> f64 {
         let [
@@ -284,22 +302,7 @@ fn bounds(
     let work = WORK_OF_AN_ELEMENT * away.len() + WORK_OF_A_PLACE * 3 * system.nodes.len();
     let mut bounds = Vec::with_capacity(quantities.len());
     for quantity in quantities {
-        let mut parts = Parts {
-            ends: quantity.value.abs() * end_spacing(quantity, quantities).powi(2),
-            spacing: quantity.spacing,
-            between: quantity.between,
-            unresolved: quantity.unresolved,
-            truncation: quantity.truncation,
-            unseen: quantity.unseen,
-            value: quantity.value.abs(),
-            ..Parts::default()
-        };
-        use QuantityName::{NormalForce, PeakNormalStress};
-        if system.model.section.axisymmetric()
-            && matches!(quantity.name, NormalForce | PeakNormalStress)
-        {
-            parts.ends_of_revolution = OF_REVOLUTION * parts.ends;
-        }
+        let mut parts = Parts::of(quantity, quantities, system.model.section.axisymmetric());
         let mut displaced = quantity.displaced;
         let mut added = Added::default();
         if let Some(gradient) = &quantity.gradient {
