@@ -5,7 +5,7 @@
 //! smoothed in the same way, and is solved on the same mesh. Samples come in pairs of opposite noise: half the difference
 //! of a pair scatters as a quantity does, and the mean of a pair shows how far smoothing and curvature shift it
 //! (`accuracy::add_measurement`). The noise is a fixed sequence, so that equal problems give equal bits, and evened out
-//! ([`evened`]).
+//! (`evened`).
 
 use crate::accuracy::{self, OnOtherMesh};
 use crate::algorithm::quiet;
