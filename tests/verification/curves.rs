@@ -136,9 +136,10 @@ fn a_polygon_in_place_of_a_curve_is_told_however_fine_the_mesh() {
         for refine in refines {
             let solution = of(&ring(around, refine, false));
             let off = (solution.summary.normal_force / exact - 1.0).abs();
-            let code = match coarse {
-                true => WarningCode::PolygonTooCoarse,
-                false => WarningCode::PolygonInContact,
+            let code = if coarse {
+                WarningCode::PolygonTooCoarse
+            } else {
+                WarningCode::PolygonInContact
             };
             assert!(
                 told(&solution, code),
@@ -351,7 +352,7 @@ fn reentrant_corners_are_reported() {
         .collect();
     let mut bore = Sector::new([4.0, 8.0], [-150.0, -30.0], 30);
     (bore.across, bore.straight) = (10, true);
-    let told = |obstacle: Value, indentation: f64, changes: &[(&str, Value)]| {
+    let told = |bore: Sector, obstacle: Value, indentation: f64, changes: &[(&str, Value)]| {
         let mut text = cylinder(bore, changes);
         text["supports"] = json!([{"boundary": "outer", "ux": 0, "uy": 0}]);
         text["contacts"][0]["boundary"] = json!("inner");
@@ -362,12 +363,20 @@ fn reentrant_corners_are_reported() {
         kinks(&solution).join("\n")
     };
     let round = json!({"kind": "polyline", "points": pin, "interpolation": "cubic"});
-    let facets = told(round.clone(), 0.05, &[]);
+    let facets = told(bore, round.clone(), 0.05, &[]);
     assert!(
         facets.contains("is a polygon") && facets.contains("turns by up to 4.00°"),
         "{facets}"
     );
+    // a single corner is no polygon
+    (bore.angles, bore.around) = ([-120.0, -60.0], 2);
+    let single = told(bore, round.clone(), 0.15, &[("refine", json!(2))]);
+    assert!(
+        single.contains("has a reentrant corner in the contact") && single.contains("-30.00°"),
+        "{single}"
+    );
+    (bore.angles, bore.around) = ([-150.0, -30.0], 30);
     let circle = json!({"inner": {"kind": "circle", "center": [0, 0], "radius": 4}});
-    assert_eq!(told(round, 0.05, &[("curves", circle)]), "");
-    assert_eq!(told(json!({"kind": "flat"}), 0.05, &[]), "");
+    assert_eq!(told(bore, round, 0.05, &[("curves", circle)]), "");
+    assert_eq!(told(bore, json!({"kind": "flat"}), 0.05, &[]), "");
 }

@@ -18,7 +18,7 @@ const CORNERS: usize = 3;
 const TELLING: f64 = 0.05;
 
 /// The height of a side's arc, as a part of the largest overlap of body and obstacle, above which forces may be wrong by more
-/// than the 5 % of the verdict `fair`. Rings of 60 to 500 straight sides are wrong by 1.1 to 1.7 times that part.
+/// than the 5 % of the verdict `fair`, as rings of straight sides on a pin are (`tests/verification/curves.rs`).
 const COARSE: f64 = 0.03;
 
 /// The part of the peak from which on the angles between parabolic sides are told.
@@ -32,8 +32,7 @@ pub(super) struct Polygon {
     turn: f64,
     /// The length of the longest side.
     side: f64,
-    /// The height of an arc over a side, as a part of the largest overlap of body and obstacle before deformation; none
-    /// without an overlap.
+    /// The height of an arc over a side, as the part that `part_of_overlap` returns.
     height: Option<f64>,
     /// The arc lengths of its first and its last corner.
     ends: [f64; 2],
