@@ -57,6 +57,7 @@ mod refusals;
 mod rigid_tools;
 mod robustness;
 mod rounding;
+mod sharp_ends;
 mod sliding;
 mod small_strain;
 mod smooth;

@@ -66,6 +66,8 @@ struct Parts {
     truncation: f64,
     /// The pressure of a shape of the obstacle that the nodes miss, [`Quantity::unseen`].
     unseen: f64,
+    /// The least error that a sharp end leaves, [`Quantity::sharp_end`].
+    sharp_end: f64,
     /// The change of the quantity by the mean, over an edge, of shapes of the obstacle that the nodes miss.
     unseen_mean: f64,
     /// The size of the quantity itself, for rounding and errors that no other part contains.
@@ -86,6 +88,7 @@ impl Parts {
             unresolved: quantity.unresolved,
             truncation: quantity.truncation,
             unseen: quantity.unseen,
+            sharp_end: quantity.sharp_end,
             value: quantity.value.abs(),
             ..Parts::default()
         }
@@ -117,6 +120,7 @@ impl Parts {
             + self.unresolved
             + truncation_factor(name) * self.truncation
             + value * self.value;
+        let sum = sum.max(self.sharp_end);
         // the shape of the obstacle between the nodes is in the other parts as far as the nodes see it; its mean, which moves
         // the whole body, is in none, but changes the peak of the pressure less than the shape does
         match name {
@@ -460,6 +464,13 @@ fn by_spacing(quantity: &Quantity, all: &[Quantity], parts: &Parts, added: &mut 
         &quantity.between_at,
     );
     added.spread(parts.unseen + parts.unseen_mean, &quantity.unseen_at);
+    // as far as it exceeds the other parts
+    let without = Parts {
+        sharp_end: 0.0,
+        ..*parts
+    };
+    let more = parts.bound(quantity.name) - without.bound(quantity.name);
+    added.spread(more, &quantity.sharp_end_at);
 }
 
 /// The nodes of the mesh that are in contact.

@@ -59,6 +59,9 @@ pub struct Place {
 /// The places between the nodes of an edge where the obstacle is evaluated.
 const BETWEEN: [f64; 6] = [-0.75, -0.5, -0.25, 0.25, 0.5, 0.75];
 
+/// The largest part of the shortest edge that counts as rounding of coordinates.
+const OF_AN_EDGE: f64 = 1e-3;
+
 /// The largest number of places on one edge: a quarter where the obstacle is nearest, a quarter where it is farthest,
 /// and the sharpest kinks.
 const MOST_PLACES: usize = 32;
@@ -172,7 +175,13 @@ impl<'a> View<'a> {
     ) -> Self {
         let shape = Shape::new(obstacle);
         let whole = along(mesh, boundary, held);
-        let rounding = ROUNDING * whole.s[whole.s.len() - 1];
+        // rounded coordinates are those of the whole boundary, but a mesh may be finer than that
+        let edges = (0..boundary.len()).map(|k| {
+            let [start, end, _] = whole.edge_arc(k);
+            end - start
+        });
+        let shortest = edges.fold(f64::INFINITY, f64::min);
+        let rounding = (ROUNDING * whole.s[whole.s.len() - 1]).min(OF_AN_EDGE * shortest);
         View {
             mesh,
             held,

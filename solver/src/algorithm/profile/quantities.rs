@@ -7,6 +7,7 @@ use crate::algorithm::system::Point;
 use crate::contact::edge_nodes;
 use crate::element::edge3;
 use crate::friction::BoundLaw;
+use crate::problem::Condition;
 use crate::solution::{Outcome, QuantityName};
 
 /// A quantity of a contact, and the parts of its error.
@@ -43,6 +44,11 @@ pub struct Quantity {
     pub displaced: f64,
     /// For a peak: the stress due to a shape of the obstacle between the nodes that they do not see; else 0.
     pub unseen: f64,
+    /// The least error that a sharp end leaves, in the unit of the value: of friction forces on the edges there, and of a peak of
+    /// σ_t there where the body sticks.
+    pub sharp_end: f64,
+    /// The edges at sharp ends, with their parts in any unit.
+    pub sharp_end_at: Vec<(usize, f64)>,
     /// The edges of the contact that contribute to `spacing`, with their parts in any unit.
     pub spacing_at: Vec<(usize, f64)>,
     /// The edges of the contact that contribute to `between`, with their parts in any unit.
@@ -90,8 +96,15 @@ pub(super) struct EndOfContact {
 /// of the ends depend on the mesh.
 const MOST_STICK_ENDS: usize = 8;
 
+/// The least pressure at the end of a boundary, as a part of that at the node beside it, that shows contact up to the end: at
+/// a sharp end the pressure grows, and that of a parabola which contact reaches just so is half (`tests/verification/widths.rs`).
+const REACHES_END: f64 = 0.7;
+
+/// The same, below which contact ends before the end of the boundary.
+const NEXT_TO_NOTHING: f64 = 0.25;
+
 /// The part of its bound above which friction counts as having reached it: no peak of σ_t is known as exactly as that.
-const WHOLE_BOUND: f64 = 1.0 - 1e-6;
+pub(super) const WHOLE_BOUND: f64 = 1.0 - 1e-6;
 
 /// The change of slip along an edge, as a part of ε, up to which the slip is constant apart from rounding: if it equals
 /// ε, there is no end of stick. The incremental law leads to such slip where the load rests.
@@ -234,6 +247,8 @@ impl PatchView<'_> {
             truncation: 0.0,
             displaced: 0.0,
             unseen: 0.0,
+            sharp_end: 0.0,
+            sharp_end_at: Vec::new(),
             spacing_at: Vec::new(),
             between_at: Vec::new(),
             unseen_at: Vec::new(),
@@ -289,6 +304,8 @@ impl PatchView<'_> {
             by_edge.iter().sum::<f64>(),
             by_edge.iter().map(|part| part.abs()).sum(),
         ];
+        let at_sharp_ends = self.friction_at_sharp_ends();
+        let sharp_end: f64 = at_sharp_ends.iter().map(|(_, force)| force).sum();
         let at = |parts: &[f64]| parts.iter().map(|part| part.abs()).enumerate().collect();
         let quantity = |(name, value, gradient)| Quantity {
             factor: circumference,
@@ -302,6 +319,11 @@ impl PatchView<'_> {
                 QuantityName::TangentialForce => circumference * between[0].abs(),
                 _ => circumference * between[1],
             },
+            sharp_end: match name {
+                QuantityName::NormalForce => 0.0,
+                _ => circumference * sharp_end,
+            },
+            sharp_end_at: at_sharp_ends.clone(),
             spacing_at: open_at.clone(),
             between_at: at(&by_edge),
             ..self.quantity(name, value, Some(gradient))
@@ -360,6 +382,8 @@ impl PatchView<'_> {
                 unresolved: self.unresolved_bound(highest)
                     + ripple
                     + self.bound_of_parabolas(stress),
+                sharp_end: self.traction_at_sharp_end(highest, reached),
+                sharp_end_at: vec![(edge, 1.0)],
                 estimable: limited(!self.averages_nothing() || !self.pressure_without_limit()),
                 ..self.quantity(QuantityName::PeakTangentialStress, stress, Some(gradient))
             });
@@ -486,7 +510,10 @@ impl PatchView<'_> {
                     node: i,
                     s: s[i],
                     truncation: if i == 0 { self.left_out(0) } else { 0.0 },
-                    spacing: if i == 0 { 0.0 } else { s[i] - s[i - 1] },
+                    spacing: match i {
+                        0 => self.open_before_end(0, 1),
+                        _ => s[i] - s[i - 1],
+                    },
                     edge: i.saturating_sub(1) / 2,
                 });
             }
@@ -496,12 +523,35 @@ impl PatchView<'_> {
                     node: i,
                     s: s[i],
                     truncation: if i == last { self.left_out(last) } else { 0.0 },
-                    spacing: if i == last { 0.0 } else { s[i + 1] - s[i] },
+                    spacing: if i == last {
+                        self.open_before_end(last, last - 1)
+                    } else {
+                        s[i + 1] - s[i]
+                    },
                     edge: i.min(last - 1) / 2,
                 });
             }
         }
         found
+    }
+
+    /// How far before the end of the boundary contact may end (length): where the pressure falls towards the end, contact may
+    /// end between the two outermost nodes; 0 where the pressure shows that it reaches the end. `end`: the last node of the
+    /// boundary; `beside`: the node beside it.
+    fn open_before_end(&self, end: usize, beside: usize) -> f64 {
+        let goes_on = self.symmetric(end) || self.patch.contact.condition == Condition::Bonded;
+        if goes_on || self.pressure(end) >= REACHES_END * self.pressure(beside) {
+            return 0.0;
+        }
+        let s = &self.patch.contact.boundary.s;
+        (s[end] - s[beside]).abs()
+    }
+
+    /// Whether contact ends before the end of the boundary, although its last node touches: the pressure there is next to
+    /// nothing.
+    pub(super) fn ends_before(&self, end: usize, beside: usize) -> bool {
+        self.open_before_end(end, beside) > 0.0
+            && self.pressure(end) < NEXT_TO_NOTHING * self.pressure(beside)
     }
 
     /// A point for evaluating the law at the place ξ of an edge, with the anchor interpolated there.

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeSet;
 
+use super::quantities::WHOLE_BOUND;
 use super::{Highest, PatchView};
 use crate::contact::edge_nodes;
 use crate::element::edge3;
@@ -46,6 +47,14 @@ const UNSEEN_STICK: f64 = 1.2;
 
 /// The error of the friction force at a kink, as a part of the friction force on the edges beside the kink; calibrated.
 const AT_KINKS: f64 = 0.2;
+
+/// The least error of the friction force on an edge at a sharp end, as a part of this force: as much as flat punches show
+/// (`tests/verification/sharp_ends.rs`).
+const AT_SHARP_END: f64 = 0.07;
+
+/// The least error of a peak of σ_t at a sharp end where the body sticks, as a part of the change of σ_t along the edge there: as
+/// much as flat punches show (`tests/verification/sharp_ends.rs`).
+const CUSP: f64 = 0.65;
 
 impl PatchView<'_> {
     /// A value at ξ of an edge; a ξ beyond −1 … 1 is a place on the neighbouring edge.
@@ -257,6 +266,57 @@ impl PatchView<'_> {
             reached + self.bound_at_jumps(turn, xi) - value.abs()
         });
         there.fold(self.bound_at_jumps(edge, xi), f64::max)
+    }
+
+    /// The least error of the friction force on the edges at sharp ends, where the pressure, of which friction is an average, is known
+    /// only roughly, by edge (force, without 2π).
+    pub(super) fn friction_at_sharp_ends(&self) -> Vec<(usize, f64)> {
+        let on_edge = |edge: usize| {
+            let [start, end, _] = self.patch.contact.boundary.edge_arc(edge);
+            let points = self.system.points.iter().zip(&self.finished.tractions);
+            let own = points
+                .filter(|(point, _)| point.patch == self.p && (start..=end).contains(&point.s));
+            let friction: f64 = own
+                .map(|(point, stress)| (point.weight * stress).abs())
+                .sum();
+            // at a corner of the body the pressure may hardly grow
+            let [start, end, _] = edge_nodes(edge).map(|i| self.pressure(i));
+            let (inner, outer) = if edge == 0 {
+                (end, start)
+            } else {
+                (start, end)
+            };
+            let growth = ((outer - inner) / inner.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            (edge, AT_SHARP_END * growth * friction)
+        };
+        self.sharp_ends().into_iter().map(on_edge).collect()
+    }
+
+    /// The least error of a peak of σ_t at a sharp end where the body sticks (stress): slip grows there like a root of the distance,
+    /// which no element follows. `reached`: σ_t as a part of the friction bound.
+    pub(super) fn traction_at_sharp_end(
+        &self,
+        Highest { value, edge, .. }: Highest,
+        reached: f64,
+    ) -> f64 {
+        if reached >= WHOLE_BOUND || !self.sharp_ends().contains(&edge) {
+            return 0.0;
+        }
+        let last = self.count() - 1;
+        let inner = if edge == 0 { 1.0 } else { -1.0 };
+        let inner = self.tangential_stress_at(edge, inner).abs();
+        let end = if edge == 0 { 0 } else { last };
+        let bound = self.averaged_and_bound_at_nodes()[end].1;
+        let room = (bound.max(value.abs() / reached) - value.abs()).max(0.0);
+        (CUSP * (value.abs() - inner).max(0.0)).min(room)
+    }
+
+    /// The edges at the ends of the boundary up to which contact reaches, and where its pressure has no limit.
+    fn sharp_ends(&self) -> Vec<usize> {
+        let last = self.count() - 1;
+        let sharp = |i: &usize| self.active(*i) && self.may_be_sharp(*i);
+        let ends = [0, last].into_iter().filter(sharp);
+        ends.map(|i| i.saturating_sub(1) / 2).collect()
     }
 
     /// The edges with ends of stick, each with the place of one on it and the largest pressure at its nodes; if there are

@@ -497,7 +497,8 @@ impl PatchView<'_> {
             patch.contact.boundary.nodes.iter().zip(system.range(patch))
         });
         let touched = there.any(|(other, k)| *other == node && self.finished.state.active[k]);
-        !self.symmetric(i) && !touched && !self.is_mild_corner(i)
+        let beside = if i == 0 { 1 } else { i - 1 };
+        !self.symmetric(i) && !touched && !self.is_mild_corner(i) && !self.ends_before(i, beside)
     }
 
     /// Whether the body itself ends at the first or the last node of the boundary, on an obstacle that goes on, in a corner so
