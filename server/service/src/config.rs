@@ -98,7 +98,7 @@ pub struct Config {
     #[arg(long, env = "SIGNORINI_MAX_BYTES_PER_OWNER", value_name = "BYTES")]
     pub max_bytes_per_owner: Option<u64>,
 
-    /// Jobs that one owner may submit in a minute. It applies only where there are tokens or a trusted proxy [default: no limit]
+    /// Jobs that one owner may submit in any minute. It applies only where there are tokens or a trusted proxy [default: no limit]
     #[arg(long, env = "SIGNORINI_MAX_SUBMISSIONS_PER_OWNER_PER_MINUTE", value_name = "N",
           value_parser = clap::value_parser!(u32).range(1..))]
     pub max_submissions_per_owner_per_minute: Option<u32>,

@@ -34,7 +34,8 @@ impl Store {
         let folder = self.folder.path();
         let free = rustix::fs::statvfs(folder).map_or(0, |free| free.f_bavail * free.f_frsize);
         Ok(Space {
-            used: pages.bytes_of(pages.count) + self.length(LOG),
+            // pages that are only in the log are counted with the log
+            used: self.length(DATABASE) + self.length(LOG),
             unused: pages.bytes_of(pages.free),
             free,
         })

@@ -110,7 +110,7 @@ pub struct Kept {
 /// A limit per minute.
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct Rate {
-    /// The number of jobs that may be submitted in a minute.
+    /// The number of jobs that may be submitted in any minute.
     pub per_minute: u64,
     /// The number of jobs that may be submitted at this moment.
     pub left: u64,
