@@ -56,6 +56,16 @@ const AT_SHARP_END: f64 = 0.07;
 /// much as flat punches show (`tests/verification/sharp_ends.rs`).
 const CUSP: f64 = 0.65;
 
+/// The least error of a peak of σ_t that is the bound at a sharp end, as a part of itself, for a length of the edge there in nonlocal
+/// radii: as much as flat punches show (`tests/verification/sharp_ends.rs`).
+const OF_LAST_EDGE: f64 = 2.5;
+
+/// The largest such error, as a part of the peak: on edges as long as the radius the bound is known to that.
+const MOST_OF_BOUND: f64 = 0.2;
+
+/// How near to a sharp end, in nonlocal radii, a peak is that the pressure at the end decides.
+const NEAR_END: f64 = 0.1;
+
 impl PatchView<'_> {
     /// A value at ξ of an edge; a ξ beyond −1 … 1 is a place on the neighbouring edge.
     pub(super) fn along(
@@ -279,15 +289,7 @@ impl PatchView<'_> {
             let friction: f64 = own
                 .map(|(point, stress)| (point.weight * stress).abs())
                 .sum();
-            // at a corner of the body the pressure may hardly grow
-            let [start, end, _] = edge_nodes(edge).map(|i| self.pressure(i));
-            let (inner, outer) = if edge == 0 {
-                (end, start)
-            } else {
-                (start, end)
-            };
-            let growth = ((outer - inner) / inner.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-            (edge, AT_SHARP_END * growth * friction)
+            (edge, AT_SHARP_END * self.growth_at_end(edge) * friction)
         };
         self.sharp_ends().into_iter().map(on_edge).collect()
     }
@@ -296,10 +298,13 @@ impl PatchView<'_> {
     /// which no element follows. `reached`: σ_t as a part of the friction bound.
     pub(super) fn traction_at_sharp_end(
         &self,
-        Highest { value, edge, .. }: Highest,
+        Highest { value, edge, xi }: Highest,
         reached: f64,
     ) -> f64 {
-        if reached >= WHOLE_BOUND || !self.sharp_ends().contains(&edge) {
+        if reached >= WHOLE_BOUND {
+            return self.bound_at_sharp_end(value, edge, xi);
+        }
+        if !self.sharp_ends().contains(&edge) {
             return 0.0;
         }
         let last = self.count() - 1;
@@ -309,6 +314,47 @@ impl PatchView<'_> {
         let bound = self.averaged_and_bound_at_nodes()[end].1;
         let room = (bound.max(value.abs() / reached) - value.abs()).max(0.0);
         (CUSP * (value.abs() - inner).max(0.0)).min(room)
+    }
+
+    /// The least error of a peak of σ_t that is the friction bound, near a sharp end (stress): most of the average is the pressure
+    /// of the edge at the end, whose place the mesh does not know.
+    fn bound_at_sharp_end(&self, value: f64, edge: usize, xi: f64) -> f64 {
+        let radius = self.patch.law.as_ref().and_then(|law| law.bound.reach());
+        let Some(radius) = radius.filter(|radius| *radius > 0.0) else {
+            return 0.0;
+        };
+        let boundary = &self.patch.contact.boundary;
+        let s = edge3::interpolate(&edge3::shape(xi), &boundary.edge_arc(edge));
+        let of_end = |at: usize| {
+            let [start, end, _] = boundary.edge_arc(at);
+            let length = end - start;
+            let place = if at == 0 { start } else { end };
+            // longer edges are warned of
+            let near = length <= radius && (s - place).abs() <= length.max(NEAR_END * radius);
+            if near {
+                (OF_LAST_EDGE * self.growth_at_end(at) * length / radius).min(MOST_OF_BOUND)
+            } else {
+                0.0
+            }
+        };
+        let most = self
+            .sharp_ends()
+            .into_iter()
+            .map(of_end)
+            .fold(0.0, f64::max);
+        value.abs() * most
+    }
+
+    /// How much the pressure grows along an edge towards the end of the boundary, as a part of the pressure at the other end of the
+    /// edge, 0 … 1: at a corner of the body it may hardly grow.
+    fn growth_at_end(&self, edge: usize) -> f64 {
+        let [start, end, _] = edge_nodes(edge).map(|i| self.pressure(i));
+        let (inner, outer) = if edge == 0 {
+            (end, start)
+        } else {
+            (start, end)
+        };
+        ((outer - inner) / inner.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
     }
 
     /// The edges at the ends of the boundary up to which contact reaches, and where its pressure has no limit.
