@@ -148,7 +148,9 @@ async fn the_page_of_the_api_loads_files_from_this_service_only() {
 /// Operations: GetProto
 #[tokio::test]
 async fn the_contract_of_grpc_is_served_unchanged() {
-    let served = server().await.get("/proto/signorini.proto").send().await;
+    // it lives until its whole answer is read
+    let server = server().await;
+    let served = server.get("/proto/signorini.proto").send().await;
     let served = served.unwrap().text().await.unwrap();
     let written = include_str!("../../proto/signorini/v1/signorini.proto");
     assert_eq!(served, written);
