@@ -5,6 +5,7 @@
 //! the whole field by one back-substitution. The factor is private to this module.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use serde::Serialize;
 
@@ -24,7 +25,7 @@ use crate::solution::Phase;
 /// A body, assembled, supported and condensed onto its contact boundaries.
 pub struct ElasticBody {
     /// The condensed stiffness Ŝ, on the contact unknowns in the order of `contact_dofs`.
-    pub stiffness: Dense,
+    pub stiffness: Arc<Dense>,
     /// The load f̂ that the problem's loads condense to.
     load_of_loads: Vec<f64>,
     /// The load f̂ that the prescribed displacements condense to.
@@ -192,7 +193,7 @@ impl ElasticBody {
             }
         }
         Ok(ElasticBody {
-            stiffness,
+            stiffness: Arc::new(stiffness),
             load_of_loads,
             load_of_supports,
             contact_dofs,
@@ -228,6 +229,14 @@ impl ElasticBody {
             displacements[beside] += AXIS_SHARE * displacements[end];
         }
         displacements
+    }
+
+    /// Converts displacements of contact nodes along n and t, in the order of Ŝ, to contact unknowns: the inverse of
+    /// [`ElasticBody::nodal_displacements`].
+    pub fn contact_unknowns(&self, displacements: &mut [f64]) {
+        for &[end, beside] in &self.axis_ends {
+            displacements[beside] -= AXIS_SHARE * displacements[end];
+        }
     }
 
     /// Whether two models have the same body: all that [`ElasticBody::new`] reads is equal.

@@ -50,6 +50,12 @@ pub struct Member {
     pub peak_normal_stress: f64,
     /// The largest |σ_t| of all contacts, with its sign; 0 without friction.
     pub peak_tangential_stress: f64,
+    /// The indentation of the obstacle under loads, if there is one such obstacle (length).
+    pub indentation: Option<f64>,
+    /// The tangential displacement of the obstacle under loads, if there is one such obstacle (length).
+    pub tangential_displacement: Option<f64>,
+    /// The tilt of the obstacle under loads, if there is one such obstacle (radians).
+    pub tilt: Option<f64>,
     /// The number of rows of the history.
     pub iterations: u32,
     /// Dimensionless residuals of the final state.
@@ -219,8 +225,13 @@ impl Member {
             let larger = |a: f64, b: f64| if b.abs() > a.abs() { b } else { a };
             values.fold(0.0, larger)
         };
+        let mut tools = contacts.values().filter(|contact| contact.tilt.is_some());
+        let tool = tools.next().filter(|_| tools.next().is_none());
         Member {
             outcome: Outcome::Converged,
+            indentation: tool.and_then(|contact| contact.indentation),
+            tangential_displacement: tool.and_then(|contact| contact.tangential_displacement),
+            tilt: tool.and_then(|contact| contact.tilt),
             normal_force: sum(|contact| contact.normal_force),
             tangential_force: sum(|contact| contact.tangential_force),
             friction_force: sum(|contact| contact.friction_force),

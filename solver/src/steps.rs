@@ -734,35 +734,19 @@ struct StepPath<'a> {
 impl StepPath<'_> {
     /// The level at a part of the step, 0 … 1.
     fn level(&self, part: f64) -> Level {
-        let between = |from: f64, to: f64| match part {
-            1.0 => to,
-            _ => from + part * (to - from),
-        };
-        let Level {
-            indentation,
-            tangential_displacement,
-            loads,
-            supports,
-        } = self.from;
-        let grown = match (self.step.spacing, self.power) {
-            // a contact's width grows like the root of the indentation
-            (Spacing::ContactWidth, Some(power))
-                if indentation >= 0.0 && self.step.indentation >= 0.0 && part < 1.0 =>
-            {
-                let width = |factor: f64| factor.powf(1.0 / power);
-                between(width(indentation), width(self.step.indentation)).powf(power)
-            }
-            _ => between(indentation, self.step.indentation),
-        };
-        Level {
-            indentation: grown,
-            tangential_displacement: between(
-                tangential_displacement,
-                self.step.tangential_displacement,
-            ),
-            loads: between(loads, self.step.loads),
-            supports: between(supports, self.step.supports),
+        let to = Level::end_of(self.step);
+        let mut level = Level::between(&self.from, &to, part);
+        let ([from, ..], [to, ..]) = (self.from.motions, to.motions);
+        // a contact's width grows like the root of the indentation
+        if let (Spacing::ContactWidth, Some(power)) = (self.step.spacing, self.power)
+            && from >= 0.0
+            && to >= 0.0
+            && part < 1.0
+        {
+            let [from, to] = [from, to].map(|factor| factor.powf(1.0 / power));
+            level.motions[0] = (from + part * (to - from)).powf(power);
         }
+        level
     }
 }
 
@@ -786,12 +770,12 @@ mod tests {
             path.level(part)
         };
         let half = at(&step, Some(2.0), 0.5);
-        assert_eq!((half.indentation, half.loads), (0.45, 0.5));
+        assert_eq!((half.motions[0], half.loads), (0.45, 0.5));
         step.spacing = Spacing::ContactWidth;
         let half = at(&step, Some(2.0), 0.5);
-        assert!((half.indentation - 0.225).abs() < 1e-15);
-        assert_eq!(half.tangential_displacement, 0.15);
-        assert_eq!(at(&step, None, 0.5).indentation, 0.45);
-        assert_eq!(at(&step, Some(2.0), 1.0).indentation, 0.9);
+        assert!((half.motions[0] - 0.225).abs() < 1e-15);
+        assert_eq!(half.motions[1], 0.15);
+        assert_eq!(at(&step, None, 0.5).motions[0], 0.45);
+        assert_eq!(at(&step, Some(2.0), 1.0).motions[0], 0.9);
     }
 }

@@ -208,7 +208,7 @@ async fn an_unknown_column_is_refused_with_all_that_there_are() {
         (
             "columns=id,colour",
             "bad-parameter",
-            "peak_tangential_stress, label.KEY",
+            "peak_tangential_stress, indentation, tangential_displacement, tilt, label.KEY",
         ),
         ("columns=", "bad-parameter", "stored_bytes, labels"),
         ("columns=id,id", "bad-parameter", "each once"),

@@ -44,6 +44,7 @@ mod measured;
 mod misuse;
 mod nearly_incompressible;
 mod oblique;
+mod obstacle_loads;
 mod obstacle_normals;
 mod obstacle_points;
 mod overlaps;
@@ -69,6 +70,7 @@ mod thermal;
 mod thesis;
 mod thick_cylinder;
 mod tolerance;
+
 mod traps;
 mod unmerged;
 mod unseen;

@@ -1,7 +1,7 @@
 //! `normal: obstacle`: gap and displacement along the obstacle's own normal, formulation 1.2.
 
 use serde_json::{Value, json};
-use solver::model::{ContactModel, Model};
+use solver::model::{ContactModel, Level, Model};
 use solver::solution::WarningCode;
 
 use crate::support::{problem, solve};
@@ -34,12 +34,14 @@ fn the_gap_to_a_line_is_its_perpendicular_distance() {
     let line = json!({"kind": "line", "point": [0, 1.5], "angle": 30});
     let (s, c) = 30f64.to_radians().sin_cos();
     let (body, own) = (top(line.clone(), "body"), top(line, "obstacle"));
+    let mut half = Level::FULL;
+    half.motions[0] = 0.5;
     for i in 0..9 {
         let distance = 0.5 + body.boundary.positions[i][0] * s / c;
         near(body.profile[i], distance);
-        near(body.gap(i, 0.5), distance - 0.1);
+        near(body.gap(i, &half), distance - 0.1);
         near(own.profile[i], distance * c);
-        near(own.gap(i, 0.5), (distance - 0.1) * c);
+        near(own.gap(i, &half), (distance - 0.1) * c);
         let (n, t) = (own.boundary.normals[i], own.boundary.tangent(i));
         near(n[0], -s);
         near(n[1], c);

@@ -7,7 +7,7 @@ use solver::element::Element;
 use solver::error::Violation;
 use solver::error::shortened;
 use solver::mesh::Mesh;
-use solver::model::Model;
+use solver::model::{Level, Model};
 use solver::problem::Problem;
 use solver::solution::Fields;
 
@@ -251,7 +251,7 @@ fn entries(problem: &Problem, names: &[String], has_obstacle: bool) -> Vec<(Stri
 fn at_contact(model: &Model, body: &Window) -> Option<(Window, f64)> {
     let mut reached = Vec::new();
     for contact in &model.contacts {
-        let gap = |i: usize| contact.gap(i, 1.0);
+        let gap = |i: usize| contact.gap(i, &Level::FULL);
         let nodes = 0..contact.boundary.positions.len();
         let least = nodes.clone().map(gap).fold(f64::INFINITY, f64::min);
         let touches = nodes.filter(|&i| gap(i) <= least.max(0.0));

@@ -90,9 +90,12 @@ fn field(path: &str) -> Option<(usize, &str)> {
 }
 
 /// The fields of a contact whose numbers affect neither the body nor the structure of a problem.
-const NAMES: [&str; 7] = [
+const NAMES: [&str; 10] = [
     "indentation",
     "tangential_displacement",
+    "normal_force",
+    "tangential_force",
+    "moment",
     "friction/coefficient",
     "friction/nonlocal_radius",
     "friction/elastic_slip",
@@ -111,6 +114,13 @@ fn set(problem: &mut Problem, path: &str, number: f64) -> bool {
     match (name, &mut contact.friction) {
         ("indentation", _) => contact.indentation = number,
         ("tangential_displacement", _) => contact.tangential_displacement = number,
+        ("normal_force", _) if contact.normal_force.is_some() => {
+            contact.normal_force = Some(number)
+        }
+        ("tangential_force", _) if contact.tangential_force.is_some() => {
+            contact.tangential_force = Some(number);
+        }
+        ("moment", _) if contact.moment.is_some() => contact.moment = Some(number),
         ("friction/coefficient", Some(law)) => law.coefficient = Some(number),
         ("friction/nonlocal_radius", Some(law)) => law.nonlocal_radius = Some(number),
         ("friction/elastic_slip", Some(law)) => law.elastic_slip = number,

@@ -114,6 +114,15 @@ pub struct MemberRow {
     pub peak_normal_stress: Option<f64>,
     /// The largest |σ_t|, with its sign; 0 without friction.
     pub peak_tangential_stress: Option<f64>,
+    /// Indentation of the obstacle with a load or a tilt; absent without one such obstacle, or with several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub obstacle_indentation: Option<f64>,
+    /// Tangential displacement of this obstacle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub obstacle_tangential_displacement: Option<f64>,
+    /// Tilt of this obstacle (radians).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub obstacle_tilt: Option<f64>,
     /// The number of iterations of the member; 0 if it was not solved.
     pub iterations: u32,
     /// The dimensionless residuals of the member's final state.
@@ -184,6 +193,9 @@ impl MemberRow {
                 &mut self.slip_width,
                 &mut self.peak_normal_stress,
                 &mut self.peak_tangential_stress,
+                &mut self.obstacle_indentation,
+                &mut self.obstacle_tangential_displacement,
+                &mut self.obstacle_tilt,
             ] {
                 *number = None;
             }
@@ -211,6 +223,9 @@ impl MemberRow {
             slip_width,
             peak_normal_stress,
             peak_tangential_stress,
+            indentation,
+            tangential_displacement,
+            tilt,
             iterations,
             residuals,
             warnings,
@@ -239,6 +254,9 @@ impl MemberRow {
             slip_width: Some(slip_width),
             peak_normal_stress: Some(peak_normal_stress),
             peak_tangential_stress: Some(peak_tangential_stress),
+            obstacle_indentation: indentation,
+            obstacle_tangential_displacement: tangential_displacement,
+            obstacle_tilt: tilt,
             iterations,
             residuals: Some(residuals),
             warnings,

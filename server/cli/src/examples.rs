@@ -48,6 +48,7 @@ const FILES: &[(&str, &[u8])] = files! {
     "examples/sweeps/stick_width.json"
     "examples/sweeps/tangential_force.json"
     "examples/punch.R"
+    "examples/tool_under_load.json"
     "docs/gallery/hertz.json"
     "docs/gallery/known_load.json"
     "docs/gallery/gmsh_part.json"

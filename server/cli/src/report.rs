@@ -369,6 +369,24 @@ impl Lines {
             let sticks = ranges(&contact.stick) + &of_ends(accuracy, &[StickEnd], name);
             self.add("  sticks, s", sticks);
         }
+        use QuantityName::{Indentation, TangentialDisplacement, Tilt};
+        for (words, value, quantity) in [
+            ("  indentation", contact.indentation, Indentation),
+            (
+                "  tangential shift",
+                contact.tangential_displacement,
+                TangentialDisplacement,
+            ),
+            ("  tilt, radians", contact.tilt, Tilt),
+        ] {
+            if let Some(value) = value {
+                let error = stated(accuracy, quantity, Some(name));
+                self.add(words, number(value) + &error);
+            }
+        }
+        if let Some(moment) = contact.moment {
+            self.add("  moment", number(moment));
+        }
         for (words, peak, quantity) in [
             ("  peak σ_n", normal, QuantityName::PeakNormalStress),
             ("  peak σ_t", tangential, QuantityName::PeakTangentialStress),

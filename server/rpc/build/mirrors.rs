@@ -73,6 +73,7 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     array("Traction", "[problem::BoundaryValue; 2]"),
     content("NodalForces", "Vec<[f64; 2]>"),
     fields("Contact", "problem::Contact"),
+    fields("ObstacleStiffness", "problem::ObstacleStiffness"),
     names("NormalOf", "problem::NormalOf").defaulted(),
     names("Condition", "problem::Condition").defaulted(),
     kinds("Obstacle", "problem::Obstacle"),

@@ -31,6 +31,7 @@ fn factors(name: QuantityName) -> [f64; 2] {
         // to the end on the finer mesh, and from there as far as that is known: half as far as on this one
         ContactStart | ContactEnd => [1.0, 0.5],
         StickEnd => [3.0, 0.6],
+        Indentation | TangentialDisplacement | Tilt => [2.0, 0.3],
     }
 }
 

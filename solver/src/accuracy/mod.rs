@@ -77,9 +77,15 @@ struct Parts {
 impl Parts {
     /// The parts that need no dual solution, of a quantity among those of its contact. `of_revolution`: whether the body is one.
     fn of(quantity: &Quantity, all: &[Quantity], of_revolution: bool) -> Parts {
-        use QuantityName::{NormalForce, PeakNormalStress};
+        use QuantityName::{Indentation, NormalForce, PeakNormalStress};
         let ends = quantity.value.abs() * end_spacing(quantity, all).powi(2);
-        let ring = of_revolution && matches!(quantity.name, NormalForce | PeakNormalStress);
+        let ring =
+            of_revolution && matches!(quantity.name, NormalForce | PeakNormalStress | Indentation);
+        // a motion that is given is exact
+        let given = quantity.name.is_motion() && quantity.gradient.is_none();
+        if given {
+            return Parts::default();
+        }
         Parts {
             ends,
             ends_of_revolution: if ring { OF_REVOLUTION * ends } else { 0.0 },
@@ -153,6 +159,9 @@ fn factors(name: QuantityName) -> [f64; 9] {
         // the contact ends somewhere between the outermost node in contact and the next one
         ContactStart | ContactEnd => [0.0, 0.0,  0.0, 0.0,  0.0,  0.0,  1.0,   0.0,   0.0],
         StickEnd                 => [0.0,  2.05, 0.0, 0.0,  0.0,  0.0,  0.42,  0.0,   0.0],
+        // as of the normal force, on which they depend
+        Indentation | TangentialDisplacement | Tilt
+                                 => [0.95, 2.1,  0.0, 0.0,  0.45, 0.0,  0.0,   0.0,   1e-4],
     };
     factors
 }
@@ -164,8 +173,15 @@ fn truncation_factor(name: QuantityName) -> f64 {
     use QuantityName::*;
     match name {
         NormalForce => 0.5,
-        TangentialForce | FrictionForce | PeakNormalStress | PeakTangentialStress
-        | ContactStart | ContactEnd => 1.0,
+        TangentialForce
+        | FrictionForce
+        | PeakNormalStress
+        | PeakTangentialStress
+        | ContactStart
+        | ContactEnd
+        | Indentation
+        | TangentialDisplacement
+        | Tilt => 1.0,
         StickEnd => 1.5,
     }
 }
@@ -295,6 +311,8 @@ fn bounds(
         .filter_map(|q| q.gradient.as_ref())
         .collect();
     let influences = influences(system, &finished.state, &gradients, observer)?;
+    let motions = gradients.iter().map(|gradient| gradient.motion);
+    let influences: Vec<_> = influences.into_iter().zip(motions).collect();
     let errors = weighted_errors(solved, &influences, observer)?;
     let mut duals = influences.iter().zip(errors);
     let smoothing = smoothing_of_reactions(system, finished);
@@ -310,9 +328,14 @@ fn bounds(
         let mut displaced = quantity.displaced;
         let mut added = Added::default();
         if let Some(gradient) = &quantity.gradient {
-            let (z, errors) = duals.next()?;
+            let ((z, _), errors) = duals.next()?;
             interrupt.worked((z.len().pow(2) + work) as f64).ok()?;
-            let force = system.stiffness.times(z);
+            let mut force = system.stiffness.times(z);
+            // a motion of an obstacle depends on the gaps themselves, too
+            if gradient.motion.is_some() {
+                let own = force.iter_mut().zip(&gradient.displacement);
+                own.for_each(|(force, own)| *force -= own);
+            }
             let moved = gradient.reaction.iter().zip(&smoothing);
             parts.signed = quantity.factor * errors.iter().sum::<f64>();
             parts.absolute = quantity.factor.abs() * errors.iter().map(|e| e.abs()).sum::<f64>();
@@ -373,9 +396,10 @@ fn bounds(
 }
 
 /// ∫ (σ* − σ_h) : C⁻¹ (σ_z* − σ_z,h) over each element, by dual solution and element. None if the observer stops.
+/// `influences`: the dual solutions, each with the number of the unknown motion of an obstacle whose influence it is.
 fn weighted_errors(
     solved: Solved<'_>,
-    influences: &[Vec<f64>],
+    influences: &[(Vec<f64>, Option<usize>)],
     observer: &mut dyn Observer,
 ) -> Option<Vec<Vec<f64>>> {
     /// The number of dual solutions that are treated together: eight numbers fill a cache line, but many problems have
@@ -399,13 +423,15 @@ fn weighted_errors(
 /// Like [`weighted_errors`], for at most `DUALS` dual solutions.
 fn weighted_errors_of<const DUALS: usize>(
     solved: Solved<'_>,
-    influences: &[Vec<f64>],
+    influences: &[(Vec<f64>, Option<usize>)],
     threads: usize,
     interrupt: &mut Interrupt<'_>,
 ) -> Result<Vec<Vec<f64>>, Stopped> {
     interrupt.ask()?;
+    let of_body = |(z, motion): &(Vec<f64>, Option<usize>)| solved.system.dual_of_body(z, *motion);
+    let influences: Vec<Vec<f64>> = influences.iter().map(of_body).collect();
     let body = solved.system.body;
-    let duals = body.displacements_without_loads::<DUALS>(influences, threads);
+    let duals = body.displacements_without_loads::<DUALS>(&influences, threads);
     let elements = body.elements(solved.system.model);
     let difference = &solved.reported.difference;
     let products = difference.products_with_fields(elements, &duals, interrupt)?;

@@ -64,7 +64,8 @@ impl Finding {
 }
 
 /// The reference size, not negative, by which the error of a quantity is divided: for a force or a peak its own size;
-/// for a tangential force the friction force; for an end the length of the contact. `own`: the values of a kind at the
+/// for a tangential force the friction force; for an end the length of the contact; for a tangential displacement or a tilt at
+/// least the indentation, and that by length of the contact. `own`: the values of a kind at the
 /// same contact. `images`: the number of equal parts of the contact, of which one is modelled.
 pub(super) fn scale(
     name: QuantityName,
@@ -72,15 +73,20 @@ pub(super) fn scale(
     own: impl Fn(QuantityName) -> Vec<f64>,
     images: f64,
 ) -> f64 {
+    let of_contact = || {
+        images
+            * length(
+                own(QuantityName::ContactStart).into_iter(),
+                own(QuantityName::ContactEnd).into_iter(),
+            )
+    };
+    let pushed = || own(QuantityName::Indentation).iter().sum::<f64>().abs();
     let scale = match name {
         QuantityName::TangentialForce => own(QuantityName::FrictionForce).iter().sum(),
-        name if name.is_extent() => {
-            images
-                * length(
-                    own(QuantityName::ContactStart).into_iter(),
-                    own(QuantityName::ContactEnd).into_iter(),
-                )
-        }
+        name if name.is_extent() => of_contact(),
+        // an obstacle may hardly move sideways, or turn, at all
+        QuantityName::TangentialDisplacement => f64::abs(value).max(pushed()),
+        QuantityName::Tilt => f64::abs(value).max(pushed() / of_contact()),
         _ => value,
     };
     f64::abs(scale)
@@ -189,9 +195,12 @@ pub fn limit_by(warnings: &[Warning], accuracy: &mut Accuracy) {
 pub(super) fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<Finding> {
     let (name, contact) = (<&str>::from(q.quantity), &q.contact);
     let [good, fair] = match q.quantity {
-        QuantityName::NormalForce | QuantityName::TangentialForce | QuantityName::FrictionForce => {
-            FORCES
-        }
+        QuantityName::NormalForce
+        | QuantityName::TangentialForce
+        | QuantityName::FrictionForce
+        | QuantityName::Indentation
+        | QuantityName::TangentialDisplacement
+        | QuantityName::Tilt => FORCES,
         QuantityName::ContactStart | QuantityName::ContactEnd => ENDS_OF_CONTACT,
         _ => OTHERS,
     };

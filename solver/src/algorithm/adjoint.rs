@@ -13,6 +13,7 @@
 use crate::algorithm::factors::{dense, free_dofs};
 use crate::algorithm::newton::jacobian;
 use crate::algorithm::system::{Point, State, System};
+use crate::algorithm::tools::Tools;
 use crate::elasticity::Dof;
 use crate::linear::Interrupt;
 use crate::observer::Observer;
@@ -26,6 +27,8 @@ pub struct Gradient {
     pub reaction: Vec<f64>,
     /// The derivative by the tangential reaction of each contact node whose tangent is held.
     pub held: Vec<f64>,
+    /// The number of the unknown motion of an obstacle that the quantity is.
+    pub motion: Option<usize>,
 }
 
 impl Gradient {
@@ -35,6 +38,16 @@ impl Gradient {
             displacement: vec![0.0; system.load.len()],
             reaction: vec![0.0; system.nodes.len()],
             held: vec![0.0; system.nodes.len()],
+            motion: None,
+        }
+    }
+
+    /// The gradient of an unknown motion of an obstacle.
+    pub(super) fn of_motion(system: &System<'_>, tools: &Tools, motion: usize) -> Self {
+        Gradient {
+            displacement: tools.gradient(motion),
+            motion: Some(motion),
+            ..Gradient::zero(system)
         }
     }
 
@@ -190,24 +203,37 @@ mod tests {
     fn influences_are_what_small_forces_change() {
         let law =
             serde_json::json!({"coefficient": 0.4, "nonlocal_radius": 0.2, "elastic_slip": 1e-2});
+        let pushed = serde_json::json!({"indentation": 0.1});
+        let pressed = serde_json::json!({"normal_force": 60});
+        let turned = serde_json::json!({"normal_force": 60, "tangential_force": 5, "moment": -20, "about": [0, 0.3]});
         let cases = [
-            ("plane_strain", "unilateral", Some(law.clone())),
-            ("axisymmetric", "unilateral", Some(law)),
-            ("plane_strain", "unilateral", None),
-            ("plane_strain", "bonded", None),
+            ("plane_strain", "unilateral", Some(law.clone()), &pushed),
+            ("axisymmetric", "unilateral", Some(law.clone()), &pushed),
+            ("plane_strain", "unilateral", None, &pushed),
+            ("plane_strain", "bonded", None, &pushed),
+            ("plane_strain", "unilateral", Some(law.clone()), &pressed),
+            ("axisymmetric", "unilateral", Some(law.clone()), &pressed),
+            ("plane_strain", "unilateral", Some(law), &turned),
+            ("plane_strain", "bonded", None, &turned),
         ];
-        for (kind, condition, friction) in cases {
+        for (kind, condition, friction, given) in cases {
             let mut problem = serde_json::json!({
                 "analysis": {"kind": kind},
                 "mesh": {"grid": {"x": [0, 0.2, 0.4, 0.6, 0.8, 1, 1.5, 2], "y": [-2, -1, -0.4, 0]}},
                 "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
                 "supports": [{"boundary": "left", "ux": 0}, {"boundary": "bottom", "uy": 0}],
                 "contacts": [{"boundary": "top", "obstacle": {"kind": "parabola", "radius": 5},
-                    "indentation": 0.1, "condition": condition}],
+                    "condition": condition}],
                 "solver": {"tolerance": 1e-13}
             });
             if let Some(friction) = friction {
                 problem["contacts"][0]["friction"] = friction;
+            }
+            let more = given.as_object().unwrap().clone();
+            problem["contacts"][0].as_object_mut().unwrap().extend(more);
+            if given == &turned {
+                // a line of symmetry would hold the obstacle
+                problem["supports"] = serde_json::json!([{"boundary": "bottom", "ux": 0, "uy": 0}]);
             }
             let problem = serde_json::from_value(problem).unwrap();
             let quiet: &mut dyn Observer = &mut ();

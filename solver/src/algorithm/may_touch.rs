@@ -74,7 +74,7 @@ struct MayTouch {
     /// The order of all unknowns: first the eliminated unknowns, then the others.
     order: Vec<usize>,
     eliminated: Eliminated,
-    stiffness: Dense,
+    stiffness: Arc<Dense>,
     /// The numbers of the friction points whose nodes all remain.
     points: Vec<usize>,
     /// By contact: the kind of points where friction acts; none if the contact is frictionless.
@@ -307,7 +307,9 @@ impl Region {
 /// bound that does not depend on its pressure.
 fn may_touch(system: &System<'_>, last: Option<&Finished>) -> Vec<bool> {
     let steps = system.model.steps.iter().map(|step| step.indentation);
-    let deepest = steps.fold(system.level.indentation, f64::max);
+    let [pushed, ..] = system.level.motions;
+    let mut deepest = system.level;
+    deepest.motions[0] = steps.fold(pushed, f64::max);
     let mut touches = Vec::with_capacity(system.nodes.len());
     for patch in &system.patches {
         let by_pressure = |law: &FrictionLaw| matches!(law.bound, BoundLaw::Pressure { .. });
@@ -318,7 +320,7 @@ fn may_touch(system: &System<'_>, last: Option<&Finished>) -> Vec<bool> {
             .enumerate()
             .map(|(i, node)| {
                 !known
-                    || patch.contact.gap(i, deepest) < 0.0
+                    || patch.contact.gap(i, &deepest) < 0.0
                     || last.is_some_and(|last| last.state.active[node])
             })
             .collect();
@@ -401,7 +403,7 @@ impl MayTouch {
             kept,
             order,
             eliminated,
-            stiffness,
+            stiffness: Arc::new(stiffness),
         })
     }
 
@@ -446,7 +448,9 @@ impl MayTouch {
             ..*node
         };
         let part = System {
-            stiffness: &self.stiffness,
+            stiffness: self.stiffness.clone(),
+            tools: None,
+            tools_at_rest: Vec::new(),
             load: load[count..].to_vec(),
             nodes: system.nodes.iter().zip(&self.kept).map(node).collect(),
             points: self

@@ -22,6 +22,7 @@
 //! | forces, extents, peaks and warnings of one contact | `profile` |
 //! | what a small force would change in a quantity: the adjoint, for stated errors | `adjoint` |
 //! | common ends of contacts | `corners` |
+//! | obstacles whose motion is unknown, and that nothing holds | `tools`, `unheld` |
 //! | bodies that slide away, slide far, or strain much | `slides`, `large_slip`, `small_strain` |
 
 mod adjoint;
@@ -42,6 +43,8 @@ mod slides;
 mod small_strain;
 mod system;
 mod thesis;
+mod tools;
+mod unheld;
 mod uniqueness;
 
 pub use adjoint::{Gradient, influences};
@@ -55,6 +58,7 @@ pub use report::{AlongContacts, Reported, numbers, quantities, report};
 pub use rounding::Rounding;
 pub use slides::Slide;
 pub use system::{Averages, ContactNode, Patch, Path, Point, State, System};
+pub use tools::{FreeMotion, Tools, free_motions};
 pub use uniqueness::{
     EndForces, note_doubled_increments, note_uniqueness, other_solution, rounding_of_forces,
     warn_of_increments,

@@ -8,6 +8,7 @@ use crate::algorithm::large_slip::large_slip;
 use crate::algorithm::profile::{DisplacedNode, Forces, Missed, PatchView, Quantity};
 use crate::algorithm::small_strain::large_strain;
 use crate::algorithm::system::{Patch, System};
+use crate::algorithm::unheld;
 use crate::elasticity::{Dof, Recovered, StressDifference, recover};
 use crate::error::SolveError;
 use crate::linear::{Interrupt, Stopped};
@@ -77,6 +78,9 @@ pub fn numbers(
     finished: &Finished,
     observer: &mut dyn Observer,
 ) -> Result<(BTreeMap<String, ContactSummary>, Vec<Warning>), SolveError> {
+    if finished.outcome == Outcome::Converged {
+        unheld::held(system, &finished.state, &finished.bound)?;
+    }
     let mut stop = || observer.stop();
     let state = FinalState::new(system, finished, &mut stop);
     let mut warnings = system.model.warnings.clone();
@@ -233,6 +237,9 @@ pub fn report(
     if system.semidefinite && finished.outcome != Outcome::Canceled {
         held(system, finished)?;
     }
+    if finished.outcome == Outcome::Converged {
+        unheld::held(system, &finished.state, &finished.bound)?;
+    }
     let state = FinalState::new(system, finished, &mut stop);
     let (inside, difference) = Inside::new(&state)?;
     let mut warnings = system.model.warnings.clone();
@@ -310,6 +317,40 @@ fn contact_force(system: &System<'_>, finished: &Finished, forces: &Forces) -> V
     force
 }
 
+/// The largest imbalance of an obstacle under loads: what its load, its spring and the body leave of a force or moment, as a part of
+/// the forces on it, times the length of the contact for a moment.
+fn imbalance_of_tools(state: &FinalState<'_>, contacts: &BTreeMap<String, ContactSummary>) -> f64 {
+    let system = state.system;
+    let Some(tools) = &system.tools else {
+        return 0.0;
+    };
+    let q = system.free_motions(&state.finished.state.v);
+    let mut most = 0.0f64;
+    for (free, q) in tools.motions.iter().zip(q) {
+        let contact = system.patches[free.patch].contact;
+        let (Some(tool), Some(found)) = (&contact.tool, contacts.get(&contact.name)) else {
+            continue;
+        };
+        let force = found.force.unwrap_or_default();
+        let [normal, tangential] = tool.components(force);
+        let on_body = [normal, tangential, found.moment.unwrap_or_default()][free.motion];
+        let load = tools.load(system.model, &system.level, free);
+        let spring = tools.spring(system.model, free) * q;
+        let left = system.circumference * (load - spring) - on_body;
+        let arm = if free.motion == 2 {
+            contact.boundary.length()
+        } else {
+            1.0
+        };
+        let size = (arm * force[0].hypot(force[1])).max(on_body.abs());
+        let floor = FORCE_FLOOR * arm * system.circumference * system.reference_force;
+        if left != 0.0 {
+            most = most.max(left.abs() / size.max(floor));
+        }
+    }
+    most
+}
+
 /// The energy of friction, ∫τψ of thesis (1.21), without 2π.
 fn friction_energy(system: &System<'_>, finished: &Finished) -> f64 {
     let points = system.points.iter().zip(&finished.bound);
@@ -332,7 +373,8 @@ impl Inside {
     fn new(state: &FinalState<'_>) -> Result<(Self, StressDifference), SolveError> {
         let (system, v) = (state.system, &state.finished.state.v);
         let (model, body) = (system.model, system.body);
-        let displacements = body.displacements_on(system.threads, v, &system.level);
+        let moved = system.displaced(v);
+        let displacements = body.displacements_on(system.threads, &moved, &system.level);
         let elements = body.elements(model);
         let inner = model.inner(&system.level);
         let interrupt = &mut *state.questions.interrupt.borrow_mut();
@@ -356,7 +398,9 @@ impl Inside {
     ) -> Summary {
         let (system, finished) = (state.system, state.finished);
         let (circumference, recovered) = (system.circumference, &self.recovered);
-        let equilibrium = self.equilibrium(state);
+        let equilibrium = self
+            .equilibrium(state)
+            .max(imbalance_of_tools(state, &contacts));
         let (most, other_causes) = if system.model.section.has_split() {
             (
                 OUT_OF_BALANCE_INCOMPRESSIBLE,
@@ -383,8 +427,10 @@ impl Inside {
         let total =
             |f: fn(&ContactSummary) -> f64| contacts.values().map(f).fold(0.0, |sum, x| sum + x);
         let springs = system.model.springs.energy(&self.displacements);
+        let of_tools = system.energy_of_tools(&finished.state.v);
         let energy = recovered.strain_energy + springs - self.work_of_loads(system)
-            + friction_energy(system, finished);
+            + friction_energy(system, finished)
+            + of_tools;
         Summary {
             outcome,
             converged: outcome == Outcome::Converged,

@@ -3,6 +3,7 @@
 
 use crate::algorithm::recorder::Measured;
 use crate::algorithm::system::{Patch, Point, State, System};
+use crate::algorithm::tools::FreeMotion;
 use crate::elasticity::Dof;
 use crate::error::rounded;
 use crate::friction::{BoundLaw, Source};
@@ -19,10 +20,12 @@ const ALIGNED: f64 = 1e-9;
 /// How far a body that slides away is moved, in elastic slips: all of its friction then acts, also with `tanh`.
 const MOVED: f64 = 20.0;
 
-/// A body that slides away.
+/// A body, or an obstacle under loads, that slides away.
 #[derive(Clone, Debug)]
 pub struct Slide {
     motion: RigidMotion,
+    /// The boundary of the obstacle that slides away; none if the body does.
+    obstacle: Option<String>,
     /// The power of the loads along the motion, with its sign (with 2π).
     push: f64,
     /// The power of the largest friction along the motion (with 2π).
@@ -44,6 +47,16 @@ impl Slide {
             Some(_) => "turn",
         };
         let words = &self.motion.words;
+        let (subject, remedy) = match &self.obstacle {
+            None => (
+                "the body".to_owned(),
+                format!("Support the body against this motion, or {verb} it less."),
+            ),
+            Some(name) => (
+                format!("the obstacle of contact `{name}`"),
+                "Give a `tangential_displacement` in place of the force, a smaller force, or a spring by `stiffness`.".to_owned(),
+            ),
+        };
         let most = if self.certain {
             format!("at most {hold:?}: there is no equilibrium")
         } else {
@@ -52,7 +65,7 @@ impl Slide {
             )
         };
         format!(
-            "The loads {verb} the body with {kind} {push:?} {words}. Only friction resists this motion, and it can resist {most}. Support the body against this motion, or {verb} it less."
+            "The loads {verb} {subject} with {kind} {push:?} {words}. Only friction resists this motion, and it can resist {most}. {remedy}"
         )
     }
 }
@@ -67,6 +80,7 @@ pub(super) fn certain(system: &System<'_>) -> Option<Slide> {
         let slides = push.abs() > most * (1.0 + EQUAL[0]);
         slides.then_some(Slide {
             motion,
+            obstacle: None,
             push,
             hold,
             certain: true,
@@ -88,12 +102,46 @@ pub(super) fn found(system: &System<'_>, state: &State) -> Option<Slide> {
         let slides = push.abs() > hold * (1.0 + EQUAL[1]) && !moved.stopped(system, active, push);
         slides.then_some(Slide {
             motion,
+            obstacle: None,
             push,
             hold,
             certain: false,
         })
     };
-    motions.filter_map(slide).next()
+    let of_body = motions.filter_map(slide).next();
+    of_body.or_else(|| obstacle_found(system, &bound))
+}
+
+/// The obstacle that a tangential force slides along a straight contact against all friction, with these bounds.
+fn obstacle_found(system: &System<'_>, bound: &[f64]) -> Option<Slide> {
+    let tools = system.tools.as_ref()?;
+    let along = tools.motions.iter().filter(|free| free.motion == 1);
+    let slide = |free: &FreeMotion| {
+        let patch = &system.patches[free.patch];
+        let tool = patch.contact.tool.as_ref()?;
+        let straight = system.range(patch).len();
+        let straight = (0..straight).all(|i| tool.row(i, 1)[0].abs() <= ALIGNED);
+        let push = system.circumference * tools.load(system.model, &system.level, free);
+        let points = system.points.iter().zip(bound);
+        let own = points.filter(|(point, _)| point.patch == free.patch);
+        let hold = system.circumference * own.map(|(point, tau)| point.weight * tau).sum::<f64>();
+        let slides = straight
+            && tool.stiffness[1] == 0.0
+            && patch.contact.condition == Condition::Unilateral
+            && push.abs() > hold * (1.0 + EQUAL[1]);
+        slides.then(|| Slide {
+            motion: RigidMotion {
+                words: "along the contact".to_owned(),
+                moves: Vec::new(),
+                arm: None,
+            },
+            obstacle: Some(patch.contact.name.clone()),
+            push,
+            hold,
+            certain: false,
+        })
+    };
+    along.filter_map(slide).next()
 }
 
 /// The bonded state moved along a slide until all friction acts against it.

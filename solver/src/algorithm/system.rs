@@ -1,7 +1,10 @@
 //! The problem reduced to Γ_C at one load level: contact nodes, friction points, and the forces between them.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
+use crate::algorithm::tools::{self, Tools};
 use crate::body::{AXIS_SHARE, ElasticBody};
 use crate::elasticity::Dof;
 use crate::error::SolveError;
@@ -14,12 +17,19 @@ use crate::problem::{Condition, FrictionPoints};
 /// The part of the largest bound below which a friction point counts as open: its anchor then follows it.
 const OPEN: f64 = 1e-12;
 
+/// The part of a contact's length within which nodes are equally near to an obstacle.
+const NEAREST: f64 = 1e-9;
+
 /// The data of the iterations; nodes and points of all contacts are in a row.
 pub struct System<'a> {
-    /// The condensed stiffness Ŝ.
-    pub stiffness: &'a Dense,
-    /// The condensed load f̂ at this load level.
+    /// The condensed stiffness Ŝ; with unknown motions of obstacles that on displacements relative to them, S_w.
+    pub stiffness: Arc<Dense>,
+    /// The condensed load f̂ at this load level; with unknown motions of obstacles f_w.
     pub load: Vec<f64>,
+    /// The unknown motions of obstacles; none if all are given.
+    pub tools: Option<Arc<Tools>>,
+    /// The unknown motions at this load level without relative displacements.
+    pub tools_at_rest: Vec<f64>,
     /// The contact nodes of all contacts.
     pub nodes: Vec<ContactNode>,
     /// Points where friction acts; none in a frictionless contact.
@@ -30,7 +40,7 @@ pub struct System<'a> {
     pub circumference: f64,
     /// The load level of `load`, and of gaps and drags of the nodes.
     pub level: Level,
-    /// Whether Ŝ has rigid motions that only contact can prevent.
+    /// Whether the stiffness has rigid motions, of the body or of obstacles, that only contact can prevent.
     pub semidefinite: bool,
     /// The work that sliding has dissipated in the increments so far, under the incremental law (force × length,
     /// without 2π).
@@ -234,15 +244,22 @@ impl<'a> System<'a> {
         averages: &mut Averages,
         observer: &mut dyn Observer,
     ) -> Result<Self, SolveError> {
+        let tools = Tools::new(model, body, observer)?.map(Arc::new);
+        let stiffness = match &tools {
+            None => body.stiffness.clone(),
+            Some(tools) => tools.stiffness.clone(),
+        };
         let mut system = System {
-            stiffness: &body.stiffness,
+            stiffness,
             load: Vec::new(),
+            tools_at_rest: Vec::new(),
+            semidefinite: model.held_by_contact || tools.is_some(),
+            tools,
             nodes: Vec::new(),
             points: Vec::new(),
             patches: Vec::new(),
             circumference: model.section.circumference(),
             level: Level::FULL,
-            semidefinite: model.held_by_contact,
             dissipated: 0.0,
             touched: BTreeSet::new(),
             reference_force: 0.0,
@@ -256,7 +273,7 @@ impl<'a> System<'a> {
         system.set_level(Level::FULL);
         let most =
             |values: &mut dyn Iterator<Item = f64>| values.fold(0.0f64, |a, b| a.max(b.abs()));
-        let stiffest = most(&mut (0..system.load.len()).map(|i| body.stiffness.at(i, i)));
+        let stiffest = most(&mut (0..system.load.len()).map(|i| system.stiffness.at(i, i)));
         let pushed = most(
             &mut model
                 .contacts
@@ -436,6 +453,10 @@ impl<'a> System<'a> {
     pub fn set_level(&mut self, level: Level) {
         self.level = level;
         self.load = self.body.load(&level);
+        if let Some(tools) = &self.tools {
+            self.tools_at_rest = tools.at_rest(self.model, &level, &self.load);
+            self.load = tools.reduced(std::mem::take(&mut self.load), &self.tools_at_rest);
+        }
         for patch in &self.patches {
             let contact = patch.contact;
             for (i, node) in self.nodes[patch.first..].iter_mut().enumerate() {
@@ -454,7 +475,7 @@ impl<'a> System<'a> {
                 }
                 node.gap = match contact.condition {
                     Condition::None => f64::INFINITY,
-                    _ => contact.gap(i, level.indentation),
+                    _ => contact.gap(i, &level),
                 };
                 node.drag = contact.drag(i, &level);
                 node.held_tangent = node.bonded.then_some(node.drag);
@@ -473,7 +494,10 @@ impl<'a> System<'a> {
     pub fn bonded(&self) -> Self {
         // without friction points, whose averages are most of a large system
         let mut bonded = System {
+            stiffness: self.stiffness.clone(),
             load: self.load.clone(),
+            tools: self.tools.clone(),
+            tools_at_rest: self.tools_at_rest.clone(),
             nodes: self.nodes.clone(),
             points: Vec::new(),
             patches: self.patches.clone(),
@@ -518,12 +542,96 @@ impl<'a> System<'a> {
         self.dissipated + work.sum::<f64>()
     }
 
-    /// The initial state: no displacement, and no nodes in contact but bonded nodes.
+    /// The initial state: no displacement, and no nodes in contact but bonded nodes and, where a force presses the obstacle, those
+    /// that it is nearest to.
     pub fn rest(&self) -> State {
+        let mut active: Vec<bool> = self.nodes.iter().map(|node| node.bonded).collect();
+        for patch in &self.patches {
+            let Some([Some(_), _, moment]) = patch.contact.tool.as_ref().map(|tool| tool.loads)
+            else {
+                continue;
+            };
+            let range = self.range(patch);
+            let gap = |i: usize| patch.contact.gap(i, &self.level);
+            let least = (0..range.len()).map(gap).fold(f64::INFINITY, f64::min);
+            let equal = NEAREST * patch.contact.boundary.length();
+            // an obstacle that may turn about a single node is not held
+            let beside = if moment.is_some() { 2 } else { 0 };
+            for i in (0..range.len()).filter(|i| gap(*i) <= least + equal) {
+                let last = range.end.min(range.start + i + beside + 1);
+                active[range.start + i.saturating_sub(beside)..last].fill(true);
+            }
+        }
+        for (active, node) in active.iter_mut().zip(&self.nodes) {
+            *active &= node.bonded || matches!(node.normal, Dof::Free(_));
+        }
         State {
             v: vec![0.0; self.load.len()],
-            active: self.nodes.iter().map(|node| node.bonded).collect(),
+            active,
         }
+    }
+
+    /// The unknown motions of obstacles in a state, in the order of its tools.
+    pub fn free_motions(&self, v: &[f64]) -> Vec<f64> {
+        match &self.tools {
+            None => Vec::new(),
+            Some(tools) => tools.motions(&self.tools_at_rest, v),
+        }
+    }
+
+    /// The motions of the obstacle of a contact in a state: indentation, tangential displacement and tilt.
+    pub fn obstacle_motions(&self, v: &[f64], patch: usize) -> [f64; 3] {
+        let contact = self.patches[patch].contact;
+        let given = match &contact.tool {
+            None => {
+                let [pushed, along, _] = self.level.motions;
+                [
+                    pushed * contact.indentation,
+                    along * contact.tangential_displacement,
+                    0.0,
+                ]
+            }
+            Some(tool) => tool.motions(&self.level),
+        };
+        let Some(tools) = &self.tools else {
+            return given;
+        };
+        let free = tools::of_patch(&tools.motions, &self.free_motions(v), patch);
+        std::array::from_fn(|k| given[k] + free[k])
+    }
+
+    /// The displacements of the contact unknowns in a state, which itself is relative to obstacles whose motion is unknown.
+    pub fn displaced<'b>(&self, v: &'b [f64]) -> Cow<'b, [f64]> {
+        match &self.tools {
+            None => Cow::Borrowed(v),
+            Some(tools) => Cow::Owned(tools.displaced(v, &self.free_motions(v))),
+        }
+    }
+
+    /// The displacements of the contact unknowns in the dual solution of a quantity, z + P (A⁻¹ e − A⁻¹PᵀŜ z). `z`: its influence
+    /// on displacements relative to obstacles; `motion`: the unknown motion that the quantity is, if it is one.
+    pub fn dual_of_body(&self, z: &[f64], motion: Option<usize>) -> Vec<f64> {
+        let Some(tools) = &self.tools else {
+            return z.to_vec();
+        };
+        let own = match motion {
+            None => vec![0.0; tools.motions.len()],
+            Some(motion) => tools.unit_response(motion),
+        };
+        tools.displaced(z, &tools.motions(&own, z))
+    }
+
+    /// The energy of the springs of obstacles less the work of the loads on obstacles (without 2π).
+    pub fn energy_of_tools(&self, v: &[f64]) -> f64 {
+        let Some(tools) = &self.tools else {
+            return 0.0;
+        };
+        let q = self.free_motions(v);
+        let energy = tools.motions.iter().zip(&q).map(|(free, q)| {
+            let load = tools.load(self.model, &self.level, free);
+            (0.5 * tools.spring(self.model, free) * q - load) * q
+        });
+        energy.sum()
     }
 
     /// The nodes of a contact, as a range.

@@ -124,6 +124,13 @@ pub enum SolveError {
         /// A node that moves in the free motion.
         node: u32,
     },
+    /// Nothing in the final state holds an obstacle whose loads are given.
+    ObstacleUnheld {
+        /// The boundary of the obstacle's contact.
+        contact: String,
+        /// The free motion, in words.
+        motion: String,
+    },
     /// There is not enough memory for a matrix.
     ResourceExhausted {
         /// The number of bytes that the matrix needs.
@@ -161,6 +168,13 @@ impl fmt::Display for SolveError {
                 "nothing holds the body: it is free to move {motion}, e.g. at node {node}. The supports rely \
                  on contact to prevent this motion, but in the final state there is no contact where it would \
                  do so. Add a support, or loads that press the body against the obstacle"
+            ),
+            SolveError::ObstacleUnheld { contact, motion } => write!(
+                f,
+                "nothing holds the obstacle of contact `{contact}`: {motion}. Its loads are given, and in the final \
+                 state neither pressure nor friction resists this motion, so that there is no equilibrium or any number \
+                 of them. Give the motion (`indentation`, `tangential_displacement` or `tilt`) in place of its load, or a \
+                 spring by `stiffness`; a normal force must act within the contact"
             ),
             SolveError::ResourceExhausted { bytes } => write!(
                 f,

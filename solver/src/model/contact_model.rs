@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use super::checks::ALIGNED;
 use super::level::Level;
+use super::tool::Tool;
 use crate::contact::ContactBoundary;
 use crate::contact::obstacle::Place;
 use crate::friction::{Average, FrictionLaw};
 use crate::mesh::Edge;
-use crate::problem::{Condition, NormalOf, Obstacle};
+use crate::problem::{Condition, Contact, NormalOf, Obstacle};
 
 /// An obstacle that is pushed along one direction.
 #[derive(Clone, Debug)]
@@ -48,6 +49,8 @@ pub struct ContactModel {
     pub push: Vec<[f64; 2]>,
     /// The direction of the indentation, if one is given.
     pub along: Option<AlongDirection>,
+    /// The obstacle as a rigid body, if it has a load or a tilt.
+    pub tool: Option<Tool>,
     /// The body's own normal at each node.
     pub outward: Vec<[f64; 2]>,
     /// The obstacle's own displacement along the contact's t (length).
@@ -70,14 +73,22 @@ pub struct ContactModel {
 }
 
 impl ContactModel {
-    /// The gap at a node (length) when the obstacle is pushed by `factor` times the contact's indentation.
-    pub fn gap(&self, node: usize, factor: f64) -> f64 {
-        self.gap_behind(node, factor * self.indentation)
+    /// The gap at a node (length) at a load level, without motions of the obstacle that are unknown.
+    pub fn gap(&self, node: usize, level: &Level) -> f64 {
+        let pushed = match &self.tool {
+            None => level.motions[0] * self.indentation * self.push[node][0],
+            Some(tool) => tool.moved(node, &tool.motions(level))[0],
+        };
+        self.profile[node] - pushed
     }
 
-    /// The gap at a node (length) when the obstacle is pushed by `pushed` (length).
-    pub fn gap_behind(&self, node: usize, pushed: f64) -> f64 {
-        self.profile[node] - pushed * self.push[node][0]
+    /// Takes the motions and loads of the obstacle of a contact that has the same free motions.
+    pub(super) fn take(&mut self, contact: &Contact) {
+        self.indentation = contact.indentation;
+        self.tangential_displacement = contact.tangential_displacement;
+        if let Some(tool) = &mut self.tool {
+            tool.take(contact);
+        }
     }
 
     /// Whether the second of the oblique axes of a node lies along the surface of the body.
@@ -98,15 +109,14 @@ impl ContactModel {
         self.indentation * (y * (b * t[0] - a * m[0]) - x * (b * t[1] - a * m[1]))
     }
 
-    /// The displacement d of the obstacle along the contact's t at a node (length).
+    /// The displacement d of the obstacle along the contact's t at a node (length), without its unknown motions.
     pub fn drag(&self, node: usize, level: &Level) -> f64 {
-        let along = level.tangential_displacement * self.tangential_displacement;
-        self.drag_behind(node, [level.indentation * self.indentation, along])
-    }
-
-    /// The displacement d of the obstacle along the contact's t at a node (length), for a given push and motion along
-    /// t.
-    pub fn drag_behind(&self, node: usize, [pushed, along]: [f64; 2]) -> f64 {
-        along + pushed * self.push[node][1]
+        match &self.tool {
+            None => {
+                let pushed = level.motions[0] * self.indentation;
+                level.motions[1] * self.tangential_displacement + pushed * self.push[node][1]
+            }
+            Some(tool) => tool.moved(node, &tool.motions(level))[1],
+        }
     }
 }

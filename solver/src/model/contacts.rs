@@ -10,6 +10,7 @@ use super::corners::Alone;
 use super::level::Level;
 use super::sliding;
 use super::supports::Held;
+use super::tool::Tool;
 use crate::contact::obstacle::{self, FacingRun};
 use crate::contact::{ContactBoundary, HeldDirections, Profile};
 use crate::elasticity::Section;
@@ -60,8 +61,9 @@ impl Checks {
                 continue;
             };
             all.check(self.shared_nodes(&model, &models, problem));
-            let moved = [model.indentation, model.tangential_displacement];
-            all.check(self.supported_contact_nodes(&model, moved, &problem.steps, fixed));
+            all.check(self.supported_contact_nodes(&model, &problem.steps, fixed));
+            all.check(self.nodes_held_along_tool(&model, fixed));
+            all.check(self.tangential_force_borne(&model, &problem.steps));
             models.push(model);
         }
         all.check(self.oblique_supports(&models, fixed, problem));
@@ -113,8 +115,9 @@ impl Checks {
         let end_slopes = [0, run.profile.len() - 1].map(|i| run.profile[i].slope);
         let along = |(profile, turned): (&Profile, &[f64; 2])| profile.distance * turned[0];
         let profile: Vec<f64> = run.profile.iter().zip(&turned).map(along).collect();
+        let direction = self.direction_of_push(contact, &boundary, &outward, &pointer)?;
         let push = match contact.direction {
-            Some(direction) => push_along(direction, &boundary),
+            Some(_) => push_along(direction, &boundary),
             None => turned,
         };
         let nodes = [boundary.nodes[0], boundary.nodes[boundary.nodes.len() - 1]];
@@ -122,6 +125,7 @@ impl Checks {
             name: contact.boundary.clone(),
             pointer,
             endless: sliding::endless(mesh, &boundary, &contact.obstacle, &profile),
+            tool: Tool::new(contact, &boundary, direction),
             boundary,
             cut,
             profile,
@@ -130,8 +134,8 @@ impl Checks {
             end_slopes,
             indentation: contact.indentation,
             push,
-            along: contact.direction.map(|[x, y]| AlongDirection {
-                direction: [x / x.hypot(y), y / x.hypot(y)],
+            along: contact.direction.map(|_| AlongDirection {
+                direction,
                 obstacle: Arc::new(contact.obstacle.clone()),
             }),
             outward,
@@ -403,24 +407,12 @@ impl Checks {
     pub(super) fn supported_contact_nodes(
         &mut self,
         contact: &ContactModel,
-        [indentation, along]: [f64; 2],
         steps: &[Step],
         fixed: &BTreeMap<u32, Held>,
     ) -> Checked {
         let (boundary, pointer) = (&contact.boundary, &contact.pointer);
-        let ends: Vec<Level> = match steps {
-            [] => vec![Level::FULL],
-            _ => steps.iter().map(Level::end_of).collect(),
-        };
+        let ends = Level::ends_of(steps);
         let bonded = contact.condition == Condition::Bonded;
-        let gap = |i: usize, level: &Level| contact.gap_behind(i, level.indentation * indentation);
-        let drag = |i: usize, level: &Level| {
-            let moved = [
-                level.indentation * indentation,
-                level.tangential_displacement * along,
-            ];
-            contact.drag_behind(i, moved)
-        };
         for (i, node) in boundary.nodes.iter().enumerate() {
             let Some(held) = fixed.get(node) else {
                 continue;
@@ -432,7 +424,7 @@ impl Checks {
             );
             let (along_n, along_t) = (held.along(n), held.along(t));
             for level in ends.iter().filter(|_| bonded) {
-                let wanted = [gap(i, level), drag(i, level)];
+                let wanted = [contact.gap(i, level), contact.drag(i, level)];
                 for (prescribed, wanted) in [along_n, along_t].into_iter().zip(wanted) {
                     let Some(u) = prescribed.map(|u| level.supports * u) else {
                         continue;
@@ -450,7 +442,7 @@ impl Checks {
             }
             let Some(u_n) = along_n else { continue };
             for level in &ends {
-                let (u_n, gap) = (level.supports * u_n, gap(i, level));
+                let (u_n, gap) = (level.supports * u_n, contact.gap(i, level));
                 let free = contact.condition == Condition::None;
                 if !free && u_n > gap + ALIGNED * gap.abs() {
                     return Err(self.report(
@@ -531,9 +523,7 @@ pub(super) fn put_nodes_at_ends<'a>(
 ) {
     /// The largest number of ends of one obstacle inside edges: its two ends, and the places where a curve is hidden.
     const MOST_ENDS: usize = 16;
-    let factors = steps
-        .iter()
-        .map(|step| Level::end_of(step).indentation.abs());
+    let factors = steps.iter().map(|step| step.indentation.abs());
     let most = factors.fold(1.0, f64::max);
     for (contact, _) in contacts.filter(|(_, sound)| *sound) {
         for _ in 0..MOST_ENDS {
@@ -548,7 +538,8 @@ pub(super) fn put_nodes_at_ends<'a>(
                 .friction
                 .as_ref()
                 .is_some_and(|law| law.bound.is_some());
-            let deepest = if everywhere {
+            // how far a load pushes is unknown
+            let deepest = if everywhere || contact.is_tool() {
                 f64::INFINITY
             } else {
                 most * contact.indentation.abs()

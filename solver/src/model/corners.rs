@@ -19,17 +19,14 @@ pub(super) fn guess(
     fixed: &BTreeMap<u32, Held>,
     steps: &[Step],
 ) -> Alone {
-    let ends: Vec<Level> = match steps {
-        [] => vec![Level::FULL],
-        _ => steps.iter().map(Level::end_of).collect(),
-    };
+    let ends = Level::ends_of(steps);
     let nearest = |c: usize, node: u32| {
         let contact = &contacts[c];
         let place = contact.boundary.nodes.iter().position(|n| *n == node);
         let law = contact.friction.as_ref();
         match place {
             Some(i) if law.is_none_or(|law| law.bound.radius().is_some()) => {
-                let gaps = ends.iter().map(|level| contact.gap(i, level.indentation));
+                let gaps = ends.iter().map(|level| contact.gap(i, level));
                 gaps.fold(f64::INFINITY, f64::min)
             }
             _ => f64::NEG_INFINITY,

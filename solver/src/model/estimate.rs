@@ -72,6 +72,8 @@ struct Size {
     points: f64,
     /// The number of nodes and friction points on all contacts, which have results for each step.
     profile: f64,
+    /// 1 if an obstacle has an unknown motion, else 0.
+    relative: f64,
     /// The number of contacts, each with a summary and warnings for each step.
     contacts: f64,
     steps: f64,
@@ -230,6 +232,7 @@ impl Model {
             weights: all.weights,
             points: all.points,
             profile: all.nodes + all.points,
+            relative: f64::from(u8::from(self.contacts.iter().any(has_free_obstacle))),
             contacts: self.contacts.len() as f64,
             steps: self.steps.len().max(1) as f64,
             increments: increments.max(1.0),
@@ -275,7 +278,8 @@ impl Size {
         // Fronts of parts of the contact wait, too. Beside them Ŝ, and a matrix of the same size that is factored
         // (Cholesky's or Newton's).
         let factor = margin * fill * dofs + 0.8 * contact * contact;
-        let dense = 2.0 * contact * contact;
+        // with unknown motions of obstacles, the stiffness on displacements relative to them, too
+        let dense = (2.0 + self.relative) * contact * contact;
         // mesh and structure of the factor; later displacements and stresses, and the stored result
         let of_nodes = 1500.0 * margin * self.nodes;
         let memory = 8.0 * (factor + dense + self.weights) + of_nodes + self.history() + FLOOR;
@@ -354,6 +358,12 @@ impl Along {
         }
         along
     }
+}
+
+/// Whether the obstacle of a contact has a load, and so an unknown motion.
+fn has_free_obstacle(contact: &ContactModel) -> bool {
+    let tool = contact.tool.as_ref();
+    tool.is_some_and(|tool| tool.free().next().is_some())
 }
 
 /// Whether friction acts at a contact.

@@ -20,6 +20,7 @@
 //! | a checked contact | `contact_model` |
 //! | common ends of two contacts | `corners` |
 //! | obstacles that slide along the body | `sliding` |
+//! | obstacles under loads, and their checks | `tool`, `tool_checks` |
 //! | rigid motions that nothing prevents | `freedom` |
 //! | distinct nodes at one place | `unmerged` |
 //! | the axis of a body of revolution | `axis` |
@@ -51,6 +52,8 @@ mod sliding;
 mod springs;
 mod supports;
 mod temperatures;
+mod tool;
+mod tool_checks;
 mod units;
 mod unmerged;
 mod variable;
@@ -61,6 +64,7 @@ pub use corners::Alone;
 pub use freedom::{Hold, RigidMotion};
 pub use level::Level;
 pub use supports::Held;
+pub use tool::Tool;
 pub use variable::VariableModel;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -181,7 +185,7 @@ impl Model {
     pub fn hollow_at_axis(&self) -> bool {
         self.contacts.iter().any(|contact| {
             let ends = self.axis.ends(&contact.boundary.positions);
-            let gap = |i: usize| contact.gap(i, contact.indentation);
+            let gap = |i: usize| contact.gap(i, &Level::FULL);
             let least = HOLLOW * contact.boundary.length();
             contact.condition == Condition::Unilateral
                 && ends
@@ -240,6 +244,8 @@ impl Checks {
             let (friction, sound) = self.friction(&analysis, contact, &at("friction"));
             all.check(sound);
             all.check(self.push_direction(&analysis, contact.direction, &at("direction")));
+            let pointer = format!("/contacts/{i}");
+            all.check(self.obstacle_loads(&analysis, contact, &problem.steps, &pointer));
             numbers.push((obstacle, friction));
         }
         let mesh = match source {

@@ -15,7 +15,7 @@ use crate::solution::WarningCode;
 /// What the thesis's own iteration does not support in a contact: the test for it, the field, what was found, what is
 /// supported, and the reason.
 #[rustfmt::skip] // a table
-const NOT_OF_THE_THESIS: [(OfContact, [&str; 4]); 7] = [
+const NOT_OF_THE_THESIS: [(OfContact, [&str; 4]); 8] = [
     (|contact| contact.condition != Condition::Unilateral, [
         "condition", "a condition other than `unilateral`", "`unilateral`",
         "The thesis's iteration supports no other condition",
@@ -35,6 +35,10 @@ const NOT_OF_THE_THESIS: [(OfContact, [&str; 4]); 7] = [
     (|contact| contact.direction.is_some(), [
         "direction", "a direction", "none: against the body's normal",
         "Obstacles of the thesis move against the body's normal",
+    ]),
+    (Contact::is_tool, [
+        "condition", "an obstacle with a load or a tilt", "an obstacle with an `indentation`",
+        "Obstacles of the thesis have given displacements",
     ]),
     (|contact| has_friction(contact, |f| f.bound.is_some()), [
         "friction/bound", "a prescribed bound", "a coefficient and a nonlocal radius",

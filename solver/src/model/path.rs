@@ -18,13 +18,14 @@ struct Multiplied {
     length: Option<f64>,
 }
 
-fn multiplied(problem: &Problem) -> [Multiplied; 4] {
+fn multiplied(problem: &Problem) -> [Multiplied; 8] {
     let longest = |of: fn(&Contact) -> f64| {
         let lengths = problem.contacts.iter().map(|contact| of(contact).abs());
         lengths.fold(0.0, f64::max)
     };
     let pushed = longest(|contact| contact.indentation);
     let dragged = longest(|contact| contact.tangential_displacement);
+    let has = |of: fn(&Contact) -> f64| problem.contacts.iter().any(|contact| of(contact) != 0.0);
     let moves = |value: &BoundaryValue| match *value {
         BoundaryValue::Constant(value) => value != 0.0,
         BoundaryValue::Linear(ends) => ends != [0.0; 2],
@@ -45,6 +46,30 @@ fn multiplied(problem: &Problem) -> [Multiplied; 4] {
             factor: |step| step.tangential_displacement,
             given: dragged > 0.0,
             length: Some(dragged),
+        },
+        Multiplied {
+            name: "normal_force",
+            factor: |step| step.normal_force,
+            given: has(|contact| contact.normal_force.unwrap_or(0.0)),
+            length: None,
+        },
+        Multiplied {
+            name: "tangential_force",
+            factor: |step| step.tangential_force,
+            given: has(|contact| contact.tangential_force.unwrap_or(0.0)),
+            length: None,
+        },
+        Multiplied {
+            name: "tilt",
+            factor: |step| step.tilt,
+            given: has(|contact| contact.tilt.unwrap_or(0.0)),
+            length: None,
+        },
+        Multiplied {
+            name: "moment",
+            factor: |step| step.moment,
+            given: has(|contact| contact.moment.unwrap_or(0.0)),
+            length: None,
         },
         Multiplied {
             name: "loads",
@@ -87,10 +112,14 @@ impl Checks {
         let most = steps.iter().map(|step| factor(step).abs());
         let most = most.fold(0.0, f64::max);
         if most == 0.0 {
+            let unnamed = match *name {
+                "tangential_force" => "tangential_force",
+                _ => "tangential_displacement",
+            };
             self.warn(
                 WarningCode::NeverApplied,
                 "/steps",
-                format!("The problem has `{name}`, but the factor on it is 0 in every load step, so that it is never applied. A step that does not name `tangential_displacement` has the factor 0 on it, and 1 on everything else."),
+                format!("The problem has `{name}`, but the factor on it is 0 in every load step, so that it is never applied. A step that does not name `{unnamed}` has the factor 0 on it, and 1 on everything else."),
             );
         } else if let Some(length) = length
             && most <= SMALL

@@ -106,10 +106,7 @@ impl Checks {
         axis: &Axis,
         steps: &[Step],
     ) {
-        let ends: Vec<Level> = match steps {
-            [] => vec![Level::FULL],
-            _ => steps.iter().map(Level::end_of).collect(),
-        };
+        let ends = Level::ends_of(steps);
         for contact in contacts {
             let boundary = &contact.boundary;
             let last = boundary.nodes.len() - 1;
@@ -118,8 +115,8 @@ impl Checks {
                 continue;
             }
             let radial = |level: &Level| {
-                let pushed = level.indentation * contact.indentation;
-                let along = level.tangential_displacement * contact.tangential_displacement;
+                let pushed = level.motions[0] * contact.indentation;
+                let along = level.motions[1] * contact.tangential_displacement;
                 // a ring that is pressed onto a cylinder along the axis is only thicker than the gap
                 let of_drag = |i: usize| along * boundary.tangent(i)[0];
                 let of_all = |i: usize| {

@@ -67,8 +67,7 @@ impl VariableModel {
             .zip(&problem.contacts)
             .zip(frictions)
         {
-            model.indentation = contact.indentation;
-            model.tangential_displacement = contact.tangential_displacement;
+            model.take(contact);
             model.friction = friction;
         }
         model.steps.clone_from(&problem.steps);
@@ -118,12 +117,17 @@ fn without_mesh(problem: &Problem) -> Problem {
     }
 }
 
-/// Whether two contacts are equal apart from their law, indentation and drag.
+/// Whether two contacts are equal apart from their law, and the motions and loads of the obstacle.
 fn same_boundary((a, b): (&Contact, &Contact)) -> bool {
     a.boundary == b.boundary
         && a.obstacle == b.obstacle
         && a.normal == b.normal
         && a.direction == b.direction
+        && a.is_tool() == b.is_tool()
+        && a.obstacle_loads().map(|load| load.is_some())
+            == b.obstacle_loads().map(|load| load.is_some())
+        && a.about == b.about
+        && a.stiffness == b.stiffness
         && a.condition == b.condition
 }
 
@@ -149,9 +153,18 @@ impl Checks {
             all.check(sound);
             let radius = law.as_ref().and_then(|law| law.bound.radius());
             all.check(self.radius(&model_contact.boundary, radius, &format!("/contacts/{i}")));
-            let moved = [contact.indentation, contact.tangential_displacement];
             let (steps, fixed) = (&problem.steps, &model.fixed);
-            all.check(self.supported_contact_nodes(model_contact, moved, steps, fixed));
+            all.check(self.obstacle_loads(
+                &problem.analysis,
+                contact,
+                steps,
+                &format!("/contacts/{i}"),
+            ));
+            let mut moved = model_contact.clone();
+            moved.take(contact);
+            moved.friction.clone_from(&law);
+            all.check(self.supported_contact_nodes(&moved, steps, fixed));
+            all.check(self.tangential_force_borne(&moved, steps));
             laws.push(law);
         }
         all.check(self.thesis_elements(problem, &model.mesh));

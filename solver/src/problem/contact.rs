@@ -16,14 +16,37 @@ pub struct Contact {
     /// gap = profile − indentation.
     #[serde(default)]
     pub indentation: f64,
+    /// The force that presses the obstacle against the body (force, as `normal_force` of the summary; in a half model that
+    /// of the half), instead of an indentation: the obstacle moves along `direction` until it is in equilibrium.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal_force: Option<f64>,
     /// The direction `[x, y]` that the indentation moves the obstacle along, as a rigid body; its length does not
     /// matter. Absent: against the body's normal at each node, which on a curved boundary is no motion of a rigid body.
+    /// An obstacle with a force, a moment or a tilt moves as a rigid body, and needs a direction on a curved boundary.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub direction: Option<[f64; 2]>,
     /// Displacement of the obstacle along t, the outward normal turned clockwise (length). The contact stays on the
     /// material that faced the obstacle before: keep the slip below the contact's length.
     #[serde(default)]
     pub tangential_displacement: f64,
+    /// The force on the body along t (force, as `tangential_force` of the summary), instead of a tangential displacement: the
+    /// obstacle moves perpendicular to `direction` until it is in equilibrium.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tangential_force: Option<f64>,
+    /// The angle by which the obstacle is turned about `about`, counter-clockwise (radians, as a small rotation).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tilt: Option<f64>,
+    /// The moment on the body about `about`, counter-clockwise (force × length), instead of a tilt: the obstacle turns until
+    /// it is in equilibrium. A normal force P at a distance e from `about` along t is a moment −P e about that point.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moment: Option<f64>,
+    /// The point `[x, y]` of `tilt` and `moment`, through which `normal_force` and `tangential_force` act.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub about: Option<[f64; 2]>,
+    /// Springs between an obstacle under forces and the ground, such as the testing machine: they bear their part of the
+    /// forces.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stiffness: Option<ObstacleStiffness>,
     /// The direction that gap and normal displacement are measured along.
     #[serde(default)]
     pub normal: NormalOf,
@@ -33,6 +56,46 @@ pub struct Contact {
     /// The friction law; absent: frictionless.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction: Option<Friction>,
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
+/// Springs between an obstacle and the ground, each against a motion that a force or moment causes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct ObstacleStiffness {
+    /// Against the indentation, ≥ 0 (force / length).
+    #[serde(skip_serializing_if = "is_zero")]
+    pub normal: f64,
+    /// Against the tangential displacement, ≥ 0 (force / length).
+    #[serde(skip_serializing_if = "is_zero")]
+    pub tangential: f64,
+    /// Against the tilt, ≥ 0 (force × length).
+    #[serde(skip_serializing_if = "is_zero")]
+    pub rotational: f64,
+}
+
+impl Contact {
+    /// The given load along each motion of the obstacle: its normal force, its tangential force and its moment.
+    pub fn obstacle_loads(&self) -> [Option<f64>; 3] {
+        [self.normal_force, self.tangential_force, self.moment]
+    }
+
+    /// The given motions of the obstacle: its indentation, its tangential displacement and its tilt.
+    pub fn obstacle_motions(&self) -> [f64; 3] {
+        [
+            self.indentation,
+            self.tangential_displacement,
+            self.tilt.unwrap_or(0.0),
+        ]
+    }
+
+    /// Whether the obstacle moves as a rigid body whose equilibrium matters: it has a load, or a tilt.
+    pub fn is_tool(&self) -> bool {
+        self.tilt.is_some() || self.obstacle_loads().iter().any(Option::is_some)
+    }
 }
 
 /// The normal that a contact uses. On a sloping obstacle the body's and the obstacle's normal differ, and so do the

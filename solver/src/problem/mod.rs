@@ -13,8 +13,8 @@ mod support;
 
 pub use contact::{
     Along, BoundTable, Condition, Contact, Friction, FrictionPoints, History, Interpolation,
-    Kernel, Measure, NormalOf, Normalization, Obstacle, PrescribedBound, SLIP_PART, Smoothing,
-    Transition, elastic_slip_rule,
+    Kernel, Measure, NormalOf, Normalization, Obstacle, ObstacleStiffness, PrescribedBound,
+    SLIP_PART, Smoothing, Transition, elastic_slip_rule,
 };
 pub use load::{Load, LoadFields, Rotation};
 pub use material::{Elasticity, Material, MaterialFields, Orthotropic};

@@ -17,6 +17,18 @@ pub struct Step {
     pub indentation: f64,
     /// Factor on the tangential displacement of every obstacle.
     pub tangential_displacement: f64,
+    /// Factor on the normal force of every obstacle.
+    #[serde(skip_serializing_if = "is_one")]
+    pub normal_force: f64,
+    /// Factor on the tangential force of every obstacle.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub tangential_force: f64,
+    /// Factor on the tilt of every obstacle.
+    #[serde(skip_serializing_if = "is_one")]
+    pub tilt: f64,
+    /// Factor on the moment of every obstacle.
+    #[serde(skip_serializing_if = "is_one")]
+    pub moment: f64,
     /// Factor on all loads.
     pub loads: f64,
     /// Factor on all prescribed displacements.
@@ -45,6 +57,10 @@ impl Step {
             name: None,
             indentation: 1.0,
             tangential_displacement: 1.0,
+            normal_force: 1.0,
+            tangential_force: 1.0,
+            tilt: 1.0,
+            moment: 1.0,
             loads: 1.0,
             supports: 1.0,
             increments: 1,
@@ -53,11 +69,20 @@ impl Step {
     }
 }
 
-/// A step that applies all loads at once, with no tangential displacement.
+fn is_one(factor: &f64) -> bool {
+    *factor == 1.0
+}
+
+fn is_zero(factor: &f64) -> bool {
+    *factor == 0.0
+}
+
+/// A step that applies all loads at once, with no tangential displacement and no tangential force.
 impl Default for Step {
     fn default() -> Self {
         Step {
             tangential_displacement: 0.0,
+            tangential_force: 0.0,
             ..Step::whole()
         }
     }

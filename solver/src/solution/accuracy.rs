@@ -154,9 +154,23 @@ pub enum QuantityName {
     ContactEnd,
     /// An arc length between stick and slip.
     StickEnd,
+    /// The indentation of an obstacle under loads.
+    Indentation,
+    /// The tangential displacement of an obstacle under loads.
+    TangentialDisplacement,
+    /// The tilt of an obstacle under loads (radians).
+    Tilt,
 }
 
 impl QuantityName {
+    /// Whether the quantity is a motion of an obstacle.
+    pub fn is_motion(self) -> bool {
+        matches!(
+            self,
+            QuantityName::Indentation | QuantityName::TangentialDisplacement | QuantityName::Tilt
+        )
+    }
+
     /// Whether the quantity is an end of contact or stick: a place, not a force or a stress.
     pub fn is_extent(self) -> bool {
         matches!(

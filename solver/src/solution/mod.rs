@@ -235,6 +235,23 @@ pub struct ContactSummary {
     pub peak_normal_stress: Option<Peak>,
     /// Largest |σ_t|, with its sign, over the continuous profile; absent without friction.
     pub peak_tangential_stress: Option<Peak>,
+    /// For an obstacle with a load or a tilt: how far it has moved along its direction (length).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub indentation: Option<f64>,
+    /// For an obstacle with a load or a tilt: how far it has moved perpendicular to its direction, along t (length).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tangential_displacement: Option<f64>,
+    /// For an obstacle with a load or a tilt: the angle by which it has turned, counter-clockwise (radians).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tilt: Option<f64>,
+    /// For an obstacle with a load or a tilt: its force `[x, y]` on the body (force), the sum of pressures and friction as
+    /// vectors. On a curved boundary `normal_force` and `tangential_force`, sums along each point's own normal and tangent,
+    /// differ from its components.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force: Option<[f64; 2]>,
+    /// For an obstacle with a load or a tilt: its moment on the body about `about`, counter-clockwise (force × length).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moment: Option<f64>,
     /// The lengths of contact, stick and slip, with the ends of contact interpolated between nodes. Not part of the
     /// document and its digest: rows of sweeps have them.
     #[serde(skip)]
@@ -473,6 +490,8 @@ pub enum WarningCode {
     LargeStrain,
     /// Displacements that are not small compared with the body.
     LargeDisplacement,
+    /// An obstacle that turns farther than a small rotation.
+    LargeTilt,
     /// A second solution that did not converge.
     UniquenessUnknown,
     /// A second solution that differs from the first.
@@ -498,6 +517,7 @@ impl WarningCode {
             UnitsDisagree
             | LargeStrain
             | LargeDisplacement
+            | LargeTilt
             | LargeSlip
             | CoincidentNodes
             | ContactReachesObstacleEnd

@@ -18,10 +18,12 @@ from .problem import Problem
 TOTALS = ("normal_force", "tangential_force", "friction_force", "energy", "friction_work", "strain_energy")
 FORCES = ("normal_force", "tangential_force", "friction_force")
 WIDTHS = {"contact_width": "contact", "stick_width": "stick", "slip_width": "slip"}
+MOTIONS = ("indentation", "tangential_displacement", "tilt", "moment")
+"""What the summary of a contact has if its obstacle has a load or a tilt."""
 PEAKS = ("peak_normal_stress", "peak_tangential_stress")
 PLACES = ("value", "s", "x", "y")
 SCALARS = (
-    f"{', '.join(TOTALS)}; or contacts/BOUNDARY/ and {', '.join((*FORCES, *WIDTHS, *PEAKS))} "
+    f"{', '.join(TOTALS)}; or contacts/BOUNDARY/ and {', '.join((*FORCES, *WIDTHS, *MOTIONS, *PEAKS))} "
     f"(of the peaks also /{', /'.join(PLACES)})"
 )
 """All paths of scalars, in words."""
@@ -207,7 +209,7 @@ def _tokens(path: str) -> list[str] | None:
     if quantity in PEAKS:
         rest = rest or ["value"]
         return [*tokens[:3], *rest] if len(rest) == 1 and rest[0] in PLACES else None
-    return tokens if not rest and quantity in (*FORCES, *WIDTHS) else None
+    return tokens if not rest and quantity in (*FORCES, *WIDTHS, *MOTIONS) else None
 
 
 def scalar(summary: Mapping[str, Any], path: str) -> float | None:

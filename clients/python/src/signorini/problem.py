@@ -55,6 +55,7 @@ __all__ = [
     "Normalization",
     "Numbers",
     "Obstacle",
+    "ObstacleStiffness",
     "Orthotropic",
     "Pair",
     "Pairs",
@@ -1043,30 +1044,73 @@ forces.
 
 
 @dataclass(kw_only=True, repr=False)
+class ObstacleStiffness(Part):
+    """Springs between an obstacle and the ground, each against a motion that a force or moment causes.
+
+    normal: Against the indentation, ≥ 0 (force / length).
+    rotational: Against the tilt, ≥ 0 (force × length).
+    tangential: Against the tangential displacement, ≥ 0 (force / length).
+    """
+
+    normal: float | None = None
+    rotational: float | None = None
+    tangential: float | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            normal: Real | None = ...,
+            rotational: Real | None = ...,
+            tangential: Real | None = ...,
+        ) -> None: ...
+
+
+@dataclass(kw_only=True, repr=False)
 class Contact(Part):
     """A boundary that may touch a rigid obstacle.
 
     boundary: Name of the boundary.
     obstacle: The obstacle that faces the boundary.
+    about: The point `[x, y]` of `tilt` and `moment`, through which `normal_force` and `tangential_force` act.
     condition: The contact condition.
     direction: The direction `[x, y]` that the indentation moves the obstacle along, as a rigid body; its length
         does not matter. Absent: against the body's normal at each node, which on a curved boundary is no motion of
-        a rigid body.
+        a rigid body. An obstacle with a force, a moment or a tilt moves as a rigid body, and needs a direction on a
+        curved boundary.
     friction: The friction law; absent: frictionless.
     indentation: How far the obstacle is pushed against the body (length, either sign): gap = profile − indentation.
+    moment: The moment on the body about `about`, counter-clockwise (force × length), instead of a tilt: the
+        obstacle turns until it is in equilibrium. A normal force P at a distance e from `about` along t is a moment
+        −P e about that point.
     normal: The direction that gap and normal displacement are measured along.
+    normal_force: The force that presses the obstacle against the body (force, as `normal_force` of the summary; in
+        a half model that of the half), instead of an indentation: the obstacle moves along `direction` until it is
+        in equilibrium.
+    stiffness: Springs between an obstacle under forces and the ground, such as the testing machine: they bear their
+        part of the forces.
     tangential_displacement: Displacement of the obstacle along t, the outward normal turned clockwise (length). The
         contact stays on the material that faced the obstacle before: keep the slip below the contact's length.
+    tangential_force: The force on the body along t (force, as `tangential_force` of the summary), instead of a
+        tangential displacement: the obstacle moves perpendicular to `direction` until it is in equilibrium.
+    tilt: The angle by which the obstacle is turned about `about`, counter-clockwise (radians, as a small rotation).
     """
 
     boundary: str
     obstacle: Obstacle
+    about: Pair | None = None
     condition: Condition = "unilateral"
     direction: Pair | None = None
     friction: Friction | None = None
     indentation: float = 0.0
+    moment: float | None = None
     normal: NormalOf = "body"
+    normal_force: float | None = None
+    stiffness: ObstacleStiffness | None = None
     tangential_displacement: float = 0.0
+    tangential_force: float | None = None
+    tilt: float | None = None
 
     if TYPE_CHECKING:
 
@@ -1075,12 +1119,18 @@ class Contact(Part):
             *,
             boundary: str,
             obstacle: Obstacle | JSON,
+            about: Pair | None = ...,
             condition: Condition = ...,
             direction: Pair | None = ...,
             friction: Friction | JSON | None = ...,
             indentation: Real = ...,
+            moment: Real | None = ...,
             normal: NormalOf = ...,
+            normal_force: Real | None = ...,
+            stiffness: ObstacleStiffness | JSON | None = ...,
             tangential_displacement: Real = ...,
+            tangential_force: Real | None = ...,
+            tilt: Real | None = ...,
         ) -> None: ...
 
 
@@ -1296,19 +1346,27 @@ class Step(Part):
     increments: Increments of the step (≥ 1).
     indentation: Factor on the indentation of every contact at the end of the step.
     loads: Factor on all loads.
+    moment: Factor on the moment of every obstacle.
     name: A name for readers.
+    normal_force: Factor on the normal force of every obstacle.
     spacing: How the indentation grows from increment to increment.
     supports: Factor on all prescribed displacements.
     tangential_displacement: Factor on the tangential displacement of every obstacle.
+    tangential_force: Factor on the tangential force of every obstacle.
+    tilt: Factor on the tilt of every obstacle.
     """
 
     increments: int = 1
     indentation: float = 1.0
     loads: float = 1.0
+    moment: float | None = None
     name: str | None = None
+    normal_force: float | None = None
     spacing: Spacing = "uniform"
     supports: float = 1.0
     tangential_displacement: float = 0.0
+    tangential_force: float | None = None
+    tilt: float | None = None
 
     if TYPE_CHECKING:
 
@@ -1318,10 +1376,14 @@ class Step(Part):
             increments: Whole = ...,
             indentation: Real = ...,
             loads: Real = ...,
+            moment: Real | None = ...,
             name: str | None = ...,
+            normal_force: Real | None = ...,
             spacing: Spacing = ...,
             supports: Real = ...,
             tangential_displacement: Real = ...,
+            tangential_force: Real | None = ...,
+            tilt: Real | None = ...,
         ) -> None: ...
 
 

@@ -50,6 +50,9 @@ pub fn warning(code: WarningCode) -> WarningKind {
 fn reasons(code: WarningCode) -> (&'static str, &'static str) {
     use WarningCode::*;
     match code {
+        LargeTilt => (
+            "Gaps are linear in the tilt, as of a small rotation: at 0.05 radians (3°) a point of the obstacle at the distance r from its centre is off by 0.00125 r.",
+            "Draw the obstacle nearer to its final position, so that it turns less, or hold it against turning."),
         UnitsDisagree => (
             "Forces are integrals of stresses over lengths, so a force in the wrong unit is wrong by a power of ten, and nothing in the computation can notice it.",
             "Use units that belong together, for example mm, N and MPa (1 N/mm² is 1 MPa), or m, N and Pa, and convert every number that was given in another unit."),

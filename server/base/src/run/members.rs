@@ -223,7 +223,9 @@ pub fn row_of(number: usize, error: SolveError) -> Result<MemberRow, SolveError>
     let reason = match error {
         SolveError::Stopped => return Err(error),
         SolveError::Invalid(violations) => return Ok(MemberRow::invalid(number, violations)),
-        SolveError::SingularSystem { .. } | SolveError::Unheld { .. } => Reason::SingularSystem,
+        SolveError::SingularSystem { .. }
+        | SolveError::Unheld { .. }
+        | SolveError::ObstacleUnheld { .. } => Reason::SingularSystem,
         SolveError::NonFinite { .. } => Reason::NonFinite,
         SolveError::ResourceExhausted { .. } => Reason::ResourceExhausted,
         SolveError::OtherBody => Reason::Internal,

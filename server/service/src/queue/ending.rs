@@ -48,7 +48,9 @@ impl From<SolveError> for NoSolution {
         let detail = error.to_string();
         match error {
             SolveError::Stopped => NoSolution::Stopped,
-            SolveError::SingularSystem { .. } | SolveError::Unheld { .. } => {
+            SolveError::SingularSystem { .. }
+            | SolveError::Unheld { .. }
+            | SolveError::ObstacleUnheld { .. } => {
                 NoSolution::Failed(Reason::SingularSystem, detail)
             }
             SolveError::NonFinite { .. } => NoSolution::Failed(Reason::NonFinite, detail),

@@ -154,6 +154,9 @@ const NUMBERS: &[QuantityName] = &[
     QuantityName::FrictionForce,
     QuantityName::PeakNormalStress,
     QuantityName::PeakTangentialStress,
+    QuantityName::Indentation,
+    QuantityName::TangentialDisplacement,
+    QuantityName::Tilt,
 ];
 
 /// What the name of a number's column has behind it if the column has the errors.
@@ -171,10 +174,14 @@ impl Default for Columns {
             "run_s",
             "contacts",
         ];
-        let numbers = NUMBERS.iter().flat_map(|quantity| {
-            let name = <&str>::from(*quantity);
-            [name.to_owned(), format!("{name}{ERROR}")]
-        });
+        // motions only where they are asked for: few obstacles have loads
+        let numbers = NUMBERS
+            .iter()
+            .filter(|quantity| !quantity.is_motion())
+            .flat_map(|quantity| {
+                let name = <&str>::from(*quantity);
+                [name.to_owned(), format!("{name}{ERROR}")]
+            });
         let all = before.map(str::to_owned).into_iter().chain(numbers);
         let all = all.chain(["severity", "warnings", "labels"].map(str::to_owned));
         Columns(all.filter_map(|name| column(&name)).collect())

@@ -506,13 +506,14 @@ impl PatchView<'_> {
         let contact = self.patch.contact;
         let boundary = &contact.boundary;
         let h = edge3::shape(place.xi);
+        // relative to an obstacle whose motion is unknown, as the gap
         let displacement = [0, 1].map(|a| {
             let at = |i: usize| {
                 let (n, t) = (boundary.normals[i], boundary.tangent(i));
-                let u_n = self
-                    .system
-                    .normal_displacement(self.v, self.patch.first + i);
-                u_n * n[a] + self.u_t(i) * t[a]
+                let node = self.patch.first + i;
+                let u_n = self.system.normal_displacement(self.v, node);
+                let u_t = self.system.tangential_displacement(self.v, node);
+                u_n * n[a] + u_t * t[a]
             };
             edge3::interpolate(&h, &edge_nodes(place.edge).map(at))
         });
@@ -524,8 +525,18 @@ impl PatchView<'_> {
         let cosine = 1.0 / slope.hypot(1.0);
         let t = [n[1], -n[0]];
         let along = |a: usize| displacement[a] * cosine * (n[a] - slope * t[a]);
-        let pushed = self.system.level.indentation * contact.indentation;
-        along(0) + along(1) - cosine * (place.profile.distance - pushed)
+        let gap = match &contact.tool {
+            None => {
+                let pushed = self.system.level.motions[0] * contact.indentation;
+                cosine * (place.profile.distance - pushed)
+            }
+            Some(tool) => {
+                let given = tool.motions(&self.system.level);
+                let moved = edge_nodes(place.edge).map(|i| tool.moved(i, &given)[0]);
+                cosine * place.profile.distance - edge3::interpolate(&h, &moved)
+            }
+        };
+        along(0) + along(1) - gap
     }
 
     /// The largest stiffness of the nodes of an edge against their normal displacements.

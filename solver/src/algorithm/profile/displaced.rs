@@ -32,8 +32,7 @@ impl PatchView<'_> {
             let (Some(along), true) = (&contact.along, contact.condition != Condition::None) else {
                 return found;
             };
-            let pushed = self.system.level.indentation * contact.indentation;
-            let by = along.direction.map(|x| pushed * x);
+            let by = self.obstacle_displacement(along.direction);
             let displaced = Displaced::new(&along.obstacle, &contact.boundary, &contact.outward);
             let least = ROUNDING * contact.boundary.length();
             for i in 0..self.count() {
@@ -53,6 +52,16 @@ impl PatchView<'_> {
             }
             found
         })
+    }
+
+    /// The displacement of the obstacle along its direction; of one that moves as a rigid body, also perpendicular to it. The
+    /// gap of a tilted obstacle is taken as linear.
+    fn obstacle_displacement(&self, [a, b]: [f64; 2]) -> [f64; 2] {
+        let [pushed, along, _] = self.motions;
+        match self.patch.contact.tool {
+            None => [pushed * a, pushed * b],
+            Some(_) => [pushed * a - along * b, pushed * b + along * a],
+        }
     }
 
     /// The constraint at a node by the displaced obstacle, compared with the linear one; none if the displaced obstacle
@@ -77,10 +86,8 @@ impl PatchView<'_> {
             NormalOf::Obstacle => {
                 let slope = -dot(m, t) / cosine;
                 let tangent = contact.boundary.tangent(i);
-                let u_n = self
-                    .system
-                    .normal_displacement(self.v, self.patch.first + i);
-                let moved = u_n * dot(m, t) + self.u_t(i) * dot(tangent, t);
+                let [u_n, u_t] = self.displacement(i);
+                let moved = u_n * dot(m, t) + u_t * dot(tangent, t);
                 (slope, after.slope - slope, moved)
             }
         };
@@ -95,12 +102,11 @@ impl PatchView<'_> {
     /// difference is too small for a warning.
     fn told(&self) -> Option<(f64, f64)> {
         let found = self.displaced_gaps();
-        let level = self.system.level.indentation;
         let reactions = &self.forces.reactions[self.system.range(self.patch)];
         let (mut most, mut largest, mut moment, mut force) = (0.0f64, 0.0f64, 0.0, 0.0);
         for i in (0..self.count()).filter(|i| self.active(*i)) {
             most = most.max(found.nodes[i].gap.abs());
-            largest = largest.max(self.patch.contact.gap(i, level).abs());
+            largest = largest.max(self.gap(i).abs());
             moment += reactions[i] * found.nodes[i].gap;
             force += reactions[i];
         }
@@ -131,9 +137,8 @@ impl PatchView<'_> {
     /// no longer, at least the distance by which the obstacle ends elsewhere.
     pub(super) fn displaced_end(&self, end: usize) -> f64 {
         let found = self.displaced_gaps();
-        let level = self.system.level.indentation;
         let s = &self.patch.contact.boundary.s;
-        let gap = |i: usize| self.patch.contact.gap(i, level);
+        let gap = |i: usize| self.gap(i);
         let touching = (0..self.count()).filter(|i| self.active(*i));
         let (Some(deepest), more) = (
             touching.min_by(|a, b| gap(*a).total_cmp(&gap(*b))),

@@ -4,6 +4,7 @@ use std::cmp::Ordering;
 
 use super::quantities::EndOfContact;
 use super::{Highest, PatchView};
+use crate::body::AXIS_SHARE;
 use crate::contact::edge_nodes;
 use crate::element::edge3;
 use crate::element::gauss::GAUSS_3;
@@ -37,7 +38,15 @@ impl PatchView<'_> {
             slip,
             widths,
         } = self.extents();
+        let tool = self.patch.contact.tool.as_ref();
+        let [indentation, tangential_displacement, tilt] = self.motions;
+        let loads = [0, 1, 2].map(|motion| circumference * self.load_of_obstacle(motion));
         ContactSummary {
+            indentation: tool.map(|_| indentation),
+            tangential_displacement: tool.map(|_| tangential_displacement),
+            tilt: tool.map(|_| tilt),
+            force: tool.map(|tool| tool.force([loads[0], loads[1]])),
+            moment: tool.map(|_| loads[2]),
             normal: self.patch.contact.normal,
             normal_force: circumference * self.system.normal_force(range, &self.forces.reactions),
             tangential_force: circumference * tangential,
@@ -49,6 +58,29 @@ impl PatchView<'_> {
             peak_tangential_stress: self.peak_tangential_stress(),
             widths,
         }
+    }
+
+    /// The load of the obstacle on the body along a motion of the obstacle (without 2π); 0 if it has neither a load nor a tilt.
+    pub(in crate::algorithm) fn load_of_obstacle(&self, motion: usize) -> f64 {
+        let Some(tool) = &self.patch.contact.tool else {
+            return 0.0;
+        };
+        let row = |i: usize| tool.row(i, motion);
+        let mut load = 0.0;
+        for (i, node) in self.system.range(self.patch).enumerate() {
+            let [mut against_n, along_t] = row(i);
+            if let Some(end) = self.system.nodes[node].beside_axis {
+                against_n -= AXIS_SHARE * row(end - self.patch.first)[0];
+            }
+            load += self.forces.reactions[node] * against_n;
+            load += self.forces.tangential_reactions[node] * along_t;
+        }
+        let points = self.system.points.iter().zip(&self.finished.tractions);
+        for (point, traction) in points.filter(|(point, _)| point.patch == self.p) {
+            let along = |k: usize| point.shape[k] * row(point.nodes[k] - self.patch.first)[1];
+            load += point.weight * traction * (0..3).map(along).sum::<f64>();
+        }
+        load
     }
 
     /// The intervals of contact between outermost nodes, divided into stick and slip by the slip e: |e| < ε sticks.

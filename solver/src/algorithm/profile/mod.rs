@@ -25,6 +25,7 @@ mod warnings;
 
 pub use quantities::{Estimable, Quantity};
 
+use std::borrow::Cow;
 use std::cell::OnceCell;
 
 use super::system::{Patch, System, shape_without_oblique};
@@ -41,7 +42,12 @@ pub(super) struct PatchView<'a> {
     system: &'a System<'a>,
     patch: &'a Patch<'a>,
     p: usize,
+    /// The state, relative to an obstacle whose motion is unknown.
     v: &'a [f64],
+    /// The displacements of the contact unknowns.
+    displaced: Cow<'a, [f64]>,
+    /// The indentation, tangential displacement and tilt of the obstacle.
+    motions: [f64; 3],
     finished: &'a Finished,
     forces: &'a Forces,
     /// The displacement u_t − d relative to the obstacle, at the nodes.
@@ -165,6 +171,8 @@ impl<'a> PatchView<'a> {
             patch,
             p,
             v: &finished.state.v,
+            displaced: system.displaced(&finished.state.v),
+            motions: system.obstacle_motions(&finished.state.v, p),
             finished,
             forces,
             relative: system
@@ -267,9 +275,22 @@ impl<'a> PatchView<'a> {
         self.finished.state.active[self.patch.first + i]
     }
 
-    fn u_t(&self, i: usize) -> f64 {
-        self.system
-            .tangential_displacement(self.v, self.patch.first + i)
+    /// The displacements of a node along n and t.
+    fn displacement(&self, i: usize) -> [f64; 2] {
+        let node = self.patch.first + i;
+        [
+            self.system.normal_displacement(&self.displaced, node),
+            self.system.tangential_displacement(&self.displaced, node),
+        ]
+    }
+
+    /// The gap at a node after all motions of the obstacle.
+    fn gap(&self, i: usize) -> f64 {
+        let contact = self.patch.contact;
+        match &contact.tool {
+            None => contact.gap(i, &self.system.level),
+            Some(tool) => contact.profile[i] - tool.moved(i, &self.motions)[0],
+        }
     }
 
     fn pressure(&self, i: usize) -> f64 {
@@ -380,14 +401,10 @@ impl<'a> PatchView<'a> {
             profile.s.push(boundary.s[i]);
             profile.x.push(boundary.positions[i][0]);
             profile.y.push(boundary.positions[i][1]);
-            profile
-                .gap
-                .push(self.patch.contact.gap(i, self.system.level.indentation));
-            profile.normal_displacement.push(
-                self.system
-                    .normal_displacement(self.v, self.patch.first + i),
-            );
-            profile.tangential_displacement.push(self.u_t(i));
+            let [u_n, u_t] = self.displacement(i);
+            profile.gap.push(self.gap(i));
+            profile.normal_displacement.push(u_n);
+            profile.tangential_displacement.push(u_t);
             profile.normal_stress.push(-self.pressure(i) + 0.0);
             profile.tangential_stress.push(stress + 0.0);
             profile.nonlocal_pressure.push(averaged);

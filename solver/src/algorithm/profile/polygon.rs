@@ -231,12 +231,9 @@ impl PatchView<'_> {
     /// body in contact if that is larger: loads press bodies together without an overlap.
     fn part_of_overlap(&self, height: f64) -> Option<f64> {
         let contact = self.patch.contact;
-        let gaps = (0..self.count()).map(|i| contact.gap(i, self.system.level.indentation));
+        let gaps = (0..self.count()).map(|i| self.gap(i));
         let touching = (0..self.count()).filter(|i| self.active(*i));
-        let moved = touching.map(|i| {
-            self.system
-                .normal_displacement(self.v, self.patch.first + i)
-        });
+        let moved = touching.map(|i| self.displacement(i)[0]);
         let overlap = -gaps.chain(moved).fold(0.0, f64::min);
         (overlap > ROUNDING * contact.boundary.length()).then_some(height / overlap)
     }

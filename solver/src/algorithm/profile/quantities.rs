@@ -128,6 +128,7 @@ impl PatchView<'_> {
         let mut found = self.forces();
         found.extend(self.peaks());
         found.extend(self.ends());
+        found.extend(self.motions_of_obstacle());
         self.add_truncation(&mut found);
         self.add_unseen(&mut found);
         self.add_displaced(&mut found);
@@ -329,6 +330,32 @@ impl PatchView<'_> {
             ..self.quantity(name, value, Some(gradient))
         };
         forces.into_iter().map(quantity).collect()
+    }
+
+    /// The motions of an obstacle under loads: those that the loads cause, and the indentation in any case, to which the others
+    /// are compared.
+    fn motions_of_obstacle(&self) -> Vec<Quantity> {
+        let Some(tools) = &self.system.tools else {
+            return Vec::new();
+        };
+        let tool = self.patch.contact.tool.as_ref();
+        if tool.is_none_or(|tool| tool.free().next().is_none()) {
+            return Vec::new();
+        }
+        let names = [
+            QuantityName::Indentation,
+            QuantityName::TangentialDisplacement,
+            QuantityName::Tilt,
+        ];
+        let mut found = Vec::new();
+        for (k, name) in names.into_iter().enumerate() {
+            let number = tools.number(self.p, k);
+            if number.is_some() || k == 0 {
+                let gradient = number.map(|n| Gradient::of_motion(self.system, tools, n));
+                found.push(self.quantity(name, self.motions[k], gradient));
+            }
+        }
+        found
     }
 
     fn peaks(&self) -> Vec<Quantity> {

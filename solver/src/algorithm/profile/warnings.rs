@@ -41,6 +41,9 @@ const LEFT: f64 = 1e-12;
 /// The largest slope of an obstacle at its middle, as a part of its slope over the first edge beside it.
 const LEVEL: f64 = 1e-3;
 
+/// The largest rotation of an obstacle that counts as small (radians).
+const LARGE_TILT: f64 = 0.05;
+
 /// The smallest number of edges across a contact, of which half may be modelled, with which its pressure is reliable.
 const FEWEST_EDGES: usize = 6;
 
@@ -52,6 +55,7 @@ impl PatchView<'_> {
         self.warn_of_oscillation(warnings);
         self.warn_of_missed(warnings);
         self.warn_of_displaced(warnings);
+        self.warn_of_tilt(warnings);
         self.warn_of_kinks(warnings);
         self.warn_of_junction(warnings);
         self.warn_of_turning_normals(warnings);
@@ -135,6 +139,21 @@ impl PatchView<'_> {
         }
     }
 
+    /// Warns of an obstacle that turns too far for a small rotation.
+    pub(super) fn warn_of_tilt(&self, warnings: &mut Vec<Warning>) {
+        let [.., tilt] = self.motions;
+        if tilt.abs() > LARGE_TILT {
+            warnings.push(Warning {
+                code: WarningCode::LargeTilt,
+                pointer: self.patch.contact.pointer.clone(),
+                message: format!(
+                    "The obstacle turns by {tilt:.3} radians ({:.1}°), but gaps are linear in the tilt, as of a small rotation. Draw the obstacle nearer to its final position, or hold it against turning.",
+                    tilt.to_degrees()
+                ),
+            });
+        }
+    }
+
     /// The message for a body that touches the obstacle at no node: how far the obstacle is from it.
     fn without_contact(&self, how: &str) -> String {
         let contact = self.patch.contact;
@@ -142,7 +161,7 @@ impl PatchView<'_> {
             self.system
                 .normal_displacement(self.v, self.patch.first + i)
         };
-        let opening = |i: usize| contact.gap(i, self.system.level.indentation) - moved(i);
+        let opening = |i: usize| contact.gap(i, &self.system.level) - moved(i);
         let nearest = (0..self.count()).min_by(|&a, &b| opening(a).total_cmp(&opening(b)));
         let smallest = nearest.map_or(f64::INFINITY, opening);
         // without contact the obstacle does not deform the body: the missing indentation is the gap
@@ -468,7 +487,7 @@ impl PatchView<'_> {
     /// u₀/8 ≤ s₁ − s₀/8 (formulation 3.5); none if the distance is small compared with the displacements.
     fn pressed_beside_open_axis(&self) -> Option<f64> {
         let first = self.patch.first;
-        let moved = |i: usize| self.system.normal_displacement(self.v, first + i).abs();
+        let moved = |i: usize| self.displacement(i)[0].abs();
         let largest = (0..self.count()).map(moved).fold(0.0, f64::max);
         let opening = |i: usize| {
             let end = self.system.nodes[first + i].beside_axis?;

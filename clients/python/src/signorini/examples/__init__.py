@@ -1,9 +1,9 @@
-"""The five examples of the thesis (A.C. Bolt, University of Cape Town, 1983, chapter 4), ready to submit.
+"""The five examples of the thesis (A.C. Bolt, University of Cape Town, 1983, chapter 4), and a tool under loads.
 
 Each function returns a new `Problem`, which may be changed. Parameters that are not given stay as in the thesis:
 rho is the nonlocal radius ρ (length), mu the coefficient of friction μ, epsilon the elastic slip ε (length). `refine`
 replaces the refinement of the mesh: how often every element is split into four, or a tolerance below 1 to which the
-mesh is refined where errors come from; the examples have 0.002.
+mesh is refined where errors come from; those of the thesis have 0.002.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from importlib import resources
 
 from ..problem import AdaptiveRefine, Friction, Problem
 
-__all__ = ["annular_punch", "cylinder", "cylinder_on_end", "rectangular_punch", "sheet"]
+__all__ = ["annular_punch", "cylinder", "cylinder_on_end", "rectangular_punch", "sheet", "tool_under_load"]
 
 
 def rectangular_punch(
@@ -49,6 +49,13 @@ def sheet(
 ) -> Problem:
     """A thin sheet pulled through an opening, plane stress, thesis 4.3."""
     return _example("sheet", rho, mu, epsilon, refine)
+
+
+def tool_under_load(
+    rho: float | None = None, mu: float | None = None, epsilon: float | None = None, refine: float | None = None
+) -> Problem:
+    """A flat punch that is free to move and to turn, under an eccentric force and a pull, plane strain."""
+    return _example("tool_under_load", rho, mu, epsilon, refine)
 
 
 def _example(name: str, rho: float | None, mu: float | None, epsilon: float | None, refine: float | None) -> Problem:

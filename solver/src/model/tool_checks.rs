@@ -1,0 +1,268 @@
+//! Checks of obstacles that move as rigid bodies: their loads, motions and springs, and what these require of a contact.
+
+use std::collections::BTreeMap;
+
+use super::checks::{ALIGNED, Checks};
+use super::contact_model::ContactModel;
+use super::level::Level;
+use super::supports::Held;
+use crate::contact::ContactBoundary;
+use crate::error::{AllChecks, Checked, Reason};
+use crate::friction::BoundLaw;
+use crate::problem::{Analysis, Condition, Contact, Normalization, Step};
+
+/// The fields of the motions of an obstacle, with the fields of the loads along them.
+const FIELDS: [[&str; 2]; 3] = [
+    ["indentation", "normal_force"],
+    ["tangential_displacement", "tangential_force"],
+    ["tilt", "moment"],
+];
+
+impl Checks {
+    /// Checks the loads, motions and springs of an obstacle, each by itself and together.
+    pub(super) fn obstacle_loads(
+        &mut self,
+        analysis: &Analysis,
+        contact: &Contact,
+        steps: &[Step],
+        pointer: &str,
+    ) -> Checked {
+        let mut all = AllChecks::default();
+        let at = |field: &str| format!("{pointer}/{field}");
+        let (motions, loads) = (contact.obstacle_motions(), contact.obstacle_loads());
+        let stiffness = contact.stiffness.unwrap_or_default();
+        let springs = [
+            ("normal", stiffness.normal),
+            ("tangential", stiffness.tangential),
+            ("rotational", stiffness.rotational),
+        ];
+        for (k, [motion, load]) in FIELDS.into_iter().enumerate() {
+            let given = motions[k] != 0.0 || k == 2 && contact.tilt.is_some();
+            if given && loads[k].is_some() {
+                all.fail(self.report(
+                    at(load),
+                    Reason::Conflict,
+                    format!("`{motion}` and `{load}`"),
+                    format!("either `{motion}` or `{load}`"),
+                    "Where a load is given, the motion is part of the solution; springs of `stiffness` bear a part of the load.",
+                ));
+            }
+            let (spring, value) = springs[k];
+            let place = at(&format!("stiffness/{spring}"));
+            all.check(self.require(
+                value >= 0.0,
+                &place,
+                value,
+                "a stiffness ≥ 0",
+                "A spring pulls the obstacle back to where it was.",
+            ));
+            if value != 0.0 && loads[k].is_none() {
+                all.fail(self.report(
+                    place,
+                    Reason::NotUsed,
+                    format!("a spring without `{load}`"),
+                    format!("a spring only with `{load}`"),
+                    format!("A given `{motion}` does not depend on springs. A machine that moves the other end of its spring by a distance acts as the load stiffness × distance."),
+                ));
+            }
+        }
+        let turns = contact.tilt.is_some() || contact.moment.is_some();
+        if turns && contact.about.is_none() {
+            all.fail(self.report(
+                at("about"),
+                Reason::Missing,
+                "nothing",
+                "the point `[x, y]` about which the obstacle turns",
+                "Without it neither a tilt nor a moment has a meaning.",
+            ));
+        }
+        if !turns && contact.about.is_some() {
+            all.fail(self.report(
+                at("about"),
+                Reason::NotUsed,
+                "a point without `tilt` and `moment`",
+                "no `about`, or a tilt or a moment (also 0) about it",
+                "An obstacle that does not turn needs no point; with \"moment\": 0 it turns freely.",
+            ));
+        }
+        if contact.is_tool() {
+            all.check(self.tool(analysis, contact, steps, pointer));
+        }
+        all.finish(())
+    }
+
+    /// Checks what an obstacle with a load or a tilt requires of its contact.
+    fn tool(
+        &mut self,
+        analysis: &Analysis,
+        contact: &Contact,
+        steps: &[Step],
+        pointer: &str,
+    ) -> Checked {
+        let mut all = AllChecks::default();
+        let at = |field: &str| format!("{pointer}/{field}");
+        if contact.condition == Condition::None {
+            all.fail(self.report(
+                at("condition"),
+                Reason::NotUsed,
+                "`none` with a load or a tilt of the obstacle",
+                "`unilateral` or `bonded`",
+                "Without an obstacle there is nothing to push.",
+            ));
+        }
+        if matches!(analysis, Analysis::Axisymmetric {}) {
+            let across = [
+                ("tangential_force", contact.tangential_force.is_some()),
+                ("tilt", contact.tilt.is_some()),
+                ("moment", contact.moment.is_some()),
+            ];
+            for (field, _) in across.into_iter().filter(|(_, given)| *given) {
+                all.fail(self.report(
+                    at(field),
+                    Reason::NotUsed,
+                    format!("`{field}` in axisymmetry"),
+                    "only `normal_force`, along the axis",
+                    "A rigid body of revolution can only move along its axis.",
+                ));
+            }
+        }
+        if let Some(force) = contact.normal_force
+            && contact.condition == Condition::Unilateral
+            && contact.stiffness.unwrap_or_default().normal == 0.0
+        {
+            let hint = "Nothing else holds the obstacle at the body: give the force that presses it there, or a spring by `stiffness`.";
+            all.check(self.require(force > 0.0, at("normal_force"), force, "a force > 0", hint));
+            for (i, step) in steps.iter().enumerate() {
+                let place = format!("/steps/{i}/normal_force");
+                let factor = step.normal_force;
+                all.check(self.require(factor > 0.0, place, factor, "a factor > 0", hint));
+            }
+        }
+        all.finish(())
+    }
+
+    /// The direction in which the obstacle of a contact is pushed, a unit vector: the given one or, for an obstacle that moves
+    /// as a rigid body, the one against the normal of a straight boundary.
+    pub(super) fn direction_of_push(
+        &mut self,
+        contact: &Contact,
+        boundary: &ContactBoundary,
+        outward: &[[f64; 2]],
+        pointer: &str,
+    ) -> Checked<[f64; 2]> {
+        if let Some([x, y]) = contact.direction {
+            return Ok([x, y].map(|a| a / x.hypot(y)));
+        }
+        let first = outward[0];
+        let off = |(n, error): (&[f64; 2], &f64)| {
+            let angle = (first[0] * n[1] - first[1] * n[0]).abs();
+            angle > ALIGNED + error + boundary.normal_errors[0]
+        };
+        if contact.is_tool() && outward.iter().zip(&boundary.normal_errors).any(off) {
+            return Err(self.report(
+                format!("{pointer}/direction"),
+                Reason::Missing,
+                "no direction, and a contact boundary that is not straight",
+                "the direction `[x, y]` that `normal_force` pushes the obstacle along",
+                "An obstacle with a load or a tilt moves as a rigid body, which against the normals of a curved boundary it cannot.",
+            ));
+        }
+        Ok(first.map(|x| -x + 0.0))
+    }
+
+    /// Checks that no support holds a contact node along a motion of the obstacle that is unknown: the displacement relative to
+    /// the obstacle would then be neither free nor given.
+    pub(super) fn nodes_held_along_tool(
+        &mut self,
+        contact: &ContactModel,
+        fixed: &BTreeMap<u32, Held>,
+    ) -> Checked {
+        let Some(tool) = &contact.tool else {
+            return Ok(());
+        };
+        let boundary = &contact.boundary;
+        for (i, node) in boundary.nodes.iter().enumerate() {
+            let Some(held) = fixed.get(node) else {
+                continue;
+            };
+            let axes = [boundary.normals[i], boundary.tangent(i)];
+            for k in tool.free() {
+                let row = tool.row(i, k);
+                let size = row[0].hypot(row[1]);
+                let error = ALIGNED + boundary.normal_errors[i];
+                let along = |a: usize| {
+                    // a node that is held along the surface is on a line of symmetry, whose other side would move the other way
+                    let across = a == 1 && k > 0;
+                    held.along(axes[a]).is_some() && (across || row[a].abs() > error * size)
+                };
+                // oblique supports, too, hold the node along a part of the motion
+                let oblique = axes.iter().all(|axis| held.along(*axis).is_none());
+                if !(along(0) || along(1) || oblique && size > 0.0) {
+                    continue;
+                }
+                let [x, y] = boundary.positions[i];
+                let [motion, load] = FIELDS[k];
+                return Err(self.report(
+                    format!("{}/{load}", contact.pointer),
+                    Reason::Conflict,
+                    format!("node {node} of the contact at ({x}, {y}), which a support holds along the `{motion}` that `{load}` causes"),
+                    format!("a contact whose nodes no support holds along the `{motion}`"),
+                    "On a line of symmetry an obstacle can only move along this line: model the whole body for a tangential force or a moment. Else end the contact one edge before the support with `from` or `to`.",
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks that friction can bear the tangential force of an obstacle, where its normal force is given, too, and all of the
+    /// contact has one normal.
+    pub(super) fn tangential_force_borne(
+        &mut self,
+        contact: &ContactModel,
+        steps: &[Step],
+    ) -> Checked {
+        let Some(tool) = &contact.tool else {
+            return Ok(());
+        };
+        let ([Some(normal), Some(tangential), _], [_, spring, _]) = (tool.loads, tool.stiffness)
+        else {
+            return Ok(());
+        };
+        let boundary = &contact.boundary;
+        let upright = (0..boundary.nodes.len()).all(|i| (tool.row(i, 0)[0] - 1.0).abs() <= ALIGNED);
+        if contact.condition != Condition::Unilateral || !upright || spring > 0.0 {
+            return Ok(());
+        }
+        let length: f64 = boundary.weights.iter().sum();
+        let most = |normal: f64| match contact.friction.as_ref().map(|law| &law.bound) {
+            None => 0.0,
+            // the literal average of the thesis has no such limit
+            Some(BoundLaw::Pressure { average, .. })
+                if average.normalization == Normalization::PeakOne =>
+            {
+                f64::INFINITY
+            }
+            Some(BoundLaw::Pressure {
+                coefficient,
+                cohesion,
+                shear_cap,
+                ..
+            }) => (shear_cap * length).min(cohesion * length + coefficient * normal),
+            Some(BoundLaw::Prescribed(_)) => f64::INFINITY,
+        };
+        for level in Level::ends_of(steps) {
+            let [normal, tangential] = [normal * level.forces[0], tangential * level.forces[1]];
+            let most = most(normal);
+            if tangential.abs() > most * (1.0 + ALIGNED) {
+                return Err(self.report(
+                    format!("{}/tangential_force", contact.pointer),
+                    Reason::Impossible,
+                    format!("a tangential force of {tangential} with a normal force of {normal}"),
+                    format!("at most {most}, which friction can bear"),
+                    "Beyond it the obstacle slides away and there is no equilibrium. Give a `tangential_displacement` for sliding, a smaller force, or a spring by `stiffness`.",
+                ));
+            }
+        }
+        Ok(())
+    }
+}

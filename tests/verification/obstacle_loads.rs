@@ -1,0 +1,490 @@
+//! Rigid obstacles under loads. Source: the duality of loads and displacements; the half-space under an eccentric flat punch,
+//! whose tilt is 4Pe/(πE*a²); Hertz. Goal: the motions that loads cause are those that cause the loads, to 1e-8, and the stated
+//! errors of the motions hold.
+
+use serde_json::{Value, json};
+use solver::error::SolveError;
+use solver::family::{Family, Start};
+use solver::solution::{ContactSummary, QuantityName, Solution, WarningCode};
+
+use crate::support::{graded, problem, solve, union};
+
+/// A whole block of half-width and depth `size` under an obstacle over its middle, with elements of size `h` there.
+fn block(size: f64, h: f64, contact: &Value) -> Value {
+    let fine: Vec<f64> = (0..=(1.2 / h).round() as usize)
+        .map(|k| k as f64 * h)
+        .collect();
+    let right = union(&[fine, graded(1.2, size, h, 1.5)]);
+    let left: Vec<f64> = right[1..].iter().rev().map(|x| -x).collect();
+    let x = [left, right].concat();
+    let y: Vec<f64> = graded(0.0, -size, h, 1.5).into_iter().rev().collect();
+    json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grid": {"x": x, "y": y}},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
+        "contacts": [contact],
+        "solver": {"tolerance": 1e-12},
+    })
+}
+
+/// Grid lines that are graded to the edges of a punch of half-width `a`.
+fn to_the_edges(a: f64, size: f64) -> Vec<f64> {
+    let h = 1e-3;
+    let inside: Vec<f64> = graded(a, 0.0, h, 1.4).into_iter().rev().collect();
+    let right = union(&[inside, graded(a, size, h, 1.4)]);
+    let left: Vec<f64> = right[1..].iter().rev().map(|x| -x).collect();
+    [left, right].concat()
+}
+
+fn merged(mut value: Value, more: Value) -> Value {
+    let (Some(into), Value::Object(more)) = (value.as_object_mut(), more) else {
+        panic!("two objects");
+    };
+    into.extend(more);
+    value
+}
+
+fn top(solution: &Solution) -> &ContactSummary {
+    &solution.summary.contacts["top"]
+}
+
+fn solved(value: &Value) -> Solution {
+    let solution = solve(&problem(&value.to_string()));
+    assert!(
+        solution.summary.converged,
+        "{:?}",
+        solution.summary.warnings
+    );
+    solution
+}
+
+/// The violations of a problem, as pointers.
+fn refused(value: &Value) -> Vec<String> {
+    match solver::prepare(&problem(&value.to_string()), None, &mut ()) {
+        Err(SolveError::Invalid(violations)) => violations.into_iter().map(|v| v.pointer).collect(),
+        Err(error) => panic!("{error}"),
+        Ok(_) => Vec::new(),
+    }
+}
+
+fn law() -> Value {
+    json!({"coefficient": 0.3, "nonlocal_radius": 0.1, "elastic_slip": 2e-3})
+}
+
+/// By displacement and tilt; then the force and the moment that these need, as loads, one, two or all three of them: the same
+/// motions, forces and profiles.
+#[test]
+fn loads_cause_the_motions_that_need_them() {
+    let parabola = json!({"boundary": "top", "obstacle": {"kind": "parabola", "radius": 8}, "friction": law(), "about": [0, 0]});
+    let flat = json!({"boundary": "top", "obstacle": {"kind": "flat", "from": -0.6, "to": 0.6}, "friction": law(), "about": [0.1, 0.3]});
+    let frictionless = json!({"boundary": "top", "obstacle": {"kind": "flat", "from": -0.6, "to": 0.6}, "about": [0, 0]});
+    let bonded = json!({"boundary": "top", "obstacle": {"kind": "flat", "from": -0.6, "to": 0.6}, "condition": "bonded", "about": [0, 0]});
+    for (name, base, [y, x, tilt]) in [
+        ("parabola", &parabola, [0.18, 0.01, 1e-9]),
+        ("tilted parabola", &parabola, [0.18, -0.004, 0.01]),
+        ("flat", &flat, [0.02, 0.001, -0.004]),
+        ("frictionless", &frictionless, [0.02, 0.0, 0.01]),
+        ("bonded", &bonded, [0.01, 0.02, 0.003]),
+    ] {
+        let given = json!({"indentation": y, "tangential_displacement": x, "tilt": tilt});
+        let first = solved(&block(6.0, 0.1, &merged(base.clone(), given)));
+        let contact = top(&first);
+        let [fx, fy] = contact.force.unwrap();
+        let loads = [-fy, fx, contact.moment.unwrap()];
+        let motions = [y, x, tilt];
+        for free in 1..8u32 {
+            // without friction nothing holds an obstacle against sliding
+            if name == "frictionless" && free & 2 > 0 {
+                continue;
+            }
+            let fields = [
+                ["indentation", "normal_force"],
+                ["tangential_displacement", "tangential_force"],
+                ["tilt", "moment"],
+            ];
+            let mut given = json!({});
+            for (k, [motion, load]) in fields.into_iter().enumerate() {
+                match free & (1 << k) > 0 {
+                    true => given[load] = loads[k].into(),
+                    false => given[motion] = motions[k].into(),
+                }
+            }
+            let second = solved(&block(6.0, 0.1, &merged(base.clone(), given.clone())));
+            let found = top(&second);
+            let pairs = [
+                (found.indentation, y, 1e-8 * y),
+                (found.tangential_displacement, x, 1e-8 * y),
+                (found.tilt, tilt, 1e-8 * y),
+                (found.moment, loads[2], 1e-8 * loads[0].abs()),
+                (found.force.map(|f| f[0]), fx, 1e-8 * loads[0].abs()),
+                (found.force.map(|f| f[1]), fy, 1e-8 * loads[0].abs()),
+                (
+                    Some(found.normal_force),
+                    contact.normal_force,
+                    1e-8 * loads[0].abs(),
+                ),
+                (
+                    Some(found.friction_force),
+                    contact.friction_force,
+                    1e-8 * loads[0].abs(),
+                ),
+                (
+                    Some(second.summary.strain_energy.unwrap()),
+                    first.summary.strain_energy.unwrap(),
+                    1e-7 * first.summary.strain_energy.unwrap(),
+                ),
+            ];
+            for (k, (value, right, tolerance)) in pairs.into_iter().enumerate() {
+                let off = (value.unwrap() - right).abs();
+                assert!(
+                    off <= tolerance,
+                    "{name} {given} {k}: {value:?} for {right}"
+                );
+            }
+            let (a, b) = (&first.node_profiles["top"], &second.node_profiles["top"]);
+            for i in 0..a.s.len() {
+                let near = |a: f64, b: f64, size: f64| (a - b).abs() <= 1e-7 * size;
+                assert!(near(a.gap[i], b.gap[i], 1.0), "{name} {given} gap {i}");
+                assert!(
+                    near(a.normal_displacement[i], b.normal_displacement[i], 1.0)
+                        && near(
+                            a.tangential_displacement[i],
+                            b.tangential_displacement[i],
+                            1.0
+                        ),
+                    "{name} {given} u {i}"
+                );
+                assert!(
+                    near(a.normal_stress[i], b.normal_stress[i], 1e3),
+                    "{name} {given} p {i}"
+                );
+            }
+            assert!(second.summary.residuals.equilibrium < 1e-9);
+        }
+    }
+}
+
+/// A flat punch under an eccentric force: forces and moments balance, and it tilts as on a half-space.
+#[test]
+fn an_eccentric_punch_tilts_as_on_a_half_space() {
+    let (a, p) = (0.5, 100.0);
+    let e_star = 1000.0 / 0.91;
+    for e in [0.1, -0.2] {
+        let contact = json!({"boundary": "top", "obstacle": {"kind": "flat", "from": -a, "to": a},
+            "normal_force": p, "moment": -p * e, "about": [0, 0]});
+        let mut punch = block(20.0, 0.05, &contact);
+        let y: Vec<f64> = graded(0.0, -20.0, 1e-3, 1.4).into_iter().rev().collect();
+        punch["mesh"]["grid"] = json!({"x": to_the_edges(a, 20.0), "y": y});
+        let solution = solved(&punch);
+        let contact = top(&solution);
+        assert!((contact.normal_force / p - 1.0).abs() < 1e-10);
+        assert!((contact.moment.unwrap() + p * e).abs() < 1e-10 * p);
+        // positive e is to the right, where the punch goes down: clockwise
+        let exact = -4.0 * p * e / (std::f64::consts::PI * e_star * a * a);
+        let off = (contact.tilt.unwrap() / exact - 1.0).abs();
+        assert!(off < 2e-3, "{e}: {} for {exact}", contact.tilt.unwrap());
+        let accuracy = solution.summary.accuracy.as_ref().unwrap();
+        let tilt = accuracy
+            .quantities
+            .iter()
+            .find(|q| q.quantity == QuantityName::Tilt);
+        let tilt = tilt.unwrap();
+        assert!((tilt.value - exact).abs() <= tilt.error.unwrap() + 2e-3 * exact.abs());
+        assert!(tilt.error.unwrap() < 0.05 * exact.abs(), "{:?}", tilt.error);
+    }
+}
+
+/// The motions on a coarse mesh lie within their stated errors of those on a fine one.
+#[test]
+fn motions_are_within_their_stated_errors() {
+    let cases = [
+        json!({"boundary": "top", "obstacle": {"kind": "parabola", "radius": 8}, "normal_force": 60, "friction": law()}),
+        json!({"boundary": "top", "obstacle": {"kind": "parabola", "radius": 8}, "normal_force": 60, "tangential_force": 5, "friction": law()}),
+        json!({"boundary": "top", "obstacle": {"kind": "flat", "from": -0.6, "to": 0.6}, "normal_force": 60, "tangential_force": 6, "moment": 3, "about": [0, 0], "friction": law()}),
+        json!({"boundary": "top", "obstacle": {"kind": "flat", "from": -0.6, "to": 0.6}, "normal_force": 60, "tangential_force": 6, "moment": 3, "about": [0, 0], "condition": "bonded"}),
+    ];
+    let mut checked = 0;
+    for case in &cases {
+        let fine = solved(&block(6.0, 0.0125, case));
+        for h in [0.2, 0.1, 0.05] {
+            let coarse = solved(&block(6.0, h, case));
+            let motions = |s: &Solution| {
+                let contact = top(s);
+                [
+                    contact.indentation,
+                    contact.tangential_displacement,
+                    contact.tilt,
+                ]
+                .map(Option::unwrap)
+            };
+            let right = motions(&fine);
+            for q in &coarse.summary.accuracy.as_ref().unwrap().quantities {
+                let right = match q.quantity {
+                    QuantityName::Indentation => right[0],
+                    QuantityName::TangentialDisplacement => right[1],
+                    QuantityName::Tilt => right[2],
+                    _ => continue,
+                };
+                let (off, error) = ((q.value - right).abs(), q.error.unwrap());
+                println!(
+                    "{case} {h} {:?}: {} ± {error:.1e}, right {right}: {:.2}",
+                    q.quantity,
+                    q.value,
+                    off / error
+                );
+                assert!(
+                    off <= 1.05 * error + 1e-12,
+                    "{case} {h} {:?}: {} ± {error} for {right}",
+                    q.quantity,
+                    q.value
+                );
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked >= 24, "{checked}");
+}
+
+/// A spring between the obstacle and the ground bears its part of the load: what is left presses the body.
+#[test]
+fn springs_bear_their_part_of_the_loads() {
+    let base = json!({"boundary": "top", "obstacle": {"kind": "flat", "from": -0.6, "to": 0.6}, "condition": "bonded", "about": [0, 0]});
+    let stiffness = json!({"normal": 300, "tangential": 200, "rotational": 100});
+    let loads =
+        json!({"normal_force": 50, "tangential_force": -20, "moment": 8, "stiffness": stiffness});
+    let solution = solved(&block(6.0, 0.2, &merged(base, loads)));
+    let contact = top(&solution);
+    let [fx, fy] = contact.force.unwrap();
+    let left = [
+        50.0 - 300.0 * contact.indentation.unwrap() + fy,
+        -20.0 - 200.0 * contact.tangential_displacement.unwrap() - fx,
+        8.0 - 100.0 * contact.tilt.unwrap() - contact.moment.unwrap(),
+    ];
+    assert!(left.iter().all(|rest| rest.abs() < 1e-9), "{left:?}");
+}
+
+/// A sphere under a force is pushed as far as the force needs; total forces and springs include 2π.
+#[test]
+fn a_sphere_under_a_force_moves_along_the_axis() {
+    let with = |contact: Value| {
+        let x = union(&[
+            (0..=12).map(|k| 0.1 * f64::from(k)).collect(),
+            graded(1.2, 20.0, 0.1, 1.5),
+        ]);
+        let y: Vec<f64> = graded(0.0, -20.0, 0.1, 1.5).into_iter().rev().collect();
+        json!({
+            "analysis": {"kind": "axisymmetric"},
+            "mesh": {"grid": {"x": x, "y": y}},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "supports": [{"boundary": "bottom", "uy": 0}],
+            "contacts": [merged(json!({"boundary": "top", "obstacle": {"kind": "parabola", "radius": 8}, "friction": law()}), contact)],
+            "solver": {"tolerance": 1e-12},
+        })
+    };
+    let first = solved(&with(json!({"indentation": 0.12})));
+    let force = first.summary.normal_force;
+    let second = solved(&with(json!({"normal_force": force})));
+    assert!((top(&second).indentation.unwrap() / 0.12 - 1.0).abs() < 1e-8);
+    assert!((second.summary.normal_force / force - 1.0).abs() < 1e-10);
+    let third = solved(&with(
+        json!({"normal_force": force + 500.0 * 0.12, "stiffness": {"normal": 500}}),
+    ));
+    assert!((top(&third).indentation.unwrap() / 0.12 - 1.0).abs() < 1e-8);
+    for field in ["tangential_force", "moment"] {
+        let contact = json!({"normal_force": force, field: 1, "about": [0, 0]});
+        assert!(
+            refused(&with(contact)).contains(&format!("/contacts/0/{field}")),
+            "{field}"
+        );
+    }
+}
+
+/// A block on a plate under a loaded obstacle: the body itself is held by contact alone along y.
+#[test]
+fn a_block_between_a_plate_and_a_loaded_obstacle_is_in_equilibrium() {
+    let text = json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grid": {"x": [-1, -0.6, -0.3, 0, 0.3, 0.6, 1], "y": [0, 0.25, 0.5, 0.75, 1]}},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "contacts": [
+            {"boundary": "bottom", "obstacle": {"kind": "flat"}, "friction": law()},
+            {"boundary": "top", "obstacle": {"kind": "flat"}, "normal_force": 40, "tangential_force": 3, "friction": law()},
+        ],
+        "solver": {"tolerance": 1e-12},
+    });
+    let solution = solved(&text);
+    let bottom = &solution.summary.contacts["bottom"];
+    assert!((bottom.normal_force - 40.0).abs() < 1e-8);
+    assert!((top(&solution).normal_force - 40.0).abs() < 1e-8);
+    // t points along −x at the bottom
+    assert!(
+        (bottom.tangential_force - 3.0).abs() < 1e-8,
+        "{}",
+        bottom.tangential_force
+    );
+    assert!(solution.summary.residuals.equilibrium < 1e-9);
+}
+
+/// Cattaneo and Mindlin under given forces, to and fro: each step has its forces, and the obstacle returns on another way.
+#[test]
+fn forces_to_and_fro_draw_a_loop_of_displacements() {
+    let friction = json!({"coefficient": 0.3, "nonlocal_radius": 0, "elastic_slip": 1e-4, "history": "incremental", "points": "nodal"});
+    let contact = json!({"boundary": "top", "obstacle": {"kind": "parabola", "radius": 8}, "normal_force": 50, "tangential_force": 10, "friction": friction});
+    let factors = [0.0, 1.0, 0.0, -1.0, 0.0, 1.0, 0.0, -1.0, 0.0, 1.0];
+    let steps: Vec<Value> = factors
+        .iter()
+        .map(|f| json!({"tangential_force": f, "increments": 8}))
+        .collect();
+    let solution = solved(&merged(block(6.0, 0.1, &contact), json!({"steps": steps})));
+    let mut shifts = Vec::new();
+    for (step, factor) in solution.steps.iter().zip(factors) {
+        let contact = &step.summary.contacts["top"];
+        assert!((contact.force.unwrap()[1] + 50.0).abs() < 1e-8);
+        assert!((contact.force.unwrap()[0] - 10.0 * factor).abs() < 1e-8);
+        shifts.push(contact.tangential_displacement.unwrap());
+    }
+    let [rest, _, _, _, _, right, back, left, again, last] = shifts[..] else {
+        panic!("ten steps");
+    };
+    let most = right.abs();
+    assert!(rest.abs() < 1e-6 * most);
+    // the second cycle is closed, and the way back is not the way there
+    assert!((right - last).abs() < 1e-9 * most, "{shifts:?}");
+    // pressing has left friction outwards, which the two ways begin from: the loop is not quite symmetric
+    assert!((right + left).abs() < 0.1 * most, "{shifts:?}");
+    assert!(back - again > 0.03 * most, "{shifts:?}");
+}
+
+/// What cannot be solved is refused in words before solving: at the field that is wrong, all at once.
+#[test]
+fn impossible_loads_are_refused_at_their_fields() {
+    let flat = |more: Value| {
+        let base =
+            json!({"boundary": "top", "obstacle": {"kind": "flat", "from": -0.6, "to": 0.6}});
+        block(6.0, 0.2, &merged(base, more))
+    };
+    let at = |field: &str| vec![format!("/contacts/0/{field}")];
+    for (more, fields) in [
+        (
+            json!({"indentation": 0.1, "normal_force": 1}),
+            at("normal_force"),
+        ),
+        (json!({"normal_force": 0}), at("normal_force")),
+        (json!({"normal_force": -1}), at("normal_force")),
+        (json!({"normal_force": 1, "moment": 1}), at("about")),
+        (json!({"indentation": 1, "tilt": 0.1}), at("about")),
+        (json!({"normal_force": 1, "about": [0, 0]}), at("about")),
+        (
+            json!({"normal_force": 1, "stiffness": {"tangential": 1}}),
+            at("stiffness/tangential"),
+        ),
+        (
+            json!({"normal_force": 1, "stiffness": {"normal": -1}}),
+            at("stiffness/normal"),
+        ),
+        (
+            json!({"normal_force": 1, "condition": "none", "friction": {"bound": 1, "elastic_slip": 1e-3}}),
+            at("condition"),
+        ),
+        // beyond what friction bears, or without friction
+        (
+            json!({"normal_force": 10, "tangential_force": 3.1, "friction": law()}),
+            at("tangential_force"),
+        ),
+        (
+            json!({"normal_force": 10, "tangential_force": -3.1, "friction": law()}),
+            at("tangential_force"),
+        ),
+        (
+            json!({"normal_force": 10, "tangential_force": 0.1}),
+            at("tangential_force"),
+        ),
+    ] {
+        assert_eq!(refused(&flat(more.clone())), fields, "{more}");
+    }
+    let both = json!({"indentation": 0.1, "normal_force": 1, "tilt": 0.1, "moment": 1});
+    assert_eq!(refused(&flat(both)).len(), 3);
+    // a curved body needs a direction
+    let curved = json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"inline": {
+            "nodes": [[0, 0], [1, 0], [1, 1], [0, 1.2], [0.5, 0], [1, 0.5], [0.5, 1.15], [0, 0.6]],
+            "elements": [[0, 1, 2, 3, 4, 5, 6, 7]],
+            "boundaries": {"bottom": [[0, 1, 4]], "top": [[2, 3, 6]]}}},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
+        "contacts": [{"boundary": "top", "obstacle": {"kind": "line", "point": [0, 1.2], "angle": 0}, "normal_force": 1}],
+    });
+    assert_eq!(refused(&curved), at("direction"));
+    let mut directed = curved;
+    directed["contacts"][0]["direction"] = json!([0, -2]);
+    assert!(refused(&directed).is_empty());
+    // half a model
+    let mut half = flat(json!({"normal_force": 10, "moment": 0, "about": [0, 0]}));
+    half["mesh"]["grid"]["x"] = json!([0, 0.3, 0.6, 1, 3, 6]);
+    half["contacts"][0]["obstacle"]["from"] = json!(0);
+    half["supports"] =
+        json!([{"boundary": "left", "ux": 0}, {"boundary": "bottom", "ux": 0, "uy": 0}]);
+    assert_eq!(refused(&half), at("moment"));
+    // steps
+    let mut steps = flat(json!({"normal_force": 10}));
+    steps["steps"] = json!([{"normal_force": 1}, {"normal_force": 0}]);
+    assert_eq!(refused(&steps), ["/steps/1/normal_force"]);
+}
+
+/// Members of a sweep over a force have the motions of their own jobs, and a force that friction cannot bear is refused in them, too.
+#[test]
+fn a_sweep_over_a_force_has_the_motions_of_its_jobs() {
+    let with = |normal: f64, tangential: f64| {
+        let contact = json!({"boundary": "top", "obstacle": {"kind": "parabola", "radius": 8},
+            "normal_force": normal, "tangential_force": tangential, "friction": law()});
+        problem(&block(6.0, 0.1, &contact).to_string())
+    };
+    let mut family = Family::new(&with(20.0, 1.0), None, &mut ()).unwrap();
+    for (normal, tangential) in [(20.0, 1.0), (40.0, -2.0), (80.0, 5.0)] {
+        let given = with(normal, tangential);
+        let (member, _) = family.member(&given, Start::Anew, &mut ()).unwrap();
+        let own = solve(&given);
+        let own = top(&own);
+        for (a, b) in [
+            (member.indentation, own.indentation),
+            (member.tangential_displacement, own.tangential_displacement),
+            (member.tilt, own.tilt),
+            (Some(member.normal_force), Some(normal)),
+            (Some(member.tangential_force), Some(tangential)),
+        ] {
+            assert!((a.unwrap() - b.unwrap()).abs() < 1e-8, "{a:?} {b:?}");
+        }
+    }
+    let refused = family.member(&with(20.0, 7.0), Start::Anew, &mut ());
+    assert!(matches!(refused, Err(SolveError::Invalid(_))));
+}
+
+/// A force outside the punch tips it over, and a parabola rolls freely where contact uses the obstacle's normals: both are told,
+/// and never a number. A large tilt is warned of.
+#[test]
+fn an_obstacle_that_nothing_holds_is_told_of() {
+    let flat = json!({"boundary": "top", "obstacle": {"kind": "flat", "from": -0.5, "to": 0.5}, "normal_force": 10, "about": [0, 0]});
+    let tipping = block(6.0, 0.1, &merged(flat.clone(), json!({"moment": -6.0})));
+    let result = solver::solve(&problem(&tipping.to_string()), &mut ());
+    let told = match result {
+        Err(SolveError::ObstacleUnheld { .. }) => true,
+        Ok(solution) => !solution.summary.converged,
+        Err(error) => panic!("{error}"),
+    };
+    assert!(told);
+    let soft = block(
+        6.0,
+        0.1,
+        &merged(flat, json!({"normal_force": 200, "moment": -45.0})),
+    );
+    let solution = solve(&problem(&soft.to_string()));
+    let tilt = top(&solution).tilt.unwrap();
+    let warned = solution
+        .summary
+        .warnings
+        .iter()
+        .any(|w| w.code == WarningCode::LargeTilt);
+    assert_eq!(warned, tilt.abs() > 0.05, "{tilt}");
+}
