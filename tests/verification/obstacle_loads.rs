@@ -461,6 +461,25 @@ fn a_sweep_over_a_force_has_the_motions_of_its_jobs() {
     assert!(matches!(refused, Err(SolveError::Invalid(_))));
 }
 
+/// Where the indentation is given, what friction bears is known afterwards: an obstacle that is pulled by more slides away, and the
+/// message has both forces.
+#[test]
+fn an_obstacle_that_is_pulled_beyond_its_friction_slides_away() {
+    let contact = json!({"boundary": "top", "obstacle": {"kind": "flat", "from": -0.6, "to": 0.6},
+        "indentation": 0.05, "tangential_force": 100, "friction": law()});
+    let given = problem(&block(6.0, 0.1, &contact).to_string());
+    let solution = solver::solve(&given, &mut ()).unwrap();
+    assert!(!solution.summary.converged);
+    let mut told = solution.summary.warnings.iter();
+    let told = told.find(|w| w.code == WarningCode::SlidesAway).unwrap();
+    assert!(
+        told.message
+            .contains("the obstacle of contact `top` with a force of 100.0"),
+        "{}",
+        told.message
+    );
+}
+
 /// A force outside the punch tips it over, and a parabola rolls freely where contact uses the obstacle's normals: both are told,
 /// and never a number. A large tilt is warned of.
 #[test]

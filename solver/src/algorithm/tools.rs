@@ -67,12 +67,12 @@ impl Tools {
             .collect();
         let forces: Vec<Vec<f64>> = moves.iter().map(|p| body.stiffness.times(p)).collect();
         let unit = 1.0 / model.section.circumference();
-        let spring = |free: &FreeMotion| {
-            let tool = model.contacts[free.patch].tool.as_ref();
-            unit * tool.map_or(0.0, |tool| tool.stiffness[free.motion])
-        };
         let entry = |i: usize, j: usize| {
-            let own = if i == j { spring(&motions[i]) } else { 0.0 };
+            let own = if i == j {
+                unit * spring(model, &motions[i])
+            } else {
+                0.0
+            };
             own + dot(&moves[i], &forces[j])
         };
         let mut stop = || observer.stop();
@@ -143,8 +143,7 @@ impl Tools {
 
     /// The stiffness of the spring between an obstacle and the ground against a motion (without 2π).
     pub(super) fn spring(&self, model: &Model, free: &FreeMotion) -> f64 {
-        let tool = model.contacts[free.patch].tool.as_ref();
-        self.unit * tool.map_or(0.0, |tool| tool.stiffness[free.motion])
+        self.unit * spring(model, free)
     }
 
     /// The load f_w = f̂ − ŜP q₀ on displacements relative to the obstacles. `at_rest`: q₀ of [`Tools::at_rest`].
@@ -200,6 +199,12 @@ impl Tools {
 
 /// The resistance of a motion, as a part of the stiffness of the nodes that it moves, below which it is rounding.
 const RESISTS: f64 = 1e-12;
+
+/// The stiffness of the spring against a motion, as the problem gives it.
+fn spring(model: &Model, free: &FreeMotion) -> f64 {
+    let tool = model.contacts[free.patch].tool.as_ref();
+    tool.map_or(0.0, |tool| tool.stiffness[free.motion])
+}
 
 fn stiffest(body: &ElasticBody) -> f64 {
     (0..body.stiffness.size()).fold(0.0, |most, i| body.stiffness.at(i, i).max(most))

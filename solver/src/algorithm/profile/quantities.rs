@@ -45,7 +45,7 @@ pub struct Quantity {
     /// For a peak: the stress due to a shape of the obstacle between the nodes that they do not see; else 0.
     pub unseen: f64,
     /// The least error that a sharp end leaves, in the unit of the value: of friction forces on the edges there, and of a peak of
-    /// σ_t there where the body sticks.
+    /// σ_t there.
     pub sharp_end: f64,
     /// The edges at sharp ends, with their parts in any unit.
     pub sharp_end_at: Vec<(usize, f64)>,
@@ -97,7 +97,7 @@ pub(super) struct EndOfContact {
 const MOST_STICK_ENDS: usize = 8;
 
 /// The least pressure at the end of a boundary, as a part of that at the node beside it, that shows contact up to the end: at
-/// a sharp end the pressure grows, and that of a parabola which contact reaches just so is half (`tests/verification/widths.rs`).
+/// a sharp end the pressure grows, and that of a parabola which contact reaches just so is half (`tests/verification/sharp_ends.rs`).
 const REACHES_END: f64 = 0.7;
 
 /// The same, below which contact ends before the end of the boundary.

@@ -294,8 +294,8 @@ impl PatchView<'_> {
         self.sharp_ends().into_iter().map(on_edge).collect()
     }
 
-    /// The least error of a peak of σ_t at a sharp end where the body sticks (stress): slip grows there like a root of the distance,
-    /// which no element follows. `reached`: σ_t as a part of the friction bound.
+    /// The least error of a peak of σ_t at a sharp end (stress). Where the body sticks, slip grows like a root of the distance, which no
+    /// element follows; where it slips, the peak is the bound. `reached`: σ_t as a part of the friction bound.
     pub(super) fn traction_at_sharp_end(
         &self,
         Highest { value, edge, xi }: Highest,
