@@ -306,3 +306,68 @@ fn the_ripple_of_an_incremental_solution_is_in_the_error_of_its_peak() {
         );
     }
 }
+
+/// A parabola, pressed in many increments and then dragged a little, on edges of 1/6 that `refine` halves.
+fn dragged_parabola(refine: u32, center: f64, drag: f64, points: &str) -> Value {
+    let mut x: Vec<f64> = (0..=7).map(|k| f64::from(k) / 6.0).collect();
+    let mut step = 1.0 / 6.0;
+    while x[x.len() - 1] < 30.0 {
+        step *= 1.6;
+        x.push(x[x.len() - 1] + step);
+    }
+    let y: Vec<f64> = x.iter().rev().map(|x| -x).collect();
+    let x: Vec<f64> = [&y[..y.len() - 1], &x].concat();
+    json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grid": {"x": x, "y": y}, "refine": refine},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0}],
+        "supports": [{"boundary": "bottom", "ux": 0, "uy": 0}],
+        "contacts": [{
+            "boundary": "top",
+            "obstacle": {"kind": "parabola", "radius": 40, "center": center},
+            "indentation": 0.025,
+            "tangential_displacement": drag,
+            "friction": {"coefficient": 1, "nonlocal_radius": 0.1, "elastic_slip": 5e-4, "history": "incremental", "points": points},
+        }],
+        "steps": [
+            {"increments": 64, "spacing": "contact_width", "tangential_displacement": 0},
+            {"increments": 8, "tangential_displacement": 1},
+        ],
+    })
+}
+
+/// With averaging, too, the ripple lifts the peak, which then touches the bound: it is in the error, and told. Points at the
+/// nodes and meshes up to four times as fine lead to 5.8.
+#[test]
+fn the_ripple_beside_an_end_of_stick_is_in_the_error_and_told() {
+    let right = 5.8;
+    for refine in [1, 2] {
+        let problem = dragged_parabola(refine, 0.23, -0.003, "gauss3");
+        let solution = solve(&problem_of(&problem.to_string()));
+        let peak = of_kind(&solution, QuantityName::PeakTangentialStress)[0];
+        let error = peak.error.unwrap();
+        assert!((peak.value + right).abs() <= error, "{refine}: {peak:?}");
+        let told = solution.summary.warnings.iter();
+        let mut told = told.filter(|w| w.code == WarningCode::OscillatingStick);
+        assert!(
+            told.next()
+                .is_some_and(|w| w.message.contains("rises and falls within each edge"))
+        );
+    }
+}
+
+/// Of an obstacle that is dragged a little, both ends of stick have nearly the same σ_t: which is larger is chance, and told; of the
+/// same without a drag, mirrored exactly, and of one that is dragged far, nothing is.
+#[test]
+fn a_peak_whose_sign_is_not_known_is_told() {
+    let told = |center: f64, drag: f64| {
+        let problem = dragged_parabola(1, center, drag, "nodal");
+        let warnings = solve(&problem_of(&problem.to_string())).summary.warnings;
+        warnings
+            .iter()
+            .any(|w| w.code == WarningCode::PeakSignUnknown)
+    };
+    assert!(told(0.02, 0.0));
+    assert!(!told(0.0, 0.0));
+    assert!(!told(0.0, 0.02));
+}

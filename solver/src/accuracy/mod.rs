@@ -30,7 +30,9 @@ use crate::element::edge3;
 use crate::linear::{Interrupt, Stopped};
 use crate::observer::Observer;
 use crate::origins::{Added, Origins};
-use crate::solution::{Accuracy, ErrorMethod, EstimatedQuantity, Outcome, QuantityName};
+use crate::solution::{
+    Accuracy, ErrorMethod, EstimatedQuantity, Outcome, QuantityName, Warning, WarningCode,
+};
 use singular::Surroundings;
 use verdict::{Doubt, conclude, length, relative, scale};
 
@@ -258,6 +260,35 @@ pub fn assess(
     let doubt = |quantity: &Quantity| unseen(quantity).then_some(Doubt::Unseen);
     let doubts: Vec<_> = quantities.iter().map(doubt).collect();
     conclude(reported.summary.outcome, found, &doubts, &[])
+}
+
+/// The part of a peak within which that of the other direction counts as equal, as in a symmetric problem.
+const EQUAL_PEAKS: f64 = 1e-6;
+
+/// Notes of peaks of σ_t whose sign is not known: one in the other direction is as large within the stated error.
+pub fn unknown_signs(
+    quantities: &[Quantity],
+    system: &System<'_>,
+    accuracy: &Accuracy,
+) -> Vec<Warning> {
+    let stated = quantities.iter().zip(&accuracy.quantities);
+    let unknown = stated.filter_map(|(quantity, stated)| {
+        let (size, opposite) = (quantity.value.abs(), quantity.opposite);
+        let less = size - opposite;
+        let error = stated.error?;
+        let unknown = opposite > 0.0 && less > EQUAL_PEAKS * size && less <= error;
+        unknown.then(|| Warning {
+            code: WarningCode::PeakSignUnknown,
+            pointer: system.patches[quantity.patch].contact.pointer.clone(),
+            message: format!(
+                "The largest tangential stress is {:.5e}, and {:.5e} in the other direction: by its error, {:.1e}, either may be the larger. The size of peak_tangential_stress is known to that error, its sign and place are not.",
+                quantity.value,
+                -opposite * quantity.value.signum(),
+                error,
+            ),
+        })
+    });
+    unknown.collect()
 }
 
 /// The reference size of a quantity, by which its error is divided.

@@ -496,6 +496,8 @@ pub enum WarningCode {
     UniquenessUnknown,
     /// A second solution that differs from the first.
     NotUnique,
+    /// A largest tangential stress whose direction the mesh does not tell: one in the other direction is as large within its error.
+    PeakSignUnknown,
     /// Twice the increments change the result.
     IncrementsMatter,
     /// Adaptive refinement that ended before all errors were within its tolerance.
@@ -566,6 +568,7 @@ impl WarningCode {
             | SlowContraction
             | FactorsSmall
             | ContactOpened
+            | PeakSignUnknown
             | FrictionBeyondContact => Severity::Note,
         }
     }

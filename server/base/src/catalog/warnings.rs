@@ -188,6 +188,9 @@ fn reasons(code: WarningCode) -> (&'static str, &'static str) {
         OscillatingStick => (
             "Inside stick, σ_t alternates from point to point and cancels in the sum. Forces are right, single values of σ_t are not.",
             "Refine the mesh there, or raise elastic_slip: a thousandth of the indentation or of the obstacle's displacement along the surface, whichever is larger, is small enough where it is not known from a measurement. Or choose \"points\": \"nodal\", or read σ_t as means over edges."),
+        PeakSignUnknown => (
+            "The largest tangential stresses of the two directions differ by less than their error. Which is the larger, and with it the sign and the place of `peak_tangential_stress`, may change with the mesh; its size does not.",
+            "Quote the size of the peak, or read both peaks from the profile. A finer mesh tells which is the larger."),
         SlowContraction => (
             "Pressure and friction feed each other almost as much as is possible. The solution was found, but a little more friction may have none, or several.",
             "Set \"check_uniqueness\": true if the result matters, and lower the coefficient to see how far away the limit is."),

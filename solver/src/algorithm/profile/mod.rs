@@ -8,6 +8,7 @@
 //! | the quantities that have a stated error | `quantities` |
 //! | what nodes do not see of an obstacle | `between` |
 //! | what the distances between nodes leave open | `resolution` |
+//! | the ripple of σ_t where the body sticks | `ripple` |
 //! | what a push along a direction leaves open | `displaced` |
 //! | the force as a vector | `resultant` |
 //! | materials that meet under the contact | `junction` |
@@ -21,6 +22,7 @@ mod polygon;
 mod quantities;
 mod resolution;
 mod resultant;
+mod ripple;
 mod warnings;
 
 pub use quantities::{Estimable, Quantity};

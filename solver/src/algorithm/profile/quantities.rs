@@ -33,7 +33,7 @@ pub struct Quantity {
     /// change of the bound τ.
     pub between: f64,
     /// What the mesh does not resolve, in the unit of the value. Of a peak: the pressure where σ_t jumps beside it, or where
-    /// sides of a smooth curve meet at an angle, and the height of a peak of σ_t above a smooth curve where the body sticks. Of an end of stick at a node, where friction just
+    /// sides of a smooth curve meet at an angle, and what a ripple of σ_t lifts its peak where the body sticks. Of an end of stick at a node, where friction just
     /// reaches its bound: the distance to the next node. Else 0.
     pub unresolved: f64,
     /// The error by truncation, if the obstacle ends inside an edge, which is left out: for extents the length that is
@@ -55,6 +55,8 @@ pub struct Quantity {
     pub between_at: Vec<(usize, f64)>,
     /// The edges on which the obstacle has a shape that the nodes do not see, with their parts in any unit.
     pub unseen_at: Vec<(usize, f64)>,
+    /// Of a peak of σ_t: the largest σ_t in the other direction (stress, ≥ 0); else 0.
+    pub opposite: f64,
     /// The number of equal parts of the contact, of which one is modelled: two if it continues beyond a line of
     /// symmetry.
     pub images: f64,
@@ -250,6 +252,7 @@ impl PatchView<'_> {
             unseen: 0.0,
             sharp_end: 0.0,
             sharp_end_at: Vec::new(),
+            opposite: 0.0,
             spacing_at: Vec::new(),
             between_at: Vec::new(),
             unseen_at: Vec::new(),
@@ -397,20 +400,18 @@ impl PatchView<'_> {
             } else if bound.is_finite() {
                 gradient.add_traction(system, state, pressures, bound, &point, 1.0);
             }
-            let ripple = match reached < WHOLE_BOUND {
-                true => self.off_smooth_traction(stress, point.s),
-                false => 0.0,
-            };
+            let at_sharp_ends = self.traction_at_sharp_ends(highest, reached);
             found.push(Quantity {
                 spacing: stress.abs() * self.turn_around(edge, xi),
                 spacing_at: vec![(edge, 1.0)],
                 between: self.change_of_bound(edge, xi),
                 between_at: vec![(edge, 1.0)],
                 unresolved: self.unresolved_bound(highest)
-                    + ripple
+                    + self.ripple_at(highest)
                     + self.bound_of_parabolas(stress),
-                sharp_end: self.traction_at_sharp_end(highest, reached),
-                sharp_end_at: vec![(edge, 1.0)],
+                sharp_end: at_sharp_ends.iter().fold(0.0, |most, at| most.max(at.1)),
+                sharp_end_at: at_sharp_ends,
+                opposite: self.opposite_traction(stress),
                 estimable: limited(!self.averages_nothing() || !self.pressure_without_limit()),
                 ..self.quantity(QuantityName::PeakTangentialStress, stress, Some(gradient))
             });

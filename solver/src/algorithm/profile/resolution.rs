@@ -133,29 +133,6 @@ impl PatchView<'_> {
         found
     }
 
-    /// How far a peak σ_t = `stress` at s is above the highest value of a smooth curve (stress): a cubic by least squares
-    /// through the [`AROUND`] nearest friction points, and the values at the ends of stick. Where the body sticks, and the
-    /// contact grows from node to node, σ_t may have a ripple.
-    pub(super) fn off_smooth_traction(&self, stress: f64, s: f64) -> f64 {
-        let points = self.system.points.iter().zip(&self.finished.tractions);
-        let own = points.filter(|(point, _)| point.patch == self.p);
-        let mut near: Vec<[f64; 3]> = own
-            .map(|(point, traction)| [point.s - s, traction * stress.signum(), 1.0])
-            .collect();
-        near.sort_by(|a, b| a[0].abs().total_cmp(&b[0].abs()));
-        near.truncate(AROUND);
-        let reach = near.last().map_or(0.0, |point| point[0].abs());
-        if near.len() <= CUBIC || reach == 0.0 {
-            return 0.0;
-        }
-        near.iter_mut().for_each(|point| point[0] /= reach);
-        // where stick ends, σ_t is the bound, which has no ripple
-        let at_ends = self.turns().into_iter();
-        let at_ends = at_ends.map(|(edge, xi)| self.tangential_stress_at(edge, xi).abs());
-        let highest = at_ends.fold(highest_of_cubic(&near), f64::max);
-        (stress.abs() - highest).max(0.0)
-    }
-
     /// The part of the change of friction from full slip to opposite slip that happens around a place, without what the
     /// points there resolve: between them u_t is a parabola, and a peak of σ_t may be due to that parabola.
     pub(super) fn turn_around(&self, edge: usize, xi: f64) -> f64 {
@@ -294,18 +271,19 @@ impl PatchView<'_> {
         self.sharp_ends().into_iter().map(on_edge).collect()
     }
 
-    /// The least error of a peak of σ_t at a sharp end (stress). Where the body sticks, slip grows like a root of the distance, which no
-    /// element follows; where it slips, the peak is the bound. `reached`: σ_t as a part of the friction bound.
-    pub(super) fn traction_at_sharp_end(
+    /// The least error of a peak of σ_t at sharp ends, by edge at such an end (stress): the largest counts. Where the body sticks, slip
+    /// grows like a root of the distance, which no element follows; where it slips, the peak is the bound. `reached`: σ_t as a part of
+    /// the friction bound.
+    pub(super) fn traction_at_sharp_ends(
         &self,
         Highest { value, edge, xi }: Highest,
         reached: f64,
-    ) -> f64 {
+    ) -> Vec<(usize, f64)> {
         if reached >= WHOLE_BOUND {
-            return self.bound_at_sharp_end(value, edge, xi);
+            return self.bound_at_sharp_ends(value, edge, xi);
         }
         if !self.sharp_ends().contains(&edge) {
-            return 0.0;
+            return Vec::new();
         }
         let last = self.count() - 1;
         let inner = if edge == 0 { 1.0 } else { -1.0 };
@@ -313,15 +291,15 @@ impl PatchView<'_> {
         let end = if edge == 0 { 0 } else { last };
         let bound = self.averaged_and_bound_at_nodes()[end].1;
         let room = (bound.max(value.abs() / reached) - value.abs()).max(0.0);
-        (CUSP * (value.abs() - inner).max(0.0)).min(room)
+        vec![(edge, (CUSP * (value.abs() - inner).max(0.0)).min(room))]
     }
 
-    /// The least error of a peak of σ_t that is the friction bound, near a sharp end (stress): most of the average is the pressure
+    /// The least error of a peak of σ_t that is the friction bound, near sharp ends (stress): most of the average is the pressure
     /// of the edge at the end, whose place the mesh does not know.
-    fn bound_at_sharp_end(&self, value: f64, edge: usize, xi: f64) -> f64 {
+    fn bound_at_sharp_ends(&self, value: f64, edge: usize, xi: f64) -> Vec<(usize, f64)> {
         let radius = self.patch.law.as_ref().and_then(|law| law.bound.reach());
         let Some(radius) = radius.filter(|radius| *radius > 0.0) else {
-            return 0.0;
+            return Vec::new();
         };
         let boundary = &self.patch.contact.boundary;
         let s = edge3::interpolate(&edge3::shape(xi), &boundary.edge_arc(edge));
@@ -331,18 +309,10 @@ impl PatchView<'_> {
             let place = if at == 0 { start } else { end };
             // longer edges are warned of
             let near = length <= radius && (s - place).abs() <= length.max(NEAR_END * radius);
-            if near {
-                (OF_LAST_EDGE * self.growth_at_end(at) * length / radius).min(MOST_OF_BOUND)
-            } else {
-                0.0
-            }
+            let part = (OF_LAST_EDGE * self.growth_at_end(at) * length / radius).min(MOST_OF_BOUND);
+            near.then_some((at, value.abs() * part))
         };
-        let most = self
-            .sharp_ends()
-            .into_iter()
-            .map(of_end)
-            .fold(0.0, f64::max);
-        value.abs() * most
+        self.sharp_ends().into_iter().filter_map(of_end).collect()
     }
 
     /// How much the pressure grows along an edge towards the end of the boundary, as a part of the pressure at the other end of the
