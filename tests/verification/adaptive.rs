@@ -234,7 +234,7 @@ impl solver::observer::Observer for WithMemory {
 /// Elements are divided several times for the next mesh. Where that mesh needs too much memory, they are divided once.
 #[test]
 fn a_mesh_that_is_too_large_is_tried_with_fewer_divisions() {
-    let problem = to(0.0005, example("cylinder"));
+    let problem = to(0.001, example("cylinder"));
     let solve = |most: u64| {
         let mut observer = WithMemory {
             most,

@@ -3,7 +3,7 @@
 use solver::error::{SolveError, Violation};
 use solver::observer::Progress;
 use solver::problem::{Contact, Elasticity, MeshSource, Problem};
-use solver::solution::{Verdict, WarningCode};
+use solver::solution::{Verdict, Warning, WarningCode};
 
 use crate::support::{example, problem, solve, watching};
 
@@ -461,6 +461,11 @@ fn an_observer_gets_the_solution_so_far_after_every_step_but_the_last() {
         let mut shorter = solve(&p);
         // only the end of the last step is assessed
         assert!(shorter.summary.accuracy.take().is_some());
+        let of_errors = |warning: &Warning| warning.code == WarningCode::PeakSignUnknown;
+        shorter
+            .summary
+            .warnings
+            .retain(|warning| !of_errors(warning));
         assert_eq!(so_far.summary, shorter.summary);
         assert_eq!(so_far.node_profiles, shorter.node_profiles);
         assert_eq!(so_far.friction_profiles, shorter.friction_profiles);

@@ -14,16 +14,12 @@ const REACH: usize = 3;
 const OSCILLATES: f64 = 0.05;
 
 impl PatchView<'_> {
-    /// How far the ripple beside a peak of σ_t lifts it (stress); 0 without a ripple. One edge alone may be a bend of the curve, so
-    /// that the second largest of the edges around counts.
+    /// How far a ripple beside a peak of σ_t lifts it (stress), the largest of the edges around; 0 without a ripple.
     pub(super) fn ripple_at(&self, Highest { value, edge, .. }: Highest) -> f64 {
         let last = self.patch.contact.boundary.edge_count() - 1;
         let around = edge.saturating_sub(REACH)..=(edge + REACH).min(last);
-        let mut lifts: Vec<f64> = around
-            .filter_map(|edge| self.lift(edge, value.signum()))
-            .collect();
-        lifts.sort_by(|a, b| b.total_cmp(a));
-        lifts.get(1).copied().unwrap_or(0.0).clamp(0.0, value.abs())
+        let lifts = around.filter_map(|edge| self.lift(edge, value.signum()));
+        lifts.fold(0.0, f64::max).min(value.abs())
     }
 
     /// The ripple beside the peak of σ_t as a part of the peak, if it is large enough to be told.
