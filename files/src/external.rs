@@ -11,7 +11,7 @@ use crate::{abaqus, gmsh, source::ReadError};
 /// warnings point to the place of the mesh in the problem.
 pub fn external_mesh(problem: &Problem, stored: Option<Mesh>) -> Option<External> {
     match &problem.mesh.source {
-        MeshSource::Grid(_) | MeshSource::Inline(_) => None,
+        MeshSource::Grid(_) | MeshSource::Grids(_) | MeshSource::Inline(_) => None,
         MeshSource::Gmsh(text) => Some(at("/mesh/gmsh", gmsh::read(text.as_bytes()))),
         MeshSource::Abaqus(text) => {
             let read = abaqus::read_for(text.as_bytes(), Some(problem));

@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
+use crate::contact::AXIS_SHARE;
 use crate::elasticity::{
     self, Axes, Dof, DofMap, ElementStiffness, ElementTables, Elements, Loads, Section, Springs,
 };
@@ -24,7 +25,8 @@ use crate::solution::Phase;
 
 /// A body, assembled, supported and condensed onto its contact boundaries.
 pub struct ElasticBody {
-    /// The condensed stiffness Ŝ, on the contact unknowns in the order of `contact_dofs`.
+    /// The condensed stiffness Ŝ, on the contact unknowns in the order of `contact_dofs`, and after them on those of nodes of other
+    /// bodies that face contacts.
     pub stiffness: Arc<Dense>,
     /// The load f̂ that the problem's loads condense to.
     load_of_loads: Vec<f64>,
@@ -44,6 +46,8 @@ pub struct ElasticBody {
     /// displacements.
     reduced: [Vec<f64>; 2],
     factor: Factor,
+    /// The number of unknowns of nodes of other bodies that face contacts, the last ones of Ŝ.
+    facing_unknowns: usize,
     /// The normal unknowns of contact nodes on the axis, each with the unknown of the midside node beside it.
     axis_ends: Vec<[usize; 2]>,
     /// Tables of the elements of the models that have this body.
@@ -58,6 +62,9 @@ pub struct Source<'a> {
     section: &'a Section,
     quadrature: u32,
     fixed: &'a BTreeMap<u32, Held>,
+    /// The nodes of other bodies that face contacts; skipped where there are none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    facing: Vec<u32>,
     /// Skipped where there are none, so that bodies without springs keep their fingerprints.
     #[serde(skip_serializing_if = "Springs::is_empty")]
     springs: &'a Springs,
@@ -77,6 +84,7 @@ impl<'a> Source<'a> {
             section: &model.section,
             quadrature: model.quadrature,
             fixed: &model.fixed,
+            facing: facing(model),
             springs: &model.springs,
             loads: &model.loads,
             alone: &model.alone,
@@ -87,12 +95,6 @@ impl<'a> Source<'a> {
         }
     }
 }
-
-/// The share a = 1/8 in the unknown u_n − a u_n⁰ of the midside node beside a contact's end on the axis, with u_n⁰ the
-/// displacement of this end. The end has no area of its own: ∫ h₀ r dr = 0. With a = 1/8 the end's unknown moves h₀ +
-/// h₁/8, whose area is 1/8 of the area of h₁, and the pressure at the end, the unknown's reaction over this area, is
-/// exact for p = p₀ + β r² (formulation 3.5).
-pub const AXIS_SHARE: f64 = 0.125;
 
 impl ElasticBody {
     /// Assembles, factors and condenses the body of a model, and reports each phase to the observer.
@@ -180,6 +182,15 @@ impl ElasticBody {
                 contact_dofs.push(dofs);
             }
         }
+        let free = |node: u32| {
+            map.dofs[node as usize]
+                .iter()
+                .filter(|dof| matches!(dof, Dof::Free(_)))
+        };
+        let facing_unknowns = facing(model)
+            .into_iter()
+            .map(|node| free(node).count())
+            .sum();
         let axis_ends = axis_ends(model, &contact_dofs);
         for &[end, beside] in &axis_ends {
             for load in [&mut load_of_loads, &mut load_of_supports] {
@@ -202,6 +213,7 @@ impl ElasticBody {
             map,
             reduced: [of_loads, of_supports],
             factor,
+            facing_unknowns,
             axis_ends,
             tables,
         })
@@ -237,6 +249,26 @@ impl ElasticBody {
         for &[end, beside] in &self.axis_ends {
             displacements[beside] -= AXIS_SHARE * displacements[end];
         }
+    }
+
+    /// The number of unknowns of contact nodes, the first ones of Ŝ.
+    pub fn contact_unknown_count(&self) -> usize {
+        self.stiffness.size() - self.facing_unknowns
+    }
+
+    /// The two components of a node that is kept: a contact node, or one that faces a contact.
+    pub fn kept_dofs(&self, node: u32) -> [Dof; 2] {
+        let interior = self.map.unknowns - self.stiffness.size();
+        self.map.dofs[node as usize].map(|dof| match dof {
+            Dof::Free(i) => Dof::Free(i - interior),
+            fixed => fixed,
+        })
+    }
+
+    /// The axes of the two components of a node.
+    pub fn axes(&self, node: u32) -> Axes {
+        let usual = Axes::perpendicular([[1.0, 0.0], [0.0, 1.0]]);
+        self.map.axes[node as usize].unwrap_or(usual)
     }
 
     /// Whether two models have the same body: all that [`ElasticBody::new`] reads is equal.
@@ -330,6 +362,20 @@ fn axis_ends(model: &Model, contact_dofs: &[[Dof; 2]]) -> Vec<[usize; 2]> {
     ends
 }
 
+/// The nodes of other bodies that face contacts, in order.
+fn facing(model: &Model) -> Vec<u32> {
+    let pairs = model
+        .contacts
+        .iter()
+        .filter_map(|contact| contact.pair.as_ref());
+    let followed = pairs.flat_map(|pair| {
+        let rows = pair.rows.iter().flatten();
+        rows.map(|(k, _)| pair.nodes[*k])
+    });
+    let nodes: BTreeSet<u32> = followed.collect();
+    nodes.into_iter().collect()
+}
+
 /// Numbers the unknowns in the order of their elimination, and plans the elimination. The unknowns of contact nodes
 /// come last, turned to (n, t) and in the order of the contacts.
 fn number(
@@ -368,6 +414,7 @@ fn number(
             }
         }
     }
+    contact_nodes.extend(facing(model));
     let along = |node: usize| {
         let axes: Option<Axes> = axes[node];
         axes.map_or([[1.0, 0.0], [0.0, 1.0]], |axes| axes.along)

@@ -194,6 +194,13 @@ pub fn solve_with_mesh(
         verification.verify(problem, &mesh, &mut solution, observer);
     }
     measured::add_error(problem, &mesh, &mut solution, observer);
+    accuracy::note_unknown_signs(&mut solution, |name| {
+        let place = problem
+            .contacts
+            .iter()
+            .position(|contact| contact.boundary == name);
+        place.map_or(String::new(), |i| format!("/contacts/{i}"))
+    });
     Ok((solution, mesh))
 }
 

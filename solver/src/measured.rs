@@ -33,7 +33,10 @@ fn deviation(obstacle: &Obstacle) -> Option<f64> {
 
 /// Whether an obstacle of the problem is measured, so that its noise is part of the errors.
 pub fn is_measured(problem: &Problem) -> bool {
-    let mut obstacles = problem.contacts.iter().map(|contact| &contact.obstacle);
+    let mut obstacles = problem
+        .contacts
+        .iter()
+        .filter_map(|contact| contact.obstacle.as_ref());
     obstacles.any(|obstacle| deviation(obstacle).is_some())
 }
 
@@ -118,11 +121,13 @@ struct Curve {
 fn curves(problem: &Problem) -> Vec<Option<Curve>> {
     let contacts = problem.contacts.iter().enumerate();
     let curve = |(number, contact): (usize, &Contact)| match &contact.obstacle {
-        Obstacle::Table { x, gap, .. } => deviation(&contact.obstacle).map(|deviation| Curve {
-            gap: smoothed(x, gap, deviation),
-            deviation,
-            noise: evened(number, gap.len()),
-        }),
+        Some(obstacle @ Obstacle::Table { x, gap, .. }) => {
+            deviation(obstacle).map(|deviation| Curve {
+                gap: smoothed(x, gap, deviation),
+                deviation,
+                noise: evened(number, gap.len()),
+            })
+        }
         _ => None,
     };
     contacts.map(curve).collect()
@@ -132,7 +137,7 @@ fn curves(problem: &Problem) -> Vec<Option<Curve>> {
 fn sampled(problem: &Problem, curves: &[Option<Curve>], pair: usize, sign: f64) -> Problem {
     let mut problem = problem.clone();
     for (contact, curve) in problem.contacts.iter_mut().zip(curves) {
-        if let (Obstacle::Table { gap, .. }, Some(curve)) = (&mut contact.obstacle, curve) {
+        if let (Some(Obstacle::Table { gap, .. }), Some(curve)) = (&mut contact.obstacle, curve) {
             let points = curve.gap.iter().zip(&curve.noise[pair]);
             *gap = points
                 .map(|(gap, noise)| gap + sign * curve.deviation * noise)

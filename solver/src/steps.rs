@@ -185,11 +185,6 @@ fn run_steps<'a>(
             accuracy::assess(solved, increments.as_ref(), origins, observer)
         });
         let mut summary = reported.summary;
-        if let Some(accuracy) = &accuracy {
-            let (quantities, system) = (&reported.along.quantities, &load_history.system);
-            let notes = accuracy::unknown_signs(quantities, system, accuracy);
-            summary.warnings.extend(notes);
-        }
         summary.accuracy = accuracy;
         if assessed && summary.converged && observer.stop() {
             // its errors would be unknown for no reason of its own, and others would be given them

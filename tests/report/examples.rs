@@ -235,7 +235,7 @@ fn closed_form(problem: &Problem, summary: &Summary) -> Option<Vec<(f64, f64)>> 
             .map(|x| (x, f(x)))
             .collect()
     };
-    match (&problem.contacts[0].obstacle, problem.analysis) {
+    match (problem.contacts[0].obstacle.as_ref()?, problem.analysis) {
         (
             Obstacle::Flat {
                 to: Some(a),

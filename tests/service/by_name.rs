@@ -88,7 +88,7 @@ enum Shape {
 fn shape(message: &MessageDescriptor) -> Shape {
     match message.name() {
         "Point" | "Range" | "Vector" | "Expansion" | "Box" | "Traction" => Shape::Array,
-        "Edge3" | "EdgeList" | "Element" | "ElementList" | "NodeList" | "NodalForces" => {
+        "Edge3" | "EdgeList" | "Element" | "ElementList" | "NodeList" | "NodalForces" | "Grids" => {
             Shape::Content
         }
         "Analysis" | "Obstacle" => Shape::Tagged("kind"),

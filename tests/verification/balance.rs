@@ -1,7 +1,8 @@
 //! docs/verification.md, row 25: what every solution must satisfy, checked on the five examples.
 
 use solver::algorithm::{Finished, Place, State, System, run};
-use solver::body::{AXIS_SHARE, ElasticBody};
+use solver::body::ElasticBody;
+use solver::contact::AXIS_SHARE;
 use solver::elasticity::Dof;
 use solver::friction::{Average, Averaging, Chain};
 use solver::model::Model;

@@ -380,7 +380,7 @@ pub(crate) fn orthotropic(number: u64) -> Problem {
 /// stay.
 pub(crate) fn coarse(number: u64) -> Problem {
     let mut problem = case(number).problem;
-    let edges = problem.contacts[0].obstacle.span();
+    let edges = problem.contacts[0].obstacle.as_ref().unwrap().span();
     if let Some(grid) = problem.mesh.grid_mut() {
         for lines in [&mut grid.x, &mut grid.y] {
             let last = lines.len() - 1;

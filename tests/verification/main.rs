@@ -10,6 +10,8 @@ mod annular_punch;
 mod assembled;
 mod axis;
 mod balance;
+mod bodies;
+mod bonded_wedges;
 mod calibration;
 mod catalogue;
 mod conserving;

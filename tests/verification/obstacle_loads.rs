@@ -507,3 +507,25 @@ fn an_obstacle_that_nothing_holds_is_told_of() {
         .any(|w| w.code == WarningCode::LargeTilt);
     assert_eq!(warned, tilt.abs() > 0.05, "{tilt}");
 }
+
+/// While a parabola is pressed straight down with little friction, no friction point sticks, but between slip to the left and slip to
+/// the right a place does: the tangential force that follows is borne.
+#[test]
+fn friction_to_both_sides_holds_an_obstacle() {
+    let contact = json!({
+        "boundary": "top",
+        "obstacle": {"kind": "parabola", "radius": 20},
+        "normal_force": 39.26990816987241,
+        "tangential_force": -1.5603835450825023,
+        "friction": {"coefficient": 0.12383519526292633, "nonlocal_radius": 0.2, "elastic_slip": 3.75e-5, "history": "incremental"},
+    });
+    let mut problem = block(30.0, 0.15, &contact);
+    problem["mesh"]["refine"] = json!(1);
+    problem["materials"][0]["poissons_ratio"] = json!(0);
+    problem["steps"] = json!([
+        {"increments": 8, "spacing": "contact_width"},
+        {"tangential_force": 1, "increments": 4},
+    ]);
+    let found = solved(&problem);
+    assert!((top(&found).tangential_force + 1.5603835450825023).abs() < 1e-8);
+}

@@ -155,7 +155,7 @@ fn a_symmetric_spline_is_flat_at_the_line_of_symmetry() {
     let in_space: Vec<_> = x.iter().zip(&gap).map(|(x, gap)| [*x, *gap]).collect();
     let line = json!({"kind": "polyline", "points": in_space});
     let mut exact = example("cylinder");
-    exact.contacts[0].normal = NormalOf::Obstacle;
+    exact.contacts[0].normal = Some(NormalOf::Obstacle);
     for obstacle in [cubic(table((x, gap))), cubic(line)] {
         let mut problem = exact.clone();
         problem.contacts[0].obstacle = serde_json::from_value(obstacle).unwrap();

@@ -177,7 +177,7 @@ fn a_roller_is_a_circle_that_is_pushed() {
 fn an_arc_ends_where_it_ends() {
     let half = "*SURFACE, TYPE=SEGMENTS, NAME=TOOL\nSTART, 4., 4.\nCIRCL, 0., 0., 0., 4.\n";
     let problem = read(&(block(0.0) + &touching(half, "") + &pressed([0.0, -0.05])));
-    let (from, to, _) = problem.contacts[0].obstacle.span();
+    let (from, to, _) = problem.contacts[0].obstacle.as_ref().unwrap().span();
     assert_eq!((from, to), (Some(0.0), None));
 }
 

@@ -239,7 +239,9 @@ impl Source<'_> {
         Some(Made {
             contact: Contact {
                 boundary: surfaces.boundary.to_owned(),
-                obstacle: shape.obstacle,
+                obstacle: Some(shape.obstacle),
+                against: None,
+                gap: None,
                 indentation: 0.0,
                 normal_force: None,
                 direction: shape.direction,
@@ -249,7 +251,7 @@ impl Source<'_> {
                 moment: None,
                 about: None,
                 stiffness: None,
-                normal: NormalOf::Obstacle,
+                normal: Some(NormalOf::Obstacle),
                 condition: Default::default(),
                 friction,
             },

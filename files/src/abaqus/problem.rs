@@ -234,7 +234,7 @@ impl Built {
                     body.line
                 ),
                 "a rigid body that *BOUNDARY moves",
-                "A rigid body is moved here by a given displacement, not by a force. Prescribe the displacement, read `normal_force` of the result (of a curved contact, the force in its note `normals_differ`), and repeat with another displacement until that is the force.",
+                "A rigid body is moved here by a given displacement, not by a force. Prescribe a displacement in the deck, have it converted (`signorini convert`), and give the contact `normal_force` in place of `indentation` in the JSON (docs/how-to/tools.md).",
             );
         }
         let label = self.raw.node_labels[*first as usize];

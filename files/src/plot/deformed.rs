@@ -155,7 +155,7 @@ struct Surface<'a> {
     profile: &'a ContactProfile,
     /// The row of each node in the profile, and the node.
     nodes: Vec<(usize, u32)>,
-    /// Whether there is an obstacle, rather than only prescribed friction.
+    /// Whether there is an obstacle, rather than another body or only prescribed friction.
     faces: bool,
     /// Whether the contact has friction, so that its states are stick and slip.
     rough: bool,
@@ -352,7 +352,9 @@ impl Body<'_> {
             Surface {
                 profile,
                 nodes: nodes.collect(),
-                faces: contact.is_some_and(|contact| contact.condition != Condition::None),
+                faces: contact.is_some_and(|contact| {
+                    contact.obstacle.is_some() && contact.condition != Condition::None
+                }),
                 rough: contact.is_some_and(|contact| contact.friction.is_some()),
             }
         };

@@ -22,7 +22,8 @@ impl Face {
     /// The face of the obstacle before it is pushed; empty for a contact without an obstacle.
     pub(super) fn before(contact: &ContactModel) -> Face {
         let mut face = Face::default();
-        if contact.condition == Condition::None {
+        // another body has elements of its own
+        if contact.condition == Condition::None || contact.pair.is_some() {
             return face;
         }
         let boundary = &contact.boundary;
@@ -134,7 +135,7 @@ mod tests {
             Face::before(&Model::new(problem, None).unwrap().contacts[0]).points
         };
         let of_body = face(&problem);
-        problem.contacts[0].normal = solver::problem::NormalOf::Obstacle;
+        problem.contacts[0].normal = Some(solver::problem::NormalOf::Obstacle);
         for (p, q) in of_body.iter().zip(face(&problem)) {
             assert!((p[0] - q[0]).hypot(p[1] - q[1]) < 1e-9, "{p:?} {q:?}");
             assert!(

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::json;
 use solver::error::{Findings, Violation};
 use solver::model::Model;
-use solver::problem::{MeshSource, NormalOf, Problem, Refine};
+use solver::problem::{MeshSource, NormalOf, Obstacle, Problem, Refine};
 
 use super::numbers::{Problems, Read};
 use super::read::Sweep;
@@ -130,12 +130,14 @@ fn body(problem: &Problem, sweep: &Sweep, number: usize) -> String {
     let contacts: Vec<_> = contacts
         .iter()
         .map(|contact| {
-            let turned = contact.normal == NormalOf::Obstacle;
+            let turned = contact.normal == Some(NormalOf::Obstacle);
             json!([
                 contact.boundary,
                 contact.normal,
-                contact.obstacle.span(),
+                contact.obstacle.as_ref().map(Obstacle::span),
                 turned.then_some(&contact.obstacle),
+                contact.against,
+                contact.gap.is_some(),
             ])
         })
         .collect();

@@ -193,7 +193,7 @@ fn a_value_may_be_a_whole_part_of_the_problem_and_one_that_the_base_lacks() {
     assert_eq!(first.contacts[0].tangential_displacement, 0.5);
     assert!(matches!(
         first.contacts[0].obstacle,
-        solver::problem::Obstacle::Flat { .. }
+        Some(solver::problem::Obstacle::Flat { .. })
     ));
     assert_eq!(plan.problem(1).unwrap().quadrature, 3);
 }

@@ -49,6 +49,8 @@ const FILES: &[(&str, &[u8])] = files! {
     "examples/sweeps/tangential_force.json"
     "examples/punch.R"
     "examples/tool_under_load.json"
+    "examples/roller_on_block.json"
+    "examples/press_fit.json"
     "docs/gallery/hertz.json"
     "docs/gallery/known_load.json"
     "docs/gallery/gmsh_part.json"

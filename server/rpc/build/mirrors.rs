@@ -73,6 +73,8 @@ pub(crate) const MIRRORS: &[Mirror] = &[
     array("Traction", "[problem::BoundaryValue; 2]"),
     content("NodalForces", "Vec<[f64; 2]>"),
     fields("Contact", "problem::Contact"),
+    fields("Against", "problem::Against"),
+    fields("BodyGap", "problem::BodyGap"),
     fields("ObstacleStiffness", "problem::ObstacleStiffness"),
     names("NormalOf", "problem::NormalOf").defaulted(),
     names("Condition", "problem::Condition").defaulted(),

@@ -219,7 +219,7 @@ pub(super) fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<Fi
             Verdict::Fair,
             1.0,
             format!(
-                "Contact `{contact}` has too many ends of stick (`{name}`) to state errors for them: where stick and slip alternate from point to point, they depend on the mesh. Refine the contact, or raise elastic_slip."
+                "Contact `{contact}` has too many ends of stick (`{name}`) to state errors for them, or some within the length of an edge: where stick and slip alternate from point to point, they depend on the mesh. Refine the contact, or raise elastic_slip."
             ),
         ),
         // nothing acts, and nothing is wrong

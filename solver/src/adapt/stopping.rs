@@ -2,7 +2,7 @@
 
 use super::mesh_results::relative_error;
 use crate::model::estimate::MOST_ADAPTIVE_ELEMENTS;
-use crate::problem::{AdaptiveRefine, Problem};
+use crate::problem::{AdaptiveRefine, Obstacle, Problem};
 use crate::solution::{
     EstimatedQuantity, QuantityName, Refinement, Solution, Summary, Warning, WarningCode,
 };
@@ -176,7 +176,8 @@ fn advice(problem: &Problem, above: &[&EstimatedQuantity]) -> String {
             return false;
         }
         let contact = problem.contacts.iter().find(|c| c.boundary == q.contact);
-        contact.is_some_and(|contact| contact.obstacle.has_kinks())
+        let obstacle = contact.and_then(|contact| contact.obstacle.as_ref());
+        obstacle.is_some_and(Obstacle::has_kinks)
     };
     match above.iter().find(kinks) {
         Some(q) => format!(

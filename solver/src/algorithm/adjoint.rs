@@ -12,8 +12,8 @@
 
 use crate::algorithm::factors::{dense, free_dofs};
 use crate::algorithm::newton::jacobian;
+use crate::algorithm::opposite::Opposite;
 use crate::algorithm::system::{Point, State, System};
-use crate::algorithm::tools::Tools;
 use crate::elasticity::Dof;
 use crate::linear::Interrupt;
 use crate::observer::Observer;
@@ -43,9 +43,9 @@ impl Gradient {
     }
 
     /// The gradient of an unknown motion of an obstacle.
-    pub(super) fn of_motion(system: &System<'_>, tools: &Tools, motion: usize) -> Self {
+    pub(super) fn of_motion(system: &System<'_>, opposite: &Opposite, motion: usize) -> Self {
         Gradient {
-            displacement: tools.gradient(motion),
+            displacement: opposite.gradient(motion),
             motion: Some(motion),
             ..Gradient::zero(system)
         }

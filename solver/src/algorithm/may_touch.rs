@@ -449,8 +449,8 @@ impl MayTouch {
         };
         let part = System {
             stiffness: self.stiffness.clone(),
-            tools: None,
-            tools_at_rest: Vec::new(),
+            opposite: None,
+            opposite_at_rest: Vec::new(),
             load: load[count..].to_vec(),
             nodes: system.nodes.iter().zip(&self.kept).map(node).collect(),
             points: self

@@ -35,6 +35,7 @@ mod large_slip;
 mod may_touch;
 mod neighbour;
 mod newton;
+mod opposite;
 mod profile;
 mod recorder;
 mod report;
@@ -43,7 +44,6 @@ mod slides;
 mod small_strain;
 mod system;
 mod thesis;
-mod tools;
 mod unheld;
 mod uniqueness;
 
@@ -52,13 +52,13 @@ pub use convex::{Minimum, minimise};
 pub use corners::{better, closed_on_axis, open_on_axis, touched_by_both};
 pub use finished::Finished;
 pub use may_touch::{Extent, Region, follow_neighbour, run_reduced};
+pub use opposite::{FreeMotion, Opposite, free_motions};
 pub use profile::{DisplacedNode, Estimable, Missed, Quantity};
 pub use recorder::{Cycle, Place};
 pub use report::{AlongContacts, Reported, numbers, quantities, report};
 pub use rounding::Rounding;
 pub use slides::Slide;
 pub use system::{Averages, ContactNode, Patch, Path, Point, State, System};
-pub use tools::{FreeMotion, Tools, free_motions};
 pub use uniqueness::{
     EndForces, note_doubled_increments, note_uniqueness, other_solution, rounding_of_forces,
     warn_of_increments,

@@ -274,14 +274,13 @@ pub fn report(
 fn held(system: &System<'_>, finished: &Finished) -> Result<(), SolveError> {
     let mut hindered = Vec::new();
     for patch in &system.patches {
-        let boundary = &patch.contact.boundary;
         for (i, node) in system.range(patch).enumerate() {
             let state = &system.nodes[node];
             if finished.state.active[node] {
-                hindered.push(Hold::along_normal(boundary, i));
+                hindered.push(Hold::along_normal(patch.contact, i));
             }
             if state.held_tangent.is_some() {
-                hindered.push(Hold::along_tangent(boundary, i));
+                hindered.push(Hold::along_tangent(patch.contact, i));
             }
         }
     }
@@ -290,8 +289,7 @@ fn held(system: &System<'_>, finished: &Finished) -> Result<(), SolveError> {
         let patch = &system.patches[point.patch];
         let moved = point.nodes.into_iter().zip(point.shape);
         for (node, _) in moved.filter(|(_, shape)| *shape != 0.0) {
-            let (boundary, i) = (&patch.contact.boundary, node - patch.first);
-            hindered.push(Hold::along_tangent(boundary, i));
+            hindered.push(Hold::along_tangent(patch.contact, node - patch.first));
         }
     }
     match system.model.free_motion(&hindered) {
@@ -319,14 +317,17 @@ fn contact_force(system: &System<'_>, finished: &Finished, forces: &Forces) -> V
 
 /// The largest imbalance of an obstacle under loads: what its load, its spring and the body leave of a force or moment, as a part of
 /// the forces on it, times the length of the contact for a moment.
-fn imbalance_of_tools(state: &FinalState<'_>, contacts: &BTreeMap<String, ContactSummary>) -> f64 {
+fn imbalance_of_obstacles(
+    state: &FinalState<'_>,
+    contacts: &BTreeMap<String, ContactSummary>,
+) -> f64 {
     let system = state.system;
-    let Some(tools) = &system.tools else {
+    let Some(opposite) = &system.opposite else {
         return 0.0;
     };
     let q = system.free_motions(&state.finished.state.v);
     let mut most = 0.0f64;
-    for (free, q) in tools.motions.iter().zip(q) {
+    for (free, q) in opposite.motions.iter().zip(q) {
         let contact = system.patches[free.patch].contact;
         let (Some(tool), Some(found)) = (&contact.tool, contacts.get(&contact.name)) else {
             continue;
@@ -334,8 +335,8 @@ fn imbalance_of_tools(state: &FinalState<'_>, contacts: &BTreeMap<String, Contac
         let force = found.force.unwrap_or_default();
         let [normal, tangential] = tool.components(force);
         let on_body = [normal, tangential, found.moment.unwrap_or_default()][free.motion];
-        let load = tools.load(system.model, &system.level, free);
-        let spring = tools.spring(system.model, free) * q;
+        let load = opposite.load(system.model, &system.level, free);
+        let spring = opposite.spring(system.model, free) * q;
         let left = system.circumference * (load - spring) - on_body;
         let arm = if free.motion == 2 {
             contact.boundary.length()
@@ -400,7 +401,7 @@ impl Inside {
         let (circumference, recovered) = (system.circumference, &self.recovered);
         let equilibrium = self
             .equilibrium(state)
-            .max(imbalance_of_tools(state, &contacts));
+            .max(imbalance_of_obstacles(state, &contacts));
         let (most, other_causes) = if system.model.section.has_split() {
             (
                 OUT_OF_BALANCE_INCOMPRESSIBLE,
@@ -427,7 +428,7 @@ impl Inside {
         let total =
             |f: fn(&ContactSummary) -> f64| contacts.values().map(f).fold(0.0, |sum, x| sum + x);
         let springs = system.model.springs.energy(&self.displacements);
-        let of_tools = system.energy_of_tools(&finished.state.v);
+        let of_tools = system.energy_of_obstacles(&finished.state.v);
         let energy = recovered.strain_energy + springs - self.work_of_loads(system)
             + friction_energy(system, finished)
             + of_tools;
@@ -488,6 +489,10 @@ impl Inside {
         let system = state.system;
         let (model, body, loads) = (system.model, system.body, system.level.loads);
         let contact_force = contact_force(system, state.finished, &state.forces);
+        let contact_force = match &system.opposite {
+            None => contact_force,
+            Some(opposite) => opposite.with_reactions(&contact_force),
+        };
         let contact_force = body.nodal_forces(&contact_force);
         let floor = FORCE_FLOOR * system.reference_force;
         let first = usize::from(model.section.axisymmetric());

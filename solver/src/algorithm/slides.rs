@@ -1,13 +1,13 @@
 //! Bodies that slide away: only friction holds them against some motion, and the loads push them along it by more than
 //! friction can resist. They have no equilibrium, so iterations would diverge.
 
+use crate::algorithm::opposite::FreeMotion;
 use crate::algorithm::recorder::Measured;
 use crate::algorithm::system::{Patch, Point, State, System};
-use crate::algorithm::tools::FreeMotion;
 use crate::elasticity::Dof;
 use crate::error::rounded;
 use crate::friction::{BoundLaw, Source};
-use crate::model::{Hold, RigidMotion};
+use crate::model::{ContactModel, Hold, RigidMotion};
 use crate::problem::Condition;
 
 /// The largest relative differences of push and friction that count as equal: because of rounding, and because of the
@@ -114,14 +114,14 @@ pub(super) fn found(system: &System<'_>, state: &State) -> Option<Slide> {
 
 /// The obstacle that a tangential force slides along a straight contact against all friction, with these bounds.
 fn obstacle_found(system: &System<'_>, bound: &[f64]) -> Option<Slide> {
-    let tools = system.tools.as_ref()?;
-    let along = tools.motions.iter().filter(|free| free.motion == 1);
+    let opposite = system.opposite.as_ref()?;
+    let along = opposite.motions.iter().filter(|free| free.motion == 1);
     let slide = |free: &FreeMotion| {
         let patch = &system.patches[free.patch];
         let tool = patch.contact.tool.as_ref()?;
         let straight = system.range(patch).len();
         let straight = (0..straight).all(|i| tool.row(i, 1)[0].abs() <= ALIGNED);
-        let push = system.circumference * tools.load(system.model, &system.level, free);
+        let push = system.circumference * opposite.load(system.model, &system.level, free);
         let points = system.points.iter().zip(bound);
         let own = points.filter(|(point, _)| point.patch == free.patch);
         let hold = system.circumference * own.map(|(point, tau)| point.weight * tau).sum::<f64>();
@@ -166,13 +166,12 @@ pub(super) fn slid(system: &System<'_>, bonded: Measured, slide: &Slide) -> Meas
 fn motions(system: &System<'_>, touches: impl Fn(usize) -> bool) -> Vec<RigidMotion> {
     let mut hindered = Vec::new();
     for patch in &system.patches {
-        let boundary = &patch.contact.boundary;
         for (i, node) in system.range(patch).enumerate() {
             if patch.contact.condition != Condition::None && touches(node) {
-                hindered.push(Hold::along_normal(boundary, i));
+                hindered.push(Hold::along_normal(patch.contact, i));
             }
             if system.nodes[node].held_tangent.is_some() {
-                hindered.push(Hold::along_tangent(boundary, i));
+                hindered.push(Hold::along_tangent(patch.contact, i));
             }
         }
     }
@@ -191,8 +190,18 @@ impl Moved {
         Moved(moved)
     }
 
-    fn of(&self, node: u32) -> [f64; 2] {
-        self.0[node as usize].unwrap_or_default()
+    /// The displacement of a contact node relative to what it faces; none if both are at rest.
+    fn at_node(&self, contact: &ContactModel, i: usize) -> Option<[f64; 2]> {
+        let of = |node: u32| self.0[node as usize];
+        let own = of(contact.boundary.nodes[i]);
+        let facing = contact.pair.as_ref().and_then(|pair| of(pair.nearest(i)?));
+        match (own, facing) {
+            (own, None) => own,
+            (own, Some([x, y])) => {
+                let [a, b] = own.unwrap_or_default();
+                Some([a - x, b - y])
+            }
+        }
     }
 
     /// The power of the loads along the motion, with 2π.
@@ -208,8 +217,8 @@ impl Moved {
     }
 
     fn along_tangent(&self, patch: &Patch<'_>, i: usize) -> f64 {
-        let boundary = &patch.contact.boundary;
-        dot(boundary.tangent(i), self.of(boundary.nodes[i]))
+        let moved = self.at_node(patch.contact, i).unwrap_or_default();
+        dot(patch.contact.boundary.tangent(i), moved)
     }
 
     /// How far the motion moves a friction point along its tangent.
@@ -231,7 +240,7 @@ impl Moved {
         system.patches.iter().any(|patch| {
             let boundary = &patch.contact.boundary;
             let in_the_way = |i: usize| {
-                let moved = self.of(boundary.nodes[i]);
+                let moved = self.at_node(patch.contact, i).unwrap_or_default();
                 let error = boundary.normal_errors[i] * moved[0].hypot(moved[1]);
                 !active[patch.first + i]
                     && push.signum() * dot(boundary.normals[i], moved) > ALIGNED + error
@@ -315,17 +324,23 @@ impl Moved {
         let mut inside = None;
         for patch in &system.patches {
             let boundary = &patch.contact.boundary;
-            for (i, &node) in boundary.nodes.iter().enumerate() {
+            for i in 0..boundary.nodes.len() {
                 if system.nodes[patch.first + i].bonded {
                     bonded.extend([
-                        Hold::along_normal(boundary, i),
-                        Hold::along_tangent(boundary, i),
+                        Hold::along_normal(patch.contact, i),
+                        Hold::along_tangent(patch.contact, i),
                     ]);
                 }
-                if self.0[node as usize].is_none() || patch.contact.condition == Condition::None {
+                let moves = self.at_node(patch.contact, i).is_some();
+                if !moves || patch.contact.condition == Condition::None {
                     continue;
                 }
-                inside = Some(node);
+                // of two bodies that both move, or of the other one alone, the pressures do not follow from their loads alone
+                let own = boundary.nodes[i];
+                if patch.contact.pair.is_some() && self.0[own as usize].is_none() {
+                    return None;
+                }
+                inside = Some(own);
                 let n = boundary.normals[i];
                 let first = *normal.get_or_insert(n);
                 if (first[0] - n[0]).hypot(first[1] - n[1]) > ALIGNED {

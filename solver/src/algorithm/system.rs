@@ -4,8 +4,9 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use crate::algorithm::tools::{self, Tools};
-use crate::body::{AXIS_SHARE, ElasticBody};
+use crate::algorithm::opposite::{self, Opposite};
+use crate::body::ElasticBody;
+use crate::contact::AXIS_SHARE;
 use crate::elasticity::Dof;
 use crate::error::SolveError;
 use crate::friction::{Average, Averaging, Chain, FrictionLaw, Source, largest_pressure};
@@ -27,9 +28,9 @@ pub struct System<'a> {
     /// The condensed load f̂ at this load level; with unknown motions of obstacles f_w.
     pub load: Vec<f64>,
     /// The unknown motions of obstacles; none if all are given.
-    pub tools: Option<Arc<Tools>>,
+    pub opposite: Option<Arc<Opposite>>,
     /// The unknown motions at this load level without relative displacements.
-    pub tools_at_rest: Vec<f64>,
+    pub opposite_at_rest: Vec<f64>,
     /// The contact nodes of all contacts.
     pub nodes: Vec<ContactNode>,
     /// Points where friction acts; none in a frictionless contact.
@@ -60,9 +61,8 @@ pub struct System<'a> {
 
 /// One contact node: two unknowns, and a bound on the first of them.
 ///
-/// A constraint is a bound on one unknown, and not a row of coefficients on several. That would hold where two bodies
-/// meet, too: `body` would turn the condensed unknowns so that the displacement relative to the other body is one of
-/// them (docs/theory.md, "Where a second body would enter").
+/// A constraint is a bound on one unknown, and not a row of coefficients on several, also where two bodies meet: the unknown
+/// is the displacement relative to the other body (docs/theory.md, "Where a second body enters").
 #[derive(Clone, Copy, Debug)]
 pub struct ContactNode {
     /// The unknown u_n; at a node beside the axis the part of u_n that [`AXIS_SHARE`] leaves.
@@ -244,17 +244,17 @@ impl<'a> System<'a> {
         averages: &mut Averages,
         observer: &mut dyn Observer,
     ) -> Result<Self, SolveError> {
-        let tools = Tools::new(model, body, observer)?.map(Arc::new);
-        let stiffness = match &tools {
+        let opposite = Opposite::new(model, body, observer)?.map(Arc::new);
+        let stiffness = match &opposite {
             None => body.stiffness.clone(),
-            Some(tools) => tools.stiffness.clone(),
+            Some(opposite) => opposite.stiffness.clone(),
         };
         let mut system = System {
             stiffness,
             load: Vec::new(),
-            tools_at_rest: Vec::new(),
-            semidefinite: model.held_by_contact || tools.is_some(),
-            tools,
+            opposite_at_rest: Vec::new(),
+            semidefinite: model.held_by_contact || opposite::free_motions(model).next().is_some(),
+            opposite,
             nodes: Vec::new(),
             points: Vec::new(),
             patches: Vec::new(),
@@ -274,12 +274,10 @@ impl<'a> System<'a> {
         let most =
             |values: &mut dyn Iterator<Item = f64>| values.fold(0.0f64, |a, b| a.max(b.abs()));
         let stiffest = most(&mut (0..system.load.len()).map(|i| system.stiffness.at(i, i)));
-        let pushed = most(
-            &mut model
-                .contacts
-                .iter()
-                .flat_map(|contact| [contact.indentation, contact.tangential_displacement]),
-        );
+        let pushed = most(&mut model.contacts.iter().flat_map(|contact| {
+            let pushed = [contact.indentation, contact.tangential_displacement];
+            pushed.into_iter().chain(contact.overlap())
+        }));
         system.reference_force = (stiffest * pushed).max(most(&mut system.load.iter().copied()));
         Ok(system)
     }
@@ -453,9 +451,9 @@ impl<'a> System<'a> {
     pub fn set_level(&mut self, level: Level) {
         self.level = level;
         self.load = self.body.load(&level);
-        if let Some(tools) = &self.tools {
-            self.tools_at_rest = tools.at_rest(self.model, &level, &self.load);
-            self.load = tools.reduced(std::mem::take(&mut self.load), &self.tools_at_rest);
+        if let Some(opposite) = &self.opposite {
+            let load = std::mem::take(&mut self.load);
+            (self.load, self.opposite_at_rest) = opposite.reduced(self.model, &level, &load);
         }
         for patch in &self.patches {
             let contact = patch.contact;
@@ -478,6 +476,11 @@ impl<'a> System<'a> {
                     _ => contact.gap(i, &level),
                 };
                 node.drag = contact.drag(i, &level);
+                if let Some(opposite) = &self.opposite {
+                    let [along_n, along_t] = opposite.prescribed(patch.first + i);
+                    node.gap += level.supports * along_n;
+                    node.drag += level.supports * along_t;
+                }
                 node.held_tangent = node.bonded.then_some(node.drag);
             }
         }
@@ -496,8 +499,8 @@ impl<'a> System<'a> {
         let mut bonded = System {
             stiffness: self.stiffness.clone(),
             load: self.load.clone(),
-            tools: self.tools.clone(),
-            tools_at_rest: self.tools_at_rest.clone(),
+            opposite: self.opposite.clone(),
+            opposite_at_rest: self.opposite_at_rest.clone(),
             nodes: self.nodes.clone(),
             points: Vec::new(),
             patches: self.patches.clone(),
@@ -542,17 +545,21 @@ impl<'a> System<'a> {
         self.dissipated + work.sum::<f64>()
     }
 
-    /// The initial state: no displacement, and no nodes in contact but bonded nodes and, where a force presses the obstacle, those
-    /// that it is nearest to.
+    /// The initial state: no displacement, and no nodes in contact but bonded nodes and, where a force presses the obstacle or a
+    /// body floats on another, those nearest to what they face.
     pub fn rest(&self) -> State {
         let mut active: Vec<bool> = self.nodes.iter().map(|node| node.bonded).collect();
         for patch in &self.patches {
-            let Some([Some(_), _, moment]) = patch.contact.tool.as_ref().map(|tool| tool.loads)
-            else {
+            let loads = patch.contact.tool.as_ref().map(|tool| tool.loads);
+            // a body that only its contact with another holds is held by the nearest nodes, too
+            let floats = patch.contact.pair.is_some() && self.model.held_by_contact;
+            let pressed = matches!(loads, Some([Some(_), ..]));
+            if !(floats || pressed) {
                 continue;
-            };
+            }
+            let moment = loads.and_then(|loads| loads[2]);
             let range = self.range(patch);
-            let gap = |i: usize| patch.contact.gap(i, &self.level);
+            let gap = |i: usize| self.nodes[range.start + i].gap;
             let least = (0..range.len()).map(gap).fold(f64::INFINITY, f64::min);
             let equal = NEAREST * patch.contact.boundary.length();
             // an obstacle that may turn about a single node is not held
@@ -573,9 +580,9 @@ impl<'a> System<'a> {
 
     /// The unknown motions of obstacles in a state, in the order of its tools.
     pub fn free_motions(&self, v: &[f64]) -> Vec<f64> {
-        match &self.tools {
+        match &self.opposite {
             None => Vec::new(),
-            Some(tools) => tools.motions(&self.tools_at_rest, v),
+            Some(opposite) => opposite.motions(&self.opposite_at_rest, v),
         }
     }
 
@@ -593,43 +600,40 @@ impl<'a> System<'a> {
             }
             Some(tool) => tool.motions(&self.level),
         };
-        let Some(tools) = &self.tools else {
+        let Some(opposite) = &self.opposite else {
             return given;
         };
-        let free = tools::of_patch(&tools.motions, &self.free_motions(v), patch);
+        let free = opposite::of_patch(&opposite.motions, &self.free_motions(v), patch);
         std::array::from_fn(|k| given[k] + free[k])
     }
 
     /// The displacements of the contact unknowns in a state, which itself is relative to obstacles whose motion is unknown.
     pub fn displaced<'b>(&self, v: &'b [f64]) -> Cow<'b, [f64]> {
-        match &self.tools {
+        match &self.opposite {
             None => Cow::Borrowed(v),
-            Some(tools) => Cow::Owned(tools.displaced(v, &self.free_motions(v))),
+            Some(opposite) => Cow::Owned(opposite.displaced(v, &self.free_motions(v))),
         }
     }
 
     /// The displacements of the contact unknowns in the dual solution of a quantity, z + P (A⁻¹ e − A⁻¹PᵀŜ z). `z`: its influence
     /// on displacements relative to obstacles; `motion`: the unknown motion that the quantity is, if it is one.
     pub fn dual_of_body(&self, z: &[f64], motion: Option<usize>) -> Vec<f64> {
-        let Some(tools) = &self.tools else {
+        let Some(opposite) = &self.opposite else {
             return z.to_vec();
         };
-        let own = match motion {
-            None => vec![0.0; tools.motions.len()],
-            Some(motion) => tools.unit_response(motion),
-        };
-        tools.displaced(z, &tools.motions(&own, z))
+        let own = opposite.unit_at_rest(motion);
+        opposite.displaced(z, &opposite.motions(&own, z))
     }
 
     /// The energy of the springs of obstacles less the work of the loads on obstacles (without 2π).
-    pub fn energy_of_tools(&self, v: &[f64]) -> f64 {
-        let Some(tools) = &self.tools else {
+    pub fn energy_of_obstacles(&self, v: &[f64]) -> f64 {
+        let Some(opposite) = &self.opposite else {
             return 0.0;
         };
         let q = self.free_motions(v);
-        let energy = tools.motions.iter().zip(&q).map(|(free, q)| {
-            let load = tools.load(self.model, &self.level, free);
-            (0.5 * tools.spring(self.model, free) * q - load) * q
+        let energy = opposite.motions.iter().zip(&q).map(|(free, q)| {
+            let load = opposite.load(self.model, &self.level, free);
+            (0.5 * opposite.spring(self.model, free) * q - load) * q
         });
         energy.sum()
     }

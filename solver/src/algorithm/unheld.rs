@@ -1,6 +1,8 @@
 //! Obstacles under loads that nothing holds: neither pressure nor friction of the final state resists one of their motions.
 
-use crate::algorithm::system::{State, System};
+use std::collections::BTreeSet;
+
+use crate::algorithm::system::{Point, State, System};
 use crate::error::SolveError;
 
 /// Checks that contact and friction of the final state resist all unknown motions of obstacles. `bound`: the friction bound.
@@ -27,9 +29,13 @@ pub(super) fn held(system: &System<'_>, state: &State, bound: &[f64]) -> Result<
             }
         }
         let points = system.points.iter().zip(bound);
-        for (point, tau) in points.filter(|(point, _)| point.patch == p) {
-            let sticks = system.law(point).sticks(system.slip(&state.v, point));
-            if *tau > 0.0 && sticks {
+        let rubs = points.filter(|(point, tau)| point.patch == p && **tau > 0.0);
+        let slip = |point: &Point| system.slip(&state.v, point);
+        // between points that slip to opposite sides some place sticks, although no point does
+        let signs: BTreeSet<bool> = rubs.clone().map(|(point, _)| slip(point) > 0.0).collect();
+        let turns = signs.len() == 2;
+        for (point, _) in rubs {
+            if turns || system.law(point).sticks(slip(point)) {
                 let nodes = point.nodes.map(|node| node - patch.first);
                 rows.extend(nodes.map(|i| along(i, 1)));
             }

@@ -8,10 +8,12 @@
 //! | which part of a boundary faces an obstacle, distances at nodes, and what lies between nodes | `obstacle` |
 //! | the shape of each kind of obstacle: a function, or a curve in space | `shape`, `curve` |
 //! | an obstacle that is displaced along a direction | `displaced` |
+//! | another body that faces the contact | `mortar` |
 //! | where the surface is smooth and where it has a corner | `smooth` |
 
 mod curve;
 mod displaced;
+pub mod mortar;
 pub mod obstacle;
 mod shape;
 pub mod smooth;
@@ -27,6 +29,12 @@ use crate::mesh::{Edge, Mesh};
 
 /// Positions count as equal within this fraction of a length, since they coincide with grid lines only up to rounding.
 const ROUNDING: f64 = 1e-9;
+
+/// The share a = 1/8 in the unknown u_n − a u_n⁰ of the midside node beside a contact's end on the axis, with u_n⁰ the
+/// displacement of this end. The end has no area of its own: ∫ h₀ r dr = 0. With a = 1/8 the end's unknown moves h₀ +
+/// h₁/8, whose area is 1/8 of the area of h₁, and the pressure at the end, the unknown's reaction over this area, is
+/// exact for p = p₀ + β r² (formulation 3.5).
+pub const AXIS_SHARE: f64 = 0.125;
 
 /// The directions (unit vectors, with their errors as angles) along which supports hold nodes.
 pub type HeldDirections = BTreeMap<u32, ([f64; 2], f64)>;

@@ -47,16 +47,21 @@ pub fn invert(v: &[f64; 3], value: f64) -> f64 {
 /// 0.
 pub fn zeros(v: &[f64; 3]) -> impl Iterator<Item = f64> {
     const ROUNDING: f64 = 1e-9;
+    // what is not a number is no root
+    roots(v)
+        .into_iter()
+        .filter(|xi| xi.abs() <= 1.0 + ROUNDING)
+        .map(|xi| xi.clamp(-1.0, 1.0))
+}
+
+/// The two ξ with Σ h_i(ξ) v_i = 0, on the edge or beyond its ends; not finite where there is none.
+pub fn roots(v: &[f64; 3]) -> [f64; 2] {
     // a ξ² + b ξ + c = 0, without cancellation
     let a = 0.5 * (v[0] + v[1]) - v[2];
     let b = 0.5 * (v[1] - v[0]);
     let c = v[2];
     let q = -0.5 * (b + b.signum() * (b * b - 4.0 * a * c).sqrt());
-    let roots = [q / a, c / q].into_iter();
-    // what is not a number is no root
-    roots
-        .filter(|xi| xi.abs() <= 1.0 + ROUNDING)
-        .map(|xi| xi.clamp(-1.0, 1.0))
+    [q / a, c / q]
 }
 
 #[cfg(test)]

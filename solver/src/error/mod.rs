@@ -124,6 +124,8 @@ pub enum SolveError {
         /// A node that moves in the free motion.
         node: u32,
     },
+    /// Bodies in contact may move together without a force.
+    BodiesUnheld,
     /// Nothing in the final state holds an obstacle whose loads are given.
     ObstacleUnheld {
         /// The boundary of the obstacle's contact.
@@ -168,6 +170,10 @@ impl fmt::Display for SolveError {
                 "nothing holds the body: it is free to move {motion}, e.g. at node {node}. The supports rely \
                  on contact to prevent this motion, but in the final state there is no contact where it would \
                  do so. Add a support, or loads that press the body against the obstacle"
+            ),
+            SolveError::BodiesUnheld => write!(
+                f,
+                "Bodies in contact may move together: nothing but their contact holds them. Support one of them."
             ),
             SolveError::ObstacleUnheld { contact, motion } => write!(
                 f,

@@ -103,6 +103,22 @@ impl From<Mesh> for ExternalMesh {
 }
 
 impl Mesh {
+    /// Adds a separate body: its elements as a group `name`, and its boundaries with that name before theirs.
+    pub fn join(&mut self, name: &str, body: Mesh) {
+        let (nodes, elements) = (self.nodes.len() as u32, self.elements.len() as u32);
+        let count = body.elements.len() as u32;
+        self.nodes.extend(body.nodes);
+        let moved = body.elements.iter().map(|own| own.map_nodes(|n| n + nodes));
+        self.elements.extend(moved);
+        for (side, edges) in body.boundaries {
+            let edges = edges.into_iter().map(|edge| edge.map(|n| n + nodes));
+            self.boundaries
+                .insert(format!("{name}.{side}"), edges.collect());
+        }
+        let own = elements..elements + count;
+        self.groups.insert(name.to_owned(), own.collect());
+    }
+
     /// Puts the edges of all boundaries into one defined order: run after run, each from its start to its end.
     pub fn order_boundaries(&mut self) {
         for edges in self.boundaries.values_mut() {

@@ -1,11 +1,13 @@
 //! The mesh with all its names, and values along named boundaries.
 
+use std::collections::BTreeMap;
+
 use super::checks::{ALIGNED, Checks, known, one_of};
 use super::estimate::MOST_ADAPTIVE_ELEMENTS;
 use crate::error::{AllChecks, Checked, Reason, Refused, escape};
 use crate::mesh::{self, Edge, External, Mesh};
 use crate::problem::{
-    AdaptiveRefine, Analysis, BoundaryPart, BoundaryValue, MeshInput, MeshSource, Refine,
+    AdaptiveRefine, Analysis, BoundaryPart, BoundaryValue, Grid, MeshInput, MeshSource, Refine,
 };
 use crate::solution::WarningCode;
 
@@ -50,14 +52,19 @@ impl Checks {
             self.radii(&mesh, input, analysis),
         );
         let refine = upright.and(radii).and(refine)?;
-        if let Some((x, distance)) = input.grid().and_then(mesh::largest_cut) {
+        let cuts = input.grids().into_iter().filter_map(mesh::largest_cut);
+        if let Some((x, distance)) = cuts.max_by(|a, b| a.1.total_cmp(&b.1)) {
+            let place = match input.grid() {
+                Some(_) => "/mesh/grid",
+                None => "/mesh/grids",
+            };
             self.warn(
                 WarningCode::StripCutsPolyline,
-                "/mesh/grid",
+                place,
                 format!("The strip deviates from its polyline by {distance:.3e} at x = {x}, between two grid lines. Put a grid line there."),
             );
         }
-        if input.grid().is_none() {
+        if input.grids().is_empty() {
             self.unmerged = mesh::coincident_nodes(&mesh);
         }
         all.check(self.names(&mut mesh, input));
@@ -67,7 +74,7 @@ impl Checks {
             mesh = mesh::refine(&mesh);
             self.curves(&mut mesh, input, " of the refined mesh")?;
         }
-        if input.grid().is_none() && refine > 0 {
+        if input.grids().is_empty() && refine > 0 {
             let whole = |_| "/mesh".to_owned();
             let upright = mesh::check_inverted(&mesh, false, whole, " of the refined mesh");
             self.found.merge(upright)?;
@@ -95,6 +102,7 @@ impl Checks {
             match &input.source {
                 MeshSource::Inline(_) => format!("/mesh/inline/nodes/{node}"),
                 MeshSource::Grid(_) => "/mesh/grid/x".to_owned(),
+                MeshSource::Grids(_) => "/mesh/grids".to_owned(),
                 _ => "/mesh".to_owned(),
             },
             Reason::OutOfRange,
@@ -196,6 +204,7 @@ impl Checks {
                 self.found.merge(mesh::check_grid(grid, "/mesh/grid"))?;
                 Ok(mesh::grid_mesh(grid))
             }
+            MeshSource::Grids(grids) => self.grids(grids),
             MeshSource::Inline(inline) => {
                 let mesh = mesh::inline_mesh(inline.clone(), "/mesh/inline");
                 self.found.merge(mesh)
@@ -211,11 +220,46 @@ impl Checks {
         }
     }
 
+    /// The mesh of several grids, each with its name before those of its boundaries.
+    fn grids(&mut self, grids: &BTreeMap<String, Grid>) -> Checked<Mesh> {
+        let mut all = AllChecks::default();
+        if grids.is_empty() {
+            all.fail(self.report(
+                "/mesh/grids",
+                Reason::TooFew,
+                "no grid",
+                "at least one grid",
+                "Give each body its lines, for example {\"shaft\": {\"x\": …, \"y\": …}, \"hub\": …}.",
+            ));
+        }
+        for (name, grid) in grids {
+            let pointer = format!("/mesh/grids/{}", escape(name));
+            if name.is_empty() {
+                all.fail(self.report(
+                    &pointer,
+                    Reason::Malformed,
+                    "an empty name",
+                    "a name",
+                    "It begins the names of the boundaries, and names the group of the elements.",
+                ));
+            }
+            all.check(self.found.merge(mesh::check_grid(grid, &pointer)));
+        }
+        all.finish(())?;
+        let mut whole = Mesh::default();
+        for (name, grid) in grids {
+            whole.join(name, mesh::grid_mesh(grid));
+        }
+        Ok(whole)
+    }
+
     /// Checks that no element is inverted or numbered clockwise.
     fn upright(&mut self, mesh: &Mesh, source: &MeshSource) -> Checked {
         self.found.merge(match source {
             // a grid has straight sides: its corners need no check, and refinement does not fold it
-            MeshSource::Grid(_) => mesh::check_inverted(mesh, false, |_| "/mesh".to_owned(), ""),
+            MeshSource::Grid(_) | MeshSource::Grids(_) => {
+                mesh::check_inverted(mesh, false, |_| "/mesh".to_owned(), "")
+            }
             MeshSource::Inline(_) => {
                 let element = |e| format!("/mesh/inline/elements/{e}");
                 mesh::check_inverted(mesh, true, element, "")

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::checks::ALIGNED;
 use super::level::Level;
+use super::pair::Pair;
 use super::tool::Tool;
 use crate::contact::ContactBoundary;
 use crate::contact::obstacle::Place;
@@ -41,7 +42,7 @@ pub struct ContactModel {
     /// The edges inside which the obstacle ends, each with the length of it that the obstacle covers; they are not part
     /// of Γ_C.
     pub cut: Vec<(Edge, f64)>,
-    /// How far the obstacle is pushed against the body (length).
+    /// How far the obstacle is pushed against the body, or another body overlaps it (length).
     pub indentation: f64,
     /// The components of a unit push against the contact's normal and along its tangent t, at each node. Without a
     /// given direction they are 1 and 0 where the contact uses the body's normal, and the cosine and minus the sine of
@@ -51,6 +52,8 @@ pub struct ContactModel {
     pub along: Option<AlongDirection>,
     /// The obstacle as a rigid body, if it has a load or a tilt.
     pub tool: Option<Tool>,
+    /// The other body, if there is one in place of the obstacle.
+    pub pair: Option<Pair>,
     /// The body's own normal at each node.
     pub outward: Vec<[f64; 2]>,
     /// The obstacle's own displacement along the contact's t (length).
@@ -82,9 +85,15 @@ impl ContactModel {
         self.profile[node] - pushed
     }
 
+    /// How far the meshes of two bodies overlap at most (length); none against a rigid obstacle.
+    pub fn overlap(&self) -> Option<f64> {
+        let least = self.profile.iter().copied().fold(0.0, f64::min);
+        self.pair.as_ref().map(|_| -least)
+    }
+
     /// Takes the motions and loads of the obstacle of a contact that has the same free motions.
     pub(super) fn take(&mut self, contact: &Contact) {
-        self.indentation = contact.indentation;
+        self.indentation = contact.pushed();
         self.tangential_displacement = contact.tangential_displacement;
         if let Some(tool) = &mut self.tool {
             tool.take(contact);

@@ -8,6 +8,7 @@ use super::checks::{ALIGNED, Checks};
 use super::contact_model::{AlongDirection, ContactModel};
 use super::corners::Alone;
 use super::level::Level;
+use super::pair::Faced;
 use super::sliding;
 use super::supports::Held;
 use super::tool::Tool;
@@ -63,6 +64,7 @@ impl Checks {
             all.check(self.shared_nodes(&model, &models, problem));
             all.check(self.supported_contact_nodes(&model, &problem.steps, fixed));
             all.check(self.nodes_held_along_tool(&model, fixed));
+            all.check(self.nodes_of_pair(&model, &models, fixed));
             all.check(self.tangential_force_borne(&model, &problem.steps));
             models.push(model);
         }
@@ -80,9 +82,10 @@ impl Checks {
         contacts: &[Contact],
         held: &HeldDirections,
         i: usize,
-        (obstacle, friction): (Checked, Option<FrictionLaw<Average>>),
+        (sound, friction): (Checked, Option<FrictionLaw<Average>>),
     ) -> Checked<ContactModel> {
         let (contact, pointer) = (&contacts[i], format!("/contacts/{i}"));
+        let obstacle = contact.obstacle.as_ref();
         let same = |other: &Contact| other.boundary == contact.boundary;
         if contacts[..i].iter().any(same) {
             return Err(self.report(
@@ -103,15 +106,32 @@ impl Checks {
                 "Give these edges another name in the mesh, or name a part under /mesh/boundaries.",
             ));
         }
-        obstacle?;
+        sound?;
         let corners: Vec<u32> = edges.iter().flat_map(|edge| [edge[0], edge[1]]).collect();
-        let (run, cut) = self.facing_run(mesh, edges, held, contact, &pointer)?;
-        let mut boundary =
-            ContactBoundary::new(mesh, &run.chain, run.start, held, |x| section.depth(x));
+        let Faced {
+            mut boundary,
+            outward,
+            run,
+            cut,
+            pair,
+        } = match &contact.obstacle {
+            Some(obstacle) => {
+                let (run, cut) = self.facing_run(mesh, edges, held, obstacle, &pointer)?;
+                let boundary =
+                    ContactBoundary::new(mesh, &run.chain, run.start, held, |x| section.depth(x));
+                Faced {
+                    outward: boundary.normals.clone(),
+                    boundary,
+                    run,
+                    cut,
+                    pair: None,
+                }
+            }
+            None => self.faced(mesh, section, axis, contact, edges, held, &pointer)?,
+        };
         let radius = friction.as_ref().and_then(|law| law.bound.radius());
         self.sound(&boundary, axis, contact, radius, &run, &pointer)?;
-        let outward = boundary.normals.clone();
-        let turned = turn_normals(&mut boundary, &run, contact.normal, held);
+        let turned = turn_normals(&mut boundary, &run, contact.used_normal(), held);
         let end_slopes = [0, run.profile.len() - 1].map(|i| run.profile[i].slope);
         let along = |(profile, turned): (&Profile, &[f64; 2])| profile.distance * turned[0];
         let profile: Vec<f64> = run.profile.iter().zip(&turned).map(along).collect();
@@ -124,33 +144,40 @@ impl Checks {
         Ok(ContactModel {
             name: contact.boundary.clone(),
             pointer,
-            endless: sliding::endless(mesh, &boundary, &contact.obstacle, &profile),
+            endless: obstacle
+                .is_some_and(|obstacle| sliding::endless(mesh, &boundary, obstacle, &profile)),
             tool: Tool::new(contact, &boundary, direction),
             boundary,
             cut,
             profile,
             places: run.places,
-            in_space: contact.obstacle.is_in_space(),
+            in_space: obstacle.is_some_and(Obstacle::is_in_space),
             end_slopes,
-            indentation: contact.indentation,
+            pair,
+            indentation: contact.pushed(),
             push,
-            along: contact.direction.map(|_| AlongDirection {
-                direction,
-                obstacle: Arc::new(contact.obstacle.clone()),
-            }),
+            along: contact
+                .direction
+                .and(obstacle)
+                .map(|obstacle| AlongDirection {
+                    direction,
+                    obstacle: Arc::new(obstacle.clone()),
+                }),
             outward,
             tangential_displacement: contact.tangential_displacement,
-            normal: contact.normal,
+            normal: contact.used_normal(),
             condition: contact.condition,
             measured: matches!(
-                contact.obstacle,
-                Obstacle::Table {
+                obstacle,
+                Some(Obstacle::Table {
                     smoothing: Some(_),
                     ..
-                }
+                })
             ),
-            last_points: ends_inside(&corners, &nodes, &contact.obstacle),
-            power: contact.obstacle.power(),
+            last_points: obstacle.map_or([false; 2], |obstacle| {
+                ends_inside(&corners, &nodes, obstacle)
+            }),
+            power: obstacle.and_then(Obstacle::power),
             friction,
         })
     }
@@ -282,7 +309,8 @@ impl Checks {
             ));
         }
         // a flat does not depend on the coordinate, and a curve in space has none
-        let curved = !contact.obstacle.is_straight() && !contact.obstacle.is_in_space();
+        let obstacle = contact.obstacle.as_ref();
+        let curved = obstacle.is_some_and(|shape| !shape.is_straight() && !shape.is_in_space());
         let grows = |pair: &[f64]| pair[1] > pair[0];
         let falls = |pair: &[f64]| pair[1] < pair[0];
         if curved && !run.coordinate.windows(2).all(grows) && !run.coordinate.windows(2).all(falls)
@@ -326,32 +354,11 @@ impl Checks {
         mesh: &Mesh,
         edges: &[Edge],
         held: &HeldDirections,
-        contact: &Contact,
+        obstacle: &Obstacle,
         pointer: &str,
     ) -> Checked<(FacingRun, Vec<(Edge, f64)>)> {
-        let runs = mesh::runs(edges);
-        let [run] = &runs[..] else {
-            return Err(self.report(
-                format!("{pointer}/boundary"),
-                Reason::NotAChain,
-                format!("{} pieces", runs.len()),
-                "one chain of edges",
-                format!(
-                    "Name each piece under /mesh/boundaries and give it a contact of its own.{}",
-                    self.hint_to_merge(mesh)
-                ),
-            ));
-        };
-        if run[0][0] == run[run.len() - 1][1] {
-            return Err(self.report(
-                format!("{pointer}/boundary"),
-                Reason::NotAChain,
-                "a closed loop",
-                "a chain of edges with two ends",
-                "Name a part of the loop under /mesh/boundaries.",
-            ));
-        }
-        let mut facing = obstacle::facing(mesh, run, held, &contact.obstacle);
+        let run = &self.one_chain(mesh, edges, &format!("{pointer}/boundary"), false)?[..];
+        let mut facing = obstacle::facing(mesh, run, held, obstacle);
         for [low, high] in &facing.cut {
             self.warn(
                 WarningCode::ObstacleCutsEdge,
@@ -413,6 +420,10 @@ impl Checks {
         let (boundary, pointer) = (&contact.boundary, &contact.pointer);
         let ends = Level::ends_of(steps);
         let bonded = contact.condition == Condition::Bonded;
+        // another body moves
+        if contact.pair.is_some() {
+            return Ok(());
+        }
         for (i, node) in boundary.nodes.iter().enumerate() {
             let Some(held) = fixed.get(node) else {
                 continue;
@@ -544,7 +555,10 @@ pub(super) fn put_nodes_at_ends<'a>(
             } else {
                 most * contact.indentation.abs()
             };
-            let ends = obstacle::ends_inside_edges(mesh, run, &contact.obstacle, deepest);
+            let Some(shape) = &contact.obstacle else {
+                break;
+            };
+            let ends = obstacle::ends_inside_edges(mesh, run, shape, deepest);
             let mut ends = ends.into_iter();
             if !ends.any(|(edge, xi)| mesh.divide_side(edge, xi)) {
                 break;
@@ -598,7 +612,7 @@ fn turn_normals(
     held: &HeldDirections,
 ) -> Vec<[f64; 2]> {
     let mut push = vec![[1.0, 0.0]; boundary.nodes.len()];
-    if normal == NormalOf::Body {
+    if normal != NormalOf::Obstacle {
         return push;
     }
     for (i, push) in push.iter_mut().enumerate() {

@@ -98,10 +98,12 @@ const MOST_ELEMENTS: f64 = u32::MAX as f64 / 8.0;
 pub fn estimate(problem: &Problem, stored: Option<&MeshSize>) -> Result<Estimate, Violation> {
     let mesh = &problem.mesh;
     // nodes of an element in a large mesh: of triangles fewer
+    let between = |lines: usize| lines.saturating_sub(1) as f64;
     let (elements, nodes) = match &mesh.source {
-        MeshSource::Grid(grid) => {
-            let lines = |lines: usize| lines.saturating_sub(1) as f64;
-            (lines(grid.x.len()) * lines(grid.y.len()), 3.0)
+        MeshSource::Grid(_) | MeshSource::Grids(_) => {
+            let grids = mesh.grids().into_iter();
+            let elements = grids.map(|grid| between(grid.x.len()) * between(grid.y.len()));
+            (elements.sum(), 3.0)
         }
         MeshSource::Inline(inline) => (inline.elements.len() as f64, 2.0),
         MeshSource::Gmsh(text) | MeshSource::Abaqus(text) => {
@@ -215,6 +217,11 @@ impl Model {
             points: all.points + one.points,
             weights: all.weights + one.weights,
         });
+        let pairs = self
+            .contacts
+            .iter()
+            .filter_map(|contact| contact.pair.as_ref());
+        let facing: f64 = pairs.map(|pair| pair.nodes.len() as f64).sum();
         let controls = &self.controls;
         let again = u32::from(controls.check_uniqueness)
             + 2 * u32::from(controls.check_increments)
@@ -228,11 +235,11 @@ impl Model {
             } else {
                 nodes
             },
-            contact: 2.0 * all.nodes,
+            contact: 2.0 * (all.nodes + facing),
             weights: all.weights,
             points: all.points,
             profile: all.nodes + all.points,
-            relative: f64::from(u8::from(self.contacts.iter().any(has_free_obstacle))),
+            relative: f64::from(u8::from(self.contacts.iter().any(is_relative))),
             contacts: self.contacts.len() as f64,
             steps: self.steps.len().max(1) as f64,
             increments: increments.max(1.0),
@@ -360,10 +367,10 @@ impl Along {
     }
 }
 
-/// Whether the obstacle of a contact has a load, and so an unknown motion.
-fn has_free_obstacle(contact: &ContactModel) -> bool {
+/// Whether what lies opposite a contact has an unknown motion: an obstacle with a load, or another body.
+fn is_relative(contact: &ContactModel) -> bool {
     let tool = contact.tool.as_ref();
-    tool.is_some_and(|tool| tool.free().next().is_some())
+    contact.pair.is_some() || tool.is_some_and(|tool| tool.free().next().is_some())
 }
 
 /// Whether friction acts at a contact.

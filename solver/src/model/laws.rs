@@ -20,6 +20,9 @@ const MOST_LINE_POINTS: usize = 10_000;
 /// The smallest number of points for smoothing.
 const FEWEST_SMOOTHED: usize = 4;
 
+/// The height of an undulation, in standard deviations, that adds as much to the misfit of a curve as noise does: √2.
+const UNSEEN: f64 = std::f64::consts::SQRT_2;
+
 /// A standard deviation above this fraction of the range of all values can hardly be the error of a single value.
 const LARGE_DEVIATION: f64 = 0.1;
 
@@ -227,6 +230,11 @@ impl Checks {
             );
             return;
         }
+        self.warn(
+            WarningCode::UndulationsUnseen,
+            &format!("{pointer}/smoothing"),
+            format!("Undulations of the surface up to about {:.1e} high cannot be told from noise of this deviation, and smoothing removes them. If the surface may have any, of a height A and a wavelength λ, they change the pressure by π E* A/λ, which no stated error contains. More points, or more exact ones, show them.", UNSEEN * deviation),
+        );
         if least == 0.0 {
             self.warn(
                 WarningCode::LowestPointIsZero,
@@ -257,13 +265,13 @@ impl Checks {
     /// Warns of points that scatter as measured ones do, and are taken as exact.
     pub(super) fn warn_of_noise(&mut self, contact: &Contact, pointer: &str) {
         let [x, y] = match &contact.obstacle {
-            Obstacle::Table {
+            Some(Obstacle::Table {
                 x,
                 gap,
                 smoothing: None,
                 ..
-            } if x.len() == gap.len() => [x.clone(), gap.clone()],
-            Obstacle::Polyline { points, .. } => {
+            }) if x.len() == gap.len() => [x.clone(), gap.clone()],
+            Some(Obstacle::Polyline { points, .. }) => {
                 [0, 1].map(|k| points.iter().map(|p| p[k]).collect())
             }
             _ => return,

@@ -21,6 +21,7 @@
 //! | common ends of two contacts | `corners` |
 //! | obstacles that slide along the body | `sliding` |
 //! | obstacles under loads, and their checks | `tool`, `tool_checks` |
+//! | another body in place of an obstacle | `pair` |
 //! | rigid motions that nothing prevents | `freedom` |
 //! | distinct nodes at one place | `unmerged` |
 //! | the axis of a body of revolution | `axis` |
@@ -47,6 +48,7 @@ mod loads;
 mod materials;
 mod nodes;
 mod numbers;
+mod pair;
 mod path;
 mod sliding;
 mod springs;
@@ -63,6 +65,7 @@ pub use contact_model::ContactModel;
 pub use corners::Alone;
 pub use freedom::{Hold, RigidMotion};
 pub use level::Level;
+pub use pair::Pair;
 pub use supports::Held;
 pub use tool::Tool;
 pub use variable::VariableModel;
@@ -239,14 +242,18 @@ impl Checks {
         let mut numbers = Vec::new();
         for (i, contact) in problem.contacts.iter().enumerate() {
             let at = |field: &str| format!("/contacts/{i}/{field}");
-            let obstacle = self.obstacle(&contact.obstacle, &at("obstacle"));
+            let obstacle = match &contact.obstacle {
+                Some(obstacle) => self.obstacle(obstacle, &at("obstacle")),
+                None => Ok(()),
+            };
+            let faces = self.facing_body_numbers(contact, &format!("/contacts/{i}"));
             self.warn_of_noise(contact, &at("obstacle"));
             let (friction, sound) = self.friction(&analysis, contact, &at("friction"));
             all.check(sound);
             all.check(self.push_direction(&analysis, contact.direction, &at("direction")));
             let pointer = format!("/contacts/{i}");
             all.check(self.obstacle_loads(&analysis, contact, &problem.steps, &pointer));
-            numbers.push((obstacle, friction));
+            numbers.push((obstacle.and(faces), friction));
         }
         let mesh = match source {
             Source::Given(external) => {
@@ -287,8 +294,16 @@ impl Checks {
             None => loads,
         });
         let (contacts, sound) = self.contacts(&mesh, &section, &axis, problem, numbers, &fixed);
+        let has_pairs = problem
+            .contacts
+            .iter()
+            .any(|contact| contact.against.is_some());
+        let held_by_contact = match sound {
+            // what a contact that is refused would hold is unknown
+            Err(_) if has_pairs => Ok(false),
+            _ => self.freedom(&mesh, &section, &fixed, &holds, &contacts),
+        };
         all.check(sound);
-        let held_by_contact = self.freedom(&mesh, &section, &fixed, &holds, &contacts);
         all.finish(())?;
         let (loads, held_by_contact) = (loads?, held_by_contact?);
         if held_by_contact {

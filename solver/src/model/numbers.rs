@@ -15,7 +15,7 @@ use crate::solution::WarningCode;
 /// What the thesis's own iteration does not support in a contact: the test for it, the field, what was found, what is
 /// supported, and the reason.
 #[rustfmt::skip] // a table
-const NOT_OF_THE_THESIS: [(OfContact, [&str; 4]); 8] = [
+const NOT_OF_THE_THESIS: [(OfContact, [&str; 4]); 9] = [
     (|contact| contact.condition != Condition::Unilateral, [
         "condition", "a condition other than `unilateral`", "`unilateral`",
         "The thesis's iteration supports no other condition",
@@ -28,13 +28,17 @@ const NOT_OF_THE_THESIS: [(OfContact, [&str; 4]); 8] = [
         "friction/history", "`incremental`", "`total`",
         "The thesis's law does not depend on the path",
     ]),
-    (|contact| contact.normal == NormalOf::Obstacle, [
+    (|contact| contact.normal == Some(NormalOf::Obstacle), [
         "normal", "`obstacle`", "`body`",
         "The thesis uses the body's normal only",
     ]),
     (|contact| contact.direction.is_some(), [
         "direction", "a direction", "none: against the body's normal",
         "Obstacles of the thesis move against the body's normal",
+    ]),
+    (|contact| contact.against.is_some(), [
+        "against", "another body", "an `obstacle`",
+        "Obstacles of the thesis are rigid",
     ]),
     (Contact::is_tool, [
         "condition", "an obstacle with a load or a tilt", "an obstacle with an `indentation`",

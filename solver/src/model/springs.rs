@@ -123,6 +123,7 @@ impl Held {
                 node,
                 direction,
                 error,
+                facing: None,
             });
         }
     }

@@ -3,7 +3,7 @@
 use super::checks::Checks;
 use super::{Model, contacts};
 use crate::error::{AllChecks, Violation};
-use crate::problem::{Contact, Grid, MeshInput, MeshSource, Problem};
+use crate::problem::{BodyGap, Contact, Grid, MeshInput, MeshSource, Problem};
 use crate::solution::Warning;
 
 /// A model that takes the laws of friction, indentations, drags, load steps and controls of other problems.
@@ -121,7 +121,9 @@ fn without_mesh(problem: &Problem) -> Problem {
 fn same_boundary((a, b): (&Contact, &Contact)) -> bool {
     a.boundary == b.boundary
         && a.obstacle == b.obstacle
-        && a.normal == b.normal
+        && a.against == b.against
+        && same_kind_of_gap(a.gap, b.gap)
+        && a.used_normal() == b.used_normal()
         && a.direction == b.direction
         && a.is_tool() == b.is_tool()
         && a.obstacle_loads().map(|load| load.is_some())
@@ -129,6 +131,12 @@ fn same_boundary((a, b): (&Contact, &Contact)) -> bool {
         && a.about == b.about
         && a.stiffness == b.stiffness
         && a.condition == b.condition
+}
+
+/// Whether two gaps differ in an interference only, which moves the contact as an indentation does.
+fn same_kind_of_gap(a: Option<BodyGap>, b: Option<BodyGap>) -> bool {
+    let fixed = |gap: Option<BodyGap>| gap.map(|gap| (gap.interference.is_some(), gap.clearance));
+    fixed(a) == fixed(b)
 }
 
 impl Checks {
@@ -154,6 +162,7 @@ impl Checks {
             let radius = law.as_ref().and_then(|law| law.bound.radius());
             all.check(self.radius(&model_contact.boundary, radius, &format!("/contacts/{i}")));
             let (steps, fixed) = (&problem.steps, &model.fixed);
+            all.check(self.facing_body_numbers(contact, &format!("/contacts/{i}")));
             all.check(self.obstacle_loads(
                 &problem.analysis,
                 contact,

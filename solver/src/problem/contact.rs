@@ -1,17 +1,26 @@
-//! A boundary that faces a rigid obstacle: the obstacle, and the friction law.
+//! A boundary that faces a rigid obstacle or another body: what faces it, and the friction law.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use strum::VariantArray;
 
-/// A boundary that may touch a rigid obstacle.
+/// A boundary that may touch a rigid obstacle or another elastic body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Contact {
     /// Name of the boundary.
     pub boundary: String,
-    /// The obstacle that faces the boundary.
-    pub obstacle: Obstacle,
+    /// The rigid obstacle that faces the boundary. Required unless `against` is set.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub obstacle: Option<Obstacle>,
+    /// The boundary of another elastic body that faces this one, in place of an obstacle. This boundary carries the law: it
+    /// should be the finer one, or of equally fine ones that which is covered as a whole.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub against: Option<Against>,
+    /// The distance of the two bodies before deformation, the same everywhere, in place of the distance of their meshes: for
+    /// curved bodies that fit one another, whose meshes overlap or gape by more than the bodies do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gap: Option<BodyGap>,
     /// How far the obstacle is pushed against the body (length, either sign):
     /// gap = profile − indentation.
     #[serde(default)]
@@ -47,15 +56,35 @@ pub struct Contact {
     /// forces.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<ObstacleStiffness>,
-    /// The direction that gap and normal displacement are measured along.
-    #[serde(default)]
-    pub normal: NormalOf,
+    /// The direction that gap and normal displacement are measured along; absent: `body`, and `mean` against another body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal: Option<NormalOf>,
     /// The contact condition.
     #[serde(default)]
     pub condition: Condition,
     /// The friction law; absent: frictionless.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction: Option<Friction>,
+}
+
+/// The boundary of another elastic body.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Against {
+    /// Name of the boundary.
+    pub boundary: String,
+}
+
+/// The distance of two bodies before deformation, the same everywhere: exactly one of its fields.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BodyGap {
+    /// They overlap by that much, > 0 (length), as a shaft in its hub; load steps scale it by `indentation`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interference: Option<f64>,
+    /// They are that far apart, ≥ 0 (length).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clearance: Option<f64>,
 }
 
 fn is_zero(value: &f64) -> bool {
@@ -92,6 +121,21 @@ impl Contact {
         ]
     }
 
+    /// The normal that the contact uses.
+    pub fn used_normal(&self) -> NormalOf {
+        let usual = match self.against {
+            None => NormalOf::Body,
+            Some(_) => NormalOf::Mean,
+        };
+        self.normal.unwrap_or(usual)
+    }
+
+    /// How far the bodies overlap, or the obstacle is pushed, at the end of the load path (length).
+    pub(crate) fn pushed(&self) -> f64 {
+        let overlap = self.gap.and_then(|gap| gap.interference);
+        overlap.unwrap_or(self.indentation)
+    }
+
     /// Whether the obstacle moves as a rigid body whose equilibrium matters: it has a load, or a tilt.
     pub fn is_tool(&self) -> bool {
         self.tilt.is_some() || self.obstacle_loads().iter().any(Option::is_some)
@@ -108,6 +152,8 @@ pub enum NormalOf {
     Body,
     /// The normal of the obstacle where it faces the node; the gap is measured to the tangent there.
     Obstacle,
+    /// The mean of the body's normal and the opposite normal of the other body where it faces the node.
+    Mean,
 }
 
 /// The contact condition.

@@ -9,12 +9,13 @@ use serde::{Deserialize, Serialize, Serializer};
 use crate::element::Element;
 use crate::error::{Reason, Violation, either};
 
-/// The body cut into elements: exactly one of `grid`, `inline`, `gmsh`, `abaqus`, `stored`; and names for
+/// The body cut into elements: exactly one of `grid`, `grids`, `inline`, `gmsh`, `abaqus`, `stored`; and names for
 /// parts of it.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(try_from = "MeshFields")]
 #[schemars(with = "MeshFields", extend("oneOf" = [
     {"required": ["grid"]},
+    {"required": ["grids"]},
     {"required": ["inline"]},
     {"required": ["gmsh"]},
     {"required": ["abaqus"]},
@@ -38,6 +39,8 @@ pub struct MeshInput {
 pub enum MeshSource {
     /// A grid of lines.
     Grid(Grid),
+    /// Several grids, each a body of its own, by name.
+    Grids(BTreeMap<String, Grid>),
     /// Nodes and elements, written out.
     Inline(InlineMesh),
     /// The text of a Gmsh mesh.
@@ -57,6 +60,15 @@ impl MeshInput {
             boundaries: BTreeMap::new(),
             groups: BTreeMap::new(),
             curves: BTreeMap::new(),
+        }
+    }
+
+    /// The grids that the mesh is made of; none if its source is another.
+    pub fn grids(&self) -> Vec<&Grid> {
+        match &self.source {
+            MeshSource::Grid(grid) => vec![grid],
+            MeshSource::Grids(grids) => grids.values().collect(),
+            _ => Vec::new(),
         }
     }
 
@@ -92,6 +104,10 @@ struct MeshFields {
     /// A grid of lines, with the boundaries `left`, `right`, `bottom`, `top`.
     #[serde(default)]
     grid: Option<Grid>,
+    /// Several grids by name, each a separate body that lies where its lines are: the boundaries of a grid `roller` are
+    /// `roller.left`, `roller.right`, `roller.bottom`, `roller.top`, and its elements are the group `roller`.
+    #[serde(default)]
+    grids: Option<BTreeMap<String, Grid>>,
     /// Nodes and elements, written out.
     #[serde(default)]
     inline: Option<InlineMesh>,
@@ -128,25 +144,27 @@ impl TryFrom<MeshFields> for MeshInput {
 
     #[rustfmt::skip] // a source in a row
     fn try_from(fields: MeshFields) -> Result<MeshInput, Violation> {
-        let MeshFields { grid, inline, gmsh, abaqus, stored, refine, boundaries, groups, curves } = fields;
+        let MeshFields { grid, grids, inline, gmsh, abaqus, stored, refine, boundaries, groups, curves } = fields;
         let given = [
             ("grid", grid.is_some()),
+            ("grids", grids.is_some()),
             ("inline", inline.is_some()),
             ("gmsh", gmsh.is_some()),
             ("abaqus", abaqus.is_some()),
             ("stored", stored.is_some()),
         ];
-        let source = match (grid, inline, gmsh, abaqus, stored) {
-            (Some(grid), None,         None,       None,       None)       => MeshSource::Grid(grid),
-            (None,       Some(inline), None,       None,       None)       => MeshSource::Inline(inline),
-            (None,       None,         Some(text), None,       None)       => MeshSource::Gmsh(text),
-            (None,       None,         None,       Some(text), None)       => MeshSource::Abaqus(text),
-            (None,       None,         None,       None,       Some(hash)) => MeshSource::Stored(hash),
+        let source = match (grid, grids, inline, gmsh, abaqus, stored) {
+            (Some(grid), None,        None,         None,       None,       None)       => MeshSource::Grid(grid),
+            (None,       Some(grids), None,         None,       None,       None)       => MeshSource::Grids(grids),
+            (None,       None,        Some(inline), None,       None,       None)       => MeshSource::Inline(inline),
+            (None,       None,        None,         Some(text), None,       None)       => MeshSource::Gmsh(text),
+            (None,       None,        None,         None,       Some(text), None)       => MeshSource::Abaqus(text),
+            (None,       None,        None,         None,       None,       Some(hash)) => MeshSource::Stored(hash),
             _ => return Err(Violation::new(
                 "",
                 Reason::WrongCount,
                 either(&given),
-                "exactly one of `grid`, `inline`, `gmsh`, `abaqus`, `stored`",
+                "exactly one of `grid`, `grids`, `inline`, `gmsh`, `abaqus`, `stored`",
                 "Give the mesh in one form.",
             )),
         };
@@ -173,6 +191,7 @@ impl Serialize for MeshInput {
         let mut fields = serializer.serialize_struct("MeshInput", count)?;
         match source {
             MeshSource::Grid(grid) => fields.serialize_field("grid", grid)?,
+            MeshSource::Grids(grids) => fields.serialize_field("grids", grids)?,
             MeshSource::Inline(inline) => fields.serialize_field("inline", inline)?,
             MeshSource::Gmsh(text) => fields.serialize_field("gmsh", text)?,
             MeshSource::Abaqus(text) => fields.serialize_field("abaqus", text)?,

@@ -12,9 +12,9 @@ mod solver;
 mod support;
 
 pub use contact::{
-    Along, BoundTable, Condition, Contact, Friction, FrictionPoints, History, Interpolation,
-    Kernel, Measure, NormalOf, Normalization, Obstacle, ObstacleStiffness, PrescribedBound,
-    SLIP_PART, Smoothing, Transition, elastic_slip_rule,
+    Against, Along, BodyGap, BoundTable, Condition, Contact, Friction, FrictionPoints, History,
+    Interpolation, Kernel, Measure, NormalOf, Normalization, Obstacle, ObstacleStiffness,
+    PrescribedBound, SLIP_PART, Smoothing, Transition, elastic_slip_rule,
 };
 pub use load::{Load, LoadFields, Rotation};
 pub use material::{Elasticity, Material, MaterialFields, Orthotropic};

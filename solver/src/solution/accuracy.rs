@@ -193,7 +193,7 @@ pub enum ErrorMethod {
     MeshHalved,
     /// No error: the quantity has no limit as the mesh is refined.
     NoLimit,
-    /// No error: there are too many ends of stick. Where stick and slip alternate from point to point, their places
+    /// No error: there are too many ends of stick, or some within the length of an edge. Where stick and slip alternate from point to point, their places
     /// depend on the mesh.
     TooMany,
     /// The error is unknown; the reasons of the verdict say why.

@@ -244,8 +244,8 @@ pub struct ContactSummary {
     /// For an obstacle with a load or a tilt: the angle by which it has turned, counter-clockwise (radians).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tilt: Option<f64>,
-    /// For an obstacle with a load or a tilt: its force `[x, y]` on the body (force), the sum of pressures and friction as
-    /// vectors. On a curved boundary `normal_force` and `tangential_force`, sums along each point's own normal and tangent,
+    /// The force `[x, y]` on the body (force), the sum of pressures and friction as vectors; in axisymmetry along the axis alone.
+    /// Absent in results of older versions. On a curved boundary `normal_force` and `tangential_force`, sums along each point's own normal and tangent,
     /// differ from its components.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force: Option<[f64; 2]>,
@@ -420,6 +420,8 @@ pub enum WarningCode {
     LowestPointIsZero,
     /// Points of an obstacle that scatter as measured ones do, without a standard deviation.
     NoiseUndeclared,
+    /// A smoothed profile, in which undulations as high as the noise are lost.
+    UndulationsUnseen,
     /// A contact boundary with a corner between two edges.
     ContactTurns,
     /// The middle of an obstacle at an end of the contact, where the body's side is free.
@@ -430,6 +432,8 @@ pub enum WarningCode {
     RadialDrag,
     /// Materials that meet on the surface in contact, where the pressure has no limit.
     MaterialJunction,
+    /// Two bodies in contact of which the much coarser one carries the law.
+    CoarserSideCarriesLaw,
     /// Edges longer than the nonlocal radius.
     MeshTooCoarseForRadius,
     /// Few elements in the contact.
@@ -552,6 +556,7 @@ impl WarningCode {
             | PolygonInContact
             | PolygonTooCoarse
             | RangeCutsMesh
+            | CoarserSideCarriesLaw
             | MeshTooCoarseForContact
             | MeshTooCoarseForRadius => Severity::Warning,
             CentreNodesDropped
@@ -569,6 +574,7 @@ impl WarningCode {
             | FactorsSmall
             | ContactOpened
             | PeakSignUnknown
+            | UndulationsUnseen
             | FrictionBeyondContact => Severity::Note,
         }
     }

@@ -20,10 +20,12 @@ from ._whole import WholeProblem
 __all__ = [
     "AccuracyMode",
     "AdaptiveRefine",
+    "Against",
     "Algorithm",
     "Along",
     "Analysis",
     "Axisymmetric",
+    "BodyGap",
     "BoundTable",
     "BoundaryPart",
     "BoundaryValue",
@@ -440,8 +442,8 @@ Refine = Union[int, AdaptiveRefine]
 
 @dataclass(kw_only=True, repr=False)
 class MeshInput(Part):
-    """The body cut into elements: exactly one of `grid`, `inline`, `gmsh`, `abaqus`, `stored`; and names for parts of
-    it.
+    """The body cut into elements: exactly one of `grid`, `grids`, `inline`, `gmsh`, `abaqus`, `stored`; and names for
+    parts of it.
 
     abaqus: The text of an Abaqus or CalculiX deck: surfaces become boundaries, element sets groups, and node sets
         node sets and, where their nodes span edges, also boundaries. The deck's analysis is not used.
@@ -452,6 +454,9 @@ class MeshInput(Part):
     gmsh: The text of a Gmsh mesh (MSH 2.2 or 4.1, ASCII): physical curves become boundaries, physical surfaces
         groups, physical points node sets.
     grid: A grid of lines, with the boundaries `left`, `right`, `bottom`, `top`.
+    grids: Several grids by name, each a separate body that lies where its lines are: the boundaries of a grid
+        `roller` are `roller.left`, `roller.right`, `roller.bottom`, `roller.top`, and its elements are the group
+        `roller`.
     groups: Names for groups of elements, e.g. `{"inclusion": {"x": [1, 2], "y": [-1, 0]}}`.
     inline: Nodes and elements, written out.
     refine: How often every element is split into four (which multiplies the unknowns by four each time), or the
@@ -464,6 +469,7 @@ class MeshInput(Part):
     curves: dict[str, Curve] = field(default_factory=dict)
     gmsh: str | None = None
     grid: Grid | None = None
+    grids: dict[str, Grid] | None = None
     groups: dict[str, ElementRange] = field(default_factory=dict)
     inline: InlineMesh | None = None
     refine: Refine = 0
@@ -479,11 +485,208 @@ class MeshInput(Part):
             curves: dict[str, Curve] = ...,
             gmsh: str | None = ...,
             grid: Grid | JSON | None = ...,
+            grids: dict[str, Grid] | None = ...,
             groups: dict[str, ElementRange] = ...,
             inline: InlineMesh | JSON | None = ...,
             refine: Refine | JSON = ...,
             stored: str | None = ...,
         ) -> None: ...
+
+
+@dataclass(kw_only=True, repr=False)
+class Against(Part):
+    """The boundary of another elastic body.
+
+    boundary: Name of the boundary.
+    """
+
+    boundary: str
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            boundary: str,
+        ) -> None: ...
+
+
+Condition = Literal["unilateral", "bonded", "none"]
+"""The contact condition.
+
+`unilateral`: u_n ≤ gap, and only pressure: thesis (1.14).
+
+`bonded`: u_n = gap and u_t = d on all of Γ_C; stresses of either sign.
+
+`none`: No obstacle: only friction with a prescribed bound."""
+
+
+@dataclass(kw_only=True, repr=False)
+class BoundTable(Part):
+    """A friction bound by arc length.
+
+    bound: Friction bound τ at the places `s`, ≥ 0 (stress).
+    s: Arc length from the start of the named boundary, strictly increasing.
+    """
+
+    bound: Numbers
+    s: Numbers
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            bound: Numbers,
+            s: Numbers,
+        ) -> None: ...
+
+
+PrescribedBound = Union[float, BoundTable]
+"""A prescribed friction bound τ (stress)."""
+
+
+History = Literal["total", "incremental"]
+"""Whether friction depends on the load path.
+
+`total`: Friction depends on the total displacement, as in the thesis.
+
+`incremental`: Friction depends on the displacement since the point last slipped: each point keeps an anchor,
+docs/formulation.md 1.5. For the linear transition only."""
+
+
+Kernel = Literal["bump", "parabola"]
+"""Shape of the averaging kernel ω_ρ, thesis 1.2.1.
+
+`bump`: The bump C exp(ρ²/(x² − ρ²)), thesis (1.2).
+
+`parabola`: The parabola C (1 − x²/ρ²)."""
+
+
+Measure = Literal["line", "surface"]
+"""The domain of the averaging integral in axisymmetry.
+
+`line`: Arc length along the meridian, as in the thesis.
+
+`surface`: The contact surface itself, as rings."""
+
+
+Normalization = Literal["unit_integral", "peak_one", "conserving"]
+"""Scale of the averaging kernel.
+
+`unit_integral`: ∫ω = 1 on a line: tends to Coulomb's law as ρ → 0.
+
+`peak_one`: ω(0) = 1, the literal text of the thesis; friction then vanishes with ρ.
+
+`conserving`: As `unit_integral`, divided by the part of the integral that lies on the contact boundary: no friction
+is lost beyond its ends, and at full sliding friction is μ times the normal force. For `measure: line`."""
+
+
+FrictionPoints = Literal["gauss3", "nodal"]
+"""The points where friction is evaluated.
+
+`gauss3`: At three Gauss points per edge. On a coarse mesh and with a small elastic slip the tangential stress may
+oscillate inside stick.
+
+`nodal`: At the nodes; the tangential stress does not oscillate."""
+
+
+Transition = Literal["linear", "tanh"]
+"""The transition φ_ε from stick to slip, thesis (1.7).
+
+`linear`: min(|u|/ε, 1), thesis (1.7b).
+
+`tanh`: tanh(|u|/ε), thesis (1.7a)."""
+
+
+@dataclass(kw_only=True, repr=False)
+class Friction(Part):
+    """The nonlocal, nonlinear friction law of Oden and Pires, thesis (1.8): σ_t = −τ φ_ε(|u_t − d|) sign(u_t − d), τ =
+    min(shear_cap, cohesion + coefficient · S_ρ(p)) where S_ρ(p) > 0; or with a prescribed `bound` τ.
+
+    elastic_slip: Elastic slip ε > 0 (length): the tangential displacement at which the friction bound is reached.
+        It has no default, because it is a length. If it is not known from a measurement, take a thousandth of the
+        slip in the problem: of `indentation` or `tangential_displacement`, whichever is larger in size. Friction is
+        then close to Coulomb's; a smaller one needs a finer mesh.
+    bound: A prescribed τ ≥ 0 (Tresca's law) instead of coefficient, radius, cohesion and cap. It acts on all of
+        Γ_C, with or without contact.
+    coefficient: Friction coefficient μ ≥ 0 (the thesis's ν). Required unless `bound` is set.
+    cohesion: Cohesion ≥ 0 (stress), added to μ S wherever S > 0.
+    history: Whether friction depends on the load path.
+    kernel: Shape of the averaging kernel.
+    measure: The domain of the averaging integral in axisymmetry.
+    nonlocal_radius: Radius ρ ≥ 0 (length): the pressure is averaged over this distance. 0: Coulomb's local law.
+        Required unless `bound` is set.
+    normalization: Scale of the averaging kernel.
+    points: The points where friction is evaluated.
+    shear_cap: Upper limit of τ, > 0 (stress); absent: no limit.
+    transition: The transition φ_ε from stick to slip.
+    """
+
+    elastic_slip: float
+    bound: PrescribedBound | None = None
+    coefficient: float | None = None
+    cohesion: float = 0.0
+    history: History = "total"
+    kernel: Kernel = "bump"
+    measure: Measure = "line"
+    nonlocal_radius: float | None = None
+    normalization: Normalization = "unit_integral"
+    points: FrictionPoints = "gauss3"
+    shear_cap: float | None = None
+    transition: Transition = "linear"
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            elastic_slip: Real,
+            bound: PrescribedBound | JSON | None = ...,
+            coefficient: Real | None = ...,
+            cohesion: Real = ...,
+            history: History = ...,
+            kernel: Kernel = ...,
+            measure: Measure = ...,
+            nonlocal_radius: Real | None = ...,
+            normalization: Normalization = ...,
+            points: FrictionPoints = ...,
+            shear_cap: Real | None = ...,
+            transition: Transition = ...,
+        ) -> None: ...
+
+
+@dataclass(kw_only=True, repr=False)
+class BodyGap(Part):
+    """The distance of two bodies before deformation, the same everywhere: exactly one of its fields.
+
+    clearance: They are that far apart, ≥ 0 (length).
+    interference: They overlap by that much, > 0 (length), as a shaft in its hub; load steps scale it by
+        `indentation`.
+    """
+
+    clearance: float | None = None
+    interference: float | None = None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            clearance: Real | None = ...,
+            interference: Real | None = ...,
+        ) -> None: ...
+
+
+NormalOf = Literal["body", "obstacle", "mean"]
+"""The normal that a contact uses. On a sloping obstacle the body's and the obstacle's normal differ, and so do the
+forces.
+
+`body`: The body's outward normal, as in the thesis.
+
+`obstacle`: The normal of the obstacle where it faces the node; the gap is measured to the tangent there.
+
+`mean`: The mean of the body's normal and the opposite normal of the other body where it faces the node."""
 
 
 Along = Literal["x", "arc_length"]
@@ -889,160 +1092,6 @@ Obstacle = Union[Flat, Circle, Parabola, Wedge, Cone, Tilted, Power, RoundedFlat
 the boundary; or a curve in the plane."""
 
 
-Condition = Literal["unilateral", "bonded", "none"]
-"""The contact condition.
-
-`unilateral`: u_n ≤ gap, and only pressure: thesis (1.14).
-
-`bonded`: u_n = gap and u_t = d on all of Γ_C; stresses of either sign.
-
-`none`: No obstacle: only friction with a prescribed bound."""
-
-
-@dataclass(kw_only=True, repr=False)
-class BoundTable(Part):
-    """A friction bound by arc length.
-
-    bound: Friction bound τ at the places `s`, ≥ 0 (stress).
-    s: Arc length from the start of the named boundary, strictly increasing.
-    """
-
-    bound: Numbers
-    s: Numbers
-
-    if TYPE_CHECKING:
-
-        def __init__(
-            self,
-            *,
-            bound: Numbers,
-            s: Numbers,
-        ) -> None: ...
-
-
-PrescribedBound = Union[float, BoundTable]
-"""A prescribed friction bound τ (stress)."""
-
-
-History = Literal["total", "incremental"]
-"""Whether friction depends on the load path.
-
-`total`: Friction depends on the total displacement, as in the thesis.
-
-`incremental`: Friction depends on the displacement since the point last slipped: each point keeps an anchor,
-docs/formulation.md 1.5. For the linear transition only."""
-
-
-Kernel = Literal["bump", "parabola"]
-"""Shape of the averaging kernel ω_ρ, thesis 1.2.1.
-
-`bump`: The bump C exp(ρ²/(x² − ρ²)), thesis (1.2).
-
-`parabola`: The parabola C (1 − x²/ρ²)."""
-
-
-Measure = Literal["line", "surface"]
-"""The domain of the averaging integral in axisymmetry.
-
-`line`: Arc length along the meridian, as in the thesis.
-
-`surface`: The contact surface itself, as rings."""
-
-
-Normalization = Literal["unit_integral", "peak_one", "conserving"]
-"""Scale of the averaging kernel.
-
-`unit_integral`: ∫ω = 1 on a line: tends to Coulomb's law as ρ → 0.
-
-`peak_one`: ω(0) = 1, the literal text of the thesis; friction then vanishes with ρ.
-
-`conserving`: As `unit_integral`, divided by the part of the integral that lies on the contact boundary: no friction
-is lost beyond its ends, and at full sliding friction is μ times the normal force. For `measure: line`."""
-
-
-FrictionPoints = Literal["gauss3", "nodal"]
-"""The points where friction is evaluated.
-
-`gauss3`: At three Gauss points per edge. On a coarse mesh and with a small elastic slip the tangential stress may
-oscillate inside stick.
-
-`nodal`: At the nodes; the tangential stress does not oscillate."""
-
-
-Transition = Literal["linear", "tanh"]
-"""The transition φ_ε from stick to slip, thesis (1.7).
-
-`linear`: min(|u|/ε, 1), thesis (1.7b).
-
-`tanh`: tanh(|u|/ε), thesis (1.7a)."""
-
-
-@dataclass(kw_only=True, repr=False)
-class Friction(Part):
-    """The nonlocal, nonlinear friction law of Oden and Pires, thesis (1.8): σ_t = −τ φ_ε(|u_t − d|) sign(u_t − d), τ =
-    min(shear_cap, cohesion + coefficient · S_ρ(p)) where S_ρ(p) > 0; or with a prescribed `bound` τ.
-
-    elastic_slip: Elastic slip ε > 0 (length): the tangential displacement at which the friction bound is reached.
-        It has no default, because it is a length. If it is not known from a measurement, take a thousandth of the
-        slip in the problem: of `indentation` or `tangential_displacement`, whichever is larger in size. Friction is
-        then close to Coulomb's; a smaller one needs a finer mesh.
-    bound: A prescribed τ ≥ 0 (Tresca's law) instead of coefficient, radius, cohesion and cap. It acts on all of
-        Γ_C, with or without contact.
-    coefficient: Friction coefficient μ ≥ 0 (the thesis's ν). Required unless `bound` is set.
-    cohesion: Cohesion ≥ 0 (stress), added to μ S wherever S > 0.
-    history: Whether friction depends on the load path.
-    kernel: Shape of the averaging kernel.
-    measure: The domain of the averaging integral in axisymmetry.
-    nonlocal_radius: Radius ρ ≥ 0 (length): the pressure is averaged over this distance. 0: Coulomb's local law.
-        Required unless `bound` is set.
-    normalization: Scale of the averaging kernel.
-    points: The points where friction is evaluated.
-    shear_cap: Upper limit of τ, > 0 (stress); absent: no limit.
-    transition: The transition φ_ε from stick to slip.
-    """
-
-    elastic_slip: float
-    bound: PrescribedBound | None = None
-    coefficient: float | None = None
-    cohesion: float = 0.0
-    history: History = "total"
-    kernel: Kernel = "bump"
-    measure: Measure = "line"
-    nonlocal_radius: float | None = None
-    normalization: Normalization = "unit_integral"
-    points: FrictionPoints = "gauss3"
-    shear_cap: float | None = None
-    transition: Transition = "linear"
-
-    if TYPE_CHECKING:
-
-        def __init__(
-            self,
-            *,
-            elastic_slip: Real,
-            bound: PrescribedBound | JSON | None = ...,
-            coefficient: Real | None = ...,
-            cohesion: Real = ...,
-            history: History = ...,
-            kernel: Kernel = ...,
-            measure: Measure = ...,
-            nonlocal_radius: Real | None = ...,
-            normalization: Normalization = ...,
-            points: FrictionPoints = ...,
-            shear_cap: Real | None = ...,
-            transition: Transition = ...,
-        ) -> None: ...
-
-
-NormalOf = Literal["body", "obstacle"]
-"""The normal that a contact uses. On a sloping obstacle the body's and the obstacle's normal differ, and so do the
-forces.
-
-`body`: The body's outward normal, as in the thesis.
-
-`obstacle`: The normal of the obstacle where it faces the node; the gap is measured to the tangent there."""
-
-
 @dataclass(kw_only=True, repr=False)
 class ObstacleStiffness(Part):
     """Springs between an obstacle and the ground, each against a motion that a force or moment causes.
@@ -1069,25 +1118,30 @@ class ObstacleStiffness(Part):
 
 @dataclass(kw_only=True, repr=False)
 class Contact(Part):
-    """A boundary that may touch a rigid obstacle.
+    """A boundary that may touch a rigid obstacle or another elastic body.
 
     boundary: Name of the boundary.
-    obstacle: The obstacle that faces the boundary.
     about: The point `[x, y]` of `tilt` and `moment`, through which `normal_force` and `tangential_force` act.
+    against: The boundary of another elastic body that faces this one, in place of an obstacle. This boundary
+        carries the law: it should be the finer one, or of equally fine ones that which is covered as a whole.
     condition: The contact condition.
     direction: The direction `[x, y]` that the indentation moves the obstacle along, as a rigid body; its length
         does not matter. Absent: against the body's normal at each node, which on a curved boundary is no motion of
         a rigid body. An obstacle with a force, a moment or a tilt moves as a rigid body, and needs a direction on a
         curved boundary.
     friction: The friction law; absent: frictionless.
+    gap: The distance of the two bodies before deformation, the same everywhere, in place of the distance of their
+        meshes: for curved bodies that fit one another, whose meshes overlap or gape by more than the bodies do.
     indentation: How far the obstacle is pushed against the body (length, either sign): gap = profile − indentation.
     moment: The moment on the body about `about`, counter-clockwise (force × length), instead of a tilt: the
         obstacle turns until it is in equilibrium. A normal force P at a distance e from `about` along t is a moment
         −P e about that point.
-    normal: The direction that gap and normal displacement are measured along.
+    normal: The direction that gap and normal displacement are measured along; absent: `body`, and `mean` against
+        another body.
     normal_force: The force that presses the obstacle against the body (force, as `normal_force` of the summary; in
         a half model that of the half), instead of an indentation: the obstacle moves along `direction` until it is
         in equilibrium.
+    obstacle: The rigid obstacle that faces the boundary. Required unless `against` is set.
     stiffness: Springs between an obstacle under forces and the ground, such as the testing machine: they bear their
         part of the forces.
     tangential_displacement: Displacement of the obstacle along t, the outward normal turned clockwise (length). The
@@ -1098,15 +1152,17 @@ class Contact(Part):
     """
 
     boundary: str
-    obstacle: Obstacle
     about: Pair | None = None
+    against: Against | None = None
     condition: Condition = "unilateral"
     direction: Pair | None = None
     friction: Friction | None = None
+    gap: BodyGap | None = None
     indentation: float = 0.0
     moment: float | None = None
-    normal: NormalOf = "body"
+    normal: NormalOf | None = None
     normal_force: float | None = None
+    obstacle: Obstacle | None = None
     stiffness: ObstacleStiffness | None = None
     tangential_displacement: float = 0.0
     tangential_force: float | None = None
@@ -1118,15 +1174,17 @@ class Contact(Part):
             self,
             *,
             boundary: str,
-            obstacle: Obstacle | JSON,
             about: Pair | None = ...,
+            against: Against | JSON | None = ...,
             condition: Condition = ...,
             direction: Pair | None = ...,
             friction: Friction | JSON | None = ...,
+            gap: BodyGap | JSON | None = ...,
             indentation: Real = ...,
             moment: Real | None = ...,
-            normal: NormalOf = ...,
+            normal: NormalOf | None = ...,
             normal_force: Real | None = ...,
+            obstacle: Obstacle | JSON | None = ...,
             stiffness: ObstacleStiffness | JSON | None = ...,
             tangential_displacement: Real = ...,
             tangential_force: Real | None = ...,

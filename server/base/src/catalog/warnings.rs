@@ -131,6 +131,9 @@ fn reasons(code: WarningCode) -> (&'static str, &'static str) {
         MaterialJunction => (
             "Where two materials meet at the surface in contact, the pressure has no limit as the mesh is refined. Its value at that node depends on the mesh alone.",
             "Use forces, and the pressure averaged over a length. Do not quote the peak."),
+        CoarserSideCarriesLaw => (
+            "Pressure and friction live on the nodes of the boundary that carries the law. Where it is much coarser than the boundary that faces it, the finer mesh opposite is of no use.",
+            "Let `boundary` and `against` change places, or refine the boundary that carries the law."),
         MeshTooCoarseForRadius => (
             "The averaged pressure S_ρ is an integral over a length 2ρ. Where edges are longer than ρ, the mesh and not the law decides what is averaged: the result is nearly that of Coulomb's law on this mesh, and σ_t has the mesh's own peaks.",
             "Refine the contact until edges are at most ρ/2, or set mesh.refine to a tolerance, which does it where it matters."),
@@ -188,6 +191,9 @@ fn reasons(code: WarningCode) -> (&'static str, &'static str) {
         OscillatingStick => (
             "Inside stick, σ_t alternates from point to point and cancels in the sum. Forces are right, single values of σ_t are not.",
             "Refine the mesh there, or raise elastic_slip: a thousandth of the indentation or of the obstacle's displacement along the surface, whichever is larger, is small enough where it is not known from a measurement. Or choose \"points\": \"nodal\", or read σ_t as means over edges."),
+        UndulationsUnseen => (
+            "A curve through noisy points cannot show what is as small as the noise. The pressure follows the curvature, so that a low undulation of short wavelength may change it much.",
+            "Nothing, if the surface is known to be smooth, as a ground or a lapped one. Else measure more points or more exactly, and compare."),
         PeakSignUnknown => (
             "The largest tangential stresses of the two directions differ by less than their error. Which is the larger, and with it the sign and the place of `peak_tangential_stress`, may change with the mesh; its size does not.",
             "Quote the size of the peak, or read both peaks from the profile. A finer mesh tells which is the larger."),

@@ -225,6 +225,7 @@ pub fn row_of(number: usize, error: SolveError) -> Result<MemberRow, SolveError>
         SolveError::Invalid(violations) => return Ok(MemberRow::invalid(number, violations)),
         SolveError::SingularSystem { .. }
         | SolveError::Unheld { .. }
+        | SolveError::BodiesUnheld
         | SolveError::ObstacleUnheld { .. } => Reason::SingularSystem,
         SolveError::NonFinite { .. } => Reason::NonFinite,
         SolveError::ResourceExhausted { .. } => Reason::ResourceExhausted,

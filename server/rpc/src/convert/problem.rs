@@ -24,13 +24,16 @@ impl FromMessage<pb::Mesh> for MeshInput {
         } = message;
         let source = match source {
             Some(mesh::Source::Grid(grid)) => read.field("grid", grid).map(MeshSource::Grid),
+            Some(mesh::Source::Grids(grids)) => {
+                read.field("grids", grids.grids).map(MeshSource::Grids)
+            }
             Some(mesh::Source::Inline(inline)) => {
                 read.field("inline", inline).map(MeshSource::Inline)
             }
             Some(mesh::Source::Gmsh(text)) => Some(MeshSource::Gmsh(text)),
             Some(mesh::Source::Abaqus(text)) => Some(MeshSource::Abaqus(text)),
             Some(mesh::Source::Stored(hash)) => Some(MeshSource::Stored(hash)),
-            None => read.missing("one of grid, inline, gmsh, abaqus, stored"),
+            None => read.missing("one of grid, grids, inline, gmsh, abaqus, stored"),
         };
         let refine = match refinement {
             Some(mesh::Refinement::Refine(times)) => Some(Refine::Times(times)),
@@ -63,6 +66,9 @@ impl From<MeshInput> for pb::Mesh {
         } = ours;
         let source = match source {
             MeshSource::Grid(grid) => mesh::Source::Grid(grid.into()),
+            MeshSource::Grids(grids) => mesh::Source::Grids(pb::Grids {
+                grids: grids.into_message(),
+            }),
             MeshSource::Inline(inline) => mesh::Source::Inline(inline.into()),
             MeshSource::Gmsh(text) => mesh::Source::Gmsh(text),
             MeshSource::Abaqus(text) => mesh::Source::Abaqus(text),

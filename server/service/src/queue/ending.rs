@@ -50,6 +50,7 @@ impl From<SolveError> for NoSolution {
             SolveError::Stopped => NoSolution::Stopped,
             SolveError::SingularSystem { .. }
             | SolveError::Unheld { .. }
+            | SolveError::BodiesUnheld
             | SolveError::ObstacleUnheld { .. } => {
                 NoSolution::Failed(Reason::SingularSystem, detail)
             }

@@ -519,7 +519,7 @@ impl PatchView<'_> {
         });
         let (slope, n) = (place.profile.slope, place.normal);
         let slope = match contact.normal {
-            NormalOf::Body => 0.0,
+            NormalOf::Body | NormalOf::Mean => 0.0,
             NormalOf::Obstacle => slope,
         };
         let cosine = 1.0 / slope.hypot(1.0);

@@ -82,7 +82,7 @@ impl PatchView<'_> {
         let near = before.distance + dot(by, n) - before.slope * dot(by, t);
         let after = displaced.profile(i, by, near)?;
         let (slope, change, moved) = match contact.normal {
-            NormalOf::Body => (0.0, 0.0, 0.0),
+            NormalOf::Body | NormalOf::Mean => (0.0, 0.0, 0.0),
             NormalOf::Obstacle => {
                 let slope = -dot(m, t) / cosine;
                 let tangent = contact.boundary.tangent(i);

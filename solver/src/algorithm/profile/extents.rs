@@ -4,8 +4,7 @@ use std::cmp::Ordering;
 
 use super::quantities::EndOfContact;
 use super::{Highest, PatchView};
-use crate::body::AXIS_SHARE;
-use crate::contact::edge_nodes;
+use crate::contact::{AXIS_SHARE, edge_nodes};
 use crate::element::edge3;
 use crate::element::gauss::GAUSS_3;
 use crate::friction::BoundLaw;
@@ -45,7 +44,10 @@ impl PatchView<'_> {
             indentation: tool.map(|_| indentation),
             tangential_displacement: tool.map(|_| tangential_displacement),
             tilt: tool.map(|_| tilt),
-            force: tool.map(|tool| tool.force([loads[0], loads[1]])),
+            force: Some(match tool {
+                Some(tool) => tool.force([loads[0], loads[1]]),
+                None => self.resultant(),
+            }),
             moment: tool.map(|_| loads[2]),
             normal: self.patch.contact.normal,
             normal_force: circumference * self.system.normal_force(range, &self.forces.reactions),

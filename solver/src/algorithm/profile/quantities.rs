@@ -55,8 +55,6 @@ pub struct Quantity {
     pub between_at: Vec<(usize, f64)>,
     /// The edges on which the obstacle has a shape that the nodes do not see, with their parts in any unit.
     pub unseen_at: Vec<(usize, f64)>,
-    /// Of a peak of σ_t: the largest σ_t in the other direction (stress, ≥ 0); else 0.
-    pub opposite: f64,
     /// The number of equal parts of the contact, of which one is modelled: two if it continues beyond a line of
     /// symmetry.
     pub images: f64,
@@ -252,7 +250,6 @@ impl PatchView<'_> {
             unseen: 0.0,
             sharp_end: 0.0,
             sharp_end_at: Vec::new(),
-            opposite: 0.0,
             spacing_at: Vec::new(),
             between_at: Vec::new(),
             unseen_at: Vec::new(),
@@ -302,8 +299,10 @@ impl PatchView<'_> {
         let by_edge = self.between_points();
         let left_open = self.open_friction();
         let open: f64 = left_open.iter().map(|(_, force)| force).sum();
+        let bonded = self.bonded_at_kinks();
+        let jumps: f64 = bonded.iter().map(|(_, force)| force).sum();
         let canceling_at = self.canceling().into_iter().map(f64::abs).enumerate();
-        let open_at: Vec<(usize, f64)> = canceling_at.chain(left_open).collect();
+        let open_at: Vec<(usize, f64)> = canceling_at.chain(left_open).chain(bonded).collect();
         let between = [
             by_edge.iter().sum::<f64>(),
             by_edge.iter().map(|part| part.abs()).sum(),
@@ -323,6 +322,10 @@ impl PatchView<'_> {
                 QuantityName::TangentialForce => circumference * between[0].abs(),
                 _ => circumference * between[1],
             },
+            unresolved: match name {
+                QuantityName::NormalForce => 0.0,
+                _ => circumference * jumps,
+            },
             sharp_end: match name {
                 QuantityName::NormalForce => 0.0,
                 _ => circumference * sharp_end,
@@ -338,7 +341,7 @@ impl PatchView<'_> {
     /// The motions of an obstacle under loads: those that the loads cause, and the indentation in any case, to which the others
     /// are compared.
     fn motions_of_obstacle(&self) -> Vec<Quantity> {
-        let Some(tools) = &self.system.tools else {
+        let Some(opposite) = &self.system.opposite else {
             return Vec::new();
         };
         let tool = self.patch.contact.tool.as_ref();
@@ -352,9 +355,9 @@ impl PatchView<'_> {
         ];
         let mut found = Vec::new();
         for (k, name) in names.into_iter().enumerate() {
-            let number = tools.number(self.p, k);
+            let number = opposite.number(self.p, k);
             if number.is_some() || k == 0 {
-                let gradient = number.map(|n| Gradient::of_motion(self.system, tools, n));
+                let gradient = number.map(|n| Gradient::of_motion(self.system, opposite, n));
                 found.push(self.quantity(name, self.motions[k], gradient));
             }
         }
@@ -411,7 +414,6 @@ impl PatchView<'_> {
                     + self.bound_of_parabolas(stress),
                 sharp_end: at_sharp_ends.iter().fold(0.0, |most, at| most.max(at.1)),
                 sharp_end_at: at_sharp_ends,
-                opposite: self.opposite_traction(stress),
                 estimable: limited(!self.averages_nothing() || !self.pressure_without_limit()),
                 ..self.quantity(QuantityName::PeakTangentialStress, stress, Some(gradient))
             });
@@ -458,7 +460,7 @@ impl PatchView<'_> {
         turns.retain(|(edge, _, slope)| touches(*edge) && slope.abs() > steady);
         // as many as of the whole, of which this may be a half
         let most = MOST_STICK_ENDS / (1 + self.mirrored_ends());
-        let few = turns.len() <= most;
+        let few = turns.len() <= most && !self.alternates(&turns);
         turns.truncate(most);
         for (edge, xi, slope) in turns {
             let point = self.point(edge, xi);
@@ -483,6 +485,27 @@ impl PatchView<'_> {
             found.extend(at_nodes);
         }
         found
+    }
+
+    /// Whether the body sticks, between slip to one and the same side, or slips, between parts that stick, on less than the length of
+    /// an edge: another mesh has it elsewhere, or not at all. `turns`: the ends of stick, in order.
+    fn alternates(&self, turns: &[(usize, f64, f64)]) -> bool {
+        let boundary = &self.patch.contact.boundary;
+        let at = |(edge, xi, _): &(usize, f64, f64)| {
+            let arc = boundary.edge_arc(*edge);
+            let side = self.slip_at(*edge, *xi) > 0.0;
+            (
+                edge3::interpolate(&edge3::shape(*xi), &arc),
+                side,
+                arc[1] - arc[0],
+            )
+        };
+        let mut places: Vec<(f64, bool, f64)> = turns.iter().map(at).collect();
+        places.sort_by(|a, b| a.0.total_cmp(&b.0));
+        places.windows(2).any(|pair| {
+            let ((start, side, length), (end, other, _)) = (pair[0], pair[1]);
+            side == other && end > start && end - start < length
+        })
     }
 
     /// The ends of stick that are no place where the slip passes ε: at a node the slip reaches ε, and stays there. `known`:

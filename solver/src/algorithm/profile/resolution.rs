@@ -9,6 +9,7 @@ use crate::contact::edge_nodes;
 use crate::element::edge3;
 use crate::element::gauss::GAUSS_3;
 use crate::friction::BoundLaw;
+use crate::problem::Condition;
 
 /// The number of halvings of a quarter of an edge in the search for a jump: down to 1/256 of the quarter.
 const HALVINGS: u32 = 8;
@@ -44,6 +45,10 @@ const FEW_STICK: usize = 3;
 /// The error of the friction force where a part sticks between friction points, as a part of the friction between two of them;
 /// calibrated.
 const UNSEEN_STICK: f64 = 1.2;
+
+/// What a jump of σ_t at a node takes from the tangential force of a bonded contact, as a part of the largest σ_t on an edge beside it
+/// times the length of the edge: wedges show 0.22 (`tests/verification/bonded_wedges.rs`).
+const OF_JUMP: f64 = 0.3;
 
 /// The error of the friction force at a kink, as a part of the friction force on the edges beside the kink; calibrated.
 const AT_KINKS: f64 = 0.2;
@@ -403,6 +408,33 @@ impl PatchView<'_> {
         let part = AT_KINKS / (with_kinks.len().max(1) as f64).sqrt();
         let open = |edge: usize| (edge, part * self.friction_on(edge));
         beside.into_iter().map(open).collect()
+    }
+
+    /// The error of the tangential force of a bonded contact at kinks of its obstacle, by the edges beside them (force, without 2π):
+    /// there σ_t jumps from one side to the other, and is zero at a node on the kink.
+    pub(super) fn bonded_at_kinks(&self) -> Vec<(usize, f64)> {
+        let contact = self.patch.contact;
+        if contact.condition != Condition::Bonded {
+            return Vec::new();
+        }
+        let last = self.count() - 1;
+        let places = contact.places.iter().filter(|place| place.kink != 0.0);
+        let mut beside: BTreeSet<usize> = places
+            .flat_map(|place| self.neighbours(place.edge))
+            .collect();
+        for (end, slope) in [(0, contact.end_slopes[0]), (last, contact.end_slopes[1])] {
+            if slope != 0.0 && self.symmetric(end) {
+                beside.insert(end.saturating_sub(1) / 2);
+            }
+        }
+        let jump = |edge: usize| {
+            let stresses = [-1.0, 0.0, 1.0].map(|xi| self.tangential_stress_at(edge, xi).abs());
+            (
+                edge,
+                OF_JUMP * self.weight(edge) * stresses.into_iter().fold(0.0, f64::max),
+            )
+        };
+        beside.into_iter().map(jump).collect()
     }
 
     /// By edge, the friction on parts that stick where the motion turns, if few friction points are inside (force, without

@@ -67,17 +67,4 @@ impl PatchView<'_> {
             (start + 4.0 * middle + end) / 6.0
         })
     }
-
-    /// The largest σ_t opposite to the peak σ_t = `stress` (stress, > 0), at friction points and where stick ends; 0 if there is none.
-    pub(super) fn opposite_traction(&self, stress: f64) -> f64 {
-        let points = self.system.points.iter().zip(&self.finished.tractions);
-        let own = points.filter(|(point, _)| point.patch == self.p);
-        let at_points = own.map(|(_, traction)| *traction);
-        let at_ends = self.turns().into_iter();
-        let at_ends = at_ends.map(|(edge, xi)| self.tangential_stress_at(edge, xi));
-        let opposite = at_points
-            .chain(at_ends)
-            .map(|traction| -stress.signum() * traction);
-        opposite.fold(0.0, f64::max)
-    }
 }

@@ -155,9 +155,14 @@ fn held_on_one_side(moves: &BTreeMap<u32, [f64; 2]>, contacts: &[ContactModel]) 
     for contact in contacts {
         let boundary = &contact.boundary;
         for (i, node) in boundary.nodes.iter().enumerate() {
-            let Some(moved) = moves.get(node) else {
+            let facing = contact.pair.as_ref().and_then(|pair| pair.nearest(i));
+            let facing = facing.and_then(|node| moves.get(&node));
+            let own = moves.get(node);
+            if own.is_none() && facing.is_none() {
                 continue;
-            };
+            }
+            let [own, facing] = [own, facing].map(|moved| moved.copied().unwrap_or_default());
+            let moved = [own[0] - facing[0], own[1] - facing[1]];
             let along = |[x, y]: [f64; 2]| x * moved[0] + y * moved[1];
             let error = boundary.normal_errors[i] * moved[0].hypot(moved[1]);
             if contact.condition == Condition::Unilateral {
@@ -240,9 +245,9 @@ pub(super) fn free_motions(
     let mut held = directions(fixed);
     held.extend(hindered);
     let parts = Parts::new(mesh, section.axisymmetric());
-    let rows = parts.rows(&held);
+    let (rows, mechanisms) = parts.rows(&held);
     let mut found = Vec::new();
-    for together in parts.mechanisms(&rows) {
+    for together in mechanisms {
         let nodes = together
             .iter()
             .flat_map(|p| &parts.parts[*p as usize].nodes);
@@ -283,11 +288,13 @@ fn directions(fixed: &BTreeMap<u32, Held>) -> Vec<Hold> {
                 node,
                 direction,
                 error,
+                facing: None,
             }),
             Held::Both(_) => held.extend([[1.0, 0.0], [0.0, 1.0]].map(|direction| Hold {
                 node,
                 direction,
                 error: 0.0,
+                facing: None,
             })),
         }
     }
@@ -304,10 +311,10 @@ fn hindered(contact: &ContactModel) -> Vec<Hold> {
     let mut hindered = Vec::new();
     for i in 0..boundary.nodes.len() {
         if normal {
-            hindered.push(Hold::along_normal(boundary, i));
+            hindered.push(Hold::along_normal(contact, i));
         }
         if tangent {
-            hindered.push(Hold::along_tangent(boundary, i));
+            hindered.push(Hold::along_tangent(contact, i));
         }
     }
     hindered

@@ -11,7 +11,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::super::checks::ALIGNED;
-use crate::contact::ContactBoundary;
+use super::super::contact_model::ContactModel;
 use crate::mesh::Mesh;
 
 /// The largest number of parts in one mechanism that are examined: the elimination is cubic in them.
@@ -24,7 +24,7 @@ pub(super) const MOST_IN_MECHANISMS: usize = 10 * MOST_HINGED;
 /// pair gives four rows at most; each part has two rows of its own.
 const MOST_ROWS: usize = 14;
 
-/// A node, and a direction along which it is held.
+/// A node, and a direction along which it is held: by the ground, or by a node of another body that faces it.
 #[derive(Clone, Copy, Debug)]
 pub struct Hold {
     /// The node.
@@ -33,12 +33,16 @@ pub struct Hold {
     pub direction: [f64; 2],
     /// The error of the direction, if it is the direction of a curved surface (angle).
     pub error: f64,
+    /// The node of another body, relative to which it is held.
+    pub facing: Option<u32>,
 }
 
 impl Hold {
     /// A contact node that is held along the normal.
-    pub fn along_normal(boundary: &ContactBoundary, i: usize) -> Hold {
+    pub fn along_normal(contact: &ContactModel, i: usize) -> Hold {
+        let boundary = &contact.boundary;
         Hold {
+            facing: contact.pair.as_ref().and_then(|pair| pair.nearest(i)),
             node: boundary.nodes[i],
             direction: boundary.normals[i],
             error: boundary.normal_errors[i],
@@ -46,12 +50,22 @@ impl Hold {
     }
 
     /// A contact node that is held along the tangent.
-    pub fn along_tangent(boundary: &ContactBoundary, i: usize) -> Hold {
+    pub fn along_tangent(contact: &ContactModel, i: usize) -> Hold {
         Hold {
-            direction: boundary.tangent(i),
-            ..Hold::along_normal(boundary, i)
+            direction: contact.boundary.tangent(i),
+            ..Hold::along_normal(contact, i)
         }
     }
+}
+
+/// A place of a part, and a direction along which it is held.
+#[derive(Clone, Copy, Debug)]
+struct OnPart {
+    part: u32,
+    place: [f64; 2],
+    direction: [f64; 2],
+    /// As [`Hold::error`].
+    error: f64,
 }
 
 /// What is known about parts that nothing holds.
@@ -123,6 +137,12 @@ impl Part {
     fn row(&self, place: [f64; 2], [a, b]: [f64; 2]) -> Motion {
         let [x, y] = [0, 1].map(|i| (place[i] - self.centre[i]) / self.size);
         [a, b, b * x - a * y]
+    }
+
+    /// A row of coefficients of the motions of another part, as a row of those of this part: the same motions of the plane.
+    fn seen_from(&self, other: &Part, [a, b, c]: Motion) -> Motion {
+        let [x, y] = [0, 1].map(|i| other.centre[i] - self.centre[i]);
+        [a, b, (b * x - a * y + c * other.size) / self.size]
     }
 
     /// The displacement of a place by a motion.
@@ -202,10 +222,11 @@ impl<'a> Parts<'a> {
 
     /// The free motions that remain if the nodes `held` are held.
     pub(super) fn unheld(&self, held: &[Hold]) -> Vec<Unheld> {
-        let rows = self.rows(held);
+        let (single, relative) = self.on_parts(held);
+        let rows = self.rows_of(single, &relative);
         let mut found = Vec::new();
         let mut examined = 0;
-        for parts in self.mechanisms(&rows) {
+        for parts in self.mechanisms(&rows, &relative) {
             if let [part] = parts[..] {
                 let number = part as usize;
                 let free = null_space(&rows[number], 3, self.parts[number].tolerance);
@@ -224,34 +245,88 @@ impl<'a> Parts<'a> {
                 found.push(Unheld::TooMany(parts.len(), node));
                 continue;
             }
-            found.extend(self.of_mechanism(&parts, &rows));
+            found.extend(self.of_mechanism(&parts, &rows, &relative));
         }
         found
     }
 
-    /// The rows that hold each part, directly or through parts that are held.
-    pub(super) fn rows(&self, held: &[Hold]) -> Vec<Vec<Motion>> {
-        let mut rows: Vec<Vec<Motion>> = vec![self.never.to_vec(); self.parts.len()];
-        let hold = |rows: &mut Vec<Vec<Motion>>, part: u32, node: u32, direction: [f64; 2]| {
-            let (rows, part) = (&mut rows[part as usize], &self.parts[part as usize]);
-            let row = part.row(self.mesh.nodes[node as usize], direction);
-            add(rows, row, part.tolerance);
-        };
-        let mut inexact: BTreeMap<u32, Vec<&Hold>> = BTreeMap::new();
+    /// The rows that hold each part, directly or through parts that are held, and the groups of the others that are hinged to or
+    /// face one another.
+    pub(super) fn rows(&self, held: &[Hold]) -> (Vec<Vec<Motion>>, Vec<Vec<u32>>) {
+        let (single, relative) = self.on_parts(held);
+        let rows = self.rows_of(single, &relative);
+        let mechanisms = self.mechanisms(&rows, &relative);
+        (rows, mechanisms)
+    }
+
+    /// What holds a part by the ground, and what holds two parts relative to one another.
+    fn on_parts(&self, held: &[Hold]) -> (Vec<OnPart>, Vec<(u32, OnPart)>) {
+        let (mut single, mut relative) = (Vec::new(), Vec::new());
         for one in held {
             for &part in self.of(one.node).iter().filter(|part| **part != u32::MAX) {
-                hold(&mut rows, part, one.node, one.direction);
-                if one.error > 0.0 {
-                    inexact.entry(part).or_default().push(one);
+                let own = OnPart {
+                    part,
+                    place: self.mesh.nodes[one.node as usize],
+                    direction: one.direction,
+                    error: one.error,
+                };
+                match one.facing {
+                    None => single.push(own),
+                    Some(node) => {
+                        let others = self.of(node).iter().filter(|other| **other != u32::MAX);
+                        relative.extend(others.map(|other| (*other, own)));
+                    }
                 }
+            }
+        }
+        (single, relative)
+    }
+
+    /// The rows that hold each part, if those that face a part that is held are held by it.
+    fn rows_of(&self, mut single: Vec<OnPart>, relative: &[(u32, OnPart)]) -> Vec<Vec<Motion>> {
+        let mut used = vec![false; relative.len()];
+        loop {
+            let rows = self.rows_by_ground(&single);
+            let is_held = |part: u32| rows[part as usize].len() == 3;
+            let before = single.len();
+            for ((other, own), used) in relative.iter().zip(&mut used) {
+                if !*used && is_held(own.part) != is_held(*other) {
+                    let part = if is_held(own.part) { *other } else { own.part };
+                    single.push(OnPart { part, ..*own });
+                    *used = true;
+                }
+            }
+            if single.len() == before {
+                return rows;
+            }
+        }
+    }
+
+    /// The rows that hold each part, directly or through hinges with parts that are held.
+    fn rows_by_ground(&self, held: &[OnPart]) -> Vec<Vec<Motion>> {
+        let mut rows: Vec<Vec<Motion>> = vec![self.never.to_vec(); self.parts.len()];
+        let hold =
+            |rows: &mut Vec<Vec<Motion>>, part: u32, place: [f64; 2], direction: [f64; 2]| {
+                let (rows, part) = (&mut rows[part as usize], &self.parts[part as usize]);
+                let row = part.row(place, direction);
+                add(rows, row, part.tolerance);
+            };
+        let mut inexact: BTreeMap<u32, Vec<&OnPart>> = BTreeMap::new();
+        for one in held {
+            hold(&mut rows, one.part, one.place, one.direction);
+            if one.error > 0.0 {
+                inexact.entry(one.part).or_default().push(one);
             }
         }
         for (part, inexact) in inexact {
             if rows[part as usize].len() == 3 {
-                let of_part = |one: &&Hold| self.of(one.node).contains(&part);
-                let exact = held.iter().filter(|one| one.error == 0.0).filter(of_part);
-                let exact: Vec<&Hold> = exact.collect();
-                if let Some(firm) = self.firm(&self.parts[part as usize], &exact, &inexact) {
+                let exact = held
+                    .iter()
+                    .filter(|one| one.error == 0.0 && one.part == part);
+                let exact: Vec<&OnPart> = exact.collect();
+                if let Some(firm) =
+                    Self::firm(&self.parts[part as usize], self.never, &exact, &inexact)
+                {
                     rows[part as usize] = firm;
                 }
             }
@@ -265,12 +340,13 @@ impl<'a> Parts<'a> {
                 let Some(others) = self.shared.get(&node).filter(|_| passed.insert(node)) else {
                     continue;
                 };
+                let place = self.mesh.nodes[node as usize];
                 for &other in others {
                     if rows[other as usize].len() == 3 {
                         continue;
                     }
-                    hold(&mut rows, other, node, [1.0, 0.0]);
-                    hold(&mut rows, other, node, [0.0, 1.0]);
+                    hold(&mut rows, other, place, [1.0, 0.0]);
+                    hold(&mut rows, other, place, [0.0, 1.0]);
                     if rows[other as usize].len() == 3 {
                         settled.push(other);
                     }
@@ -282,10 +358,14 @@ impl<'a> Parts<'a> {
 
     /// The two rows that alone hold a part, if its third row is only an error of directions, as for a ring that can
     /// turn in a sleeve whose mesh is not an exact circle.
-    fn firm(&self, part: &Part, exact: &[&Hold], inexact: &[&Hold]) -> Option<Vec<Motion>> {
-        let at = |one: &Hold| self.mesh.nodes[one.node as usize];
-        let row = |one: &Hold| part.row(at(one), one.direction);
-        let mut rows = self.never.to_vec();
+    fn firm(
+        part: &Part,
+        never: &[Motion],
+        exact: &[&OnPart],
+        inexact: &[&OnPart],
+    ) -> Option<Vec<Motion>> {
+        let row = |one: &OnPart| part.row(one.place, one.direction);
+        let mut rows = never.to_vec();
         for one in exact {
             add(&mut rows, row(one), part.tolerance);
         }
@@ -303,17 +383,22 @@ impl<'a> Parts<'a> {
             return None;
         };
         let motion = [b * f - c * e, c * d - a * f, a * e - b * d];
-        let in_error = |one: &&Hold| {
-            let [x, y] = part.displacement(at(one), &motion);
+        let in_error = |one: &&OnPart| {
+            let [x, y] = part.displacement(one.place, &motion);
             let along = x * one.direction[0] + y * one.direction[1];
             along.abs() <= one.error * x.hypot(y) + part.tolerance
         };
         inexact.iter().all(in_error).then_some(rows)
     }
 
-    /// Groups of parts that are not held and are hinged to one another.
-    pub(super) fn mechanisms(&self, rows: &[Vec<Motion>]) -> Vec<Vec<u32>> {
+    /// Groups of parts that are not held and are hinged to one another, or held relative to one another.
+    fn mechanisms(&self, rows: &[Vec<Motion>], relative: &[(u32, OnPart)]) -> Vec<Vec<u32>> {
         let free = |part: u32| rows[part as usize].len() < 3;
+        let mut facing: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();
+        for (other, own) in relative {
+            facing.entry(*other).or_default().insert(own.part);
+            facing.entry(own.part).or_default().insert(*other);
+        }
         let mut seen = vec![false; self.parts.len()];
         let mut found = Vec::new();
         for start in (0..self.parts.len() as u32).filter(|part| free(*part)) {
@@ -324,6 +409,11 @@ impl<'a> Parts<'a> {
             let mut next = 0;
             while let Some(&part) = together.get(next) {
                 next += 1;
+                for &other in facing.get(&part).into_iter().flatten() {
+                    if free(other) && !std::mem::replace(&mut seen[other as usize], true) {
+                        together.push(other);
+                    }
+                }
                 for node in &self.parts[part as usize].nodes {
                     for &other in self.shared.get(node).into_iter().flatten() {
                         if free(other) && !std::mem::replace(&mut seen[other as usize], true) {
@@ -339,7 +429,12 @@ impl<'a> Parts<'a> {
     }
 
     /// The free motion of a group of hinged parts, if there is one.
-    fn of_mechanism(&self, parts: &[u32], rows: &[Vec<Motion>]) -> Option<Unheld> {
+    fn of_mechanism(
+        &self,
+        parts: &[u32],
+        rows: &[Vec<Motion>],
+        relative: &[(u32, OnPart)],
+    ) -> Option<Unheld> {
         let place: BTreeMap<u32, usize> = parts.iter().copied().zip(0..).collect();
         let columns = 3 * parts.len();
         let tolerance = parts
@@ -353,6 +448,15 @@ impl<'a> Parts<'a> {
                 whole[3 * i..3 * i + 3].copy_from_slice(row);
                 matrix.push(whole);
             }
+        }
+        for ([p, q], row) in self.relative_rows(&place, relative) {
+            let mut whole = vec![0.0; columns];
+            let of_other = self.parts[q as usize].seen_from(&self.parts[p as usize], row);
+            for (part, row) in [(p, row), (q, of_other.map(|v| -v))] {
+                let start = 3 * place[&part];
+                whole[start..start + 3].copy_from_slice(&row);
+            }
+            matrix.push(whole);
         }
         for [p, q, node] in self.hinges(&place) {
             let at = self.mesh.nodes[node as usize];
@@ -403,6 +507,30 @@ impl<'a> Parts<'a> {
             together: 1,
             more: free.len() - 1,
         }))
+    }
+
+    /// What holds two unheld parts relative to one another: at most three independent rows for each pair, of the motions of the
+    /// first.
+    fn relative_rows(
+        &self,
+        place: &BTreeMap<u32, usize>,
+        relative: &[(u32, OnPart)],
+    ) -> Vec<([u32; 2], Motion)> {
+        let mut pairs: BTreeMap<[u32; 2], Vec<Motion>> = BTreeMap::new();
+        for (other, own) in relative {
+            let inside = [other, &own.part]
+                .into_iter()
+                .all(|part| place.contains_key(part));
+            if inside && *other != own.part {
+                let pair = [(*other).min(own.part), (*other).max(own.part)];
+                let part = &self.parts[pair[0] as usize];
+                let row = part.row(own.place, own.direction);
+                add(pairs.entry(pair).or_default(), row, part.tolerance);
+            }
+        }
+        let each =
+            |(pair, rows): ([u32; 2], Vec<Motion>)| rows.into_iter().map(move |row| (pair, row));
+        pairs.into_iter().flat_map(each).collect()
     }
 
     /// Nodes that two unheld parts share, as (part, part, node): at most two for each pair, as far apart as possible,

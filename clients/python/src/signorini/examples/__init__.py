@@ -1,4 +1,5 @@
-"""The five examples of the thesis (A.C. Bolt, University of Cape Town, 1983, chapter 4), and a tool under loads.
+"""The five examples of the thesis (A.C. Bolt, University of Cape Town, 1983, chapter 4), a tool under loads, and two pairs of
+elastic bodies.
 
 Each function returns a new `Problem`, which may be changed. Parameters that are not given stay as in the thesis:
 rho is the nonlocal radius ρ (length), mu the coefficient of friction μ, epsilon the elastic slip ε (length). `refine`
@@ -13,7 +14,16 @@ from importlib import resources
 
 from ..problem import AdaptiveRefine, Friction, Problem
 
-__all__ = ["annular_punch", "cylinder", "cylinder_on_end", "rectangular_punch", "sheet", "tool_under_load"]
+__all__ = [
+    "annular_punch",
+    "cylinder",
+    "cylinder_on_end",
+    "press_fit",
+    "rectangular_punch",
+    "roller_on_block",
+    "sheet",
+    "tool_under_load",
+]
 
 
 def rectangular_punch(
@@ -56,6 +66,20 @@ def tool_under_load(
 ) -> Problem:
     """A flat punch that is free to move and to turn, under an eccentric force and a pull, plane strain."""
     return _example("tool_under_load", rho, mu, epsilon, refine)
+
+
+def roller_on_block(
+    rho: float | None = None, mu: float | None = None, epsilon: float | None = None, refine: float | None = None
+) -> Problem:
+    """An elastic roller that a load presses on an elastic block, half of both, plane strain."""
+    return _example("roller_on_block", rho, mu, epsilon, refine)
+
+
+def press_fit(
+    rho: float | None = None, mu: float | None = None, epsilon: float | None = None, refine: float | None = None
+) -> Problem:
+    """A hub that is shrunk on a shaft, half of both, axisymmetric."""
+    return _example("press_fit", rho, mu, epsilon, refine)
 
 
 def _example(name: str, rho: float | None, mu: float | None, epsilon: float | None, refine: float | None) -> Problem:

@@ -161,7 +161,7 @@ fn expected(pointer: &str, problem: &Problem) -> Body {
     let turned = problem
         .contacts
         .iter()
-        .any(|contact| contact.normal == solver::problem::NormalOf::Obstacle);
+        .any(|contact| contact.normal == Some(solver::problem::NormalOf::Obstacle));
     let parts: Vec<&str> = pointer.split('/').skip(1).collect();
     match parts[..] {
         ["title" | "units" | "steps" | "solver", ..] => Body::Same,

@@ -1,0 +1,324 @@
+//! Where two chains of edges face one another: dual multipliers on the edges of one of them, integrated segment by segment.
+//!
+//! On each edge of the chain that carries the law, with its shape functions h and the weight ds times the depth,
+//!
+//!   D = diag(∫hᵢ),   M = ∫h hᵀ,   ψ = D M⁻¹ h   (∫ψᵢ hⱼ = δᵢⱼ ∫hᵢ)
+//!   Pᵢₖ = Σ ∫ψᵢ h²ₖ(χ(s)) ds / Dᵢ,   gapᵢ = Σ ∫ψᵢ g(s) ds / Dᵢ,   Dᵢ = Σ ∫hᵢ over both edges
+//!
+//! χ projects along the field of normals, which is interpolated between the nodes, and g is the length of that projection. Where
+//! the other chain has a corner node, the integrals are split. A row of P adds up to 1.
+
+use super::{AXIS_SHARE, ContactBoundary, HeldDirections, aligned, edge_nodes};
+use crate::element::edge3;
+use crate::element::gauss::GAUSS_3;
+
+/// The largest angle between a mean normal and a line of symmetry in which it is put: 20°.
+const MIRRORED: f64 = 0.35;
+
+/// How far beyond its very ends the other chain is continued (part of its last edge).
+const BEYOND: f64 = 0.05;
+
+/// The number of equal parts of a segment that are integrated by three points each: exact for straight edges in one.
+const PARTS: usize = 2;
+
+/// Places of an edge that are closer than this, −1 … 1, are one.
+const SAME_PLACE: f64 = 1e-9;
+
+/// The number of halvings in the search for the place that faces a corner.
+const HALVINGS: u32 = 60;
+
+/// The least cosine between the normal of one chain and the opposite normal of the other where they face one another: 80°.
+const FACING: f64 = 0.17;
+
+/// How one chain follows the other.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Coupling {
+    /// By node: the nodes of the other chain, by their places in it, with their weights, which add up to 1. Empty at a node of
+    /// edges that are not covered.
+    pub rows: Vec<Vec<(usize, f64)>>,
+    /// The gap at each node, averaged by the multiplier (length).
+    pub gaps: Vec<f64>,
+    /// Whether the other chain faces all of an edge.
+    pub covered: Vec<bool>,
+}
+
+/// A place of the other chain that faces a place of this one.
+#[derive(Clone, Copy, Debug)]
+struct Hit {
+    edge: usize,
+    /// The place on that edge, −1 … 1.
+    eta: f64,
+    /// The distance along the normal, negative where the chains overlap.
+    gap: f64,
+}
+
+/// The chain that carries the law, and the one that faces it.
+struct Facing<'a> {
+    own: &'a ContactBoundary,
+    other: &'a ContactBoundary,
+}
+
+/// Couples the nodes of `own` to those of `other`. `depth`: the depth of the section at x; `axis_ends`: the ends on the axis of a
+/// body of revolution, each with the midside node beside it.
+pub fn couple(
+    own: &ContactBoundary,
+    other: &ContactBoundary,
+    depth: impl Fn(f64) -> f64,
+    axis_ends: &[[usize; 2]],
+) -> Coupling {
+    let facing = Facing { own, other };
+    let count = own.nodes.len();
+    let mut weights = vec![vec![0.0; other.nodes.len()]; count];
+    let (mut gaps, mut areas) = (vec![0.0; count], vec![0.0; count]);
+    let mut covered = vec![false; own.edge_count()];
+    for (edge, covered) in covered.iter_mut().enumerate() {
+        let Some(segments) = facing.segments(edge) else {
+            continue;
+        };
+        *covered = true;
+        let end = axis_ends
+            .iter()
+            .find(|[end, beside]| *beside == 2 * edge + 1 && edge_nodes(edge).contains(end));
+        let on_axis = end.and_then(|[end, _]| edge_nodes(edge).iter().position(|i| i == end));
+        let points = facing.points(edge, &segments, &depth, on_axis);
+        let dual = dual_shapes(&points);
+        for point in &points {
+            let psi: [f64; 3] =
+                std::array::from_fn(|i| (0..3).map(|j| dual[i][j] * point.shape[j]).sum());
+            let h = edge3::shape(point.hit.eta);
+            for (i, node) in edge_nodes(edge).into_iter().enumerate() {
+                areas[node] += point.weight * point.shape[i];
+                gaps[node] += point.weight * psi[i] * point.hit.gap;
+                for (k, there) in edge_nodes(point.hit.edge).into_iter().enumerate() {
+                    weights[node][there] += point.weight * psi[i] * h[k];
+                }
+            }
+        }
+    }
+    for i in (0..count).filter(|i| areas[*i] != 0.0) {
+        gaps[i] /= areas[i];
+        weights[i].iter_mut().for_each(|w| *w /= areas[i]);
+    }
+    // the unknown of the node beside the axis is what its end leaves of it: u₁ − a u₀
+    for &[end, beside] in axis_ends {
+        gaps[beside] += AXIS_SHARE * gaps[end];
+        let of_end = weights[end].clone();
+        let own = weights[beside].iter_mut().zip(of_end);
+        own.for_each(|(w, end)| *w += AXIS_SHARE * end);
+    }
+    let row = |weights: Vec<f64>| -> Vec<(usize, f64)> {
+        let all = weights.into_iter().enumerate();
+        all.filter(|(_, w)| *w != 0.0).collect()
+    };
+    Coupling {
+        rows: weights.into_iter().map(row).collect(),
+        gaps,
+        covered,
+    }
+}
+
+/// Turns the normals of a chain to the mean of its own and the opposite ones of the other chain where they face one another:
+/// (n₁ − n₂)/|n₁ − n₂|. On a line of symmetry, whose nodes are in `held`, it lies in the line.
+pub fn take_mean_normals(
+    own: &mut ContactBoundary,
+    other: &ContactBoundary,
+    held: &HeldDirections,
+) {
+    /// The place that a node faces depends on its normal.
+    const PASSES: usize = 2;
+    let outward = own.normals.clone();
+    for _ in 0..PASSES {
+        let facing = Facing { own, other };
+        let mean = |i: usize| {
+            let hit = facing.nearest(own.positions[i], own.normals[i])?;
+            let there = other.normal_at(hit.edge, hit.eta);
+            let [x, y] = [0, 1].map(|a| outward[i][a] - there[a]);
+            let length = x.hypot(y);
+            let mean = [x / length, y / length];
+            Some(match held.get(&own.nodes[i]) {
+                // beyond a line of symmetry both surfaces go on, mirrored
+                Some((direction, _)) => aligned(mean, *direction, MIRRORED),
+                None => mean,
+            })
+        };
+        let normals: Vec<_> = (0..own.nodes.len())
+            .map(|i| mean(i).unwrap_or(own.normals[i]).map(|n| n + 0.0))
+            .collect();
+        own.normals = normals;
+    }
+}
+
+/// A point of integration on an edge.
+struct Point {
+    /// The shape functions of the edge; beside the axis h₀ + a h₁ in place of h₀.
+    shape: [f64; 3],
+    weight: f64,
+    hit: Hit,
+}
+
+/// ψ = D M⁻¹ h on an edge: the coefficients of the shape functions in each ψ.
+fn dual_shapes(points: &[Point]) -> [[f64; 3]; 3] {
+    let sum = |f: &dyn Fn(&[f64; 3]) -> f64| -> f64 {
+        points.iter().map(|p| p.weight * f(&p.shape)).sum()
+    };
+    let mass: [[f64; 3]; 3] =
+        std::array::from_fn(|i| std::array::from_fn(|j| sum(&|h| h[i] * h[j])));
+    let area: [f64; 3] = std::array::from_fn(|i| sum(&|h| h[i]));
+    let minor = |i: usize, j: usize| {
+        let [a, b] = [(i + 1) % 3, (i + 2) % 3];
+        let [c, d] = [(j + 1) % 3, (j + 2) % 3];
+        mass[a][c] * mass[b][d] - mass[a][d] * mass[b][c]
+    };
+    let determinant: f64 = (0..3).map(|j| mass[0][j] * minor(0, j)).sum();
+    std::array::from_fn(|i| std::array::from_fn(|j| area[i] * minor(j, i) / determinant))
+}
+
+impl Facing<'_> {
+    /// The pieces of an edge between which another edge of the other chain faces it: their ends, and the number of that edge.
+    /// None if it does not face all of the edge.
+    fn segments(&self, edge: usize) -> Option<Vec<([f64; 2], usize)>> {
+        let mut places = vec![-1.0, 1.0];
+        for corner in (0..self.other.nodes.len()).step_by(2) {
+            places.extend(self.facing_corner(edge, corner));
+        }
+        places.sort_by(f64::total_cmp);
+        places.dedup_by(|a, b| *a - *b < SAME_PLACE);
+        // the last of two that are one is kept at the end of the edge
+        if let Some(last) = places.last_mut() {
+            *last = 1.0;
+        }
+        let segment = |ends: &[f64]| {
+            let [a, b] = [ends[0], ends[1]];
+            let (x, n) = self.own.place(edge, 0.5 * (a + b));
+            let there = self.nearest(x, n)?.edge;
+            // all of it
+            let inside = [a, b].into_iter().all(|xi| {
+                let (x, n) = self.own.place(edge, xi);
+                self.hit(x, n, there).is_some_and(|hit| {
+                    let [low, high] = self.reach(there, 10.0 * SAME_PLACE);
+                    (low..=high).contains(&hit.eta)
+                })
+            });
+            inside.then_some(([a, b], there))
+        };
+        places.windows(2).map(segment).collect()
+    }
+
+    /// The place of an edge that a corner node of the other chain faces.
+    fn facing_corner(&self, edge: usize, corner: usize) -> Option<f64> {
+        let at = self.other.positions[corner];
+        let off = |xi: f64| {
+            let (x, n) = self.own.place(edge, xi);
+            cross([at[0] - x[0], at[1] - x[1]], n)
+        };
+        let (mut low, mut high) = (-1.0, 1.0);
+        let (start, end) = (off(low), off(high));
+        if start * end >= 0.0 {
+            return None;
+        }
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            match off(middle) * start > 0.0 {
+                true => low = middle,
+                false => high = middle,
+            }
+        }
+        let xi = 0.5 * (low + high);
+        let (_, n) = self.own.place(edge, xi);
+        faces(n, self.other.normals[corner]).then_some(xi)
+    }
+
+    /// The range of places, −1 … 1, in which an edge of the other chain counts: its first and its last go on for a little.
+    fn reach(&self, edge: usize, rounding: f64) -> [f64; 2] {
+        let last = self.other.edge_count() - 1;
+        let beyond = |ends: bool| if ends { 2.0 * BEYOND } else { 0.0 } + rounding;
+        [-1.0 - beyond(edge == 0), 1.0 + beyond(edge == last)]
+    }
+
+    /// The place of an edge of the other chain that faces a place along a normal, also beyond its ends.
+    fn hit(&self, x: [f64; 2], n: [f64; 2], edge: usize) -> Option<Hit> {
+        let nodes = edge_nodes(edge);
+        let positions = nodes.map(|i| self.other.positions[i]);
+        let away = positions.map(|p| [p[0] - x[0], p[1] - x[1]]);
+        let roots = edge3::roots(&away.map(|a| cross(a, n))).into_iter();
+        let eta = roots.min_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+        let (there, _) = edge3::map(&away, eta);
+        let hit = Hit {
+            edge,
+            eta,
+            gap: there[0] * n[0] + there[1] * n[1],
+        };
+        hit.eta.is_finite().then_some(hit)
+    }
+
+    /// The nearest place of the other chain that faces a place along a normal.
+    fn nearest(&self, x: [f64; 2], n: [f64; 2]) -> Option<Hit> {
+        let hits = (0..self.other.edge_count()).filter_map(|edge| {
+            let hit = self.hit(x, n, edge)?;
+            let [low, high] = self.reach(edge, SAME_PLACE);
+            let inside = (low..=high).contains(&hit.eta);
+            (inside && faces(n, self.other.normal_at(edge, hit.eta))).then_some(hit)
+        });
+        hits.min_by(|a, b| a.gap.abs().total_cmp(&b.gap.abs()))
+    }
+
+    /// The points of integration on an edge. `on_axis`: which of its nodes (start, end) lies on the axis.
+    fn points(
+        &self,
+        edge: usize,
+        segments: &[([f64; 2], usize)],
+        depth: &impl Fn(f64) -> f64,
+        on_axis: Option<usize>,
+    ) -> Vec<Point> {
+        let positions = edge_nodes(edge).map(|i| self.own.positions[i]);
+        let mut points = Vec::new();
+        for &([a, b], there) in segments {
+            for part in 0..PARTS {
+                let step = (b - a) / PARTS as f64;
+                let middle = a + (part as f64 + 0.5) * step;
+                for (xi, w) in GAUSS_3 {
+                    let xi = middle + 0.5 * step * xi;
+                    let (x, n) = self.own.place(edge, xi);
+                    let Some(hit) = self.hit(x, n, there) else {
+                        continue;
+                    };
+                    let (_, [dx, dy]) = edge3::map(&positions, xi);
+                    let mut shape = edge3::shape(xi);
+                    if let Some(end) = on_axis {
+                        shape[end] += AXIS_SHARE * shape[2];
+                    }
+                    points.push(Point {
+                        shape,
+                        weight: 0.5 * step * w * dx.hypot(dy) * depth(x[0]),
+                        hit,
+                    });
+                }
+            }
+        }
+        points
+    }
+}
+
+impl ContactBoundary {
+    /// The position at a place of an edge, −1 … 1, and the normal there, interpolated between the nodes.
+    fn place(&self, edge: usize, xi: f64) -> ([f64; 2], [f64; 2]) {
+        let (x, _) = edge3::map(&edge_nodes(edge).map(|i| self.positions[i]), xi);
+        (x, self.normal_at(edge, xi))
+    }
+
+    /// The normal at a place of an edge (unit vector).
+    fn normal_at(&self, edge: usize, xi: f64) -> [f64; 2] {
+        let ([x, y], _) = edge3::map(&edge_nodes(edge).map(|i| self.normals[i]), xi);
+        let length = x.hypot(y);
+        [x / length, y / length]
+    }
+}
+
+/// Whether two surfaces with these outward normals face one another.
+fn faces(n: [f64; 2], other: [f64; 2]) -> bool {
+    n[0] * other[0] + n[1] * other[1] <= -FACING
+}
+
+fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}

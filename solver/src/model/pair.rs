@@ -1,0 +1,435 @@
+//! Contacts whose obstacle is another elastic body: their checks, and which nodes of that body each node of theirs follows.
+
+use std::collections::BTreeMap;
+
+use super::axis::Axis;
+use super::checks::Checks;
+use super::contact_model::ContactModel;
+use super::supports::Held;
+use crate::contact::mortar::{self, Coupling};
+use crate::contact::obstacle::FacingRun;
+use crate::contact::{ContactBoundary, HeldDirections, Profile, arc_lengths};
+use crate::elasticity::Section;
+use crate::error::{AllChecks, Checked, Reason, either};
+use crate::mesh::{self, Edge, Mesh};
+use crate::problem::{Condition, Contact, NormalOf};
+use crate::solution::WarningCode;
+
+/// The ratio of the lengths of facing edges above which the coarser side should not carry the law.
+const MUCH_COARSER: f64 = 3.0;
+
+/// The body that faces a contact.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pair {
+    /// The name of its boundary.
+    pub boundary: String,
+    /// The nodes of that boundary, in order.
+    pub nodes: Vec<u32>,
+    /// P: by node of the contact, nodes of the other body by their places in `nodes`, with weights that add up to 1.
+    pub rows: Vec<Vec<(usize, f64)>>,
+}
+
+impl Pair {
+    /// The node of the other body that a node of the contact follows most.
+    pub fn nearest(&self, i: usize) -> Option<u32> {
+        let most = self.rows[i].iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some(self.nodes[most.0])
+    }
+}
+
+/// A contact boundary, the part of it that an obstacle or another body faces.
+pub(super) struct Faced {
+    pub(super) boundary: ContactBoundary,
+    /// The body's own normals.
+    pub(super) outward: Vec<[f64; 2]>,
+    pub(super) run: FacingRun,
+    /// The edges inside which the other boundary ends, each with the length that it covers.
+    pub(super) cut: Vec<(Edge, f64)>,
+    /// The other body; none if it is a rigid obstacle.
+    pub(super) pair: Option<Pair>,
+}
+
+impl Checks {
+    /// Checks which of `obstacle` and `against` a contact has, and that nothing else contradicts it.
+    pub(super) fn facing_body_numbers(&mut self, contact: &Contact, pointer: &str) -> Checked {
+        let mut all = AllChecks::default();
+        let at = |field: &str| format!("{pointer}/{field}");
+        match (&contact.obstacle, &contact.against) {
+            (None, None) => all.fail(self.report(
+                at("obstacle"),
+                Reason::Missing,
+                "neither `obstacle` nor `against`",
+                "a rigid `obstacle`, or the boundary of another body: \"against\": {\"boundary\": …}",
+                "A contact needs something that it can touch.",
+            )),
+            (Some(_), Some(_)) => all.fail(self.report(
+                at("against"),
+                Reason::Conflict,
+                "`obstacle` and `against`",
+                "either a rigid `obstacle` or another body",
+                "Give each of the two a contact and a boundary of its own.",
+            )),
+            _ => {}
+        }
+        if contact.against.is_none() {
+            if contact.gap.is_some() {
+                all.fail(self.report(
+                    at("gap"),
+                    Reason::NotUsed,
+                    "`gap` without `against`",
+                    "`gap` only against another body",
+                    "The distance of a rigid obstacle is its profile less the `indentation`.",
+                ));
+            }
+            if contact.normal == Some(NormalOf::Mean) {
+                all.fail(self.report(
+                    at("normal"),
+                    Reason::NotUsed,
+                    "`mean` without `against`",
+                    "`body` or `obstacle`",
+                    "A mean of two normals is that of two bodies.",
+                ));
+            }
+            return all.finish(());
+        }
+        let given = [
+            ("indentation", contact.indentation != 0.0),
+            ("normal_force", contact.normal_force.is_some()),
+            ("direction", contact.direction.is_some()),
+            (
+                "tangential_displacement",
+                contact.tangential_displacement != 0.0,
+            ),
+            ("tangential_force", contact.tangential_force.is_some()),
+            ("tilt", contact.tilt.is_some()),
+            ("moment", contact.moment.is_some()),
+            ("about", contact.about.is_some()),
+            ("stiffness", contact.stiffness.is_some()),
+        ];
+        for (field, _) in given.into_iter().filter(|(_, given)| *given) {
+            all.fail(self.report(
+                at(field),
+                Reason::NotUsed,
+                format!("`{field}` against another body"),
+                format!("no `{field}`"),
+                "An elastic body is moved by its own supports and loads; two bodies that overlap before deformation are given by \"gap\": {\"interference\": …}.",
+            ));
+        }
+        if contact.normal == Some(NormalOf::Obstacle) {
+            all.fail(self.report(
+                at("normal"),
+                Reason::NotUsed,
+                "`obstacle` against another body",
+                "`mean` or `body`",
+                "There is no obstacle.",
+            ));
+        }
+        if contact.condition == Condition::None {
+            all.fail(self.report(
+                at("condition"),
+                Reason::NotUsed,
+                "`none` against another body",
+                "`unilateral` or `bonded`",
+                "Without the condition there is no other body.",
+            ));
+        }
+        let Some(gap) = contact.gap else {
+            return all.finish(());
+        };
+        if gap.interference.is_some() == gap.clearance.is_some() {
+            let given = [
+                ("interference", gap.interference.is_some()),
+                ("clearance", gap.clearance.is_some()),
+            ];
+            all.fail(self.report(
+                at("gap"),
+                Reason::WrongCount,
+                either(&given),
+                "exactly one of `interference` and `clearance`",
+                "Without `gap` the distance is that of the two meshes.",
+            ));
+        }
+        all.check(self.require(
+            gap.interference.is_none_or(|overlap| overlap > 0.0),
+            at("gap/interference"),
+            gap.interference.unwrap_or_default(),
+            "a length > 0",
+            "Bodies that are apart have a `clearance`.",
+        ));
+        all.check(self.require(
+            gap.clearance.is_none_or(|apart| apart >= 0.0),
+            at("gap/clearance"),
+            gap.clearance.unwrap_or_default(),
+            "a length ≥ 0",
+            "Bodies that overlap have an `interference`.",
+        ));
+        all.finish(())
+    }
+
+    /// The part of a boundary that the other body of a contact faces.
+    #[allow(clippy::too_many_arguments)] // all that it is made from
+    pub(super) fn faced(
+        &mut self,
+        mesh: &Mesh,
+        section: &Section,
+        axis: &Axis,
+        contact: &Contact,
+        edges: &[Edge],
+        held: &HeldDirections,
+        pointer: &str,
+    ) -> Checked<Faced> {
+        let against = contact
+            .against
+            .as_ref()
+            .map(|against| &against.boundary[..]);
+        let against = against.unwrap_or_default();
+        let place = format!("{pointer}/against/boundary");
+        let chain = self.one_chain(mesh, edges, &format!("{pointer}/boundary"), false)?;
+        let there = self.boundary(mesh, against, place.clone())?;
+        let there = self.one_chain(mesh, there, &place, true)?;
+        let shares = |edge: &Edge| chain.iter().flatten().any(|node| edge.contains(node));
+        if let Some(edge) = there.iter().find(|edge| shares(edge)) {
+            let node = edge
+                .iter()
+                .find(|node| chain.iter().flatten().any(|own| own == *node));
+            return Err(self.report(
+                place,
+                Reason::SharedNode,
+                format!("node {}, also on `{}`", node.unwrap_or(&edge[0]), contact.boundary),
+                "a boundary without common nodes",
+                "Two bodies in contact are separate parts of the mesh: where they meet, each has nodes of its own.",
+            ));
+        }
+        let depth = |x: f64| section.depth(x);
+        let other = ContactBoundary::new(mesh, &there, 0.0, held, depth);
+        let couple = |chain: &[Edge], start: f64| {
+            let mut own = ContactBoundary::new(mesh, chain, start, held, depth);
+            let outward = own.normals.clone();
+            if contact.used_normal() == NormalOf::Mean {
+                mortar::take_mean_normals(&mut own, &other, held);
+            }
+            let coupling = mortar::couple(&own, &other, depth, &axis.ends(&own.positions));
+            (own, outward, coupling)
+        };
+        let (_, _, whole) = couple(&chain, 0.0);
+        let covered = self.covered(mesh, &chain, &whole, contact, pointer)?;
+        let start = arc_lengths(mesh, &chain)[2 * covered.start];
+        let chain = &chain[covered];
+        let (boundary, outward, coupling) = couple(chain, start);
+        self.warn_of_coarser(&boundary, &other, &coupling, contact, pointer);
+        let distance = |gap: &f64| match contact.gap {
+            None => *gap,
+            Some(given) => given.clearance.unwrap_or(0.0),
+        };
+        let profile = coupling.gaps.iter().map(|gap| Profile {
+            distance: distance(gap),
+            slope: 0.0,
+        });
+        Ok(Faced {
+            run: FacingRun {
+                chain: chain.to_vec(),
+                profile: profile.collect(),
+                start,
+                coordinate: boundary.s.clone(),
+                places: Vec::new(),
+            },
+            boundary,
+            outward,
+            cut: Vec::new(),
+            pair: Some(Pair {
+                boundary: against.to_owned(),
+                nodes: other.nodes,
+                rows: coupling.rows,
+            }),
+        })
+    }
+
+    /// The one chain of edges that a boundary is.
+    pub(super) fn one_chain(
+        &mut self,
+        mesh: &Mesh,
+        edges: &[Edge],
+        place: &str,
+        may_be_closed: bool,
+    ) -> Checked<Vec<Edge>> {
+        let runs = mesh::runs(edges);
+        let [run] = &runs[..] else {
+            let hint = format!(
+                "Name each piece under /mesh/boundaries and give it a contact of its own.{}",
+                self.hint_to_merge(mesh)
+            );
+            return Err(self.report(
+                place,
+                Reason::NotAChain,
+                format!("{} pieces", runs.len()),
+                "one chain of edges",
+                hint,
+            ));
+        };
+        if run[0][0] == run[run.len() - 1][1] && !may_be_closed {
+            return Err(self.report(
+                place,
+                Reason::NotAChain,
+                "a closed loop",
+                "a chain of edges with two ends",
+                "Name a part of the loop under /mesh/boundaries.",
+            ));
+        }
+        Ok(run.to_vec())
+    }
+
+    /// The edges of a chain that the other body covers as a whole, which must be one piece.
+    fn covered(
+        &mut self,
+        mesh: &Mesh,
+        chain: &[Edge],
+        coupling: &Coupling,
+        contact: &Contact,
+        pointer: &str,
+    ) -> Checked<std::ops::Range<usize>> {
+        let covered = &coupling.covered;
+        let starts = (0..covered.len()).filter(|&e| covered[e] && (e == 0 || !covered[e - 1]));
+        let starts: Vec<usize> = starts.collect();
+        let [start] = starts[..] else {
+            let against = contact
+                .against
+                .as_ref()
+                .map(|against| &against.boundary[..]);
+            let [first, last] = [chain[0][0], chain[chain.len() - 1][1]];
+            let [[x0, y0], [x1, y1]] = [first, last].map(|node| mesh.nodes[node as usize]);
+            let (reason, got) = match starts.len() {
+                0 => (Reason::CoversNothing, "no edge of the boundary".to_owned()),
+                pieces => (
+                    Reason::NotAChain,
+                    format!("{pieces} separate pieces of the boundary"),
+                ),
+            };
+            return Err(self.report(
+                format!("{pointer}/against/boundary"),
+                reason,
+                format!("`{}` faces {got} as a whole", against.unwrap_or_default()),
+                "a boundary that faces all of at least one edge, in one piece",
+                format!("The boundary goes from ({x0}, {y0}) to ({x1}, {y1}). The bodies must lie opposite one another, each with its outside towards the other; or let the two boundaries change places, so that the finer one carries the law."),
+            ));
+        };
+        let end = (start..covered.len())
+            .find(|e| !covered[*e])
+            .unwrap_or(covered.len());
+        Ok(start..end)
+    }
+
+    /// Warns where the side that carries the law is much the coarser one.
+    fn warn_of_coarser(
+        &mut self,
+        own: &ContactBoundary,
+        other: &ContactBoundary,
+        coupling: &Coupling,
+        contact: &Contact,
+        pointer: &str,
+    ) {
+        let length = |boundary: &ContactBoundary, edge: usize| {
+            let [start, end, _] = boundary.edge_arc(edge);
+            end - start
+        };
+        let ratio = |edge: usize| {
+            let row = &coupling.rows[2 * edge + 1];
+            let most = row.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+            let there = (most.0 / 2).min(other.edge_count() - 1);
+            Some(length(own, edge) / length(other, there))
+        };
+        let ratios = (0..own.edge_count()).filter_map(ratio);
+        let most = ratios.fold(0.0, f64::max);
+        if most > MUCH_COARSER {
+            self.warn(
+                WarningCode::CoarserSideCarriesLaw,
+                &format!("{pointer}/against/boundary"),
+                format!(
+                    "Edges of `{}`, which carries the law, are up to {most:.1} times as long as those that face them: pressures follow the coarser side. Let the two boundaries change places, or refine `{}`.",
+                    contact.boundary, contact.boundary
+                ),
+            );
+        }
+    }
+
+    /// Checks the supports at the nodes of a contact with another body, and that its nodes and those opposite belong to no other
+    /// contact in another role.
+    pub(super) fn nodes_of_pair(
+        &mut self,
+        model: &ContactModel,
+        others: &[ContactModel],
+        fixed: &BTreeMap<u32, Held>,
+    ) -> Checked {
+        let opposite = |contact: &ContactModel, node: u32| {
+            contact
+                .pair
+                .as_ref()
+                .is_some_and(|pair| pair.nodes.contains(&node))
+        };
+        for other in others {
+            let own = model
+                .boundary
+                .nodes
+                .iter()
+                .find(|node| opposite(other, **node));
+            let theirs = other
+                .boundary
+                .nodes
+                .iter()
+                .find(|node| opposite(model, **node));
+            if let Some(node) = own.or(theirs) {
+                let [x, y] = place_of(model, other, *node);
+                return Err(self.report(
+                    format!("{}/boundary", model.pointer),
+                    Reason::SharedNode,
+                    format!("node {node} at ({x}, {y}), which carries the law of one of the contacts `{}` and `{}`, and faces the other", model.name, other.name),
+                    "nodes that carry a law in at most one contact, and face none at the same time",
+                    "End one of the contacts one edge earlier, or let boundary and `against` change places in one of them.",
+                ));
+            }
+        }
+        let Some(pair) = &model.pair else {
+            return Ok(());
+        };
+        let boundary = &model.boundary;
+        for (i, node) in boundary.nodes.iter().enumerate() {
+            let Some(held) = fixed.get(node) else {
+                continue;
+            };
+            let (n, t, [x, y]) = (
+                boundary.normals[i],
+                boundary.tangent(i),
+                boundary.positions[i],
+            );
+            // a line of symmetry holds both bodies
+            let mirrored = |k: usize| {
+                let there = fixed.get(&pair.nodes[k]);
+                there.is_some_and(|there| there.along(t) == Some(0.0))
+            };
+            let symmetric = held.along(t) == Some(0.0)
+                && held.along(n).is_none()
+                && pair.rows[i].iter().any(|(k, _)| mirrored(*k));
+            if !symmetric {
+                return Err(self.report(
+                    format!("{}/boundary", model.pointer),
+                    Reason::ObliqueSupport,
+                    format!("node {node} at ({x}, {y}), which a support holds and which faces `{}`", pair.boundary),
+                    "a support at a node of this boundary only on a line of symmetry, which holds both bodies along the tangent",
+                    "End the contact one edge before the support with `from` or `to`, or let boundary and `against` change places.",
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn place_of(a: &ContactModel, b: &ContactModel, node: u32) -> [f64; 2] {
+    let at = |contact: &ContactModel| {
+        let place = contact
+            .boundary
+            .nodes
+            .iter()
+            .position(|other| *other == node);
+        place.map(|i| contact.boundary.positions[i])
+    };
+    at(a).or_else(|| at(b)).unwrap_or_default()
+}

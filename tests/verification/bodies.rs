@@ -1,0 +1,360 @@
+//! Two elastic bodies in contact. Sources: constant stresses, one body in place of two bonded ones, a rigid obstacle in place of a
+//! stiff body, Hertz, and press fits. Goal: patches to 1e-12.
+
+use serde_json::{Value, json};
+use solver::error::SolveError;
+use solver::solution::{QuantityName, Solution, Verdict};
+
+use crate::support::{problem, solve};
+
+/// Even lines.
+fn even(from: f64, to: f64, count: u32) -> Vec<f64> {
+    (0..=count)
+        .map(|k| from + (to - from) * f64::from(k) / f64::from(count))
+        .collect()
+}
+
+/// A block on another, both as wide as 1, the upper one pressed by a traction, on `own` elements of the lower and `other` elements
+/// of the upper one.
+fn stacked(kind: &str, own: u32, other: u32, moduli: [f64; 2]) -> Value {
+    json!({
+        "analysis": match kind {
+            "plane_stress" => json!({"kind": kind, "thickness": 0.7}),
+            _ => json!({"kind": kind}),
+        },
+        "mesh": {"grids": {
+            "lower": {"x": even(0.0, 1.0, own), "y": [0, 0.3, 0.5]},
+            "upper": {"x": even(0.0, 1.0, other), "y": [0.5, 0.8, 1.2]},
+        }},
+        "materials": [
+            {"group": "lower", "youngs_modulus": moduli[0], "poissons_ratio": 0.3},
+            {"group": "upper", "youngs_modulus": moduli[1], "poissons_ratio": 0.2},
+        ],
+        "supports": [
+            {"boundary": "lower.bottom", "uy": 0},
+            {"boundary": "lower.left", "ux": 0},
+            {"boundary": "upper.left", "ux": 0},
+        ],
+        "loads": [{"boundary": "upper.top", "traction": [0, -2]}],
+        "contacts": [{"boundary": "lower.top", "against": {"boundary": "upper.bottom"}}],
+    })
+}
+
+fn solved(problem_text: &Value) -> Solution {
+    solve(&problem(&problem_text.to_string()))
+}
+
+/// The largest difference of σ_yy at all nodes from a value.
+fn off_uniform(solution: &Solution, value: f64) -> f64 {
+    let stresses = solution.fields.stress_yy.iter();
+    stresses.map(|s| (s - value).abs()).fold(0.0, f64::max)
+}
+
+/// A uniform pressure goes through, whatever the meshes.
+#[test]
+fn a_flat_patch_is_exact() {
+    for kind in ["plane_strain", "plane_stress", "axisymmetric"] {
+        for [own, other] in [[3, 2], [2, 3], [3, 5], [7, 2], [1, 4], [4, 1], [2, 2]] {
+            let solution = solved(&stacked(kind, own, other, [1.0, 3.0]));
+            let off = off_uniform(&solution, -2.0);
+            assert!(off < 1e-12, "{kind} {own}:{other}: {off:.1e}");
+            let contact = &solution.summary.contacts["lower.top"];
+            let area = match kind {
+                "axisymmetric" => std::f64::consts::PI,
+                "plane_stress" => 0.7,
+                _ => 1.0,
+            };
+            let force = contact.normal_force / (2.0 * area);
+            assert!((force - 1.0).abs() < 1e-12, "{kind} {own}:{other}: {force}");
+            assert!(solution.summary.residuals.equilibrium < 1e-12);
+        }
+    }
+}
+
+/// Matching meshes that are bonded are one body.
+#[test]
+fn bonded_matching_meshes_are_one_body() {
+    let x = [0.0, 0.2, 0.5, 0.6, 1.0];
+    let mut one = stacked("plane_strain", 1, 1, [1.0, 1.0]);
+    one["mesh"] = json!({"grid": {"x": x, "y": [0, 0.3, 0.5, 0.8, 1.2]}});
+    one["materials"] = json!([{"youngs_modulus": 1.0, "poissons_ratio": 0.3}]);
+    one["supports"] = json!([{"boundary": "bottom", "ux": 0, "uy": 0}]);
+    one["loads"] = json!([{"boundary": "top", "traction": [0.3, -2]}, {"boundary": "right", "traction": [0.2, -0.1]}]);
+    one["contacts"] = json!([]);
+    let mut two = one.clone();
+    two["mesh"] = json!({"grids": {
+        "lower": {"x": x, "y": [0, 0.3, 0.5]},
+        "upper": {"x": x, "y": [0.5, 0.8, 1.2]},
+    }});
+    two["supports"] = json!([{"boundary": "lower.bottom", "ux": 0, "uy": 0}]);
+    two["loads"] = json!([
+        {"boundary": "upper.top", "traction": [0.3, -2]},
+        {"boundary": "upper.right", "traction": [0.2, -0.1]},
+        {"boundary": "lower.right", "traction": [0.2, -0.1]},
+    ]);
+    for [own, other] in [["lower.top", "upper.bottom"], ["upper.bottom", "lower.top"]] {
+        two["contacts"] =
+            json!([{"boundary": own, "against": {"boundary": other}, "condition": "bonded"}]);
+        let (one, two) = (solved(&one), solved(&two));
+        for (k, place) in two.fields.x.iter().zip(&two.fields.y).enumerate() {
+            let same =
+                |i: &usize| (one.fields.x[*i] - place.0).hypot(one.fields.y[*i] - place.1) < 1e-9;
+            let i = (0..one.fields.x.len()).find(same).unwrap();
+            for (a, b) in [
+                (&one.fields.ux, &two.fields.ux),
+                (&one.fields.uy, &two.fields.uy),
+            ] {
+                assert!(
+                    (a[i] - b[k]).abs() < 1e-11,
+                    "{own} at {place:?}: {} {}",
+                    a[i],
+                    b[k]
+                );
+            }
+        }
+    }
+}
+
+/// A quarter of a cylinder of radius 10 under half of the load 50, on a block.
+fn hertz(refine: u32, own: &str) -> Value {
+    let outside = [1.4, 1.7, 2.2, 3.0, 4.5];
+    let x = [&even(0.0, 1.2, 12)[..], &outside, &[7.0, 11.0, 20.0]].concat();
+    let y: Vec<f64> = x.iter().rev().map(|x| -x).collect();
+    let across = [&even(0.0, 1.2, 12)[..], &outside].concat();
+    let arc: Vec<[f64; 2]> = across
+        .iter()
+        .map(|x| [*x, 10.0 - (100.0 - x * x).sqrt()])
+        .collect();
+    let up: Vec<f64> = x.iter().map(|y| y / 20.0).collect();
+    let [boundary, against] = match own {
+        "block" => ["block.top", "roller.bottom"],
+        _ => ["roller.bottom", "block.top"],
+    };
+    json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {
+            "grids": {
+                "block": {"x": x, "y": y},
+                "roller": {"x": across, "y": up, "bottom": arc, "top": [[0, 20], [4.5, 20]]},
+            },
+            "refine": refine,
+            "curves": {"roller.bottom": {"kind": "circle", "center": [0, 10], "radius": 10}},
+        },
+        "materials": [
+            {"group": "block", "youngs_modulus": 1000, "poissons_ratio": 0.3},
+            {"group": "roller", "youngs_modulus": 3000, "poissons_ratio": 0.2},
+        ],
+        "supports": [
+            {"boundary": "block.bottom", "uy": 0},
+            {"boundary": "block.left", "ux": 0},
+            {"boundary": "roller.left", "ux": 0},
+        ],
+        "loads": [{"boundary": "roller.top", "traction": [0, -25.0 / 4.5]}],
+        "contacts": [{"boundary": boundary, "against": {"boundary": against}}],
+    })
+}
+
+/// Hertz with both bodies elastic, p₀ 35.97141402: the roller floats on the block, and either side may carry the law. At a/R = .09
+/// half-spaces are off by a thousandth.
+#[test]
+fn a_roller_on_a_block_is_that_of_hertz() {
+    let peaks = ["block", "roller"].map(|own| {
+        [0, 1].map(|refine| {
+            let summary = solved(&hertz(refine, own)).summary;
+            let contact = summary.contacts.values().next().unwrap();
+            assert!((contact.normal_force - 25.0).abs() < 0.01);
+            assert_eq!(summary.warnings, []);
+            let accuracy = summary.accuracy.unwrap();
+            assert_eq!(accuracy.verdict, Verdict::Good);
+            let mut all = accuracy.quantities.iter();
+            let peak = all.find(|q| q.quantity == QuantityName::PeakNormalStress);
+            peak.map(|q| [q.value, q.error.unwrap()]).unwrap()
+        })
+    });
+    let right = peaks[0][1][0];
+    assert!((right / -35.971_414_02 - 1.0).abs() < 2e-3, "{peaks:?}");
+    for [value, error] in peaks.as_flattened() {
+        assert!((value - right).abs() <= *error, "{peaks:?}");
+    }
+}
+
+/// A ring in a ring by an interference, held between planes: Lamé's pressure, .3605769231 in plane strain.
+#[test]
+fn a_press_fit_is_that_of_lame() {
+    for own in ["shaft.right", "hub.left"] {
+        let other = if own == "hub.left" {
+            "shaft.right"
+        } else {
+            "hub.left"
+        };
+        let problem = |refine: u32| {
+            json!({
+                "analysis": {"kind": "axisymmetric"},
+                "mesh": {
+                    "grids": {
+                        "shaft": {"x": even(0.4, 1.0, 3), "y": [0, 0.5, 1]},
+                        "hub": {"x": even(1.0, 2.0, 4), "y": [0, 0.3, 0.6, 1]},
+                    },
+                    "refine": refine,
+                },
+                "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+                "supports": [
+                    {"boundary": "shaft.bottom", "uy": 0},
+                    {"boundary": "shaft.top", "uy": 0},
+                    {"boundary": "hub.bottom", "uy": 0},
+                    {"boundary": "hub.top", "uy": 0},
+                ],
+                "contacts": [{"boundary": own, "against": {"boundary": other}, "gap": {"interference": 1e-3}}],
+            })
+        };
+        let pressure = |refine: u32| {
+            let summary = solved(&problem(refine)).summary;
+            let force = summary.contacts[own].normal_force / (2.0 * std::f64::consts::PI);
+            let quantities = summary.accuracy.unwrap().quantities;
+            let error = quantities[0].error.unwrap() / (2.0 * std::f64::consts::PI);
+            [force, error]
+        };
+        let off = [0, 1, 2].map(|refine| {
+            let [force, error] = pressure(refine);
+            let off = (force - 0.360_576_923_1).abs();
+            assert!(off <= error, "{own} {refine}: {force} ± {error}");
+            off
+        });
+        // two nearly smooth fields: of fourth order
+        assert!(off[2] < 1e-5 && off[1] < off[0] / 8.0, "{own}: {off:?}");
+    }
+}
+
+/// A body that is 10⁹ times as stiff is a rigid obstacle: a flat that is pushed against a block with friction.
+#[test]
+fn a_stiff_body_is_a_rigid_obstacle() {
+    let friction = json!({"coefficient": 0.3, "nonlocal_radius": 0.1, "elastic_slip": 1e-3});
+    let x = [0.0, 0.2, 0.4, 0.6, 0.8, 1.0];
+    let mut problem = json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grids": {"block": {"x": x, "y": [0, 0.5, 0.8, 1]}}},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "block.bottom", "ux": 0, "uy": 0}],
+        "contacts": [{"boundary": "block.top", "obstacle": {"kind": "flat"}, "indentation": 0.01, "tangential_displacement": 0.002, "friction": friction}],
+    });
+    let rigid = solved(&problem);
+    problem["mesh"]["grids"]["tool"] = json!({"x": [-0.5, 0.1, 0.7, 1.5], "y": [1, 1.3]});
+    problem["materials"] = json!([
+        {"group": "block", "youngs_modulus": 1000, "poissons_ratio": 0.3},
+        {"group": "tool", "youngs_modulus": 1e12, "poissons_ratio": 0.3},
+    ]);
+    problem["supports"] = json!([
+        {"boundary": "block.bottom", "ux": 0, "uy": 0},
+        {"boundary": "tool.top", "ux": 0.002, "uy": -0.01},
+    ]);
+    problem["contacts"] = json!([{"boundary": "block.top", "against": {"boundary": "tool.bottom"}, "friction": friction}]);
+    let elastic = solved(&problem);
+    let [rigid, elastic] = [&rigid, &elastic].map(|s| &s.summary);
+    for (a, b) in [
+        (rigid.normal_force, elastic.normal_force),
+        (rigid.tangential_force, elastic.tangential_force),
+        (rigid.friction_force, elastic.friction_force),
+    ] {
+        assert!((a / b - 1.0).abs() < 1e-7, "{a} {b}");
+    }
+}
+
+/// What contradicts itself is refused at its field, and bodies that do not face one another at their boundary.
+#[test]
+fn impossible_pairs_are_refused() {
+    let refused = |contact: Value| -> Vec<String> {
+        let mut whole = stacked("plane_strain", 2, 3, [1.0, 1.0]);
+        whole["contacts"] = json!([contact]);
+        let error = solver::solve(&problem(&whole.to_string()), &mut ()).err();
+        match error {
+            Some(SolveError::Invalid(violations)) => {
+                violations.into_iter().map(|v| v.pointer).collect()
+            }
+            other => panic!("{other:?}"),
+        }
+    };
+    let against = json!({"boundary": "upper.bottom"});
+    let at = |field: &str| vec![format!("/contacts/0/{field}")];
+    for (contact, field) in [
+        (json!({"boundary": "lower.top"}), "obstacle"),
+        (
+            json!({"boundary": "lower.top", "against": against, "obstacle": {"kind": "flat"}}),
+            "against",
+        ),
+        (
+            json!({"boundary": "lower.top", "against": against, "indentation": 0.1}),
+            "indentation",
+        ),
+        (
+            json!({"boundary": "lower.top", "against": against, "normal_force": 1}),
+            "normal_force",
+        ),
+        (
+            json!({"boundary": "lower.top", "against": against, "normal": "obstacle"}),
+            "normal",
+        ),
+        (
+            json!({"boundary": "lower.top", "against": against, "condition": "none"}),
+            "condition",
+        ),
+        (
+            json!({"boundary": "lower.top", "against": against, "gap": {}}),
+            "gap",
+        ),
+        (
+            json!({"boundary": "lower.top", "against": against, "gap": {"interference": -1}}),
+            "gap/interference",
+        ),
+        (
+            json!({"boundary": "lower.top", "obstacle": {"kind": "flat"}, "gap": {"clearance": 1}}),
+            "gap",
+        ),
+        (
+            json!({"boundary": "lower.top", "obstacle": {"kind": "flat"}, "normal": "mean"}),
+            "normal",
+        ),
+        (
+            json!({"boundary": "lower.top", "against": {"boundary": "upper.top"}}),
+            "against/boundary",
+        ),
+        (
+            json!({"boundary": "lower.top", "against": {"boundary": "lower.right"}}),
+            "against/boundary",
+        ),
+        (
+            json!({"boundary": "lower.top", "against": {"boundary": "nowhere"}}),
+            "against/boundary",
+        ),
+    ] {
+        assert_eq!(refused(contact.clone()), at(field), "{contact}");
+    }
+    // both bodies without a support along y
+    let mut floating = stacked("plane_strain", 2, 3, [1.0, 1.0]);
+    floating["supports"].as_array_mut().unwrap().remove(0);
+    let error = solver::solve(&problem(&floating.to_string()), &mut ()).err();
+    let Some(SolveError::Invalid(violations)) = error else {
+        panic!("{error:?}");
+    };
+    assert_eq!(violations[0].pointer, "/supports");
+}
+
+/// Three blocks on one another: the middle one carries the law of one contact and faces the other.
+#[test]
+fn three_blocks_are_a_chain() {
+    let mut problem = stacked("plane_strain", 3, 4, [1.0, 2.0]);
+    problem["mesh"]["grids"]["third"] = json!({"x": even(0.0, 1.0, 2), "y": [1.2, 1.5]});
+    problem["materials"] = json!([{"youngs_modulus": 1, "poissons_ratio": 0.3}]);
+    problem["supports"]
+        .as_array_mut()
+        .unwrap()
+        .push(json!({"boundary": "third.left", "ux": 0}));
+    problem["loads"] = json!([{"boundary": "third.top", "pressure": 2}]);
+    problem["contacts"] = json!([
+        {"boundary": "upper.bottom", "against": {"boundary": "lower.top"}},
+        {"boundary": "upper.top", "against": {"boundary": "third.bottom"}},
+    ]);
+    assert!(off_uniform(&solved(&problem), -2.0) < 1e-12);
+    problem["contacts"][1] =
+        json!({"boundary": "third.bottom", "against": {"boundary": "upper.top"}});
+    assert!(off_uniform(&solved(&problem), -2.0) < 1e-12);
+}
