@@ -434,7 +434,7 @@ mod tests {
         let expected = &faults(grid, "")[0].2;
         assert_eq!(
             expected,
-            "exactly one of `grid`, `inline`, `gmsh`, `abaqus`, `stored`"
+            "exactly one of `grid`, `grids`, `inline`, `gmsh`, `abaqus`, `stored`"
         );
 
         let load = |load: &str| {

@@ -162,26 +162,7 @@ impl ElasticBody {
         if !(0..stiffness.size()).all(|j| all_finite(stiffness.column(j))) {
             return non_finite(Phase::Condense);
         }
-        let to_contact = |dof| match dof {
-            Dof::Free(i) => Dof::Free(i - interior),
-            fixed => fixed,
-        };
-        let (mut contact_dofs, mut tangents) = (Vec::new(), Vec::new());
-        for contact in &model.contacts {
-            for (i, &node) in contact.boundary.nodes.iter().enumerate() {
-                let mut dofs = map.dofs[node as usize].map(to_contact);
-                let oblique = map.axes[node as usize].filter(|_| model.oblique.contains_key(&node));
-                tangents.push(oblique.map(|mut axes| {
-                    if axes.along[0] != contact.boundary.normals[i] {
-                        dofs.reverse();
-                        axes.moves.reverse();
-                    }
-                    let [x, y] = contact.boundary.tangent(i);
-                    axes.moves.map(|[a, b]| x * a + y * b)
-                }));
-                contact_dofs.push(dofs);
-            }
-        }
+        let (contact_dofs, tangents) = contact_dofs(model, &map, interior);
         let free = |node: u32| {
             map.dofs[node as usize]
                 .iter()
@@ -342,6 +323,35 @@ impl ElasticBody {
 
 fn all_finite(values: &[f64]) -> bool {
     values.iter().all(|value| value.is_finite())
+}
+
+/// [`ElasticBody::contact_dofs`] and [`ElasticBody::tangents`]. `interior`: the number of unknowns that are eliminated.
+fn contact_dofs(
+    model: &Model,
+    map: &DofMap,
+    interior: usize,
+) -> (Vec<[Dof; 2]>, Vec<Option<[f64; 2]>>) {
+    let to_contact = |dof| match dof {
+        Dof::Free(i) => Dof::Free(i - interior),
+        fixed => fixed,
+    };
+    let (mut contact_dofs, mut tangents) = (Vec::new(), Vec::new());
+    for contact in &model.contacts {
+        for (i, &node) in contact.boundary.nodes.iter().enumerate() {
+            let mut dofs = map.dofs[node as usize].map(to_contact);
+            let oblique = map.axes[node as usize].filter(|_| model.oblique.contains_key(&node));
+            tangents.push(oblique.map(|mut axes| {
+                if axes.along[0] != contact.boundary.normals[i] {
+                    dofs.reverse();
+                    axes.moves.reverse();
+                }
+                let [x, y] = contact.boundary.tangent(i);
+                axes.moves.map(|[a, b]| x * a + y * b)
+            }));
+            contact_dofs.push(dofs);
+        }
+    }
+    (contact_dofs, tangents)
 }
 
 /// The normal unknowns of contact nodes on the axis, each with the normal unknown of the midside node beside it, if

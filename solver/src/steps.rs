@@ -230,6 +230,10 @@ fn run_steps<'a>(
     if let Some(accuracy) = &mut summary.accuracy {
         accuracy::limit_by(&summary.warnings, accuracy);
     }
+    accuracy::note_unknown_signs(&mut solution, |name| {
+        let own = model.contacts.iter().find(|contact| contact.name == name);
+        own.map_or(String::new(), |contact| contact.pointer.clone())
+    });
     if model.steps.is_empty() {
         solution.steps.clear();
     }

@@ -3,7 +3,8 @@
 
 use serde_json::{Value, json};
 use solver::error::SolveError;
-use solver::solution::{QuantityName, Solution, Verdict};
+use solver::family::{Family, Start};
+use solver::solution::{QuantityName, Solution, Verdict, WarningCode};
 
 use crate::support::{problem, solve};
 
@@ -318,6 +319,10 @@ fn impossible_pairs_are_refused() {
             "against/boundary",
         ),
         (
+            json!({"boundary": "lower.bottom", "against": {"boundary": "upper.top"}}),
+            "against/boundary",
+        ),
+        (
             json!({"boundary": "lower.top", "against": {"boundary": "lower.right"}}),
             "against/boundary",
         ),
@@ -357,4 +362,106 @@ fn three_blocks_are_a_chain() {
     problem["contacts"][1] =
         json!({"boundary": "third.bottom", "against": {"boundary": "upper.top"}});
     assert!(off_uniform(&solved(&problem), -2.0) < 1e-12);
+}
+
+/// A common end with another contact would follow two bodies at once, and is refused.
+#[test]
+fn a_corner_of_two_contacts_faces_no_body() {
+    let mut whole = stacked("plane_strain", 2, 3, [1.0, 1.0]);
+    whole["supports"].as_array_mut().unwrap().remove(1);
+    whole["contacts"] = json!([
+        {"boundary": "lower.top", "against": {"boundary": "upper.bottom"}},
+        {"boundary": "lower.right", "obstacle": {"kind": "flat"}, "indentation": 0.01},
+    ]);
+    let error = solver::solve(&problem(&whole.to_string()), &mut ()).err();
+    let Some(SolveError::Invalid(violations)) = error else {
+        panic!("{error:?}");
+    };
+    assert_eq!(violations[0].pointer, "/contacts/1/boundary");
+}
+
+/// An edge that the other body faces in part is left out, and told of; its length is in the errors of the contact's end.
+#[test]
+fn an_edge_that_is_faced_in_part_is_told() {
+    let mut whole = stacked("plane_strain", 5, 3, [1.0, 1.0]);
+    whole["mesh"]["grids"]["upper"]["x"] = json!(even(0.0, 0.9, 3));
+    let summary = solved(&whole).summary;
+    let told = summary.warnings.iter();
+    assert!(
+        told.map(|w| w.code)
+            .any(|code| code == WarningCode::ObstacleCutsEdge)
+    );
+    let contact = &summary.contacts["lower.top"];
+    assert!((contact.contact[0][1] - 0.8).abs() < 1e-12);
+    let ends = summary.accuracy.unwrap().quantities;
+    let end = ends.iter().find(|q| q.quantity == QuantityName::ContactEnd);
+    assert!(end.unwrap().error.unwrap() >= 0.09, "{end:?}");
+}
+
+/// Displacements of the other body's surface that are given, steps that scale them, a clearance, and the columns of the profile: a
+/// block that is pushed by a plate that is a body moves as by a rigid plate.
+#[test]
+fn a_surface_that_is_moved_presses_after_its_clearance() {
+    let mut whole = stacked("plane_strain", 3, 2, [1.0, 1.0]);
+    whole["loads"] = json!([]);
+    whole["supports"] = json!([
+        {"boundary": "lower.bottom", "uy": 0},
+        {"boundary": "lower.left", "ux": 0},
+        {"boundary": "upper.bottom", "ux": 0, "uy": -0.02},
+    ]);
+    whole["contacts"][0]["gap"] = json!({"clearance": 0.005});
+    whole["steps"] = json!([{"supports": 0.2}, {"supports": 1}]);
+    let solution = solved(&whole);
+    assert_eq!(
+        solution.steps[0].summary.contacts["lower.top"].normal_force,
+        0.0
+    );
+    // uniform: ε_yy = −0.015/0.5, free along x
+    let right = 0.015 / 0.5 / (1.0 - 0.3 * 0.3);
+    let contact = &solution.summary.contacts["lower.top"];
+    assert!(
+        (contact.normal_force / right - 1.0).abs() < 1e-10,
+        "{}",
+        contact.normal_force
+    );
+    let profile = &solution.node_profiles["lower.top"];
+    for (gap, u) in profile.gap.iter().zip(&profile.normal_displacement) {
+        assert!(
+            (gap - u).abs() < 1e-12 && (u + 0.015).abs() < 1e-12,
+            "{gap} {u}"
+        );
+    }
+}
+
+/// Members of a sweep over an interference, and steps that scale it, are the problems of their own.
+#[test]
+fn an_interference_is_swept_and_stepped() {
+    let mut whole = stacked("plane_strain", 3, 2, [1.0, 1.0]);
+    whole["loads"] = json!([]);
+    whole["supports"] = json!([
+        {"boundary": "lower.bottom", "uy": 0},
+        {"boundary": "lower.left", "ux": 0},
+        {"boundary": "upper.left", "ux": 0},
+        {"boundary": "upper.top", "uy": 0},
+    ]);
+    let of = |overlap: f64, steps: Value| {
+        let mut whole = whole.clone();
+        whole["contacts"][0]["gap"] = json!({"interference": overlap});
+        whole["steps"] = steps;
+        solved(&whole).summary.normal_force
+    };
+    let whole_force = of(0.01, json!([]));
+    assert!(whole_force > 0.0);
+    let half = of(0.01, json!([{"indentation": 0.5}]));
+    assert!((half / of(0.005, json!([])) - 1.0).abs() < 1e-12);
+    let first = {
+        let mut whole = whole.clone();
+        whole["contacts"][0]["gap"] = json!({"interference": 0.02});
+        problem(&whole.to_string())
+    };
+    let mut other = first.clone();
+    other.contacts[0].gap.as_mut().unwrap().interference = Some(0.01);
+    let mut family = Family::new(&first, None, &mut ()).unwrap();
+    let (found, _) = family.member(&other, Start::Anew, &mut ()).unwrap();
+    assert!((found.normal_force / whole_force - 1.0).abs() < 1e-12);
 }

@@ -90,8 +90,9 @@ fn field(path: &str) -> Option<(usize, &str)> {
 }
 
 /// The fields of a contact whose numbers affect neither the body nor the structure of a problem.
-const NAMES: [&str; 10] = [
+const NAMES: [&str; 11] = [
     "indentation",
+    "gap/interference",
     "tangential_displacement",
     "normal_force",
     "tangential_force",
@@ -113,6 +114,10 @@ fn set(problem: &mut Problem, path: &str, number: f64) -> bool {
     };
     match (name, &mut contact.friction) {
         ("indentation", _) => contact.indentation = number,
+        ("gap/interference", _) => match &mut contact.gap {
+            Some(gap) if gap.interference.is_some() => gap.interference = Some(number),
+            _ => return false,
+        },
         ("tangential_displacement", _) => contact.tangential_displacement = number,
         ("normal_force", _) if contact.normal_force.is_some() => {
             contact.normal_force = Some(number)

@@ -2,9 +2,11 @@
 
 use crate::solution::{QuantityName, Solution, Warning, WarningCode};
 
-/// Adds a note for each contact whose largest tangential stress may have the other sign. `pointer`: the place of a contact in the
+/// Adds a note for each contact whose largest tangential stress may have the other sign, and removes those of earlier errors. `pointer`: the place of a contact in the
 /// problem, by its name.
 pub fn note_unknown_signs(solution: &mut Solution, pointer: impl Fn(&str) -> String) {
+    let warnings = &mut solution.summary.warnings;
+    warnings.retain(|warning| warning.code != WarningCode::PeakSignUnknown);
     let Some(accuracy) = &solution.summary.accuracy else {
         return;
     };

@@ -11,6 +11,7 @@
 //! w is zero but at contact nodes. In w the gap is that before the unknown motions; reactions, slip and friction are the same as
 //! in v. S_w is the Schur complement of A in the stiffness on (q, w).
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::body::ElasticBody;
@@ -256,7 +257,7 @@ fn times(matrix: &Dense, column: &Column) -> Vec<f64> {
 fn followed(model: &Model, body: &ElasticBody) -> (Vec<Column>, Vec<[f64; 2]>) {
     let body_own = body.contact_unknown_count();
     let count = body.stiffness.size() - body_own;
-    let mut columns = vec![vec![0.0; body_own]; count];
+    let mut columns: Vec<BTreeMap<usize, f64>> = vec![BTreeMap::new(); count];
     let mut prescribed = vec![[0.0; 2]; body.contact_dofs.len()];
     let mut first = 0;
     for contact in &model.contacts {
@@ -277,8 +278,8 @@ fn followed(model: &Model, body: &ElasticBody) -> (Vec<Column>, Vec<[f64; 2]>) {
                         Dof::Free(unknown) => {
                             for (own, along) in dofs.into_iter().zip(axes.along) {
                                 if let Dof::Free(own) = own {
-                                    columns[unknown - body_own][own] +=
-                                        weight * inner(along, moves);
+                                    let column = &mut columns[unknown - body_own];
+                                    *column.entry(own).or_default() += weight * inner(along, moves);
                                 }
                             }
                         }
@@ -293,7 +294,9 @@ fn followed(model: &Model, body: &ElasticBody) -> (Vec<Column>, Vec<[f64; 2]>) {
         }
         first += boundary.nodes.len();
     }
-    let column = |(k, mut values): (usize, Vec<f64>)| {
+    let column = |(k, entries): (usize, BTreeMap<usize, f64>)| {
+        let mut values = vec![0.0; body_own];
+        entries.into_iter().for_each(|(i, value)| values[i] = value);
         body.contact_unknowns(&mut values);
         let mut column = sparse(&values);
         column.push((body_own + k, 1.0));

@@ -1,7 +1,5 @@
 //! Obstacles under loads that nothing holds: neither pressure nor friction of the final state resists one of their motions.
 
-use std::collections::BTreeSet;
-
 use crate::algorithm::system::{Point, State, System};
 use crate::error::SolveError;
 
@@ -31,9 +29,15 @@ pub(super) fn held(system: &System<'_>, state: &State, bound: &[f64]) -> Result<
         let points = system.points.iter().zip(bound);
         let rubs = points.filter(|(point, tau)| point.patch == p && **tau > 0.0);
         let slip = |point: &Point| system.slip(&state.v, point);
-        // between points that slip to opposite sides some place sticks, although no point does
-        let signs: BTreeSet<bool> = rubs.clone().map(|(point, _)| slip(point) > 0.0).collect();
-        let turns = signs.len() == 2;
+        // between neighbouring points that slip to opposite sides some place sticks, although no point does
+        let signs: Vec<(usize, bool)> = rubs
+            .clone()
+            .map(|(point, _)| (point.nodes[2], slip(point) > 0.0))
+            .collect();
+        let turns = signs.windows(2).any(|pair| {
+            let neighbours = pair[0].0.abs_diff(pair[1].0) <= 2;
+            neighbours && pair[0].1 != pair[1].1
+        });
         for (point, _) in rubs {
             if turns || system.law(point).sticks(slip(point)) {
                 let nodes = point.nodes.map(|node| node - patch.first);

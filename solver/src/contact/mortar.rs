@@ -8,6 +8,8 @@
 //! χ projects along the field of normals, which is interpolated between the nodes, and g is the length of that projection. Where
 //! the other chain has a corner node, the integrals are split. A row of P adds up to 1.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use super::{AXIS_SHARE, ContactBoundary, HeldDirections, aligned, edge_nodes};
 use crate::element::edge3;
 use crate::element::gauss::GAUSS_3;
@@ -21,7 +23,7 @@ const BEYOND: f64 = 0.05;
 /// The number of equal parts of a segment that are integrated by three points each: exact for straight edges in one.
 const PARTS: usize = 2;
 
-/// Places of an edge that are closer than this, −1 … 1, are one.
+/// Two places ξ of an edge that are closer than this count as one.
 const SAME_PLACE: f64 = 1e-9;
 
 /// The number of halvings in the search for the place that faces a corner.
@@ -56,6 +58,63 @@ struct Hit {
 struct Facing<'a> {
     own: &'a ContactBoundary,
     other: &'a ContactBoundary,
+    blocks: Vec<Block>,
+    /// Whether the other chain is a closed loop, which goes on at its ends.
+    closed: bool,
+}
+
+/// Consecutive edges of the other chain, within a circle: a line that misses the circle misses them.
+struct Block {
+    edges: std::ops::Range<usize>,
+    centre: [f64; 2],
+    radius: f64,
+}
+
+impl<'a> Facing<'a> {
+    fn new(own: &'a ContactBoundary, other: &'a ContactBoundary) -> Self {
+        /// The number of edges of a block: about the root of the longest chains.
+        const EDGES: usize = 64;
+        let count = other.edge_count();
+        let block = |first: usize| {
+            let edges = first..count.min(first + EDGES);
+            let nodes = &other.positions[2 * edges.start..=2 * edges.end];
+            let number = nodes.len() as f64;
+            let centre = [0, 1].map(|a| nodes.iter().map(|x| x[a]).sum::<f64>() / number);
+            let distance = |x: &[f64; 2]| (x[0] - centre[0]).hypot(x[1] - centre[1]);
+            let farthest = nodes.iter().map(distance).fold(0.0, f64::max);
+            // parabolic edges bulge, and the last ones go on for a little
+            let radius = 1.25 * farthest;
+            Block {
+                edges,
+                centre,
+                radius,
+            }
+        };
+        Facing {
+            own,
+            other,
+            blocks: (0..count).step_by(EDGES).map(block).collect(),
+            closed: other.nodes[0] == other.nodes[2 * count],
+        }
+    }
+
+    /// The edges of the other chain that the lines along the normals at some places of an edge, or between two of them, may hit.
+    fn near(&self, lines: &[([f64; 2], [f64; 2])]) -> impl Iterator<Item = usize> + '_ {
+        let hit = |block: &&Block| {
+            let off = |(x, n): &([f64; 2], [f64; 2])| {
+                cross([block.centre[0] - x[0], block.centre[1] - x[1]], *n)
+            };
+            let (low, high) = lines
+                .iter()
+                .map(off)
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), off| {
+                    (low.min(off), high.max(off))
+                });
+            low <= block.radius && high >= -block.radius
+        };
+        let near: Vec<&Block> = self.blocks.iter().filter(hit).collect();
+        near.into_iter().flat_map(|block| block.edges.clone())
+    }
 }
 
 /// Couples the nodes of `own` to those of `other`. `depth`: the depth of the section at x; `axis_ends`: the ends on the axis of a
@@ -66,22 +125,25 @@ pub fn couple(
     depth: impl Fn(f64) -> f64,
     axis_ends: &[[usize; 2]],
 ) -> Coupling {
-    let facing = Facing { own, other };
+    let facing = Facing::new(own, other);
     let count = own.nodes.len();
-    let mut weights = vec![vec![0.0; other.nodes.len()]; count];
+    let mut weights: Vec<BTreeMap<usize, f64>> = vec![BTreeMap::new(); count];
     let (mut gaps, mut areas) = (vec![0.0; count], vec![0.0; count]);
     let mut covered = vec![false; own.edge_count()];
     for (edge, covered) in covered.iter_mut().enumerate() {
-        let Some(segments) = facing.segments(edge) else {
-            continue;
-        };
-        *covered = true;
         let end = axis_ends
             .iter()
             .find(|[end, beside]| *beside == 2 * edge + 1 && edge_nodes(edge).contains(end));
         let on_axis = end.and_then(|[end, _]| edge_nodes(edge).iter().position(|i| i == end));
-        let points = facing.points(edge, &segments, &depth, on_axis);
-        let dual = dual_shapes(&points);
+        let segments = facing.segments(edge);
+        let points = segments.and_then(|all| facing.points(edge, &all, &depth, on_axis));
+        let Some((points, dual)) = points.and_then(|points| {
+            let dual = dual_shapes(&points)?;
+            Some((points, dual))
+        }) else {
+            continue;
+        };
+        *covered = true;
         for point in &points {
             let psi: [f64; 3] =
                 std::array::from_fn(|i| (0..3).map(|j| dual[i][j] * point.shape[j]).sum());
@@ -90,31 +152,48 @@ pub fn couple(
                 areas[node] += point.weight * point.shape[i];
                 gaps[node] += point.weight * psi[i] * point.hit.gap;
                 for (k, there) in edge_nodes(point.hit.edge).into_iter().enumerate() {
-                    weights[node][there] += point.weight * psi[i] * h[k];
+                    *weights[node].entry(there).or_default() += point.weight * psi[i] * h[k];
                 }
             }
         }
     }
     for i in (0..count).filter(|i| areas[*i] != 0.0) {
         gaps[i] /= areas[i];
-        weights[i].iter_mut().for_each(|w| *w /= areas[i]);
+        weights[i].values_mut().for_each(|w| *w /= areas[i]);
     }
     // the unknown of the node beside the axis is what its end leaves of it: u₁ − a u₀
     for &[end, beside] in axis_ends {
         gaps[beside] += AXIS_SHARE * gaps[end];
-        let of_end = weights[end].clone();
-        let own = weights[beside].iter_mut().zip(of_end);
-        own.for_each(|(w, end)| *w += AXIS_SHARE * end);
+        for (k, weight) in weights[end].clone() {
+            *weights[beside].entry(k).or_default() += AXIS_SHARE * weight;
+        }
     }
-    let row = |weights: Vec<f64>| -> Vec<(usize, f64)> {
-        let all = weights.into_iter().enumerate();
-        all.filter(|(_, w)| *w != 0.0).collect()
-    };
     Coupling {
-        rows: weights.into_iter().map(row).collect(),
+        rows: weights
+            .into_iter()
+            .map(|row| row.into_iter().collect())
+            .collect(),
         gaps,
         covered,
     }
+}
+
+/// How much of an edge the other chain faces, as a part of it, and the least distance there (length); none if it faces nothing.
+pub fn partly_faced(
+    own: &ContactBoundary,
+    other: &ContactBoundary,
+    edge: usize,
+) -> Option<(f64, f64)> {
+    const SAMPLES: usize = 32;
+    let facing = Facing::new(own, other);
+    let at = |k: usize| (2 * k + 1) as f64 / SAMPLES as f64 - 1.0;
+    let hits = (0..SAMPLES).filter_map(|k| {
+        let (x, n) = own.place(edge, at(k));
+        facing.nearest(x, n)
+    });
+    let gaps: Vec<f64> = hits.map(|hit| hit.gap.abs()).collect();
+    let least = gaps.iter().copied().fold(f64::INFINITY, f64::min);
+    (!gaps.is_empty()).then_some((gaps.len() as f64 / SAMPLES as f64, least))
 }
 
 /// Turns the normals of a chain to the mean of its own and the opposite ones of the other chain where they face one another:
@@ -128,7 +207,7 @@ pub fn take_mean_normals(
     const PASSES: usize = 2;
     let outward = own.normals.clone();
     for _ in 0..PASSES {
-        let facing = Facing { own, other };
+        let facing = Facing::new(own, other);
         let mean = |i: usize| {
             let hit = facing.nearest(own.positions[i], own.normals[i])?;
             let there = other.normal_at(hit.edge, hit.eta);
@@ -156,8 +235,8 @@ struct Point {
     hit: Hit,
 }
 
-/// ψ = D M⁻¹ h on an edge: the coefficients of the shape functions in each ψ.
-fn dual_shapes(points: &[Point]) -> [[f64; 3]; 3] {
+/// ψ = D M⁻¹ h on an edge: the coefficients of the shape functions in each ψ; none if they are not finite.
+fn dual_shapes(points: &[Point]) -> Option<[[f64; 3]; 3]> {
     let sum = |f: &dyn Fn(&[f64; 3]) -> f64| -> f64 {
         points.iter().map(|p| p.weight * f(&p.shape)).sum()
     };
@@ -170,7 +249,12 @@ fn dual_shapes(points: &[Point]) -> [[f64; 3]; 3] {
         mass[a][c] * mass[b][d] - mass[a][d] * mass[b][c]
     };
     let determinant: f64 = (0..3).map(|j| mass[0][j] * minor(0, j)).sum();
-    std::array::from_fn(|i| std::array::from_fn(|j| area[i] * minor(j, i) / determinant))
+    let dual: [[f64; 3]; 3] =
+        std::array::from_fn(|i| std::array::from_fn(|j| area[i] * minor(j, i) / determinant));
+    dual.as_flattened()
+        .iter()
+        .all(|x| x.is_finite())
+        .then_some(dual)
 }
 
 impl Facing<'_> {
@@ -178,9 +262,15 @@ impl Facing<'_> {
     /// None if it does not face all of the edge.
     fn segments(&self, edge: usize) -> Option<Vec<([f64; 2], usize)>> {
         let mut places = vec![-1.0, 1.0];
-        for corner in (0..self.other.nodes.len()).step_by(2) {
-            places.extend(self.facing_corner(edge, corner));
-        }
+        let ends = [-1.0, 0.0, 1.0].map(|xi| self.own.place(edge, xi));
+        let near: BTreeSet<usize> = self
+            .near(&ends)
+            .flat_map(|edge| [2 * edge, 2 * edge + 2])
+            .collect();
+        places.extend(
+            near.iter()
+                .filter_map(|corner| self.facing_corner(edge, *corner)),
+        );
         places.sort_by(f64::total_cmp);
         places.dedup_by(|a, b| *a - *b < SAME_PLACE);
         // the last of two that are one is kept at the end of the edge
@@ -231,7 +321,10 @@ impl Facing<'_> {
     /// The range of places, −1 … 1, in which an edge of the other chain counts: its first and its last go on for a little.
     fn reach(&self, edge: usize, rounding: f64) -> [f64; 2] {
         let last = self.other.edge_count() - 1;
-        let beyond = |ends: bool| if ends { 2.0 * BEYOND } else { 0.0 } + rounding;
+        let beyond = |ends: bool| match ends && !self.closed {
+            true => 2.0 * BEYOND + rounding,
+            false => rounding,
+        };
         [-1.0 - beyond(edge == 0), 1.0 + beyond(edge == last)]
     }
 
@@ -253,7 +346,7 @@ impl Facing<'_> {
 
     /// The nearest place of the other chain that faces a place along a normal.
     fn nearest(&self, x: [f64; 2], n: [f64; 2]) -> Option<Hit> {
-        let hits = (0..self.other.edge_count()).filter_map(|edge| {
+        let hits = self.near(&[(x, n)]).filter_map(|edge| {
             let hit = self.hit(x, n, edge)?;
             let [low, high] = self.reach(edge, SAME_PLACE);
             let inside = (low..=high).contains(&hit.eta);
@@ -262,14 +355,15 @@ impl Facing<'_> {
         hits.min_by(|a, b| a.gap.abs().total_cmp(&b.gap.abs()))
     }
 
-    /// The points of integration on an edge. `on_axis`: which of its nodes (start, end) lies on the axis.
+    /// The points of integration on an edge; none if one of them faces nothing. `on_axis`: which of its nodes (start, end) lies on the
+    /// axis.
     fn points(
         &self,
         edge: usize,
         segments: &[([f64; 2], usize)],
         depth: &impl Fn(f64) -> f64,
         on_axis: Option<usize>,
-    ) -> Vec<Point> {
+    ) -> Option<Vec<Point>> {
         let positions = edge_nodes(edge).map(|i| self.own.positions[i]);
         let mut points = Vec::new();
         for &([a, b], there) in segments {
@@ -279,9 +373,7 @@ impl Facing<'_> {
                 for (xi, w) in GAUSS_3 {
                     let xi = middle + 0.5 * step * xi;
                     let (x, n) = self.own.place(edge, xi);
-                    let Some(hit) = self.hit(x, n, there) else {
-                        continue;
-                    };
+                    let hit = self.hit(x, n, there)?;
                     let (_, [dx, dy]) = edge3::map(&positions, xi);
                     let mut shape = edge3::shape(xi);
                     if let Some(end) = on_axis {
@@ -295,7 +387,7 @@ impl Facing<'_> {
                 }
             }
         }
-        points
+        Some(points)
     }
 }
 

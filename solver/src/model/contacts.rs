@@ -64,7 +64,7 @@ impl Checks {
             all.check(self.shared_nodes(&model, &models, problem));
             all.check(self.supported_contact_nodes(&model, &problem.steps, fixed));
             all.check(self.nodes_held_along_tool(&model, fixed));
-            all.check(self.nodes_of_pair(&model, &models, fixed));
+            all.check(self.nodes_of_pair(mesh, &model, &models, fixed));
             all.check(self.tangential_force_borne(&model, &problem.steps));
             models.push(model);
         }
@@ -151,7 +151,7 @@ impl Checks {
             cut,
             profile,
             places: run.places,
-            in_space: obstacle.is_some_and(Obstacle::is_in_space),
+            in_space: obstacle.is_none_or(Obstacle::is_in_space),
             end_slopes,
             pair,
             indentation: contact.pushed(),
@@ -201,7 +201,9 @@ impl Checks {
                         && contact.condition != Condition::Bonded
                 };
                 let angle = cross(model.boundary.normals[i], other.boundary.normals[j]);
-                let corner = end(model, i)
+                let rigid = model.pair.is_none() && other.pair.is_none();
+                let corner = rigid
+                    && end(model, i)
                     && end(other, j)
                     && angle.abs() >= LEAST_ANGLE
                     && !corners.contains(node)
@@ -212,7 +214,7 @@ impl Checks {
                         format!("{}/boundary", model.pointer),
                         Reason::SharedNode,
                         format!("node {node} at ({x}, {y}), also in contact `{}`", other.name),
-                        "contacts without common nodes, or with a common end at which two normals differ by more than 6°; none bonded, and not with algorithm `thesis`",
+                        "contacts without common nodes, or with a common end at which two normals differ by more than 6°; none bonded, none against another body, and not with algorithm `thesis`",
                         "End one of the contacts one edge earlier with `from` or `to`.",
                     ));
                 }

@@ -496,7 +496,7 @@ impl Checks {
         let dragged = contact.tangential_displacement.abs();
         let (way, how) = match dragged > 0.0 {
             true => (dragged, "dragged"),
-            false => (contact.indentation.abs(), "pushed"),
+            false => (contact.pushed().abs(), "pushed"),
         };
         if way > 0.0 && elastic_slip > LARGE_ELASTIC_SLIP * way {
             let rule = elastic_slip_rule(way, 0.0);
@@ -523,7 +523,7 @@ impl Checks {
             at("elastic_slip"),
             friction.elastic_slip,
             "a length > 0",
-            &elastic_slip_rule(contact.indentation, contact.tangential_displacement),
+            &elastic_slip_rule(contact.pushed(), contact.tangential_displacement),
         ));
         self.warn_of_elastic_slip(contact, friction.elastic_slip, at("elastic_slip"));
         if friction.history == History::Incremental && friction.transition != Transition::Linear {

@@ -242,18 +242,14 @@ impl Checks {
         let mut numbers = Vec::new();
         for (i, contact) in problem.contacts.iter().enumerate() {
             let at = |field: &str| format!("/contacts/{i}/{field}");
-            let obstacle = match &contact.obstacle {
-                Some(obstacle) => self.obstacle(obstacle, &at("obstacle")),
-                None => Ok(()),
-            };
-            let faces = self.facing_body_numbers(contact, &format!("/contacts/{i}"));
+            let pointer = format!("/contacts/{i}");
+            let obstacle = self.obstacle_or_body(contact, &pointer);
             self.warn_of_noise(contact, &at("obstacle"));
             let (friction, sound) = self.friction(&analysis, contact, &at("friction"));
             all.check(sound);
             all.check(self.push_direction(&analysis, contact.direction, &at("direction")));
-            let pointer = format!("/contacts/{i}");
             all.check(self.obstacle_loads(&analysis, contact, &problem.steps, &pointer));
-            numbers.push((obstacle.and(faces), friction));
+            numbers.push((obstacle, friction));
         }
         let mesh = match source {
             Source::Given(external) => {
@@ -294,14 +290,11 @@ impl Checks {
             None => loads,
         });
         let (contacts, sound) = self.contacts(&mesh, &section, &axis, problem, numbers, &fixed);
-        let has_pairs = problem
-            .contacts
-            .iter()
-            .any(|contact| contact.against.is_some());
-        let held_by_contact = match sound {
-            // what a contact that is refused would hold is unknown
-            Err(_) if has_pairs => Ok(false),
-            _ => self.freedom(&mesh, &section, &fixed, &holds, &contacts),
+        // what a pair that is refused would hold is unknown
+        let unknown = sound.is_err() && problem.contacts.iter().any(|c| c.against.is_some());
+        let held_by_contact = match unknown {
+            true => Ok(false),
+            false => self.freedom(&mesh, &section, &fixed, &holds, &contacts),
         };
         all.check(sound);
         all.finish(())?;

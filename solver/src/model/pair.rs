@@ -1,6 +1,6 @@
 //! Contacts whose obstacle is another elastic body: their checks, and which nodes of that body each node of theirs follows.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::axis::Axis;
 use super::checks::Checks;
@@ -12,7 +12,7 @@ use crate::contact::{ContactBoundary, HeldDirections, Profile, arc_lengths};
 use crate::elasticity::Section;
 use crate::error::{AllChecks, Checked, Reason, either};
 use crate::mesh::{self, Edge, Mesh};
-use crate::problem::{Condition, Contact, NormalOf};
+use crate::problem::{BodyGap, Condition, Contact, NormalOf};
 use crate::solution::WarningCode;
 
 /// The ratio of the lengths of facing edges above which the coarser side should not carry the law.
@@ -50,6 +50,15 @@ pub(super) struct Faced {
 }
 
 impl Checks {
+    /// Checks what a contact faces: the numbers of its obstacle, or what another body needs.
+    pub(super) fn obstacle_or_body(&mut self, contact: &Contact, pointer: &str) -> Checked {
+        let obstacle = match &contact.obstacle {
+            Some(obstacle) => self.obstacle(obstacle, &format!("{pointer}/obstacle")),
+            None => Ok(()),
+        };
+        obstacle.and(self.facing_body_numbers(contact, pointer))
+    }
+
     /// Checks which of `obstacle` and `against` a contact has, and that nothing else contradicts it.
     pub(super) fn facing_body_numbers(&mut self, contact: &Contact, pointer: &str) -> Checked {
         let mut all = AllChecks::default();
@@ -133,16 +142,22 @@ impl Checks {
                 "Without the condition there is no other body.",
             ));
         }
-        let Some(gap) = contact.gap else {
-            return all.finish(());
-        };
+        if let Some(gap) = &contact.gap {
+            all.check(self.body_gap(gap, &at("gap")));
+        }
+        all.finish(())
+    }
+
+    /// Checks the distance of two bodies.
+    fn body_gap(&mut self, gap: &BodyGap, pointer: &str) -> Checked {
+        let mut all = AllChecks::default();
         if gap.interference.is_some() == gap.clearance.is_some() {
             let given = [
                 ("interference", gap.interference.is_some()),
                 ("clearance", gap.clearance.is_some()),
             ];
             all.fail(self.report(
-                at("gap"),
+                pointer,
                 Reason::WrongCount,
                 either(&given),
                 "exactly one of `interference` and `clearance`",
@@ -151,14 +166,14 @@ impl Checks {
         }
         all.check(self.require(
             gap.interference.is_none_or(|overlap| overlap > 0.0),
-            at("gap/interference"),
+            format!("{pointer}/interference"),
             gap.interference.unwrap_or_default(),
             "a length > 0",
             "Bodies that are apart have a `clearance`.",
         ));
         all.check(self.require(
             gap.clearance.is_none_or(|apart| apart >= 0.0),
-            at("gap/clearance"),
+            format!("{pointer}/clearance"),
             gap.clearance.unwrap_or_default(),
             "a length ≥ 0",
             "Bodies that overlap have an `interference`.",
@@ -181,21 +196,17 @@ impl Checks {
         let against = contact
             .against
             .as_ref()
-            .map(|against| &against.boundary[..]);
-        let against = against.unwrap_or_default();
+            .map_or("", |against| &against.boundary);
         let place = format!("{pointer}/against/boundary");
         let chain = self.one_chain(mesh, edges, &format!("{pointer}/boundary"), false)?;
         let there = self.boundary(mesh, against, place.clone())?;
         let there = self.one_chain(mesh, there, &place, true)?;
-        let shares = |edge: &Edge| chain.iter().flatten().any(|node| edge.contains(node));
-        if let Some(edge) = there.iter().find(|edge| shares(edge)) {
-            let node = edge
-                .iter()
-                .find(|node| chain.iter().flatten().any(|own| own == *node));
+        let own: BTreeSet<u32> = chain.iter().flatten().copied().collect();
+        if let Some(node) = there.iter().flatten().find(|node| own.contains(*node)) {
             return Err(self.report(
                 place,
                 Reason::SharedNode,
-                format!("node {}, also on `{}`", node.unwrap_or(&edge[0]), contact.boundary),
+                format!("node {node}, also on `{}`", contact.boundary),
                 "a boundary without common nodes",
                 "Two bodies in contact are separate parts of the mesh: where they meet, each has nodes of its own.",
             ));
@@ -211,11 +222,15 @@ impl Checks {
             let coupling = mortar::couple(&own, &other, depth, &axis.ends(&own.positions));
             (own, outward, coupling)
         };
-        let (_, _, whole) = couple(&chain, 0.0);
+        let (first, _, whole) = couple(&chain, 0.0);
         let covered = self.covered(mesh, &chain, &whole, contact, pointer)?;
         let start = arc_lengths(mesh, &chain)[2 * covered.start];
+        let cut = self.cut_edges(mesh, &chain, &covered, (&first, &other), pointer);
         let chain = &chain[covered];
         let (boundary, outward, coupling) = couple(chain, start);
+        if contact.gap.is_none() {
+            self.overlap(&boundary, &other, &coupling, contact, pointer)?;
+        }
         self.warn_of_coarser(&boundary, &other, &coupling, contact, pointer);
         let distance = |gap: &f64| match contact.gap {
             None => *gap,
@@ -235,13 +250,80 @@ impl Checks {
             },
             boundary,
             outward,
-            cut: Vec::new(),
+            cut,
             pair: Some(Pair {
                 boundary: against.to_owned(),
                 nodes: other.nodes,
                 rows: coupling.rows,
             }),
         })
+    }
+
+    /// The edges beside those that are covered of which the other body faces a part, with its length; they are left out, and told of
+    /// where the bodies are near.
+    fn cut_edges(
+        &mut self,
+        mesh: &Mesh,
+        chain: &[Edge],
+        covered: &std::ops::Range<usize>,
+        (own, other): (&ContactBoundary, &ContactBoundary),
+        pointer: &str,
+    ) -> Vec<(Edge, f64)> {
+        let beside = [covered.start.checked_sub(1), Some(covered.end)];
+        let mut cut = Vec::new();
+        for edge in beside
+            .into_iter()
+            .flatten()
+            .filter(|edge| *edge < chain.len())
+        {
+            let [start, end, _] = own.edge_arc(edge);
+            let length = end - start;
+            let Some((part, gap)) = mortar::partly_faced(own, other, edge) else {
+                continue;
+            };
+            if gap > length {
+                continue;
+            }
+            let [[x0, y0], [x1, y1]] =
+                [chain[edge][0], chain[edge][1]].map(|node| mesh.nodes[node as usize]);
+            self.warn(
+                WarningCode::ObstacleCutsEdge,
+                &format!("{pointer}/against"),
+                format!("The other body ends opposite the edge from ({x0}, {y0}) to ({x1}, {y1}), which is left out of the contact. Put a node there, or let the two boundaries change places."),
+            );
+            cut.push((chain[edge], part * length));
+        }
+        cut
+    }
+
+    /// Checks that the bodies do not lie inside one another: boundaries that look away from one another through a body would be
+    /// pressed by its thickness.
+    fn overlap(
+        &mut self,
+        own: &ContactBoundary,
+        other: &ContactBoundary,
+        coupling: &Coupling,
+        contact: &Contact,
+        pointer: &str,
+    ) -> Checked {
+        /// The largest overlap, in lengths of the shorter boundary.
+        const MOST: f64 = 0.5;
+        let least = coupling.gaps.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = MOST * own.length().min(other.length());
+        if -least <= most {
+            return Ok(());
+        }
+        let against = contact
+            .against
+            .as_ref()
+            .map_or("", |against| &against.boundary);
+        Err(self.report(
+            format!("{pointer}/against/boundary"),
+            Reason::Impossible,
+            format!("bodies that overlap by {:.3e} between `{}` and `{against}`", -least, contact.boundary),
+            format!("an overlap of at most {most:.3e}, half the length of the shorter boundary"),
+            "The two boundaries must be the sides by which the bodies touch; an overlap is also given by \"gap\": {\"interference\": …}.",
+        ))
     }
 
     /// The one chain of edges that a boundary is.
@@ -266,7 +348,7 @@ impl Checks {
                 hint,
             ));
         };
-        if run[0][0] == run[run.len() - 1][1] && !may_be_closed {
+        if mesh::is_closed(run) && !may_be_closed {
             return Err(self.report(
                 place,
                 Reason::NotAChain,
@@ -294,20 +376,23 @@ impl Checks {
             let against = contact
                 .against
                 .as_ref()
-                .map(|against| &against.boundary[..]);
+                .map_or("", |against| &against.boundary);
             let [first, last] = [chain[0][0], chain[chain.len() - 1][1]];
             let [[x0, y0], [x1, y1]] = [first, last].map(|node| mesh.nodes[node as usize]);
             let (reason, got) = match starts.len() {
-                0 => (Reason::CoversNothing, "no edge of the boundary".to_owned()),
+                0 => (
+                    Reason::CoversNothing,
+                    "all of no edge of the boundary".to_owned(),
+                ),
                 pieces => (
                     Reason::NotAChain,
-                    format!("{pieces} separate pieces of the boundary"),
+                    format!("all edges of {pieces} separate pieces of the boundary"),
                 ),
             };
             return Err(self.report(
                 format!("{pointer}/against/boundary"),
                 reason,
-                format!("`{}` faces {got} as a whole", against.unwrap_or_default()),
+                format!("`{against}` faces {got}"),
                 "a boundary that faces all of at least one edge, in one piece",
                 format!("The boundary goes from ({x0}, {y0}) to ({x1}, {y1}). The bodies must lie opposite one another, each with its outside towards the other; or let the two boundaries change places, so that the finer one carries the law."),
             ));
@@ -355,10 +440,12 @@ impl Checks {
     /// contact in another role.
     pub(super) fn nodes_of_pair(
         &mut self,
+        mesh: &Mesh,
         model: &ContactModel,
         others: &[ContactModel],
         fixed: &BTreeMap<u32, Held>,
     ) -> Checked {
+        // nodes that carry the law of one and face the other
         let opposite = |contact: &ContactModel, node: u32| {
             contact
                 .pair
@@ -377,7 +464,7 @@ impl Checks {
                 .iter()
                 .find(|node| opposite(model, **node));
             if let Some(node) = own.or(theirs) {
-                let [x, y] = place_of(model, other, *node);
+                let [x, y] = mesh.nodes[*node as usize];
                 return Err(self.report(
                     format!("{}/boundary", model.pointer),
                     Reason::SharedNode,
@@ -420,16 +507,4 @@ impl Checks {
         }
         Ok(())
     }
-}
-
-fn place_of(a: &ContactModel, b: &ContactModel, node: u32) -> [f64; 2] {
-    let at = |contact: &ContactModel| {
-        let place = contact
-            .boundary
-            .nodes
-            .iter()
-            .position(|other| *other == node);
-        place.map(|i| contact.boundary.positions[i])
-    };
-    at(a).or_else(|| at(b)).unwrap_or_default()
 }

@@ -23,7 +23,7 @@ fn multiplied(problem: &Problem) -> [Multiplied; 8] {
         let lengths = problem.contacts.iter().map(|contact| of(contact).abs());
         lengths.fold(0.0, f64::max)
     };
-    let pushed = longest(|contact| contact.indentation);
+    let pushed = longest(Contact::pushed);
     let dragged = longest(|contact| contact.tangential_displacement);
     let has = |of: fn(&Contact) -> f64| problem.contacts.iter().any(|contact| of(contact) != 0.0);
     let moves = |value: &BoundaryValue| match *value {

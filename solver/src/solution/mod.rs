@@ -710,7 +710,8 @@ pub struct ContactProfile {
     pub x: Vec<f64>,
     /// Position y before deformation.
     pub y: Vec<f64>,
-    /// Gap before deformation, obstacle profile − indentation, along the outward normal.
+    /// Gap before deformation, obstacle profile − indentation, along the outward normal; against another body the gap that its
+    /// displacement leaves.
     pub gap: Vec<f64>,
     /// Normal displacement u_n ≤ gap, along the outward normal.
     pub normal_displacement: Vec<f64>,

@@ -24,6 +24,9 @@ def mesh_lines(mesh: p.MeshInput) -> Iterator[Array]:
             yield np.column_stack([x, _height(mesh.grid, x, float(fraction))])
         for position in x:
             yield np.array([[position, _height(mesh.grid, np.array([position]), float(f))[0]] for f in (y[0], y[-1])])
+    elif mesh.grids is not None:
+        for grid in mesh.grids.values():
+            yield from mesh_lines(p.MeshInput(grid=grid))
     elif mesh.inline is not None:
         nodes = np.asarray(mesh.inline.nodes, float)
         for element in mesh.inline.elements:
@@ -137,6 +140,8 @@ def normals(points: Array) -> Array:
 def obstacle(mesh: p.MeshInput, contact: p.Contact) -> Array:
     """The face of the obstacle before it is pushed, as points in space; empty if it is not known here."""
     shape = contact.obstacle
+    if shape is None:
+        return np.empty((0, 2))
     if shape.kind == "polyline":
         return np.asarray(shape.points, float)
     face = boundary(mesh, contact.boundary)

@@ -286,9 +286,13 @@ impl<'a> PatchView<'a> {
         ]
     }
 
-    /// The gap at a node after all motions of the obstacle.
+    /// The gap at a node after all motions of the obstacle, or of another body.
     fn gap(&self, i: usize) -> f64 {
         let contact = self.patch.contact;
+        if contact.pair.is_some() {
+            let node = self.patch.first + i;
+            return self.displacement(i)[0] + self.system.opening(self.v, node);
+        }
         match &contact.tool {
             None => contact.gap(i, &self.system.level),
             Some(tool) => contact.profile[i] - tool.moved(i, &self.motions)[0],

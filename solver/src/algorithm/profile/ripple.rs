@@ -6,6 +6,7 @@
 
 use super::{Highest, PatchView};
 use crate::contact::edge_nodes;
+use crate::problem::History;
 
 /// The number of edges on either side of a peak of σ_t on which a ripple counts.
 const REACH: usize = 3;
@@ -16,6 +17,10 @@ const OSCILLATES: f64 = 0.05;
 impl PatchView<'_> {
     /// How far a ripple beside a peak of σ_t lifts it (stress), the largest of the edges around; 0 without a ripple.
     pub(super) fn ripple_at(&self, Highest { value, edge, .. }: Highest) -> f64 {
+        let friction = self.patch.contact.friction.as_ref();
+        if friction.is_none_or(|law| law.history == History::Total) {
+            return 0.0;
+        }
         let last = self.patch.contact.boundary.edge_count() - 1;
         let around = edge.saturating_sub(REACH)..=(edge + REACH).min(last);
         let lifts = around.filter_map(|edge| self.lift(edge, value.signum()));

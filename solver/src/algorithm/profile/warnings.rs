@@ -161,9 +161,15 @@ impl PatchView<'_> {
             self.system
                 .normal_displacement(self.v, self.patch.first + i)
         };
-        let opening = |i: usize| contact.gap(i, &self.system.level) - moved(i);
+        let opening = |i: usize| self.system.opening(self.v, self.patch.first + i);
         let nearest = (0..self.count()).min_by(|&a, &b| opening(a).total_cmp(&opening(b)));
         let smallest = nearest.map_or(f64::INFINITY, opening);
+        if let Some(pair) = &contact.pair {
+            return format!(
+                "The body {how}: the smallest gap to `{}` is {smallest:.6e}.",
+                pair.boundary
+            );
+        }
         // without contact the obstacle does not deform the body: the missing indentation is the gap
         let engages = |i: usize| (contact.profile[i] - moved(i)) / contact.push[i][0];
         // a push in a direction of its own may lead away from some nodes
@@ -327,6 +333,9 @@ impl PatchView<'_> {
     /// one does. A free corner may sink away from it: then only the obstacle's lowest point counts as its middle.
     fn is_half_of_obstacle(&self, end: usize) -> bool {
         let contact = self.patch.contact;
+        if contact.pair.is_some() {
+            return false;
+        }
         let (s, profile) = (&contact.boundary.s, &contact.profile);
         if !self.active(end) && profile.iter().any(|height| *height < profile[end]) {
             return false;
