@@ -2,6 +2,9 @@
 
 use crate::solution::{QuantityName, Solution, Warning, WarningCode};
 
+/// The part of the peak below which one in the other direction is no rival, whatever the error: then the peak is not known at all.
+const LEAST: f64 = 0.5;
+
 /// Adds a note for each contact whose largest tangential stress may have the other sign, and removes those of earlier errors. `pointer`: the place of a contact in the
 /// problem, by its name.
 pub fn note_unknown_signs(solution: &mut Solution, pointer: impl Fn(&str) -> String) {
@@ -28,7 +31,8 @@ pub fn note_unknown_signs(solution: &mut Solution, pointer: impl Fn(&str) -> Str
         points.sort_by(|a, b| a[0].total_cmp(&b[0]));
         points.dedup_by(|a, b| a[0] == b[0]);
         let opposite = highest(&points);
-        let unknown = opposite > 0.0 && peak.value.abs() - opposite <= error;
+        let size = peak.value.abs();
+        let unknown = opposite > LEAST * size && size - opposite <= error;
         unknown.then(|| Warning {
             code: WarningCode::PeakSignUnknown,
             pointer: pointer(&peak.contact),

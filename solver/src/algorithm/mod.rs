@@ -22,7 +22,7 @@
 //! | forces, extents, peaks and warnings of one contact | `profile` |
 //! | what a small force would change in a quantity: the adjoint, for stated errors | `adjoint` |
 //! | common ends of contacts | `corners` |
-//! | obstacles whose motion is unknown, and that nothing holds | `tools`, `unheld` |
+//! | obstacles whose motion is unknown, and that nothing holds | `opposite`, `unheld` |
 //! | bodies that slide away, slide far, or strain much | `slides`, `large_slip`, `small_strain` |
 
 mod adjoint;

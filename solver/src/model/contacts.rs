@@ -8,7 +8,7 @@ use super::checks::{ALIGNED, Checks};
 use super::contact_model::{AlongDirection, ContactModel};
 use super::corners::Alone;
 use super::level::Level;
-use super::pair::Faced;
+use super::pair_checks::Faced;
 use super::sliding;
 use super::supports::Held;
 use super::tool::Tool;

@@ -21,7 +21,7 @@
 //! | common ends of two contacts | `corners` |
 //! | obstacles that slide along the body | `sliding` |
 //! | obstacles under loads, and their checks | `tool`, `tool_checks` |
-//! | another body in place of an obstacle | `pair` |
+//! | another body in place of an obstacle, and its checks | `pair`, `pair_checks` |
 //! | rigid motions that nothing prevents | `freedom` |
 //! | distinct nodes at one place | `unmerged` |
 //! | the axis of a body of revolution | `axis` |
@@ -49,6 +49,7 @@ mod materials;
 mod nodes;
 mod numbers;
 mod pair;
+mod pair_checks;
 mod path;
 mod sliding;
 mod springs;
@@ -78,7 +79,7 @@ use nodes::FirstSides;
 use crate::elasticity::{self, Inner, Loads, Section, Springs};
 use crate::error::{AllChecks, Checked, Violation};
 use crate::mesh::{External, ExternalMesh, Mesh};
-use crate::problem::{Algorithm, Condition, History, Problem, SolverControls, Step};
+use crate::problem::{Algorithm, Condition, Contact, History, Problem, SolverControls, Step};
 use crate::solution::Warning;
 
 /// The depth above which an obstacle counts as hollow, as a part of the contact's length.
@@ -218,6 +219,11 @@ impl Model {
     }
 }
 
+/// Whether another body faces a contact, or nothing does.
+fn has_pair(contact: &Contact) -> bool {
+    contact.against.is_some() || contact.obstacle.is_none()
+}
+
 /// Where the mesh of a model comes from.
 enum Source {
     /// The mesh is given by the problem or its caller.
@@ -291,7 +297,7 @@ impl Checks {
         });
         let (contacts, sound) = self.contacts(&mesh, &section, &axis, problem, numbers, &fixed);
         // what a pair that is refused would hold is unknown
-        let unknown = sound.is_err() && problem.contacts.iter().any(|c| c.against.is_some());
+        let unknown = sound.is_err() && problem.contacts.iter().any(has_pair);
         let held_by_contact = match unknown {
             true => Ok(false),
             false => self.freedom(&mesh, &section, &fixed, &holds, &contacts),

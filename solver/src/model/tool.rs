@@ -1,7 +1,7 @@
 //! Obstacles that move as rigid bodies: a load, instead of a motion, is given along some of their three motions.
 //!
 //! The motions are the indentation along the direction of the contact, the tangential displacement perpendicular to it,
-//! and the tilt about a point. Where a load is given, the motion is unknown: `algorithm::tools` eliminates it.
+//! and the tilt about a point. Where a load is given, the motion is unknown: `algorithm::opposite` eliminates it.
 
 use super::level::Level;
 use crate::contact::ContactBoundary;

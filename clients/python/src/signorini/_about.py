@@ -45,6 +45,6 @@ def about(result: Summary, problem: Mapping[str, Any], step: int | str | None = 
 
 
 def obstacles(problem: Mapping[str, Any]) -> list[str]:
-    """The boundaries of contacts with a rigid obstacle: without a condition there is only a friction that is prescribed."""
-    contacts = problem.get("contacts") or []
-    return [contact["boundary"] for contact in contacts if contact.get("obstacle") and contact.get("condition") != "none"]
+    """The boundaries of contacts with a rigid obstacle; without a condition there is only a prescribed friction."""
+    contacts = [contact for contact in problem.get("contacts") or [] if contact.get("obstacle")]
+    return [contact["boundary"] for contact in contacts if contact.get("condition") != "none"]

@@ -18,15 +18,14 @@ if TYPE_CHECKING:
 
 def mesh_lines(mesh: p.MeshInput) -> Iterator[Array]:
     """The lines of the mesh, each a row (x, y) for each point. Raises ValueError for a mesh in a file."""
-    if mesh.grid is not None:
-        x, y = np.asarray(mesh.grid.x, float), np.asarray(mesh.grid.y, float)
-        for fraction in y:
-            yield np.column_stack([x, _height(mesh.grid, x, float(fraction))])
-        for position in x:
-            yield np.array([[position, _height(mesh.grid, np.array([position]), float(f))[0]] for f in (y[0], y[-1])])
-    elif mesh.grids is not None:
-        for grid in mesh.grids.values():
-            yield from mesh_lines(p.MeshInput(grid=grid))
+    grids = [mesh.grid] if mesh.grid is not None else list((mesh.grids or {}).values())
+    if grids:
+        for grid in grids:
+            x, y = np.asarray(grid.x, float), np.asarray(grid.y, float)
+            for fraction in y:
+                yield np.column_stack([x, _height(grid, x, float(fraction))])
+            for position in x:
+                yield np.array([[position, _height(grid, np.array([position]), float(f))[0]] for f in (y[0], y[-1])])
     elif mesh.inline is not None:
         nodes = np.asarray(mesh.inline.nodes, float)
         for element in mesh.inline.elements:

@@ -1,5 +1,5 @@
-"""The five examples of the thesis (A.C. Bolt, University of Cape Town, 1983, chapter 4), a tool under loads, and two pairs of
-elastic bodies.
+"""The five examples of the thesis (A.C. Bolt, University of Cape Town, 1983, chapter 4), a tool under loads, and two
+pairs of elastic bodies.
 
 Each function returns a new `Problem`, which may be changed. Parameters that are not given stay as in the thesis:
 rho is the nonlocal radius ρ (length), mu the coefficient of friction μ, epsilon the elastic slip ε (length). `refine`
