@@ -103,15 +103,17 @@ def boundary(mesh: p.MeshInput, name: str) -> Array:
             if limits is not None:
                 inside &= _within(points[:, axis], float(limits[0]), float(limits[1]))
         return points[inside]
-    if mesh.grid is not None:
-        x, y = np.asarray(mesh.grid.x, float), np.asarray(mesh.grid.y, float)
-        if name in ("top", "bottom"):
-            line = np.column_stack([x, _height(mesh.grid, x, float(y[-1] if name == "top" else y[0]))])
-            return line if name == "top" else line[::-1]
-        if name in ("left", "right"):
-            position = np.array([x[0] if name == "left" else x[-1]])
-            line = np.array([[position[0], _height(mesh.grid, position, float(f))[0]] for f in y])
-            return line if name == "left" else line[::-1]
+    body, _, side = name.rpartition(".")
+    grid = (mesh.grids or {}).get(body) if body else mesh.grid
+    if grid is not None:
+        x, y = np.asarray(grid.x, float), np.asarray(grid.y, float)
+        if side in ("top", "bottom"):
+            line = np.column_stack([x, _height(grid, x, float(y[-1] if side == "top" else y[0]))])
+            return line if side == "top" else line[::-1]
+        if side in ("left", "right"):
+            position = np.array([x[0] if side == "left" else x[-1]])
+            line = np.array([[position[0], _height(grid, position, float(f))[0]] for f in y])
+            return line if side == "left" else line[::-1]
     if mesh.inline is not None and name in mesh.inline.boundaries:
         nodes = np.asarray(mesh.inline.nodes, float)
         sides = [[side[0], side[2], side[1]] for side in mesh.inline.boundaries[name]]
