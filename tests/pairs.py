@@ -3,7 +3,7 @@
     pairs.py PROGRAM [--pairs 300] [--seed 1]
 
 Rollers on blocks, flats on blocks and rings in rings, of several moduli, meshes that do not match, with and without friction.
-Of the numbers of solutions that are not `poor` at most one in twenty may be off by more than its error, none by more than 1.5 times;
+Of the numbers of solutions that are not `poor` at most one in twenty may be off by more than its error, none by more than twice;
 at most one pair in a hundred may not converge. Each exception is printed.
 """
 
@@ -166,7 +166,7 @@ def main():
         "%d pairs: %d not solved, %d poor; of %d numbers %d off by more than their errors, the worst by %.2f of them"
         % (options.pairs, unsolved, poor, count, exceeded, worst)
     )
-    sys.exit(int(100 * unsolved > options.pairs or 20 * exceeded > count or worst > 1.5))
+    sys.exit(int(100 * unsolved > options.pairs or 20 * exceeded > count or worst > 2))
 
 
 if __name__ == "__main__":
