@@ -335,7 +335,7 @@ impl Moved {
                 if !moves || patch.contact.condition == Condition::None {
                     continue;
                 }
-                // of two bodies that both move, or of the other one alone, the pressures do not follow from their loads alone
+                // where the other body alone moves, the pressures do not follow from the loads on this one
                 let own = boundary.nodes[i];
                 if patch.contact.pair.is_some() && self.0[own as usize].is_none() {
                     return None;

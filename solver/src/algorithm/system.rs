@@ -25,11 +25,11 @@ const NEAREST: f64 = 1e-9;
 pub struct System<'a> {
     /// The condensed stiffness Ŝ; with unknown motions of obstacles that on displacements relative to them, S_w.
     pub stiffness: Arc<Dense>,
-    /// The condensed load f̂ at this load level; with unknown motions of obstacles f_w.
+    /// The condensed load f̂ at this load level; with unknown motions of obstacles, or other bodies, f_w.
     pub load: Vec<f64>,
-    /// The unknown motions of obstacles; none if all are given.
+    /// What lies opposite the contacts and moves by unknowns: obstacles under loads, other bodies; none if all motions are given.
     pub opposite: Option<Arc<Opposite>>,
-    /// The unknown motions at this load level without relative displacements.
+    /// What its unknowns at this load level follow from, beside the relative displacements (`Opposite::reduced`).
     pub opposite_at_rest: Vec<f64>,
     /// The contact nodes of all contacts.
     pub nodes: Vec<ContactNode>,
