@@ -4,7 +4,7 @@
 use serde_json::{Value, json};
 use solver::error::SolveError;
 use solver::family::{Family, Start};
-use solver::solution::{QuantityName, Solution, Verdict, WarningCode};
+use solver::solution::{ContactProfile, QuantityName, Solution, Verdict, WarningCode};
 
 use crate::support::{problem, solve};
 
@@ -226,38 +226,60 @@ fn a_press_fit_is_that_of_lame() {
     }
 }
 
-/// A body that is 10⁹ times as stiff is a rigid obstacle: a flat that is pushed against a block with friction.
+/// The profile of the boundary that faces: the same uniform pressure, on any meshes; of a roller its peak, its force, and gaps that
+/// its own displacements close.
 #[test]
-fn a_stiff_body_is_a_rigid_obstacle() {
-    let friction = json!({"coefficient": 0.3, "nonlocal_radius": 0.1, "elastic_slip": 1e-3});
-    let x = [0.0, 0.2, 0.4, 0.6, 0.8, 1.0];
-    let mut problem = json!({
-        "analysis": {"kind": "plane_strain"},
-        "mesh": {"grids": {"block": {"x": x, "y": [0, 0.5, 0.8, 1]}}},
-        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
-        "supports": [{"boundary": "block.bottom", "ux": 0, "uy": 0}],
-        "contacts": [{"boundary": "block.top", "obstacle": {"kind": "flat"}, "indentation": 0.01, "tangential_displacement": 0.002, "friction": friction}],
-    });
-    let rigid = solved(&problem);
-    problem["mesh"]["grids"]["tool"] = json!({"x": [-0.5, 0.1, 0.7, 1.5], "y": [1, 1.3]});
-    problem["materials"] = json!([
-        {"group": "block", "youngs_modulus": 1000, "poissons_ratio": 0.3},
-        {"group": "tool", "youngs_modulus": 1e12, "poissons_ratio": 0.3},
-    ]);
-    problem["supports"] = json!([
-        {"boundary": "block.bottom", "ux": 0, "uy": 0},
-        {"boundary": "tool.top", "ux": 0.002, "uy": -0.01},
-    ]);
-    problem["contacts"] = json!([{"boundary": "block.top", "against": {"boundary": "tool.bottom"}, "friction": friction}]);
-    let elastic = solved(&problem);
-    let [rigid, elastic] = [&rigid, &elastic].map(|s| &s.summary);
-    for (a, b) in [
-        (rigid.normal_force, elastic.normal_force),
-        (rigid.tangential_force, elastic.tangential_force),
-        (rigid.friction_force, elastic.friction_force),
-    ] {
-        assert!((a / b - 1.0).abs() < 1e-7, "{a} {b}");
+fn the_other_side_has_a_profile_too() {
+    for kind in ["plane_strain", "axisymmetric"] {
+        for [own, other] in [[3, 2], [2, 3], [1, 4], [7, 2]] {
+            let solution = solved(&stacked(kind, own, other, [1.0, 3.0]));
+            for profiles in [
+                &solution.profiles,
+                &solution.node_profiles,
+                &solution.friction_profiles,
+            ] {
+                let there = &profiles["upper.bottom"];
+                assert_eq!(
+                    there.s.len(),
+                    2 * other as usize + 1,
+                    "{kind} {own}:{other}"
+                );
+                for (i, p) in there.normal_stress.iter().enumerate() {
+                    assert!((p + 2.0).abs() < 1e-12, "{kind} {own}:{other}: {p}");
+                    let open = there.gap[i] - there.normal_displacement[i];
+                    assert!(open.abs() < 1e-12, "{kind} {own}:{other}: {open}");
+                }
+            }
+        }
     }
+    let solution = solved(&hertz(0, "block"));
+    let [own, there] = ["block.top", "roller.bottom"].map(|side| &solution.node_profiles[side]);
+    let peak = |p: &ContactProfile| p.normal_stress.iter().copied().fold(0.0, f64::min);
+    assert!(
+        (peak(there) / peak(own) - 1.0).abs() < 0.01,
+        "{} {}",
+        peak(there),
+        peak(own)
+    );
+    let force = |p: &ContactProfile| -> f64 {
+        let edges = (0..p.s.len() / 2).map(|e| {
+            let [a, m, b] = [0, 1, 2].map(|k| -p.normal_stress[2 * e + k]);
+            (p.s[2 * e + 2] - p.s[2 * e]) * (a + 4.0 * m + b) / 6.0
+        });
+        edges.sum()
+    };
+    assert!((force(there) / 25.0 - 1.0).abs() < 2e-3, "{}", force(there));
+    // its displacements are those of its nodes
+    let node = |x: f64, y: f64| {
+        let fields = &solution.fields;
+        let off = |k: &usize| (fields.x[*k] - x).hypot(fields.y[*k] - y);
+        (0..fields.x.len()).find(|k| off(k) < 1e-12).unwrap()
+    };
+    let last = there.s.len() - 1;
+    let k = node(there.x[last], there.y[last]);
+    let size = there.normal_displacement[last].hypot(there.tangential_displacement[last]);
+    let right = solution.fields.ux[k].hypot(solution.fields.uy[k]);
+    assert!((size / right - 1.0).abs() < 1e-8, "{size} {right}");
 }
 
 /// What contradicts itself is refused at its field, and bodies that do not face one another at their boundary.
@@ -431,6 +453,30 @@ fn a_surface_that_is_moved_presses_after_its_clearance() {
             "{gap} {u}"
         );
     }
+}
+
+/// What parabolas in place of arcs leave open is a part of the overlap, however little the body with the law is displaced: a press fit
+/// on few elements, of which one ring is stiff.
+#[test]
+fn errors_of_arcs_are_parts_of_the_overlap() {
+    let part = |text: &str| {
+        let problem = files::abaqus::problem(text).unwrap();
+        let contact = solve(&problem).summary;
+        let quantities = contact.accuracy.unwrap().quantities;
+        quantities[0].error.unwrap() / contact.normal_force
+    };
+    let path = format!(
+        "{}/data/abaqus/pair-fit-cpe8.inp",
+        env!("CARGO_MANIFEST_DIR")
+    );
+    let text = std::fs::read_to_string(path).unwrap();
+    let usual = part(&text);
+    assert!(usual > 2e-3, "{usual}");
+    let stiff = text
+        .replacen("1000., .3", "1e9, .3", 1)
+        .replace("1e7, 1e-3", "1e15, 1e-3");
+    let part = part(&stiff);
+    assert!((0.5 * usual..2.0 * usual).contains(&part), "{part} {usual}");
 }
 
 /// Members of a sweep over an interference, and steps that scale it, are the problems of their own.

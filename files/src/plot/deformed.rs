@@ -348,7 +348,7 @@ impl Body<'_> {
             let rows = profile.x.iter().zip(&profile.y).enumerate();
             let nodes = rows.filter_map(|(row, (&x, &y))| Some((row, *known.get(&bits(x, y))?)));
             let mut contacts = problem.contacts.iter();
-            let contact = contacts.find(|contact| contact.boundary == *name);
+            let contact = contacts.find(|contact| contact.is_on(name));
             Surface {
                 profile,
                 nodes: nodes.collect(),

@@ -58,7 +58,7 @@ fn panels(
     let along = format!("arc length s along “{}”", shortened(name, 40));
     let along = with_unit(&along, unit);
     let stress = |name: &str| with_unit(name, page::stress(&problem.units));
-    let rough = |contact: &Contact| contact.boundary == name && contact.friction.is_some();
+    let rough = |contact: &Contact| contact.is_on(name) && contact.friction.is_some();
     let rough = problem.contacts.iter().any(rough);
     let shades = if rough {
         shades(profile, shown.clone())

@@ -37,9 +37,11 @@ pub(super) fn large_slip(system: &System<'_>, v: &[f64], reactions: &[f64]) -> O
         code: WarningCode::LargeSlip,
         pointer: patch.contact.pointer.clone(),
         message: format!(
-            "The body slides along the obstacle by {:?} on average where it touches, and the contact is only {:?} long. In linear kinematics the contact stays on the material that touched at first. Slide less far, or place the obstacle in its final position and press there.",
+            "The body slides along {} by {:?} on average where it touches, and the contact is only {:?} long. In linear kinematics the contact stays on the material that touched at first. Slide less far, or place {} in its final position and press there.",
+            patch.contact.opposite(),
             rounded(piece.slip.abs()),
-            rounded(piece.length)
+            rounded(piece.length),
+            patch.contact.opposite()
         ),
     })
 }

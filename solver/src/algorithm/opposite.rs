@@ -11,14 +11,14 @@
 //! w is zero but at contact nodes. In w the gap is that before the unknown motions; reactions, slip and friction are the same as
 //! in v. S_w is the Schur complement of A in the stiffness on (q, w).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use crate::body::ElasticBody;
 use crate::elasticity::Dof;
 use crate::error::SolveError;
 use crate::linear::{Dense, Eliminated, Interrupt, Unsolved};
-use crate::model::{Level, Model};
+use crate::model::{ContactModel, Level, Model};
 use crate::observer::{Observer, take};
 
 /// An unknown motion of an obstacle: the contact, by its place in the model, and 0 for the indentation, 1 for the tangential
@@ -46,9 +46,15 @@ pub struct Opposite {
     pub stiffness: Arc<Dense>,
     /// By contact node, how far the prescribed displacements of other bodies move what it follows, along n and t.
     prescribed: Vec<[f64; 2]>,
+    /// By contact and node of the body that faces it: its two components, each with the displacement that its unit is; none of a
+    /// node that no contact node follows.
+    facing: Vec<Vec<Option<[Component; 2]>>>,
     /// A unit load of the problem, divided by 2π in axisymmetry.
     unit: f64,
 }
+
+/// A component of the displacement of a node, and the displacement that its unit is.
+type Component = (Dof, [f64; 2]);
 
 impl Opposite {
     /// What lies opposite the contacts of a model; none if nothing there moves by an unknown.
@@ -133,6 +139,7 @@ impl Opposite {
             eliminated,
             stiffness: Arc::new(stiffness),
             prescribed,
+            facing: facing(model, body),
             unit,
         }))
     }
@@ -203,6 +210,25 @@ impl Opposite {
     /// How far the prescribed displacements of another body move what a contact node follows, along n and t.
     pub(super) fn prescribed(&self, node: usize) -> [f64; 2] {
         self.prescribed[node]
+    }
+
+    /// The displacement of a node of the body that faces a contact, by its place in the boundary there; none if no contact node
+    /// follows it. `displaced`: the displacements of the kept unknowns.
+    pub(super) fn facing_displacement(
+        &self,
+        patch: usize,
+        node: usize,
+        displaced: &[f64],
+    ) -> Option<[f64; 2]> {
+        let components = self.facing.get(patch)?.get(node)?.as_ref()?;
+        let moved = |sum: [f64; 2], (dof, moves): &Component| {
+            let value = match dof {
+                Dof::Free(unknown) => displaced[*unknown],
+                Dof::Fixed(value) => *value,
+            };
+            [sum[0] + value * moves[0], sum[1] + value * moves[1]]
+        };
+        Some(components.iter().fold([0.0; 2], moved))
     }
 
     /// The derivatives of the unknown number `k` by w, −ŜP A⁻¹ e_k.
@@ -306,6 +332,23 @@ fn followed(model: &Model, body: &ElasticBody) -> (Vec<Column>, Vec<[f64; 2]>) {
         columns.into_iter().enumerate().map(column).collect(),
         prescribed,
     )
+}
+
+/// The components of the nodes that face each contact, of those that a contact node follows.
+fn facing(model: &Model, body: &ElasticBody) -> Vec<Vec<Option<[Component; 2]>>> {
+    let of_contact = |contact: &ContactModel| {
+        let Some(pair) = &contact.pair else {
+            return Vec::new();
+        };
+        let followed: BTreeSet<usize> = pair.rows.iter().flatten().map(|(k, _)| *k).collect();
+        let components = |k: usize| {
+            let node = *pair.nodes.get(k).filter(|_| followed.contains(&k))?;
+            let ([a, b], [x, y]) = (body.kept_dofs(node), body.axes(node).moves);
+            Some([(a, x), (b, y)])
+        };
+        (0..pair.nodes.len()).map(components).collect()
+    };
+    model.contacts.iter().map(of_contact).collect()
 }
 
 fn inner(a: [f64; 2], b: [f64; 2]) -> f64 {

@@ -215,6 +215,23 @@ impl AlongContacts {
         let (name, friction) = (&patch.contact.name, view.friction_profile(&profile));
         let peaks = view.peak_profile(&profile);
         let at_all = at_all_points(&profile, &friction, &peaks);
+        if let Some((facing, columns)) = view.facing_profile(&profile) {
+            // of a boundary that carries the law of another contact, the profile is its own; of one that two contacts face, the
+            // first is kept
+            let carries = view.carries_law(facing);
+            let all = [
+                &mut self.profiles,
+                &mut self.node_profiles,
+                &mut self.friction_profiles,
+            ];
+            for profiles in all
+                .into_iter()
+                .filter(|_| !carries && !columns.s.is_empty())
+            {
+                let known = profiles.entry(facing.to_owned());
+                known.or_insert_with(|| columns.clone());
+            }
+        }
         self.profiles.insert(name.clone(), at_all);
         self.node_profiles.insert(name.clone(), profile);
         self.friction_profiles.insert(name.clone(), friction);

@@ -42,6 +42,8 @@ pub struct Coupling {
     pub gaps: Vec<f64>,
     /// Whether the other chain faces all of an edge.
     pub covered: Vec<bool>,
+    /// Where corner nodes of the other chain face covered edges: the edge, the place on it, −1 … 1, and the corner node.
+    pub corners: Vec<(usize, f64, usize)>,
 }
 
 /// A place of the other chain that faces a place of this one.
@@ -130,6 +132,8 @@ pub fn couple(
     let mut weights: Vec<BTreeMap<usize, f64>> = vec![BTreeMap::new(); count];
     let (mut gaps, mut areas) = (vec![0.0; count], vec![0.0; count]);
     let mut covered = vec![false; own.edge_count()];
+    let mut corners: Vec<(usize, f64, usize)> = Vec::new();
+    let mut met: BTreeSet<usize> = BTreeSet::new();
     for (edge, covered) in covered.iter_mut().enumerate() {
         let end = axis_ends
             .iter()
@@ -144,6 +148,10 @@ pub fn couple(
             continue;
         };
         *covered = true;
+        let seen = facing
+            .corners(edge)
+            .filter(|(_, corner)| met.insert(*corner));
+        corners.extend(seen.map(|(xi, corner)| (edge, xi, corner)));
         for point in &points {
             let psi: [f64; 3] =
                 std::array::from_fn(|i| (0..3).map(|j| dual[i][j] * point.shape[j]).sum());
@@ -175,6 +183,7 @@ pub fn couple(
             .collect(),
         gaps,
         covered,
+        corners,
     }
 }
 
@@ -262,15 +271,7 @@ impl Facing<'_> {
     /// None if it does not face all of the edge.
     fn segments(&self, edge: usize) -> Option<Vec<([f64; 2], usize)>> {
         let mut places = vec![-1.0, 1.0];
-        let ends = [-1.0, 0.0, 1.0].map(|xi| self.own.place(edge, xi));
-        let near: BTreeSet<usize> = self
-            .near(&ends)
-            .flat_map(|edge| [2 * edge, 2 * edge + 2])
-            .collect();
-        places.extend(
-            near.iter()
-                .filter_map(|corner| self.facing_corner(edge, *corner)),
-        );
+        places.extend(self.corners(edge).map(|(xi, _)| xi));
         places.sort_by(f64::total_cmp);
         places.dedup_by(|a, b| *a - *b < SAME_PLACE);
         // the last of two that are one is kept at the end of the edge
@@ -294,6 +295,17 @@ impl Facing<'_> {
         places.windows(2).map(segment).collect()
     }
 
+    /// The corner nodes of the other chain that face an edge, each after its place on the edge.
+    fn corners(&self, edge: usize) -> impl Iterator<Item = (f64, usize)> + '_ {
+        let ends = [-1.0, 0.0, 1.0].map(|xi| self.own.place(edge, xi));
+        let near: BTreeSet<usize> = self
+            .near(&ends)
+            .flat_map(|edge| [2 * edge, 2 * edge + 2])
+            .collect();
+        let place = move |corner: usize| Some((self.facing_corner(edge, corner)?, corner));
+        near.into_iter().filter_map(place)
+    }
+
     /// The place of an edge that a corner node of the other chain faces.
     fn facing_corner(&self, edge: usize, corner: usize) -> Option<f64> {
         let at = self.other.positions[corner];
@@ -303,7 +315,7 @@ impl Facing<'_> {
         };
         let (mut low, mut high) = (-1.0, 1.0);
         let (start, end) = (off(low), off(high));
-        if start * end >= 0.0 {
+        if start * end > 0.0 {
             return None;
         }
         for _ in 0..HALVINGS {
@@ -313,7 +325,15 @@ impl Facing<'_> {
                 false => high = middle,
             }
         }
-        let xi = 0.5 * (low + high);
+        let xi = match [start == 0.0, end == 0.0] {
+            [true, _] => -1.0,
+            [_, true] => 1.0,
+            _ => 0.5 * (low + high),
+        };
+        let mut nodes = [-1.0, 0.0, 1.0].into_iter();
+        let xi = nodes
+            .rfind(|node| f64::abs(node - xi) < SAME_PLACE)
+            .unwrap_or(xi);
         let (_, n) = self.own.place(edge, xi);
         faces(n, self.other.normals[corner]).then_some(xi)
     }

@@ -35,7 +35,7 @@ pub struct ContactModel {
     pub profile: Vec<f64>,
     /// The obstacle between the nodes and at the obstacle's corners, in order of s.
     pub places: Vec<Place>,
-    /// Whether the obstacle is a curve in space; otherwise it is given by its distance from the body's surface.
+    /// Whether the obstacle, or another body, lies in space; otherwise it is given by its distance from the body's surface.
     pub in_space: bool,
     /// The slope of the obstacle along the body's t, at the first and at the last node.
     pub end_slopes: [f64; 2],
@@ -83,6 +83,14 @@ impl ContactModel {
             Some(tool) => tool.moved(node, &tool.motions(level))[0],
         };
         self.profile[node] - pushed
+    }
+
+    /// What lies opposite, in words.
+    pub(crate) fn opposite(&self) -> &'static str {
+        match self.pair {
+            None => "the obstacle",
+            Some(_) => "the other body",
+        }
     }
 
     /// How far the meshes of two bodies overlap at most (length); none against a rigid obstacle.

@@ -72,6 +72,29 @@ impl Checks {
         (models, all.finish(()))
     }
 
+    /// Checks that profiles can be named in URLs.
+    fn usable_names(&mut self, contact: &Contact, pointer: &str) -> Checked {
+        let against = contact.against.as_ref();
+        let names = [
+            (Some(&contact.boundary), "boundary"),
+            (against.map(|other| &other.boundary), "against/boundary"),
+        ];
+        let unusable = names.into_iter().find_map(|(name, field)| {
+            let name = name.filter(|name| ["", ".", ".."].contains(&name.as_str()))?;
+            Some((name, field))
+        });
+        if let Some((name, field)) = unusable {
+            return Err(self.report(
+                format!("{pointer}/{field}"),
+                Reason::Malformed,
+                format!("{name:?}"),
+                "a name that can be part of a URL: not empty, and neither . nor ..",
+                "Give these edges another name in the mesh, or name a part under /mesh/boundaries.",
+            ));
+        }
+        Ok(())
+    }
+
     /// Checks contact number `i` without regard to the other contacts, and makes its model.
     #[allow(clippy::too_many_arguments)] // all that a contact is made from
     fn contact(
@@ -97,15 +120,7 @@ impl Checks {
             ));
         }
         let edges = self.boundary(mesh, &contact.boundary, format!("{pointer}/boundary"))?;
-        if ["", ".", ".."].contains(&contact.boundary.as_str()) {
-            return Err(self.report(
-                format!("{pointer}/boundary"),
-                Reason::Malformed,
-                format!("{:?}", contact.boundary),
-                "a name that can be part of a URL: not empty, and neither . nor ..",
-                "Give these edges another name in the mesh, or name a part under /mesh/boundaries.",
-            ));
-        }
+        self.usable_names(contact, &pointer)?;
         sound?;
         let corners: Vec<u32> = edges.iter().flat_map(|edge| [edge[0], edge[1]]).collect();
         let Faced {
@@ -151,7 +166,7 @@ impl Checks {
             cut,
             profile,
             places: run.places,
-            in_space: obstacle.is_none_or(Obstacle::is_in_space),
+            in_space: contact.gap.is_none() && obstacle.is_none_or(Obstacle::is_in_space),
             end_slopes,
             pair,
             indentation: contact.pushed(),

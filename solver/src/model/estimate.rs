@@ -238,7 +238,8 @@ impl Model {
             contact: 2.0 * (all.nodes + facing),
             weights: all.weights,
             points: all.points,
-            profile: all.nodes + all.points,
+            // of the other side there is a profile, too
+            profile: all.nodes + all.points + facing,
             relative: f64::from(u8::from(self.contacts.iter().any(is_relative))),
             contacts: self.contacts.len() as f64,
             steps: self.steps.len().max(1) as f64,

@@ -498,12 +498,16 @@ impl Checks {
             true => (dragged, "dragged"),
             false => (contact.pushed().abs(), "pushed"),
         };
+        let moved = match contact.against {
+            None => format!("the obstacle is {how}"),
+            Some(_) => "the bodies overlap".to_owned(),
+        };
         if way > 0.0 && elastic_slip > LARGE_ELASTIC_SLIP * way {
             let rule = elastic_slip_rule(way, 0.0);
             self.warn(
                 WarningCode::ElasticSlipLarge,
                 &pointer,
-                format!("The elastic slip {elastic_slip:.1e} is {:.0} % of the {way:.1e} that the obstacle is {how}: until it has slipped that far friction acts as a spring below its bound, and tangential forces are too small for friction that slips at once. {rule}", 100.0 * elastic_slip / way),
+                format!("The elastic slip {elastic_slip:.1e} is {:.0} % of the {way:.1e} that {moved}: until it has slipped that far friction acts as a spring below its bound, and tangential forces are too small for friction that slips at once. {rule}", 100.0 * elastic_slip / way),
             );
         }
     }

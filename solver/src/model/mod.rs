@@ -66,7 +66,7 @@ pub use contact_model::ContactModel;
 pub use corners::Alone;
 pub use freedom::{Hold, RigidMotion};
 pub use level::Level;
-pub use pair::Pair;
+pub use pair::{FacingCorner, Pair};
 pub use supports::Held;
 pub use tool::Tool;
 pub use variable::VariableModel;

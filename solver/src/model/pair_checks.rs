@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::axis::Axis;
 use super::checks::Checks;
 use super::contact_model::ContactModel;
-use super::pair::Pair;
+use super::pair::{FacingCorner, Pair};
 use super::supports::Held;
 use crate::contact::mortar::{self, Coupling};
 use crate::contact::obstacle::FacingRun;
@@ -224,6 +224,31 @@ impl Checks {
             distance: distance(gap),
             slope: 0.0,
         });
+        let turned = match contact.used_normal() {
+            NormalOf::Mean => vec![0.0; boundary.nodes.len()],
+            _ => {
+                let mut mean = boundary.clone();
+                mortar::take_mean_normals(&mut mean, &other, held);
+                let both = boundary.normals.iter().zip(&mean.normals);
+                both.map(|([a, b], [x, y])| (a * y - b * x).atan2(a * x + b * y))
+                    .collect()
+            }
+        };
+        let by_meshes = contact.gap.is_none() && contact.condition == Condition::Unilateral;
+        let corner = |(edge, xi, node): &(usize, f64, usize)| {
+            let sides = [node.checked_sub(2), Some(*node)].into_iter().flatten();
+            let sides = sides.filter(|start| start + 2 < other.nodes.len());
+            let lengths = sides.map(|start| other.s[start + 2] - other.s[start]);
+            FacingCorner {
+                edge: *edge,
+                xi: *xi,
+                turn: other.turn(*node),
+                sharp: other.corner(*node) != 0.0,
+                side: lengths.fold(0.0, f64::max),
+            }
+        };
+        let corners = coupling.corners.iter().filter(|_| by_meshes).map(corner);
+        let corners = corners.filter(|corner| corner.turn != 0.0).collect();
         Ok(Faced {
             run: FacingRun {
                 chain: chain.to_vec(),
@@ -235,11 +260,7 @@ impl Checks {
             boundary,
             outward,
             cut,
-            pair: Some(Pair {
-                boundary: against.to_owned(),
-                nodes: other.nodes,
-                rows: coupling.rows,
-            }),
+            pair: Some(faced_part(against, &other, &coupling, turned, corners)),
         })
     }
 
@@ -432,24 +453,16 @@ impl Checks {
         fixed: &BTreeMap<u32, Held>,
     ) -> Checked {
         // nodes that carry the law of one and face the other
-        let opposite = |contact: &ContactModel, node: u32| {
-            contact
-                .pair
-                .as_ref()
-                .is_some_and(|pair| pair.nodes.contains(&node))
-        };
+        fn facing(contact: &ContactModel) -> impl Iterator<Item = &u32> {
+            contact.pair.iter().flat_map(|pair| &pair.nodes)
+        }
+        let own: BTreeSet<u32> = model.boundary.nodes.iter().copied().collect();
+        let faced: BTreeSet<u32> = facing(model).copied().collect();
         for other in others {
-            let own = model
-                .boundary
-                .nodes
-                .iter()
-                .find(|node| opposite(other, **node));
-            let theirs = other
-                .boundary
-                .nodes
-                .iter()
-                .find(|node| opposite(model, **node));
-            if let Some(node) = own.or(theirs) {
+            let mut both = facing(other).filter(|node| own.contains(node));
+            let carried = other.boundary.nodes.iter();
+            let mut carried = carried.filter(|node| faced.contains(node));
+            if let Some(node) = both.next().or_else(|| carried.next()) {
                 let [x, y] = mesh.nodes[*node as usize];
                 return Err(self.report(
                     format!("{}/boundary", model.pointer),
@@ -492,5 +505,34 @@ impl Checks {
             }
         }
         Ok(())
+    }
+}
+
+/// The part of the other boundary that a contact follows: a boundary may face many contacts.
+fn faced_part(
+    boundary: &str,
+    other: &ContactBoundary,
+    coupling: &Coupling,
+    turned: Vec<f64>,
+    corners: Vec<FacingCorner>,
+) -> Pair {
+    let nodes = || coupling.rows.iter().flatten().map(|(k, _)| *k);
+    let first = nodes().min().unwrap_or(0) & !1;
+    let last = nodes().max().unwrap_or(0).next_multiple_of(2);
+    let part = first..last + 1;
+    let counted = |row: &Vec<(usize, f64)>| {
+        let parts = row.iter().map(|(k, weight)| (k - first, *weight));
+        parts.collect::<Vec<_>>()
+    };
+    Pair {
+        boundary: boundary.to_owned(),
+        nodes: other.nodes[part.clone()].to_vec(),
+        s: other.s[part.clone()].to_vec(),
+        positions: other.positions[part.clone()].to_vec(),
+        normals: other.normals[part.clone()].to_vec(),
+        weights: other.weights[part].to_vec(),
+        rows: coupling.rows.iter().map(counted).collect(),
+        turned,
+        corners,
     }
 }

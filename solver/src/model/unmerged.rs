@@ -9,11 +9,14 @@ use crate::solution::WarningCode;
 
 impl Checks {
     /// Warns of nodes at the same place that are not connected. This is no violation, since a crack may be intended: if
-    /// both sides of the crack are contacts, there is no warning. (Parts that can move independently are refused.)
+    /// both sides of the crack are contacts, or the two sides of one, there is no warning. (Parts that can move independently are refused.)
     pub(super) fn warn_of_unmerged(&mut self, mesh: &Mesh, contacts: &[ContactModel]) {
         let meant: BTreeSet<u32> = contacts
             .iter()
-            .flat_map(|contact| contact.boundary.nodes.iter().copied())
+            .flat_map(|contact| {
+                let facing = contact.pair.iter().flat_map(|pair| &pair.nodes);
+                contact.boundary.nodes.iter().chain(facing).copied()
+            })
             .collect();
         self.unmerged
             .retain(|pair| !pair.iter().all(|node| meant.contains(node)));

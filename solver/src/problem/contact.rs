@@ -130,6 +130,12 @@ impl Contact {
         self.normal.unwrap_or(usual)
     }
 
+    /// Whether this boundary carries the law, or faces the one that does.
+    pub fn is_on(&self, boundary: &str) -> bool {
+        let against = self.against.as_ref();
+        self.boundary == boundary || against.is_some_and(|other| other.boundary == boundary)
+    }
+
     /// How far the bodies overlap, or the obstacle is pushed, at the end of the load path (length).
     pub(crate) fn pushed(&self) -> f64 {
         let overlap = self.gap.and_then(|gap| gap.interference);

@@ -30,14 +30,15 @@ pub struct Solution {
     /// One row per iteration.
     pub history: Vec<Iteration>,
     /// Columns along each contact boundary, by its name, at all points where the solution is known: the nodes, the points
-    /// where friction acts, and the places of the peaks, with the values of the summary.
+    /// where friction acts, and the places of the peaks, with the values of the summary. Of a boundary of another body that faces a
+    /// contact: the nodes of its edges that the contact covers, with the stress that they receive.
     pub profiles: BTreeMap<String, ContactProfile>,
-    /// Columns along each contact boundary at the nodes only, like `profiles`. Not part of the document and its digest:
+    /// Columns along the same boundaries at the nodes only, like `profiles`. Not part of the document and its digest:
     /// they are stored and served separately.
     #[serde(default, skip_serializing)]
     pub node_profiles: BTreeMap<String, ContactProfile>,
-    /// Columns along each contact boundary at the points where friction acts only, see [`ContactProfile`]; not part of
-    /// the document.
+    /// Columns along the same boundaries at the points where friction acts only (of one that faces a contact at its nodes), see
+    /// [`ContactProfile`]; not part of the document.
     #[serde(default, skip_serializing)]
     pub friction_profiles: BTreeMap<String, ContactProfile>,
     /// One entry for each load step of the problem; summary, profiles and fields of the solution are those of the last
@@ -249,7 +250,7 @@ pub struct ContactSummary {
     /// differ from its components.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force: Option<[f64; 2]>,
-    /// For an obstacle with a load or a tilt: its moment on the body about `about`, counter-clockwise (force × length).
+    /// For an obstacle with a moment or a tilt: its moment on the body about `about`, counter-clockwise (force × length).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moment: Option<f64>,
     /// The lengths of contact, stick and slip, with the ends of contact interpolated between nodes. Not part of the
@@ -434,6 +435,8 @@ pub enum WarningCode {
     MaterialJunction,
     /// Two bodies in contact of which the much coarser one carries the law.
     CoarserSideCarriesLaw,
+    /// A gap that is closed across the normals of the contact, which the total law counts as slip.
+    ClosingCountsAsSlip,
     /// Edges longer than the nonlocal radius.
     MeshTooCoarseForRadius,
     /// Few elements in the contact.
@@ -557,6 +560,7 @@ impl WarningCode {
             | PolygonTooCoarse
             | RangeCutsMesh
             | CoarserSideCarriesLaw
+            | ClosingCountsAsSlip
             | MeshTooCoarseForContact
             | MeshTooCoarseForRadius => Severity::Warning,
             CentreNodesDropped

@@ -134,6 +134,9 @@ fn reasons(code: WarningCode) -> (&'static str, &'static str) {
         CoarserSideCarriesLaw => (
             "Pressure and friction live on the nodes of the boundary that carries the law. Where it is much coarser than the boundary that faces it, the finer mesh opposite is of no use.",
             "Let `boundary` and `against` change places, or refine the boundary that carries the law."),
+        ClosingCountsAsSlip => (
+            "The total law knows displacements alone. Where the gap closes in another direction than along the normal, a part of the way before the surfaces touch lies along the contact, and counts as slip: σ_t is there where nothing has rubbed.",
+            "Let two bodies use \"normal\": \"mean\", and an obstacle with a direction \"normal\": \"obstacle\"; or give \"history\": \"incremental\" with enough increments, which counts from the first touch."),
         MeshTooCoarseForRadius => (
             "The averaged pressure S_ρ is an integral over a length 2ρ. Where edges are longer than ρ, the mesh and not the law decides what is averaged: the result is nearly that of Coulomb's law on this mesh, and σ_t has the mesh's own peaks.",
             "Refine the contact until edges are at most ρ/2, or set mesh.refine to a tolerance, which does it where it matters."),

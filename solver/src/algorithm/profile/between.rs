@@ -57,6 +57,8 @@ pub(super) struct Kink {
     change: f64,
     /// The angle by which the body's surface turns at the kink; 0 where the surface is smooth.
     turn: f64,
+    /// Whether it is a corner of the other body.
+    facing: bool,
     /// The pressure that each halving of the mesh adds at the kink (stress).
     growth: f64,
     /// The distance between the nodes on either side of the kink (length).
@@ -218,7 +220,7 @@ impl PatchView<'_> {
         let moduli = self.contact_moduli();
         let kinked = |edge: usize| {
             contact.places.iter().any(|place| {
-                let [before, after] = self.beside(place);
+                let [before, after] = self.beside(place.edge, place.xi);
                 let growth = Self::growth(&moduli, edge, place.kink);
                 place.edge == edge && before != after && growth > SHAPING * mean
             })
@@ -253,7 +255,9 @@ impl PatchView<'_> {
 
     /// Whether the nodes on either side of a place are in contact.
     fn touched_beside(&self, place: &Place) -> bool {
-        self.beside(place).iter().all(|&i| self.active(i))
+        self.beside(place.edge, place.xi)
+            .iter()
+            .all(|&i| self.active(i))
     }
 
     pub(super) fn warn_of_missed(&self, warnings: &mut Vec<Warning>) {
@@ -292,7 +296,7 @@ impl PatchView<'_> {
         let alone = |s: f64| polygon.as_ref().is_none_or(|polygon| !polygon.has(s));
         self.warn_of_notches(alone, warnings);
         let mut kinks = self.kinks();
-        kinks.retain(|kink| kink.turn == 0.0 || alone(kink.s));
+        kinks.retain(|kink| kink.turn == 0.0 && !kink.facing || alone(kink.s));
         let Some(sharpest) = kinks.iter().max_by(|a, b| a.growth.total_cmp(&b.growth)) else {
             return;
         };
@@ -303,6 +307,7 @@ impl PatchView<'_> {
             growth,
             spacing,
             mirrored,
+            facing,
             edge: _,
         } = sharpest;
         let peak = self.highest_pressure().map_or(0.0, |highest| highest.value);
@@ -340,8 +345,12 @@ impl PatchView<'_> {
         } else {
             ("", "")
         };
-        let message = match turn {
-            0.0 => format!(
+        let message = match (turn, &self.patch.contact.pair) {
+            (0.0, Some(pair)) if *facing => format!(
+                "`{}` has a corner in the contact, opposite s = {s:.4}: {size}{count}. The pressure is unbounded at a corner: {growth}. If the corners only come from straight sides of elements on a curve, mesh it with elements of second order, or name the curve under /mesh/curves; else round the corner.",
+                pair.boundary
+            ),
+            (0.0, _) => format!(
                 "The obstacle has a kink in the contact, at s = {s:.4}{mirrored}: {size}{count}. The pressure is unbounded at a kink: {growth}. If the kinks only come from the points of a table or a polyline, choose \"interpolation\": \"cubic\", with `smoothing` if they were measured; else round the edge.{symmetric}"
             ),
             _ => format!(
@@ -367,19 +376,27 @@ impl PatchView<'_> {
         if !contact.in_space || contact.condition != Condition::Unilateral {
             return Vec::new();
         }
+        let facing = self.facing_corners();
         let corner = |node: usize| {
             let turn = contact.boundary.corner(node);
             if turn == 0.0 {
                 return None;
             }
+            let facing = facing.iter().filter(|(_, at)| *at == [node; 2]);
+            let facing: f64 = facing
+                .map(|(corner, _)| 2.0 * f64::tan(0.5 * corner.turn))
+                .sum();
             // places are in order
             let own = contact
                 .places
                 .partition_point(|place| place.edge + 1 < node / 2);
             let own = contact.places[own..].iter();
             let own = own.take_while(|place| place.edge <= node / 2);
-            let own = own.filter(|place| place.kink != 0.0 && self.beside(place) == [node; 2]);
-            let change = 2.0 * (0.5 * turn).tan() + own.map(|place| place.kink).sum::<f64>();
+            let own = own.filter(|place| {
+                place.kink != 0.0 && self.beside(place.edge, place.xi) == [node; 2]
+            });
+            let obstacle = own.map(|place| place.kink).sum::<f64>();
+            let change = 2.0 * (0.5 * turn).tan() + obstacle + facing;
             Some(Corner { node, turn, change })
         };
         let corners = (2..self.count() - 1).step_by(2).filter(counts);
@@ -423,7 +440,7 @@ impl PatchView<'_> {
             code: WarningCode::KinkInContact,
             pointer: self.patch.contact.pointer.clone(),
             message: format!(
-                "The body has a reentrant corner in the contact, at s = {s:.4}: its surface turns by {:.2}°{count}. The obstacle does not reach into the corner, and on finer meshes the contact splits into one on each side of it, with other peaks. If the corners only come from straight sides of elements on a curve, mesh it with elements of second order, or name the curve under /mesh/curves.",
+                "The body has a reentrant corner in the contact, at s = {s:.4}: its surface turns by {:.2}°{count}. What lies opposite does not reach into the corner, and on finer meshes the contact splits into one on each side of it, with other peaks. If the corners only come from straight sides of elements on a curve, mesh it with elements of second order, or name the curve under /mesh/curves.",
                 turn.to_degrees()
             ),
         });
@@ -442,11 +459,11 @@ impl PatchView<'_> {
         // each with the turn of the body's surface; its kink is the whole change of slope
         let mut found: Vec<(Place, f64)> = Vec::new();
         let corners = self.corners_in_contact();
+        let own_corner = |nodes: [usize; 2]| corners.iter().any(|c| nodes == [c.node; 2]);
         for place in contact.places.iter().filter(|place| place.kink > 0.0) {
-            let nodes = self.beside(place);
+            let nodes = self.beside(place.edge, place.xi);
             let at_end = nodes == [0; 2] || nodes == [last; 2];
-            let at_corner = corners.iter().any(|corner| nodes == [corner.node; 2]);
-            if !at_end && !at_corner && nodes.iter().any(|&i| self.active(i)) {
+            if !at_end && !own_corner(nodes) && nodes.iter().any(|&i| self.active(i)) {
                 found.push((*place, 0.0));
             }
         }
@@ -458,6 +475,16 @@ impl PatchView<'_> {
             kink,
             nearer: 0.0,
         };
+        let facing = self.facing_corners().into_iter().filter(|(corner, nodes)| {
+            let touches = nodes.iter().any(|i| self.active(*i));
+            corner.sharp && corner.turn > 0.0 && touches && !own_corner(*nodes)
+        });
+        let facing: Vec<Place> = facing
+            .map(|(corner, nodes)| {
+                let change = 2.0 * f64::tan(0.5 * corner.turn);
+                at(nodes[0], corner.edge, corner.xi, change)
+            })
+            .collect();
         for Corner { node, turn, change } in corners {
             if change > 0.0 {
                 found.push((at(node, node / 2, -1.0, change), turn));
@@ -467,7 +494,9 @@ impl PatchView<'_> {
             let xi = if end == 0 { -1.0 } else { 1.0 };
             let edge = if end == 0 { 0 } else { last / 2 - 1 };
             let own = contact.places.iter().filter(|place| {
-                place.kink != 0.0 && self.beside(place) == [end; 2] && place.edge == edge
+                place.kink != 0.0
+                    && self.beside(place.edge, place.xi) == [end; 2]
+                    && place.edge == edge
             });
             let change = 2.0 * slope + own.map(|place| place.kink).sum::<f64>();
             if change > 0.0 && self.symmetric(end) && self.active(end) {
@@ -478,13 +507,20 @@ impl PatchView<'_> {
             }
         }
         let peak = match self.highest_pressure() {
-            Some(Highest { value, .. }) if !found.is_empty() && value > 0.0 => value,
+            Some(Highest { value, .. }) if value > 0.0 => value,
             _ => return Vec::new(),
         };
+        let of_own = found.into_iter().map(|(place, turn)| (place, turn, false));
+        let found: Vec<(Place, f64, bool)> = of_own
+            .chain(facing.into_iter().map(|place| (place, 0.0, true)))
+            .collect();
+        if found.is_empty() {
+            return Vec::new();
+        }
         let moduli = self.contact_moduli();
-        let kink = |(place, turn): (Place, f64)| {
+        let kink = |(place, turn, facing): (Place, f64, bool)| {
             let change = place.kink;
-            let node = self.patch.first + self.beside(&place)[0];
+            let node = self.patch.first + self.beside(place.edge, place.xi)[0];
             let on_axis = place.xi.abs() == 1.0 && self.system.nodes[node].on_axis;
             let growth = Self::growth(&moduli, place.edge, change);
             Kink {
@@ -492,9 +528,10 @@ impl PatchView<'_> {
                 s: self.arc(&place),
                 change,
                 turn,
+                facing,
                 growth: if on_axis { 0.5 * PI * growth } else { growth },
                 spacing: self.spacing(&place),
-                mirrored: [0, last].contains(&self.beside(&place)[0]),
+                mirrored: [0, last].contains(&self.beside(place.edge, place.xi)[0]),
             }
         };
         let kinks = found.into_iter().map(kink);
@@ -549,9 +586,9 @@ impl PatchView<'_> {
     }
 
     /// The nodes on either side of a place; if the place is at a node, that node twice.
-    fn beside(&self, place: &Place) -> [usize; 2] {
-        let [start, end, middle] = edge_nodes(place.edge);
-        match place.xi {
+    pub(super) fn beside(&self, edge: usize, xi: f64) -> [usize; 2] {
+        let [start, end, middle] = edge_nodes(edge);
+        match xi {
             -1.0 => [start; 2],
             0.0 => [middle; 2],
             1.0 => [end; 2],
@@ -570,8 +607,13 @@ impl PatchView<'_> {
     }
 
     fn arc(&self, place: &Place) -> f64 {
-        let arc = self.patch.contact.boundary.edge_arc(place.edge);
-        edge3::interpolate(&edge3::shape(place.xi), &arc)
+        self.arc_at(place.edge, place.xi)
+    }
+
+    /// The arc length of a place of an edge.
+    pub(super) fn arc_at(&self, edge: usize, xi: f64) -> f64 {
+        let arc = self.patch.contact.boundary.edge_arc(edge);
+        edge3::interpolate(&edge3::shape(xi), &arc)
     }
 
     /// The contact modulus E* of the material below every edge (stress): E/(1 − ν²), in plane stress E.

@@ -38,6 +38,7 @@ impl PatchView<'_> {
             widths,
         } = self.extents();
         let tool = self.patch.contact.tool.as_ref();
+        let turns = tool.filter(|tool| tool.turns);
         let [indentation, tangential_displacement, tilt] = self.motions;
         let loads = [0, 1, 2].map(|motion| circumference * self.load_of_obstacle(motion));
         ContactSummary {
@@ -48,7 +49,7 @@ impl PatchView<'_> {
                 Some(tool) => tool.force([loads[0], loads[1]]),
                 None => self.resultant(),
             }),
-            moment: tool.map(|_| loads[2]),
+            moment: turns.map(|_| loads[2]),
             normal: self.patch.contact.normal,
             normal_force: circumference * self.system.normal_force(range, &self.forces.reactions),
             tangential_force: circumference * tangential,

@@ -11,12 +11,14 @@
 //! | the ripple of σ_t where the body sticks | `ripple` |
 //! | what a push along a direction leaves open | `displaced` |
 //! | the force as a vector | `resultant` |
+//! | the same along the other body | `facing` |
 //! | materials that meet under the contact | `junction` |
 //! | warnings about a contact | `warnings` |
 
 mod between;
 mod displaced;
 mod extents;
+mod facing;
 mod junction;
 mod polygon;
 mod quantities;

@@ -1,10 +1,12 @@
-//! Surfaces that stand for a curve and are polygons: straight sides of elements, which refinement keeps.
+//! Surfaces that stand for a curve and are not that curve: polygons and parabolas by the sides of elements, of the body and of
+//! one that faces it, which refinement keeps.
 
 use std::f64::consts::PI;
 
 use super::PatchView;
 use crate::contact::edge_nodes;
 use crate::contact::smooth;
+use crate::model::FacingCorner;
 use crate::problem::Condition;
 use crate::solution::{Warning, WarningCode};
 
@@ -36,6 +38,8 @@ pub(super) struct Polygon {
     height: Option<f64>,
     /// The arc lengths of its first and its last corner.
     ends: [f64; 2],
+    /// Whether it is the surface of the other body.
+    facing: bool,
 }
 
 impl Polygon {
@@ -55,16 +59,26 @@ const ROUNDING: f64 = 1e-9;
 type Turn = (f64, f64);
 
 impl PatchView<'_> {
-    /// The polygon in contact that stands for a curve, if there is one: neighbouring corners that turn alike, at alike
-    /// distances, to which the obstacle does not conform.
+    /// The polygon in contact that stands for a curve, if there is one, of the body or of one that faces it: the sharper one.
     pub(super) fn polygon(&self) -> Option<Polygon> {
+        let own = self.polygon_through(&self.corners_with_images());
+        let facing = self.polygon_through(&self.corners_of_other());
+        let facing = facing.map(|polygon| Polygon {
+            facing: true,
+            ..polygon
+        });
+        let both = [own, facing].into_iter().flatten();
+        both.max_by(|a, b| a.turn.total_cmp(&b.turn))
+    }
+
+    /// The polygon that corners make: neighbours that turn alike, at alike distances, to which what is opposite does not conform.
+    fn polygon_through(&self, corners: &[Turn]) -> Option<Polygon> {
         let contact = self.patch.contact;
         let peak = self.highest_pressure().map(|highest| highest.value)?;
         if !contact.in_space || contact.condition != Condition::Unilateral || peak <= 0.0 {
             return None;
         }
         let s = &contact.boundary.s;
-        let corners = self.corners_with_images();
         if corners.len() < CORNERS {
             return None;
         }
@@ -110,6 +124,7 @@ impl PatchView<'_> {
                 side,
                 height: self.part_of_overlap(side * turn / 8.0),
                 ends: [run[0].0, run[run.len() - 1].0],
+                facing: false,
             });
         }
         found
@@ -118,27 +133,87 @@ impl PatchView<'_> {
     /// What the peak of the pressure may have from places in contact where parabolic sides that stand for a smooth curve meet at
     /// an angle (stress): half of what full contact with such sides takes. Refinement keeps the parabolas.
     pub(super) fn pressure_of_parabolas(&self) -> f64 {
-        let contact = self.patch.contact;
-        if !contact.in_space || contact.condition != Condition::Unilateral {
-            return 0.0;
-        }
-        let boundary = &contact.boundary;
-        let touching = (2..self.count() - 1).step_by(2).filter(|i| self.active(*i));
-        let smooth = touching.filter(|i| boundary.corner(*i) == 0.0);
-        let ends = [0, self.count() - 1].into_iter();
-        let ends =
-            ends.filter(|i| self.active(*i) && self.symmetric(*i) && self.turn_at_image(*i) == 0.0);
-        let at_images = ends.map(|end| {
-            let [before, after] = self.sides_at_image(end);
-            smooth::turn(&before, &after)
-        });
-        let turns = smooth.map(|i| boundary.turn(i)).chain(at_images);
-        let turn = turns.fold(0.0f64, |most, turn| most.max(turn.abs()));
+        let [turn, _] = self.parabolas();
         if turn == 0.0 {
             return 0.0;
         }
         let modulus = self.contact_moduli().into_iter().fold(0.0, f64::max);
         PI / 32.0 * modulus * turn
+    }
+
+    /// What forces may have from the same, as a part of them: the height of the curve over a side, in overlaps.
+    pub(super) fn part_of_parabolas(&self) -> f64 {
+        let [_, height] = self.parabolas();
+        match height > 0.0 {
+            true => self.part_of_overlap(height).unwrap_or(0.0),
+            false => 0.0,
+        }
+    }
+
+    /// The largest angle at which parabolic sides in contact meet, and the largest height of a curve over them that such angles
+    /// show, side · angle / 8; those of two bodies are added.
+    fn parabolas(&self) -> [f64; 2] {
+        let contact = self.patch.contact;
+        if !contact.in_space || contact.condition != Condition::Unilateral {
+            return [0.0; 2];
+        }
+        let boundary = &contact.boundary;
+        let length = |edge: usize| boundary.edge_arc(edge)[1] - boundary.edge_arc(edge)[0];
+        let facing = self.facing_corners();
+        let there = |i: usize| -> f64 {
+            let here = facing.iter().filter(|(_, at)| *at == [i; 2]);
+            here.map(|(corner, _)| corner.turn).sum()
+        };
+        let inside = |i: usize| i.is_multiple_of(2) && i > 0 && i + 1 < self.count();
+        let counts = |i: usize| inside(i) && self.active(i) && boundary.corner(i) == 0.0;
+        let smooth = (0..self.count()).filter(|i| counts(*i));
+        let side = |i: usize| length(i / 2 - 1).max(length(i / 2));
+        let inner = smooth.map(|i| (boundary.turn(i) + there(i), side(i)));
+        let ends = [0, self.count() - 1].into_iter();
+        let ends =
+            ends.filter(|i| self.active(*i) && self.symmetric(*i) && self.turn_at_image(*i) == 0.0);
+        let at_images = ends.map(|end| {
+            let [before, after] = self.sides_at_image(end);
+            let edge = if end == 0 { 0 } else { end / 2 - 1 };
+            (smooth::turn(&before, &after), length(edge))
+        });
+        // where a corner faces a node between two sides, both turns are counted there
+        let apart = facing.iter().filter(|(corner, at)| {
+            let counted = at[0] == at[1] && counts(at[0]);
+            !corner.sharp && !counted && at.iter().any(|i| self.active(*i))
+        });
+        let others = apart.map(|(corner, _)| (corner.turn, corner.side));
+        let most = |turns: &mut dyn Iterator<Item = (f64, f64)>| {
+            turns.fold([0.0f64; 2], |[most, height], (turn, side)| {
+                [most.max(turn.abs()), height.max(turn.abs() * side / 8.0)]
+            })
+        };
+        let own = most(&mut inner.chain(at_images));
+        let others = most(&mut others.into_iter());
+        [0, 1].map(|k| own[k] + others[k])
+    }
+
+    /// The places where sides of the other body meet at an angle, each with the nodes on either side of it.
+    pub(super) fn facing_corners(&self) -> Vec<(FacingCorner, [usize; 2])> {
+        let pair = self.patch.contact.pair.as_ref();
+        let corners = pair.map_or(&[][..], |pair| &pair.corners);
+        let beside = |corner: &FacingCorner| (*corner, self.beside(corner.edge, corner.xi));
+        corners.iter().map(beside).collect()
+    }
+
+    /// The corners of the other body's surface that the body does not have, too, in order.
+    fn corners_of_other(&self) -> Vec<Turn> {
+        let boundary = &self.patch.contact.boundary;
+        let facing = self.facing_corners().into_iter();
+        let sharp = facing.filter(|(corner, at)| {
+            let conforms = at[0] == at[1] && boundary.corner(at[0]) != 0.0;
+            corner.sharp && !conforms
+        });
+        let mut corners: Vec<Turn> = sharp
+            .map(|(corner, _)| (self.arc_at(corner.edge, corner.xi), corner.turn))
+            .collect();
+        corners.sort_by(|a, b| a.0.total_cmp(&b.0));
+        corners
     }
 
     /// The same of a peak σ_t = `stress` where the bound follows the pressure itself.
@@ -228,13 +303,22 @@ impl PatchView<'_> {
     }
 
     /// A height as a part of the largest overlap of body and obstacle before deformation, or of the deepest displacement of the
-    /// body in contact if that is larger: loads press bodies together without an overlap.
+    /// body in contact if that is larger: loads press bodies together without an overlap. Of two bodies it is a part of the largest
+    /// gap or overlap that contact closes.
     fn part_of_overlap(&self, height: f64) -> Option<f64> {
         let contact = self.patch.contact;
-        let gaps = (0..self.count()).map(|i| self.gap(i));
         let touching = (0..self.count()).filter(|i| self.active(*i));
-        let moved = touching.map(|i| self.displacement(i)[0]);
-        let overlap = -gaps.chain(moved).fold(0.0, f64::min);
+        let overlap = match contact.pair {
+            None => {
+                let gaps = (0..self.count()).map(|i| self.gap(i));
+                let moved = touching.map(|i| self.displacement(i)[0]);
+                -gaps.chain(moved).fold(0.0, f64::min)
+            }
+            // either body may be displaced as a whole
+            Some(_) => touching
+                .map(|i| contact.gap(i, &self.system.level).abs())
+                .fold(0.0, f64::max),
+        };
         (overlap > ROUNDING * contact.boundary.length()).then_some(height / overlap)
     }
 
@@ -242,16 +326,29 @@ impl PatchView<'_> {
     fn warn_of_parabolas(&self, warnings: &mut Vec<Warning>) {
         let peak = self.highest_pressure().map_or(0.0, |highest| highest.value);
         let part = self.pressure_of_parabolas() / peak;
-        if part.is_finite() && part > SHOWN {
-            warnings.push(Warning {
-                code: WarningCode::KinkInContact,
-                pointer: self.patch.contact.pointer.clone(),
-                message: format!(
-                    "The sides of elements in contact are parabolas that meet at small angles. The peak of the pressure may be {:.1} % off that of a smooth curve, which its stated error contains. Unless the curve is named under /mesh/curves, refinement keeps the angles: name it, or begin with more elements.",
-                    100.0 * part
-                ),
-            });
+        if !part.is_finite() || part <= SHOWN {
+            return;
         }
+        let of_forces = self.part_of_parabolas();
+        let forces = match of_forces > SHOWN {
+            true => format!(" and forces {:.1} %", 100.0 * of_forces),
+            false => String::new(),
+        };
+        let advice = match self.patch.contact.pair {
+            None => "",
+            Some(_) => " A known overlap or distance of the bodies is best given by `gap`.",
+        };
+        warnings.push(Warning {
+            code: match of_forces > COARSE {
+                true => WarningCode::PolygonTooCoarse,
+                false => WarningCode::KinkInContact,
+            },
+            pointer: self.patch.contact.pointer.clone(),
+            message: format!(
+                "The sides of elements in contact are parabolas that meet at small angles. The peak of the pressure may be {:.1} %{forces} off that of a smooth curve, which its stated error contains. Unless the curve is named under /mesh/curves, refinement keeps the angles: name it, or begin with more elements.{advice}",
+                100.0 * part
+            ),
+        });
     }
 
     /// Tells of a polygon in place of a curve, and returns it.
@@ -265,12 +362,21 @@ impl PatchView<'_> {
             turn,
             side,
             height,
+            facing,
             ..
         } = polygon;
+        let opposite = self.patch.contact.opposite();
+        let surface = match (facing, &self.patch.contact.pair) {
+            (true, Some(pair)) => format!(
+                "The surface of `{}`, which the body touches,",
+                pair.boundary
+            ),
+            _ => "The surface in contact".to_owned(),
+        };
         let coarse = height.is_some_and(|height| height > COARSE);
         let part = match height {
             Some(height) => format!(
-                ", which is {:.1} % of the overlap of body and obstacle: forces may be wrong by about as much",
+                ", which is {:.1} % of the overlap of the body and {opposite}: forces may be wrong by about as much",
                 100.0 * height
             ),
             None => String::new(),
@@ -283,7 +389,7 @@ impl PatchView<'_> {
             },
             pointer: self.patch.contact.pointer.clone(),
             message: format!(
-                "The surface in contact is a polygon: it turns by up to {:.2}° at {count} corners, between sides of up to {side:.4e}. Refinement keeps the corners, and the stated errors are those of the polygon. If it stands for a curve, that curve is {:.2e} off the middle of a side{part}. Name the curve under /mesh/curves, or mesh it with elements of second order whose midside nodes are on it.",
+                "{surface} is a polygon: it turns by up to {:.2}° at {count} corners, between sides of up to {side:.4e}. Refinement keeps the corners, and the stated errors are those of the polygon. If it stands for a curve, that curve is {:.2e} off the middle of a side{part}. Name the curve under /mesh/curves, or mesh it with elements of second order whose midside nodes are on it.",
                 turn.to_degrees(),
                 side * turn / 8.0
             ),

@@ -32,7 +32,7 @@ pub struct Quantity {
     /// the friction by the law between the points. Beside a peak of the pressure: a jump of σ_t. At a peak of σ_t: the
     /// change of the bound τ.
     pub between: f64,
-    /// What the mesh does not resolve, in the unit of the value. Of a peak: the pressure where σ_t jumps beside it, or where
+    /// What the mesh does not resolve, in the unit of the value. Of a force: how far sides of elements are from a curve. Of a peak: the pressure where σ_t jumps beside it, or where
     /// sides of a smooth curve meet at an angle, and what a ripple of σ_t lifts its peak where the body sticks. Of an end of stick at a node, where friction just
     /// reaches its bound: the distance to the next node. Else 0.
     pub unresolved: f64,
@@ -301,6 +301,7 @@ impl PatchView<'_> {
         let open: f64 = left_open.iter().map(|(_, force)| force).sum();
         let bonded = self.bonded_at_kinks();
         let jumps: f64 = bonded.iter().map(|(_, force)| force).sum();
+        let parabolas = self.part_of_parabolas();
         let canceling_at = self.canceling().into_iter().map(f64::abs).enumerate();
         let open_at: Vec<(usize, f64)> = canceling_at.chain(left_open).chain(bonded).collect();
         let between = [
@@ -322,10 +323,11 @@ impl PatchView<'_> {
                 QuantityName::TangentialForce => circumference * between[0].abs(),
                 _ => circumference * between[1],
             },
-            unresolved: match name {
-                QuantityName::NormalForce => 0.0,
-                _ => circumference * jumps,
-            },
+            unresolved: parabolas * f64::abs(value)
+                + match name {
+                    QuantityName::NormalForce => 0.0,
+                    _ => circumference * jumps,
+                },
             sharp_end: match name {
                 QuantityName::NormalForce => 0.0,
                 _ => circumference * sharp_end,

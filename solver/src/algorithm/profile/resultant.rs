@@ -70,8 +70,10 @@ impl PatchView<'_> {
             code: WarningCode::NormalsDiffer,
             pointer: contact.pointer.clone(),
             message: format!(
-                "The normals in the contact differ: its force on the body is {force}, and on the obstacle the opposite. `normal_force`, {:.6e}, and `tangential_force`, {:.6e}, are sums of pressures and tangential stresses in all directions.",
-                summary.normal_force, summary.tangential_force
+                "The normals in the contact differ: its force on the body is {force}, and on {} the opposite. `normal_force`, {:.6e}, and `tangential_force`, {:.6e}, are sums of pressures and tangential stresses in all directions.",
+                contact.opposite(),
+                summary.normal_force,
+                summary.tangential_force
             ),
         });
     }

@@ -5,7 +5,7 @@ use crate::algorithm::system::Point;
 use crate::contact::edge_nodes;
 use crate::elasticity::{Dof, Side, growth};
 use crate::friction::BoundLaw;
-use crate::problem::{Condition, History, Measure, Normalization};
+use crate::problem::{Condition, History, Measure, NormalOf, Normalization};
 use crate::solution::{Outcome, Warning, WarningCode};
 
 /// The relative error of the peak of a smooth pressure, times the square of the number of elements across the contact.
@@ -94,10 +94,11 @@ impl PatchView<'_> {
         let mut touching = (0..self.count()).filter(|&i| self.active(i));
         let Some(first) = touching.next() else {
             let (code, how) = match self.system.touched.contains(&self.p) {
-                true => (WarningCode::ContactOpened, "touches the obstacle no longer"),
-                false => (WarningCode::NoContact, "never touches the obstacle"),
+                true => (WarningCode::ContactOpened, "no longer touches"),
+                false => (WarningCode::NoContact, "never touches"),
             };
-            warn(code, self.without_contact(how));
+            let how = format!("{how} {}", contact.opposite());
+            warn(code, self.without_contact(&how));
             return;
         };
         let last = touching.next_back().unwrap_or(first);
@@ -105,12 +106,14 @@ impl PatchView<'_> {
             warn(
                 WarningCode::BoundBeyondContact,
                 format!(
-                    "The prescribed friction bound acts on the whole boundary, as in Tresca's law: up to {tau:.3e} also where the body does not touch the obstacle. Give it as a table over s that ends with the contact."
+                    "The prescribed friction bound acts on the whole boundary, as in Tresca's law: up to {tau:.3e} also where the body does not touch {}. Give it as a table over s that ends with the contact.",
+                    contact.opposite()
                 ),
             );
         }
         self.warn_of_coarse_mesh(warn);
         self.warn_of_total_law(first, last, warn);
+        self.warn_of_closing(warn);
         self.warn_of_ends(first, last, warn);
     }
 
@@ -258,6 +261,38 @@ impl PatchView<'_> {
                 "Friction follows the total law, by the displacements at the end alone, and {why}: with \"history\": \"incremental\", Coulomb's law along the way, stick zones and tangential forces are others, often by tens of per cent."
             ),
         );
+    }
+
+    /// Warns where the total law counts as slip what closes the gap, since the gap closes across the normals of the contact.
+    fn warn_of_closing(&self, warn: &mut Warn<'_>) {
+        let contact = self.patch.contact;
+        let law = contact.friction.as_ref();
+        let Some(law) = law.filter(|law| law.history == History::Total) else {
+            return;
+        };
+        let slope = |i: usize| match (&contact.pair, &contact.along) {
+            (Some(pair), _) => pair.turned[i],
+            (None, Some(_)) if contact.push[i][0] > 0.0 => contact.push[i][1] / contact.push[i][0],
+            _ => 0.0,
+        };
+        let touching = (0..self.count()).filter(|i| self.active(*i));
+        let most = touching
+            .map(|i| (contact.profile[i] * slope(i)).abs())
+            .fold(0.0, f64::max);
+        if most > law.elastic_slip {
+            let instead = match (&contact.pair, contact.normal) {
+                (Some(_), _) => "\"normal\": \"mean\", or ",
+                (None, NormalOf::Body) => "\"normal\": \"obstacle\", or ",
+                _ => "",
+            };
+            warn(
+                WarningCode::ClosingCountsAsSlip,
+                format!(
+                    "The gap closes across the normals of the contact: before anything touches, up to {most:.3e} of that way lies along the surface, and the total law counts it as slip, which exceeds elastic_slip ({:.3e}). Give {instead}\"history\": \"incremental\" with enough increments.",
+                    law.elastic_slip
+                ),
+            );
+        }
     }
 
     /// Warns of contact at the ends of the obstacle, and of averages that reach beyond ends. `first` and `last`: the
