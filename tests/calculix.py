@@ -21,7 +21,13 @@ ALLOWED = {"ring-cpe": 1e-5, "ring-cax": 5e-4, "ring-cps": 1e-2, "mass-cpe": 1e-
 
 # Rigid tools: CalculiX's contact is a stiff spring at each node, along the normal of the deformed surface. Friction, which
 # reaches its bound at a slip in proportion to the pressure there, differs more.
-ALLOWED |= {"roller-cpe": 1e-3, "disc-cpe": 1e-3, "drag-cpe": 5e-3}
+ALLOWED |= {"roller-cpe": 1e-3, "push-cpe": 5e-3, "disc-cpe": 1e-3, "drag-cpe": 5e-3}
+
+# Two elastic bodies: at the end of a contact its penalty lets nodes press that ours leaves open, and it integrates the contact of
+# arcs of unequal sides otherwise.
+ALLOWED |= {"pair-roller": 1e-2, "pair-fit": 1e-2}
+# Of plane elements it makes bricks, and its *TIE leaves their midside nodes out ("no tied constraint is generated").
+ONLY_OURS = {"pair-tie-cpe8"}
 DECKS = pathlib.Path(__file__).parent / "data" / "abaqus"
 
 
@@ -61,7 +67,7 @@ def difference(theirs, ours):
 
 def main():
     program = str(pathlib.Path(sys.argv[1]).resolve())
-    decks = sorted(DECKS.glob("*.inp"))
+    decks = sorted(deck for deck in DECKS.glob("*.inp") if deck.stem not in ONLY_OURS)
     missing = [name for name in ALLOWED if not any(deck.stem.startswith(name) for deck in decks)]
     if missing:
         sys.exit(f"there is no deck {', '.join(missing)}")
@@ -69,13 +75,15 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         for deck in decks:
-            nodes = deck.read_text().split("*ELEMENT")[0]
+            # those of the body, or of both bodies; those of tools are not in the result
+            blocks = re.findall(r"^\*NODE(?:, NSET=(\w+))?\n((?:\d+, .*\n)+)", deck.read_text(), re.M)
+            nodes = blocks[0][1] + "".join(block for name, block in blocks[1:] if name == "NB")
             numbers = [int(n) for n in re.findall(r"^(\d+), \S+, \S+$", nodes, re.M)]
             ours = signorini(program, deck, folder, numbers)
             off, size = difference(calculix(deck, folder), ours)
             allowed = next(value for name, value in ALLOWED.items() if deck.stem.startswith(name))
             failed |= not off <= allowed
-            print(f"{deck.stem:12} {len(ours):4} nodes, largest difference {off:.1e} of {size:.4f}, allowed {allowed:.0e}")
+            print(f"{deck.stem:16} {len(ours):4} nodes, largest difference {off:.1e} of {size:.4f}, allowed {allowed:.0e}")
     if failed:
         sys.exit("CalculiX and Signorini differ")
 

@@ -931,7 +931,10 @@ fn keywords_without_effect_are_passed_over_and_others_refused_by_name() {
             block(&format!("*EQUATION\n2\n1, 1, 1., 5, 1, 1.\n{HELD}"), load),
             "*EQUATION",
         ),
-        (block(&format!("*TIE, NAME=T\nA, B\n{HELD}"), load), "*TIE"),
+        (
+            block(&format!("*TIE, NAME=T\nA, B\n{HELD}"), load),
+            "`A` in a contact pair",
+        ),
         (block(HELD, load).replace("*STATIC", "*DYNAMIC"), "*DYNAMIC"),
         (
             block(HELD, load).replace("*STATIC", "*STATIC, RIKS"),

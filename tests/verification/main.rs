@@ -21,6 +21,8 @@ mod corner;
 mod curves;
 mod cylinder;
 mod deck_forces;
+mod deck_pairs;
+mod deck_tools;
 mod decks;
 mod directions;
 mod disc_pressure;

@@ -70,7 +70,7 @@ const MATERIAL: &str = "*MATERIAL, NAME=M\n*ELASTIC\n1000., 0.3\n*SOLID SECTION,
     *SURFACE, NAME=FACE\nBODYLAST, S3\n*BOUNDARY\nBODYLOW, 1, 2\n";
 
 /// A block 6 wide and 3 high with its face at y = 0, turned by an angle (degrees) about the origin.
-fn block(angle: f64) -> String {
+pub(crate) fn block(angle: f64) -> String {
     let (sine, cosine) = f64::to_radians(angle).sin_cos();
     // nodes come closer to the middle
     let part = |u: f64| {
@@ -103,10 +103,10 @@ fn sector([inner, outer]: [f64; 2], [from, to]: [f64; 2]) -> String {
     patch("BODY", 1, [16, 3], place) + MATERIAL
 }
 
-const ROLLER: &str = "*SURFACE, TYPE=SEGMENTS, NAME=TOOL\nSTART, 4., 4.\nCIRCL, 0., 0., 0., 4.\nCIRCL, -4., 4., 0., 4.\n";
+pub(crate) const ROLLER: &str = "*SURFACE, TYPE=SEGMENTS, NAME=TOOL\nSTART, 4., 4.\nCIRCL, 0., 0., 0., 4.\nCIRCL, -4., 4., 0., 4.\n";
 
 /// A rigid surface with its reference node, and the pair with FACE.
-fn touching(tool: &str, interaction: &str) -> String {
+pub(crate) fn touching(tool: &str, interaction: &str) -> String {
     format!(
         "*NODE\n9000, 0., 0.\n{tool}*RIGID BODY, ANALYTICAL SURFACE=TOOL, REF NODE=9000\n{}",
         pair(interaction)
@@ -119,7 +119,7 @@ fn pair(interaction: &str) -> String {
     )
 }
 
-fn step(rows: &str) -> String {
+pub(crate) fn step(rows: &str) -> String {
     format!("*STEP\n*STATIC\n*BOUNDARY\n{rows}*END STEP\n")
 }
 
@@ -620,7 +620,7 @@ fn a_contact_that_is_not_with_a_rigid_obstacle_is_refused() {
         (
             "*RIGID BODY, ANALYTICAL SURFACE=TOOL, REF NODE=9000\n",
             "",
-            "a contact of two deformable bodies",
+            "`TOOL` in a contact pair",
         ),
         ("FACE, TOOL", "TOOL, TOOL", "two rigid surfaces"),
         ("FACE, TOOL", "FAC, TOOL", "`FAC` in a contact pair"),
@@ -652,11 +652,15 @@ fn a_contact_that_is_not_with_a_rigid_obstacle_is_refused() {
         ),
         ("9000, 6, 6\n", "", "free in 6"),
         ("9000, 1, 1, 0\n", "", "free in 1"),
-        ("9000, 6, 6\n", "9000, 6, 6, 0.1\n", "that rotates"),
         (
-            "*END STEP",
-            "*CLOAD\n9000, 2, -5.\n*END STEP",
-            "a force on `9000`, the reference node of the *RIGID BODY on line",
+            "9000, 6, 6\n",
+            "9000, 3, 3, 0.1\n",
+            "a value of 0.1 for a component that a plane body",
+        ),
+        (
+            "9000, 1, 1, 0\n",
+            "*CLOAD\n9000, 3, -5.\n",
+            "the component `3`",
         ),
         ("*FRICTION, ELASTIC SLIP=1e-4", "*FRICTION, ROUGH", "ROUGH"),
         (

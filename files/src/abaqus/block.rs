@@ -1,6 +1,6 @@
 //! Reads the data lines of a deck: each line adds rows or values to the keyword before it.
 
-use super::contact_parts::ContactBlock;
+use super::contact_parts::{ContactBlock, Turning};
 use super::deck::Deck;
 use super::element::Shape;
 use super::part::Numbered;
@@ -649,6 +649,16 @@ impl Deck {
         let row = components.filter(known).zip(value);
         match row.filter(|_| words.len() <= 4 && !word(0).is_empty()) {
             Some(((3.., _), 0.0)) => {}
+            Some(((component @ (3 | 6), last), value)) if last == component => {
+                let why =
+                    format!("a value of {value} for a component that a plane body does not have");
+                let got = format!("`{text:.60}`: {why}");
+                self.note_turning(Turning {
+                    line,
+                    component,
+                    doubt: (got, PRESCRIBED, COMPONENTS),
+                });
+            }
             Some(((first, last), value)) if first < 3 && (last < 3 || value == 0.0) => {
                 let target = self.target(word(0));
                 self.here.prescribed.push(Prescribed {
@@ -684,13 +694,20 @@ impl Deck {
                     }
                     (None, _) => format!("`{:.40}` in place of a component", word(1)),
                 };
-                self.doubt(
-                    line,
-                    format!("`{text:.60}`: {why}"),
-                    "node or set, first component, last component, value; or node or set, a name like XSYMM or ENCASTRE",
-                    "Components are 1 (x) and 2 (y). A blank last component means the first one alone, a blank value 0. Temperatures and other unknowns cannot be prescribed.",
-                );
+                self.doubt(line, format!("`{text:.60}`: {why}"), PRESCRIBED, COMPONENTS);
             }
+        }
+    }
+
+    /// Keeps a row of a rotation or a moment until it is known which nodes are those of rigid bodies.
+    fn note_turning(&mut self, row: Turning) {
+        /// As many as rigid bodies in steps have a use for.
+        const MOST: usize = 1 << 16;
+        if self.contact.turning.len() < MOST {
+            self.contact.turning.push(row);
+        } else {
+            let (got, expected, hint) = row.doubt;
+            self.doubt(row.line, got, expected, hint);
         }
     }
 
@@ -706,7 +723,8 @@ impl Deck {
         // a load of the mass without a target acts on all elements
         let value = value.filter(|_| of_mass || words.len() <= 3 && !word(0).is_empty());
         let amplitude = amplitude.clone();
-        let component = word(1).parse().ok().filter(|c| (1..=2).contains(c));
+        // 6, and 3 of a rotation node, is the moment on a rigid body
+        let component = word(1).parse().ok().filter(|c| [1, 2, 3, 6].contains(c));
         let on = match rows {
             Rows::Surfaces => word(1).eq_ignore_ascii_case("P").then_some(On::Surface),
             _ if of_mass => {
@@ -716,6 +734,17 @@ impl Deck {
         };
         match (rows, value, on, component) {
             (Rows::Nodes, Some(value), _, Some(component)) => {
+                if component > 2 {
+                    self.note_turning(Turning {
+                        line,
+                        component,
+                        doubt: (
+                            format!("`{text:.60}`: {}", unlike_load(&words, "component")),
+                            FORCE,
+                            BLANK,
+                        ),
+                    });
+                }
                 let target = self.target(word(0));
                 self.here.forces.push(Force {
                     line,
@@ -728,8 +757,8 @@ impl Deck {
             (Rows::Nodes, ..) => self.doubt(
                 line,
                 format!("`{text:.60}`: {}", unlike_load(&words, "component")),
-                "a force: node or set, 1 (x) or 2 (y), value",
-                "A blank value is 0; the node and the component have no default. Moments and forces out of the plane have no meaning here.",
+                FORCE,
+                BLANK,
             ),
             (_, Some(value), Some(on), _) => {
                 let target = self.target(word(0));
@@ -743,9 +772,18 @@ impl Deck {
             }
             _ => {
                 let (expected, hint) = match rows {
-                    _ if of_mass => (LOAD_OF_MASS, "A blank set is that of all elements. All numbers after the value are the direction, or a point and the direction; a blank one is 0, and the direction must not be 0."),
-                    Rows::Surfaces => ("a pressure: surface, P, value", "A blank value is 0; the surface and P have no default. Give shear as `tangential` of a load in a problem as JSON, with this deck as its mesh."),
-                    _ => ("a pressure: element or set, P1 … P4, value", "A blank value is 0; the element and P1 … P4 have no default. Gravity is GRAV, rotation CENTRIF; other loads are not computed."),
+                    _ if of_mass => (
+                        LOAD_OF_MASS,
+                        "A blank set is that of all elements. All numbers after the value are the direction, or a point and the direction; a blank one is 0, and the direction must not be 0.",
+                    ),
+                    Rows::Surfaces => (
+                        "a pressure: surface, P, value",
+                        "A blank value is 0; the surface and P have no default. Give shear as `tangential` of a load in a problem as JSON, with this deck as its mesh.",
+                    ),
+                    _ => (
+                        "a pressure: element or set, P1 … P4, value",
+                        "A blank value is 0; the element and P1 … P4 have no default. Gravity is GRAV, rotation CENTRIF; other loads are not computed.",
+                    ),
                 };
                 self.doubt(
                     line,
@@ -757,6 +795,15 @@ impl Deck {
         }
     }
 }
+
+/// What a row of `*BOUNDARY` is, and advice.
+const PRESCRIBED: &str = "node or set, first component, last component, value; or node or set, a name like XSYMM or ENCASTRE";
+const COMPONENTS: &str = "Components are 1 (x) and 2 (y), and 6 at the reference node of a *RIGID BODY. A blank last component means the first one alone, a blank value 0. Temperatures and other unknowns cannot be prescribed.";
+
+/// What a row of `*CLOAD` is, and advice.
+const FORCE: &str =
+    "a force: node or set, 1 (x) or 2 (y), or 6 (the moment on a rigid body), value";
+const BLANK: &str = "A blank value is 0; the node and the component have no default. Moments have a meaning at the reference node of a *RIGID BODY only, forces out of the plane have none.";
 
 /// Says why a row of loads is invalid. `second`: the meaning of the row's second field, in words.
 fn unlike_load(words: &[&str], second: &str) -> String {

@@ -52,6 +52,8 @@ pub(super) struct Built {
     pub(super) tools: Tools,
     /// For each contact pair: the names of its two surfaces in the mesh.
     pub(super) pairs: Vec<[String; 2]>,
+    /// The same for each *CLEARANCE.
+    pub(super) clearances: Vec<[String; 2]>,
 }
 
 impl Deck {
@@ -66,7 +68,10 @@ impl Deck {
         };
         let mut sets = merged.sets(&names);
         let tools = merged.take_tools(&names, &sets);
-        let pairs = merged.named_pairs(&names);
+        let contact = &names.deck.contact;
+        let pairs = merged.named_pairs(&names, contact.pairs.iter().map(|pair| &pair.surfaces));
+        let clearances = contact.clearances.iter().map(|row| &row.surfaces);
+        let clearances = merged.named_pairs(&names, clearances);
         let used = merged.used();
         merged.check_plane(&used);
         let sections = merged.named_sections(&names);
@@ -80,6 +85,8 @@ impl Deck {
             |rows| &mut rows.forces,
             |row| (&row.target, row.line),
         );
+        let mut tools = tools;
+        tools.note_loaded(forces.iter().map(|row| &row.name), &merged.raw.node_sets);
         let temperatures = std::mem::take(&mut merged.rows.temperatures);
         let warming = give_temperatures(&names, temperatures, &used, &mut merged.raw);
         let springs = merged.placed_springs(&names, &sets, &used);
@@ -110,6 +117,7 @@ impl Deck {
             used,
             tools,
             pairs,
+            clearances,
         }
     }
 }
@@ -347,8 +355,12 @@ impl Merged {
         tools
     }
 
-    /// The names in the mesh of the surfaces of contact pairs; an unknown name is kept as it is written.
-    fn named_pairs(&self, names: &Names<'_>) -> Vec<[String; 2]> {
+    /// The names in the mesh of pairs of surfaces; an unknown name is kept as it is written.
+    fn named_pairs<'n>(
+        &self,
+        names: &Names<'_>,
+        pairs: impl Iterator<Item = &'n [Name; 2]>,
+    ) -> Vec<[String; 2]> {
         let has = |scope: usize, name: &Name| {
             let rigid = |(s, n, _): &(usize, Name, Analytical)| *s == scope && n == name;
             names.scopes[scope].surfaces.contains_key(name)
@@ -359,10 +371,7 @@ impl Merged {
             Some((scope, name)) => names.full(scope, &name),
             None => word.to_string(),
         };
-        let pairs = names.deck.contact.pairs.iter();
-        pairs
-            .map(|pair| [full(&pair.surfaces[0]), full(&pair.surfaces[1])])
-            .collect()
+        pairs.map(|[a, b]| [full(a), full(b)]).collect()
     }
 
     /// Whether each node belongs to a plane element.

@@ -1,4 +1,4 @@
-//! Translates contact between a surface of the body and a rigid surface of a deck into contacts with obstacles.
+//! Translates the contacts of a deck: between a surface of a body and a rigid surface here, between bodies in `bodies`.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use super::contact_parts::{
     Adjust, Behavior, DeckContact, DeckFriction, Interaction, Pair, WRITTEN_INSTEAD,
 };
 use super::rigid::{MOST_POINTS, Tools};
-use super::steps::{Motion, common_factors};
+use super::steps::{Motion, common_factors, largest};
 use super::tool::{Joined, Outline, Piece, Point, chain, cross, dot, length, met, minus, outline};
 use super::written::on_line;
 use solver::error::{Reason, Violation};
@@ -24,10 +24,10 @@ const SLIP_TOLERANCE: f64 = 0.005;
 const STRAIGHT: f64 = 1e-6;
 
 /// The largest gap that counts as closed, as a part of the body's size, since coordinates in files are rounded.
-const CLOSED: f64 = 1e-6;
+pub(super) const CLOSED: f64 = 1e-6;
 
 /// The largest number of sides of a boundary at which the rigid surface in front of it is examined.
-const MOST_LOOKS: usize = 1000;
+pub(super) const MOST_LOOKS: usize = 1000;
 
 /// The contacts of a deck and its steps, with remarks.
 #[derive(Default)]
@@ -42,10 +42,13 @@ pub(super) struct Source<'a> {
     pub(super) said: &'a DeckContact,
     /// For each contact pair: the names of its two surfaces in the mesh.
     pub(super) pairs: &'a [[String; 2]],
+    /// The same for each *CLEARANCE.
+    pub(super) clearances: &'a [[String; 2]],
     pub(super) tools: &'a Tools,
     pub(super) mesh: &'a Mesh,
     pub(super) materials: &'a [Material],
-    pub(super) axisymmetric: bool,
+    /// The thickness of a body in plane strain, whose forces are per unit of it.
+    pub(super) thickness: f64,
     /// The motion of each rigid body; `None` for a motion that was refused.
     pub(super) motions: &'a [Option<Motion>],
 }
@@ -60,13 +63,13 @@ pub(super) struct Remarks {
 }
 
 impl Remarks {
-    fn doubt(&mut self, line: u64, got: impl Into<String>, expected: &str, hint: &str) {
+    pub(super) fn doubt(&mut self, line: u64, got: impl Into<String>, expected: &str, hint: &str) {
         let violation = on_line(line, Reason::NotUnderstood, got.into(), expected, hint);
         self.violations.push(violation);
     }
 
     /// Adds a violation and returns `None`: the contact cannot be translated.
-    fn refuse<T>(
+    pub(super) fn refuse<T>(
         &mut self,
         line: u64,
         got: impl Into<String>,
@@ -77,7 +80,7 @@ impl Remarks {
         None
     }
 
-    fn differs(&mut self, message: String) {
+    pub(super) fn differs(&mut self, message: String) {
         self.warnings.push(differs(message));
     }
 }
@@ -92,11 +95,17 @@ struct Surfaces<'a> {
 }
 
 /// One contact, and its motion at the end of each step.
-struct Made {
-    contact: Contact,
-    /// The indentation and tangential displacement at the end of each step.
-    moved: Vec<[f64; 2]>,
+pub(super) struct Made {
+    pub(super) contact: Contact,
+    /// Whether each of the three motions is caused by a load.
+    pub(super) free: [bool; 3],
+    /// At the end of each step: what of [`MOTIONS_AND_LOADS`] the contact has, and 0 of the others.
+    pub(super) moved: Vec<[f64; 6]>,
 }
+
+/// The factors of a step on the indentation, the tangential displacement, the tilt, the normal force, the tangential force and
+/// the moment, if no contact has them.
+const MOTIONS_AND_LOADS: [f64; 6] = [1.0, 0.0, 1.0, 1.0, 0.0, 1.0];
 
 impl Source<'_> {
     /// Translates all contacts. `others`: the factors of loads and of supports at the end of each step.
@@ -105,6 +114,7 @@ impl Source<'_> {
         if self.report_shared_sides(&mut found.remarks) {
             return found;
         }
+        self.check_pairs(&mut found.remarks);
         if let Some(line) = self.said.perturbation {
             found.remarks.doubt(
                 line,
@@ -120,13 +130,13 @@ impl Source<'_> {
         if all.len() < self.said.pairs.len() {
             return found; // with violations
         }
-        let moved: Vec<&[[f64; 2]]> = all.iter().map(|made| &made.moved[..]).collect();
-        let Some(factors) = common_factors(&moved) else {
+        let moved: Vec<&[[f64; 6]]> = all.iter().map(|made| &made.moved[..]).collect();
+        let Some(factors) = common_factors(&moved, MOTIONS_AND_LOADS) else {
             let line = self.said.pairs.last().map_or(0, |pair| pair.line);
             found.remarks.doubt(
                 line,
-                "rigid bodies that several steps move in different proportions",
-                "motions in the same proportion in every step",
+                "rigid bodies that several steps move or load in different proportions",
+                "motions, and loads, in the same proportion in every step",
                 WRITTEN_INSTEAD,
             );
             return found;
@@ -134,10 +144,20 @@ impl Source<'_> {
         let friction = all.iter().any(|made| made.contact.friction.is_some());
         let loaded = [0, 1].map(|kind| others.iter().any(|other| other[kind] != 0.0));
         for made in all {
-            let [indentation, tangential] = largest(&made.moved);
+            let most = largest(&made.moved);
+            let load = |k: usize| made.free[k].then_some(most[3 + k]);
             found.contacts.push(Contact {
-                indentation,
-                tangential_displacement: tangential,
+                // of two bodies it is the interference
+                indentation: if made.contact.against.is_some() {
+                    0.0
+                } else {
+                    most[0]
+                },
+                tangential_displacement: most[1],
+                tilt: (most[2] != 0.0).then_some(most[2]),
+                normal_force: load(0),
+                tangential_force: load(1),
+                moment: load(2),
                 ..made.contact
             });
         }
@@ -154,6 +174,10 @@ impl Source<'_> {
                     name: Some(self.said.name_of(k)),
                     indentation: factor[0],
                     tangential_displacement: factor[1],
+                    tilt: factor[2],
+                    normal_force: factor[3],
+                    tangential_force: factor[4],
+                    moment: factor[5],
                     loads: if loaded[0] { other[0] } else { 1.0 },
                     supports: if loaded[1] { other[1] } else { 1.0 },
                     increments: if friction { increments(written) } else { 1 },
@@ -212,16 +236,18 @@ impl Source<'_> {
         remarks: &mut Remarks,
     ) -> Option<Made> {
         let line = pair.line;
-        let surfaces = self.surfaces(line, names, remarks)?;
+        let rigid = |name: &String| self.tools.by_surface.contains_key(name);
+        if !names.iter().any(rigid) {
+            return self.between_bodies(pair, names, others.len(), remarks);
+        }
+        let surfaces = self.surfaces(pair, names, remarks)?;
         let placed = self.placed(pair, &surfaces, remarks)?;
         let interaction = self.interaction(pair, remarks);
-        let shape = placed.shape(others, self.axisymmetric);
+        let shape = placed.shape(others);
         let friction = interaction.and_then(|i| i.friction.as_ref());
         let friction = friction.and_then(|said| {
-            let moved = shape
-                .as_ref()
-                .map_or([0.0; 2], |shape| largest(&shape.moved));
-            self.friction(said, placed.edges, moved, remarks)
+            let way = shape.as_ref().map_or(0.0, Shape::way);
+            self.friction(said, placed.edges, way, remarks)
         });
         let shape = match shape {
             Ok(shape) => shape,
@@ -234,8 +260,10 @@ impl Source<'_> {
             remarks.differs(format!("*CONTACT PAIR on line {line}: {message}"));
         }
         if let Some(interaction) = interaction {
-            self.behavior(&interaction.behavior, placed.edges, &shape.moved, remarks);
+            let most = largest(&shape.moved)[0].abs();
+            self.behavior(&interaction.behavior, placed.edges, most, remarks);
         }
+        let turns = shape.free[2] || shape.moved.iter().any(|m| m[2] != 0.0);
         Some(Made {
             contact: Contact {
                 boundary: surfaces.boundary.to_owned(),
@@ -249,12 +277,13 @@ impl Source<'_> {
                 tangential_force: None,
                 tilt: None,
                 moment: None,
-                about: None,
+                about: turns.then_some(shape.about),
                 stiffness: None,
                 normal: Some(NormalOf::Obstacle),
                 condition: Default::default(),
                 friction,
             },
+            free: shape.free,
             moved: shape.moved,
         })
     }
@@ -285,27 +314,28 @@ impl Source<'_> {
     /// Tells the boundary of the elastic body and the rigid surface of a contact pair apart.
     fn surfaces<'s>(
         &'s self,
-        line: u64,
+        pair: &Pair,
         [first, second]: &'s [String; 2],
         remarks: &mut Remarks,
     ) -> Option<Surfaces<'s>> {
+        let line = pair.line;
+        if pair.tie.is_some() {
+            return remarks.refuse(
+                line,
+                format!("*TIE of `{first:.60}` and `{second:.60}`, of which one is rigid"),
+                "two surfaces of elastic bodies",
+                "Hold the nodes that are tied to the rigid body by *BOUNDARY instead.",
+            );
+        }
         let rigid = [first, second].map(|name| self.tools.by_surface.get(name));
         let (boundary, tool, (body, pieces)) = match rigid {
             [None, Some(tool)] => (first, second, tool),
             [Some(tool), None] => (second, first, tool),
-            [None, None] => {
-                return remarks.refuse(
-                    line,
-                    format!("a contact of two deformable bodies, `{first:.60}` and `{second:.60}`"),
-                    "one surface of the elastic body, and one of a *RIGID BODY",
-                    &format!("Both bodies cannot be elastic here. If one is much stiffer, make it rigid: *RIGID BODY, ELSET=…, REF NODE=…. {}", self.known_surfaces()),
-                );
-            }
-            [Some(_), Some(_)] => {
+            _ => {
                 return remarks.refuse(
                     line,
                     format!("a contact of two rigid surfaces, `{first:.60}` and `{second:.60}`"),
-                    "a surface of the elastic body",
+                    "a surface of an elastic body",
                     "Name a surface of deformable elements.",
                 );
             }
@@ -335,15 +365,7 @@ impl Source<'_> {
                 "Support the shared nodes by *BOUNDARY instead.",
             );
         }
-        let edges = self.mesh.boundaries.get(name);
-        let Some(edges) = edges.filter(|edges| !edges.is_empty()) else {
-            return remarks.refuse(
-                line,
-                format!("`{name:.60}` in a contact pair"),
-                "a surface with sides of the elastic body's surface",
-                &format!("Sides are those on the outside of the body: of a set of elements only S1 … S4 that no other element shares, of a set of nodes those of which all nodes are in it, midside nodes too. {}", self.known_surfaces()),
-            );
-        };
+        let edges = self.sides(line, name, remarks)?;
         let Some(pieces) = chain(surfaces.pieces) else {
             return remarks.refuse(
                 line,
@@ -357,6 +379,7 @@ impl Source<'_> {
             edges,
             outline: outline(&pieces),
             motion: self.motions.get(surfaces.body)?.as_ref()?,
+            thickness: self.thickness,
             size: self.size(),
         };
         let count = placed.outline.points.len();
@@ -387,8 +410,22 @@ impl Source<'_> {
         Some(placed)
     }
 
+    /// The sides of a surface of an elastic body.
+    pub(super) fn sides(&self, line: u64, name: &str, remarks: &mut Remarks) -> Option<&[Edge]> {
+        let edges = self.mesh.boundaries.get(name);
+        if let Some(edges) = edges.filter(|edges| !edges.is_empty()) {
+            return Some(edges);
+        }
+        remarks.refuse(
+            line,
+            format!("`{name:.60}` in a contact pair"),
+            "a surface with sides of the elastic body's surface",
+            &format!("Sides are those on the outside of the body: of a set of elements only S1 … S4 that no other element shares, of a set of nodes those of which all nodes are in it, midside nodes too. {}", self.known_surfaces()),
+        )
+    }
+
     /// The interaction that a pair names.
-    fn interaction(&self, pair: &Pair, remarks: &mut Remarks) -> Option<&Interaction> {
+    pub(super) fn interaction(&self, pair: &Pair, remarks: &mut Remarks) -> Option<&Interaction> {
         let name = pair.interaction.as_ref()?;
         let interactions = &self.said.interactions;
         let found = interactions.get(name);
@@ -406,12 +443,12 @@ impl Source<'_> {
     }
 
     /// Translates friction into Coulomb's law, which depends on the load path; `None` if the contact is frictionless.
-    /// `moved`: the largest indentation and tangential displacement.
-    fn friction(
+    /// `way`: how far the rigid surface is moved at most (length).
+    pub(super) fn friction(
         &self,
         said: &DeckFriction,
         edges: &[Edge],
-        moved: [f64; 2],
+        way: f64,
         remarks: &mut Remarks,
     ) -> Option<Friction> {
         let line = said.line;
@@ -427,7 +464,6 @@ impl Source<'_> {
             return None;
         }
         let side = self.mean_side(edges);
-        let way = moved[0].abs().max(moved[1].abs());
         let at_once = said.stick_slope.is_some() || said.lagrange;
         let (elastic_slip, rule) = match (said.elastic_slip, said.slip_tolerance) {
             (Some(slip), _) => (slip, None),
@@ -445,6 +481,7 @@ impl Source<'_> {
         if let Some(rule) = rule {
             let ours = format!("the elastic slip is {elastic_slip:.4e} here, {rule}");
             remarks.differs(match (said.stick_slope, said.lagrange) {
+                (Some(slope), _) if way == 0.0 => format!("*FRICTION on line {line}: friction of the deck is a spring of {slope:e} until it reaches the coefficient times the pressure; {ours}, whatever the pressure. SLIP TOLERANCE or ELASTIC SLIP sets it."),
                 (Some(slope), _) => format!("*FRICTION on line {line}: friction of the deck is a spring of {slope:e} until it reaches the coefficient times the pressure: at most {:.4e} (stress) over the way of the rigid surface. Where the coefficient times the pressure is more, the deck has less friction than this result: {ours}, whatever the pressure. SLIP TOLERANCE or ELASTIC SLIP sets it.", slope * way),
                 (None, true) => format!("*FRICTION on line {line}: LAGRANGE sticks without slip; {ours}."),
                 (None, false) => format!("*FRICTION on line {line} gives no elastic slip: {ours}. SLIP TOLERANCE or ELASTIC SLIP sets it."),
@@ -467,16 +504,22 @@ impl Source<'_> {
     }
 
     /// Checks the contact stiffness of the deck, since translated contacts are hard: warns by how much a stiff contact
-    /// of the deck differs from a hard one, and refuses a soft one.
-    fn behavior(
+    /// of the deck differs from a hard one, and refuses a soft one. `most`: the largest indentation.
+    pub(super) fn behavior(
         &self,
         behavior: &Behavior,
         edges: &[Edge],
-        moved: &[[f64; 2]],
+        most: f64,
         remarks: &mut Remarks,
     ) {
         match *behavior {
             Behavior::Hard => {}
+            Behavior::Tied { line } => remarks.doubt(
+                line,
+                "PRESSURE-OVERCLOSURE=TIED of a rigid surface",
+                "PRESSURE-OVERCLOSURE=HARD",
+                "Hold the nodes that are tied to the rigid body by *BOUNDARY instead; or write a contact with \"condition\": \"bonded\" in a problem as JSON.",
+            ),
             Behavior::Linear { line, slope } => {
                 let stiffness = |material: &Material| match &material.elasticity {
                     solver::problem::Elasticity::Isotropic { youngs_modulus, .. } => {
@@ -495,20 +538,24 @@ impl Source<'_> {
                         line,
                         format!("a pressure of {} per length of overclosure", slope.unwrap_or(0.0)),
                         &format!("hard contact, or a slope of at least {least:e} (Young's modulus per side of an element), which is nearly hard"),
-                        "Such a soft layer is no contact with a rigid obstacle: include the layer in the mesh.",
+                        "Such a soft layer is no hard contact: include the layer in the mesh.",
                     ),
                 }
             }
             Behavior::Exponential { line, clearance } => {
-                let most = moved.iter().map(|m| m[0].abs()).fold(0.0, f64::max);
+                // without a given motion the mesh is the measure
+                let allowed = match most > 0.0 {
+                    true => 0.01 * most,
+                    false => 1e-3 * self.mean_side(edges),
+                };
                 match clearance {
-                    Some(clearance) if clearance > 0.0 && clearance <= 0.01 * most => remarks.differs(format!(
+                    Some(clearance) if clearance > 0.0 && clearance <= allowed => remarks.differs(format!(
                         "*SURFACE BEHAVIOR on line {line}: contact is hard here; in the deck pressure begins at a clearance of {clearance:e}."
                     )),
                     _ => remarks.doubt(
                         line,
                         format!("a pressure that begins at a clearance of {}", clearance.unwrap_or(0.0)),
-                        "hard contact, or a clearance of at most a hundredth of the indentation",
+                        &format!("hard contact, or a clearance of at most {allowed:.1e}"),
                         "Use PRESSURE-OVERCLOSURE=HARD.",
                     ),
                 }
@@ -517,7 +564,7 @@ impl Source<'_> {
     }
 
     /// The mean length of the sides of a contact.
-    fn mean_side(&self, edges: &[Edge]) -> f64 {
+    pub(super) fn mean_side(&self, edges: &[Edge]) -> f64 {
         let side = |edge: &Edge| {
             let [a, b, _] = self.mesh.edge_nodes(edge);
             length(minus(b, a))
@@ -525,7 +572,7 @@ impl Source<'_> {
         edges.iter().map(side).sum::<f64>() / edges.len() as f64
     }
 
-    fn size(&self) -> f64 {
+    pub(super) fn size(&self) -> f64 {
         self.mesh.extent(0).max(self.mesh.extent(1))
     }
 }
@@ -539,18 +586,6 @@ const MOST_INCREMENTS: f64 = 1000.0;
 fn increments(written: Option<f64>) -> u32 {
     let written = written.unwrap_or(FEWEST_INCREMENTS).ceil();
     written.clamp(FEWEST_INCREMENTS, MOST_INCREMENTS) as u32
-}
-
-/// The largest indentation and the largest tangential displacement of all steps, by size but with their signs; the last
-/// one of equal size.
-fn largest(moved: &[[f64; 2]]) -> [f64; 2] {
-    [0, 1].map(|kind| {
-        let all = moved.iter().map(|m| m[kind]);
-        all.fold(
-            0.0,
-            |most: f64, m| if m.abs() >= most.abs() { m } else { most },
-        )
-    })
 }
 
 pub(super) fn differs(message: String) -> Warning {
@@ -567,6 +602,8 @@ struct Placed<'a> {
     edges: &'a [Edge],
     outline: Outline,
     motion: &'a Motion,
+    /// The thickness of a body in plane strain, whose forces are per unit of it.
+    thickness: f64,
     /// The size of the body (length).
     size: f64,
 }
@@ -575,25 +612,27 @@ struct Placed<'a> {
 struct Shape {
     obstacle: Obstacle,
     direction: Option<Point>,
-    /// The indentation and tangential displacement at the end of each step.
-    moved: Vec<[f64; 2]>,
+    /// Whether each of the three motions is caused by a load.
+    free: [bool; 3],
+    /// At the end of each step: what of [`MOTIONS_AND_LOADS`] there is.
+    moved: Vec<[f64; 6]>,
+    /// The point that the obstacle turns about.
+    about: Point,
     message: Option<String>,
+}
+
+impl Shape {
+    /// How far the obstacle is moved at most by given displacements (length).
+    fn way(&self) -> f64 {
+        let most = largest(&self.moved);
+        most[0].abs().max(most[1].abs())
+    }
 }
 
 /// The reason why a rigid surface cannot be an obstacle: what the deck has, and what is expected.
 type Unlike = (String, &'static str);
 
 impl Placed<'_> {
-    /// Nodes of the boundary, each with the outward normal of a side there; of a long boundary only some.
-    fn looks(&self) -> impl Iterator<Item = (Point, Point)> + '_ {
-        let stride = self.edges.len().div_ceil(MOST_LOOKS).max(1);
-        self.edges.iter().step_by(stride).flat_map(|edge| {
-            let nodes = self.mesh.edge_nodes(edge);
-            let normals = solver::contact::edge_normals(&nodes);
-            [0, 2, 1].map(|k| (nodes[k], normals[k]))
-        })
-    }
-
     fn met(&self, (place, n): (Point, Point)) -> Option<(f64, Point)> {
         met(&self.outline.points, place, n, 0.1 * self.size)
     }
@@ -601,7 +640,7 @@ impl Placed<'_> {
     /// Whether the outer side of the rigid surface faces the body at the place where both are nearest. True if the
     /// surface faces no node at all, which the checks of the obstacle report.
     fn faces(&self) -> bool {
-        let hits = self.looks().filter_map(|look| {
+        let hits = looks(self.mesh, self.edges).filter_map(|look| {
             let (distance, m) = self.met(look)?;
             Some((distance.abs(), dot(m, look.1)))
         });
@@ -612,14 +651,9 @@ impl Placed<'_> {
     /// Whether the parameter `ADJUST` of the deck would move nodes of the body.
     fn is_moved_by(&self, adjust: Adjust) -> bool {
         let closed = CLOSED * self.size;
-        self.looks().any(|look| {
+        looks(self.mesh, self.edges).any(|look| {
             let distance = self.met(look).map(|(distance, _)| distance);
-            distance.is_some_and(|distance| match adjust {
-                Adjust::Within(within) => {
-                    distance < -closed || distance > closed && distance <= within
-                }
-                Adjust::Set => distance.abs() > closed,
-            })
+            distance.is_some_and(|distance| adjust.moves(distance, closed))
         })
     }
 
@@ -651,28 +685,60 @@ impl Placed<'_> {
     }
 
     /// Translates the rigid surface and its motion to an obstacle.
-    fn shape(&self, others: &[[f64; 2]], axisymmetric: bool) -> Result<Shape, Unlike> {
-        let ends = &self.motion.ends;
-        if axisymmetric && ends.iter().any(|u| u[0] != 0.0) {
+    fn shape(&self, others: &[[f64; 2]]) -> Result<Shape, Unlike> {
+        match (self.straight(), self.flat()) {
+            (Some(n), _) => self.before_a_straight_side(n, others),
+            (None, Some(q)) => self.straight_before_a_curve(q),
+            (None, None) => self.curve_before_a_curve(),
+        }
+    }
+
+    /// The motions and loads along the direction `push`, in which the rigid surface is pushed, and along the contact's tangent `t`,
+    /// as [`MOTIONS_AND_LOADS`]; and whether each of the three motions is caused by a load.
+    fn driven(&self, push: Point, t: Point) -> Result<([bool; 3], Vec<[f64; 6]>), Unlike> {
+        let [x, y, turns] = self.motion.free;
+        // a force and a displacement have no common component
+        let along_x = push[1].abs() <= STRAIGHT;
+        if x != y && !along_x && push[0].abs() > STRAIGHT {
             return Err((
-                "a rigid body of revolution that moves radially".into(),
-                "one that moves along the axis",
+                "a rigid body that is held along one axis and under a force along the other, in front of an oblique side".into(),
+                "one that is held along both axes, or under forces along both",
             ));
         }
-        match (self.straight(), self.flat()) {
-            (Some(n), _) => Ok(self.before_a_straight_side(n, ends, others)),
-            (None, Some(q)) => Ok(self.straight_before_a_curve(q, ends)),
-            (None, None) => self.curve_before_a_curve(ends),
-        }
+        let free = match along_x {
+            true => [x, y, turns],
+            false => [y, x, turns],
+        };
+        let alike = x == y;
+        let along = |axis: Point, value: &[f64; 3], first: usize| match alike {
+            true => axis[0] * value[0] + axis[1] * value[1],
+            false => axis[first] * value[first],
+        };
+        let normal = usize::from(!along_x);
+        let end = |value: &[f64; 3]| {
+            let of = [
+                along(push, value, normal),
+                along(t, value, 1 - normal),
+                value[2],
+            ];
+            let mut end = [0.0; 6];
+            for k in 0..3 {
+                match free[k] {
+                    true => end[3 + k] = of[k] / self.thickness,
+                    false => end[k] = of[k],
+                }
+            }
+            end
+        };
+        Ok((free, self.motion.ends.iter().map(end).collect()))
     }
 
     /// Translates a rigid surface in front of a straight boundary with the outward normal `n`. Its motion against n is
     /// the indentation, and that along the tangent t the tangential displacement; a surface not parallel to the
-    /// boundary is placed where it is along t at the end of the last step. `ends`: its displacement at the end of each
-    /// step.
-    fn before_a_straight_side(&self, n: Point, ends: &[Point], others: &[[f64; 2]]) -> Shape {
+    /// boundary is placed where it is along t at the end of the last step.
+    fn before_a_straight_side(&self, n: Point, others: &[[f64; 2]]) -> Result<Shape, Unlike> {
         let t = [n[1], -n[0]];
-        let mut moved: Vec<[f64; 2]> = ends.iter().map(|u| [-dot(*u, n), dot(*u, t)]).collect();
+        let (free, mut moved) = self.driven(n.map(|x| -x), t)?;
         let last = moved.last().map_or(0.0, |m| m[1]);
         let parallel = self.flat().is_some_and(|q| cross(q, n).abs() <= STRAIGHT);
         let shift = if parallel {
@@ -680,12 +746,16 @@ impl Placed<'_> {
         } else {
             t.map(|x| last * x)
         };
-        let points: Vec<Point> = self
-            .outline
-            .points
-            .iter()
-            .map(|p| [p[0] + shift[0], p[1] + shift[1]])
-            .collect();
+        let turns = moved.iter().any(|m| m[2] != 0.0);
+        if shift != [0.0; 2] && (free.contains(&true) || turns) {
+            return Err((
+                "a rigid body that is displaced along the face while a force or a rotation moves it".into(),
+                "one that a force or a rotation moves where the deck places it along the face",
+            ));
+        }
+        let shifted = |p: Point| [p[0] + shift[0], p[1] + shift[1]];
+        let points: Vec<Point> = self.outline.points.iter().map(|p| shifted(*p)).collect();
+        let mut about = shifted(self.motion.reference);
         let mut message = (shift != [0.0; 2] && others.len() > 1).then(|| {
             format!("the rigid surface is placed along the body where it is at the end of the last step, {last:e} from its start, for all steps.")
         });
@@ -701,14 +771,21 @@ impl Placed<'_> {
                 radius,
                 convex: true,
             } => {
-                let center = [center[0] + shift[0], center[1] + shift[1]];
+                let center = shifted(center);
                 let clearance = dot(minus(center, foot), n) - radius;
-                if alone || clearance.abs() <= 1e-9 * radius {
-                    moved.iter_mut().for_each(|m| m[0] -= clearance);
-                    Some(self.circle(center, radius, t, &points))
-                } else {
-                    None
+                let none = clearance.abs() <= 1e-9 * radius;
+                if alone || free[0] {
+                    about = [0, 1].map(|k| about[k] - clearance * n[k]);
                 }
+                if free[0] && !none {
+                    message = Some(format!(
+                        "the indentation of the result begins where the surfaces touch first; the rigid body of the deck moves {clearance:.4e} more."
+                    ));
+                }
+                if alone && !free[0] {
+                    moved.iter_mut().for_each(|m| m[0] -= clearance);
+                }
+                (alone || none || free[0]).then(|| self.circle(center, radius, t, &points))
             }
             _ => None,
         };
@@ -725,12 +802,14 @@ impl Placed<'_> {
                 }
             }
         });
-        Shape {
+        Ok(Shape {
             obstacle,
             direction: None,
+            free,
             moved,
+            about,
             message,
-        }
+        })
     }
 
     /// A circular obstacle, as a profile along the boundary. It ends where the arc of the deck ends.
@@ -764,12 +843,11 @@ impl Placed<'_> {
     }
 
     /// Translates a straight rigid surface in front of a curved boundary. The normal of contact is the normal `q` of
-    /// the rigid surface, towards the body, which is the same at all points. `ends`: its displacement at the end of
-    /// each step.
-    fn straight_before_a_curve(&self, q: Point, ends: &[Point]) -> Shape {
+    /// the rigid surface, towards the body, which is the same at all points.
+    fn straight_before_a_curve(&self, q: Point) -> Result<Shape, Unlike> {
         // of the contact: n = −q
         let t = [-q[1], q[0]];
-        let moved = ends.iter().map(|u| [dot(*u, q), dot(*u, t)]).collect();
+        let (free, moved) = self.driven(q, t)?;
         let reach = |p: &[Point]| span(p.iter().map(|p| dot(*p, t)));
         let ([low, high], [from, to]) = (reach(&self.outline.points), reach(&self.nodes()));
         let obstacle = if low <= from && high >= to {
@@ -777,48 +855,66 @@ impl Placed<'_> {
         } else {
             polyline(self.outline.points.clone(), self.outline.joined).0
         };
-        Shape {
+        Ok(Shape {
             obstacle,
             direction: Some(q),
+            free,
             moved,
+            about: self.motion.reference,
             message: None,
-        }
+        })
     }
 
-    /// Translates a curved rigid surface in front of a curved boundary; the surface must move in one direction. `ends`:
-    /// its displacement at the end of each step.
-    fn curve_before_a_curve(&self, ends: &[Point]) -> Result<Shape, Unlike> {
-        let most =
-            ends.iter().copied().fold(
-                [0.0; 2],
-                |most, u| if length(u) > length(most) { u } else { most },
-            );
+    /// Translates a curved rigid surface in front of a curved boundary; the surface must be moved, or pushed by a force, in one
+    /// direction.
+    fn curve_before_a_curve(&self) -> Result<Shape, Unlike> {
+        let [x, y, turns] = self.motion.free;
+        // of a force along one axis the other one is held, and must be at rest
+        let along = |u: &[f64; 3]| match (x, y) {
+            (true, false) => [u[0], 0.0],
+            (false, true) => [0.0, u[1]],
+            _ => [u[0], u[1]],
+        };
+        let ends: Vec<Point> = self.motion.ends.iter().map(along).collect();
+        let longer = |most: Point, u: &Point| if length(*u) > length(most) { *u } else { most };
+        let most = ends.iter().fold([0.0; 2], longer);
         let size = length(most);
         let (obstacle, message) = polyline(self.outline.points.clone(), self.outline.joined);
-        if size == 0.0 {
-            let moved = vec![[0.0; 2]; ends.len()];
+        if size == 0.0 && !x && !y && !turns {
             return Ok(Shape {
                 obstacle,
                 direction: None,
-                moved,
+                free: [false; 3],
+                moved: self
+                    .motion
+                    .ends
+                    .iter()
+                    .map(|u| [0.0, 0.0, u[2], 0.0, 0.0, 0.0])
+                    .collect(),
+                about: self.motion.reference,
                 message,
             });
         }
         let direction = most.map(|x| x / size);
-        if ends
-            .iter()
-            .any(|u| cross(direction, *u).abs() > STRAIGHT * size)
+        let rest = |u: &[f64; 3]| x != y && u[usize::from(x)] != 0.0;
+        if size == 0.0
+            || ends
+                .iter()
+                .any(|u| cross(direction, *u).abs() > STRAIGHT * size)
+            || self.motion.ends.iter().any(rest)
         {
             return Err((
-                "several steps that move a curved rigid surface in different directions along a curved boundary".into(),
+                "a curved rigid surface that is moved, or pushed by forces, in different directions along a curved boundary".into(),
                 "one direction",
             ));
         }
-        let moved = ends.iter().map(|u| [dot(*u, direction), 0.0]).collect();
+        let (free, moved) = self.driven(direction, [-direction[1], direction[0]])?;
         Ok(Shape {
             obstacle,
             direction: Some(direction),
+            free,
             moved,
+            about: self.motion.reference,
             message,
         })
     }
@@ -830,6 +926,19 @@ impl Placed<'_> {
             .map(|n| self.mesh.nodes[*n as usize])
             .collect()
     }
+}
+
+/// Nodes of a boundary, each with the outward normal of a side there; of a long boundary only some.
+pub(super) fn looks<'a>(
+    mesh: &'a Mesh,
+    edges: &'a [Edge],
+) -> impl Iterator<Item = (Point, Point)> + 'a {
+    let stride = edges.len().div_ceil(MOST_LOOKS).max(1);
+    edges.iter().step_by(stride).flat_map(|edge| {
+        let nodes = mesh.edge_nodes(edge);
+        let normals = solver::contact::edge_normals(&nodes);
+        [0, 2, 1].map(|k| (nodes[k], normals[k]))
+    })
 }
 
 fn span(values: impl Iterator<Item = f64>) -> [f64; 2] {

@@ -12,6 +12,7 @@ pub(super) const WRITTEN_INSTEAD: &str = "Write the contact in a problem as JSON
 #[derive(Clone, Default)]
 pub(super) struct DeckContact {
     pub(super) pairs: Vec<Pair>,
+    pub(super) clearances: Vec<Clearance>,
     pub(super) interactions: BTreeMap<Name, Interaction>,
     /// The interaction that `*FRICTION` and `*SURFACE BEHAVIOR` belong to.
     pub(super) current: Option<Name>,
@@ -19,6 +20,18 @@ pub(super) struct DeckContact {
     pub(super) steps: Vec<DeckStep>,
     /// The line of the first `*STEP, PERTURBATION`.
     pub(super) perturbation: Option<u64>,
+    /// Rows that mean something for rigid bodies only.
+    pub(super) turning: Vec<Turning>,
+}
+
+/// A row of `*BOUNDARY` that prescribes a rotation, or of `*CLOAD` that gives a moment: for the nodes of a rigid body only.
+#[derive(Clone, Debug)]
+pub(super) struct Turning {
+    pub(super) line: u64,
+    /// 6 at a reference node, 3 at a node of rotations.
+    pub(super) component: u64,
+    /// What is wrong with the row at other nodes: what was found, what is expected, and advice.
+    pub(super) doubt: (String, &'static str, &'static str),
 }
 
 /// A step of a deck.
@@ -75,13 +88,31 @@ impl Analytical {
     }
 }
 
-/// A row of `*CONTACT PAIR`.
+/// A row of `*CONTACT PAIR`, or of `*TIE`.
 #[derive(Clone, Debug)]
 pub(super) struct Pair {
     pub(super) line: u64,
     pub(super) surfaces: [Name; 2],
     pub(super) interaction: Option<Name>,
     pub(super) adjust: Option<Adjust>,
+    pub(super) tie: Option<Tie>,
+}
+
+/// That two surfaces are joined, `*TIE`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tie {
+    /// The largest distance of nodes that are joined.
+    pub(super) within: Option<f64>,
+}
+
+/// The distance of the surfaces of a contact pair, `*CLEARANCE`.
+#[derive(Clone, Debug)]
+pub(super) struct Clearance {
+    pub(super) line: u64,
+    /// The two surfaces in the order of the contact pair: SLAVE, MASTER.
+    pub(super) surfaces: [Name; 2],
+    /// The distance, negative where the surfaces overlap.
+    pub(super) value: f64,
 }
 
 /// The parameter `ADJUST` of a contact pair, which moves nodes onto the other surface before the first step.
@@ -91,6 +122,16 @@ pub(super) enum Adjust {
     Within(f64),
     /// Moves the nodes of a set.
     Set,
+}
+
+impl Adjust {
+    /// Whether it would move a node at this distance, negative where surfaces overlap. `closed`: the largest that counts as none.
+    pub(super) fn moves(self, distance: f64, closed: f64) -> bool {
+        match self {
+            Adjust::Within(within) => distance < -closed || distance > closed && distance <= within,
+            Adjust::Set => distance.abs() > closed,
+        }
+    }
 }
 
 /// The definition of an interaction, `*SURFACE INTERACTION`.
@@ -120,6 +161,8 @@ pub(super) struct DeckFriction {
 pub(super) enum Behavior {
     #[default]
     Hard,
+    /// Surfaces that are joined, in CalculiX.
+    Tied { line: u64 },
     /// A linear law: pressure per length of overclosure.
     Linear { line: u64, slope: Option<f64> },
     /// An exponential law, with the clearance at which the pressure begins.
@@ -142,6 +185,7 @@ pub(super) enum ContactBlock {
     Pairs {
         interaction: Option<Name>,
         adjust: Option<Adjust>,
+        tie: Option<Tie>,
     },
     Friction,
     Behavior,

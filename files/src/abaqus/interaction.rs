@@ -2,8 +2,8 @@
 
 use super::block::{Block, named_components};
 use super::contact_parts::{
-    Adjust, Behavior, ContactBlock, DeckFriction, DeckStep, Held, Interaction, MadeOf, Pair,
-    RigidBody, WRITTEN_INSTEAD,
+    Adjust, Behavior, Clearance, ContactBlock, DeckFriction, DeckStep, Held, Interaction, MadeOf,
+    Pair, RigidBody, Tie, WRITTEN_INSTEAD,
 };
 use super::deck::Deck;
 use super::keyword::Keyword;
@@ -50,6 +50,11 @@ impl Deck {
                 return Some(Block::Skip);
             }
             "CONTACT PAIR" => return Some(self.contact_pairs(keyword, line)),
+            "TIE" => return Some(self.ties(keyword, line)),
+            "CLEARANCE" => {
+                self.clearance(keyword, line);
+                return Some(Block::Skip);
+            }
             "SURFACE INTERACTION" => {
                 let Some(name) = value("NAME").map(|name| self.spelled(&name)) else {
                     self.doubt(
@@ -73,8 +78,7 @@ impl Deck {
                 self.model_change(keyword, line);
                 return Some(Block::Skip);
             }
-            "CLEARANCE"
-            | "CONTACT INTERFERENCE"
+            "CONTACT INTERFERENCE"
             | "CHANGE FRICTION"
             | "CONTACT"
             | "CONTACT INCLUSIONS"
@@ -82,7 +86,6 @@ impl Deck {
             | "CONTACT PROPERTY ASSIGNMENT"
             | "CONTACT INITIALIZATION DATA"
             | "CONTACT CLEARANCE"
-            | "TIE"
             | "GAP"
             | "CONTACT DAMPING"
             | "RIGID SURFACE"
@@ -90,7 +93,7 @@ impl Deck {
                 self.doubt(
                     line,
                     format!("*{}", keyword.name),
-                    "*CONTACT PAIR of a surface of the body and a surface of a *RIGID BODY",
+                    "*CONTACT PAIR of two surfaces, with *CLEARANCE; *TIE",
                     WRITTEN_INSTEAD,
                 );
                 return Some(Block::Skip);
@@ -214,7 +217,73 @@ impl Deck {
         Block::Contact(ContactBlock::Pairs {
             interaction,
             adjust,
+            tie: None,
         })
+    }
+
+    fn ties(&mut self, keyword: &Keyword, line: u64) -> Block {
+        const KNOWN: [&str; 6] = [
+            "NAME",
+            "POSITION TOLERANCE",
+            "ADJUST",
+            "TYPE",
+            "NO ROTATION",
+            "NO THICKNESS",
+        ];
+        for (name, _) in &keyword.parameters {
+            if !KNOWN.contains(&&name[..]) {
+                self.doubt(
+                    line,
+                    format!("*TIE with {name:.40}"),
+                    "*TIE with NAME, POSITION TOLERANCE and ADJUST",
+                    WRITTEN_INSTEAD,
+                );
+            }
+        }
+        let within = self.parameter(keyword, "POSITION TOLERANCE", line);
+        Block::Contact(ContactBlock::Pairs {
+            interaction: None,
+            adjust: None,
+            tie: Some(Tie { within }),
+        })
+    }
+
+    /// Reads `*CLEARANCE`, which has no data lines.
+    fn clearance(&mut self, keyword: &Keyword, line: u64) {
+        const KNOWN: [&str; 3] = ["MASTER", "SLAVE", "VALUE"];
+        let value = keyword.get("VALUE").and_then(number);
+        let known = |(name, _): &(String, _)| KNOWN.contains(&&name[..]);
+        let (Some(slave), Some(master), Some(value), true) = (
+            keyword.get("SLAVE"),
+            keyword.get("MASTER"),
+            value,
+            keyword.parameters.iter().all(known),
+        ) else {
+            return self.doubt(
+                line,
+                "*CLEARANCE",
+                "*CLEARANCE, MASTER=…, SLAVE=…, VALUE=…",
+                "Name the two surfaces of a *CONTACT PAIR and their distance, negative where they overlap; tables of nodes and CPSET are not read.",
+            );
+        };
+        let surfaces = [slave, master].map(|word| self.surface_named(word));
+        if self.contact.clearances.len() >= MOST {
+            let expected = format!("at most {MOST}");
+            return self.doubt(line, "one more *CLEARANCE", &expected, WRITTEN_INSTEAD);
+        }
+        self.contact.clearances.push(Clearance {
+            line,
+            surfaces,
+            value,
+        });
+    }
+
+    /// The name of a surface as the deck spells it.
+    fn surface_named(&mut self, word: &str) -> Name {
+        match self.target(word) {
+            Target::Set(name) => name,
+            _ => self.spelled(word),
+        }
     }
 
     fn friction_block(&mut self, keyword: &Keyword, line: u64) -> Block {
@@ -278,6 +347,7 @@ impl Deck {
         let kind = keyword.get("PRESSURE-OVERCLOSURE").unwrap_or("HARD");
         let behavior = match &kind.to_uppercase()[..] {
             "HARD" => Behavior::Hard,
+            "TIED" => Behavior::Tied { line },
             "LINEAR" => Behavior::Linear { line, slope: None },
             "EXPONENTIAL" => Behavior::Exponential {
                 line,
@@ -288,7 +358,7 @@ impl Deck {
                     line,
                     format!("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE={other:.20}"),
                     "PRESSURE-OVERCLOSURE=HARD",
-                    "Contact is hard here: pressure without overclosure. A `bonded` contact is written in a problem as JSON.",
+                    "Contact is hard here: pressure without overclosure; TIED and *TIE join surfaces.",
                 );
                 return Block::Skip;
             }
@@ -303,12 +373,12 @@ impl Deck {
                 );
             }
         }
-        let hard = matches!(behavior, Behavior::Hard);
+        let whole = matches!(behavior, Behavior::Hard | Behavior::Tied { .. });
         match self.interaction(line, "*SURFACE BEHAVIOR") {
             Some(interaction) => interaction.behavior = behavior,
             None => return Block::Skip,
         }
-        if hard {
+        if whole {
             Block::Skip
         } else {
             Block::Contact(ContactBlock::Behavior)
@@ -336,6 +406,7 @@ impl Deck {
             ContactBlock::Pairs {
                 interaction,
                 adjust,
+                tie,
             } => match words[..] {
                 [slave, master, ref rest @ ..]
                     if !slave.is_empty()
@@ -343,21 +414,19 @@ impl Deck {
                         && rest.iter().all(|word| word.is_empty())
                         && self.contact.pairs.len() < MOST =>
                 {
-                    let surfaces = [slave, master].map(|word| match self.target(word) {
-                        Target::Set(name) => name,
-                        _ => self.spelled(word),
-                    });
+                    let surfaces = [slave, master].map(|word| self.surface_named(word));
                     self.contact.pairs.push(Pair {
                         line,
                         surfaces,
                         interaction: interaction.clone(),
                         adjust: *adjust,
+                        tie: *tie,
                     });
                 }
                 _ => self.doubt(
                     line,
                     format!("`{text:.60}`"),
-                    "the surface of the body, the surface of the rigid body",
+                    "two surfaces: that of the body, and that of the rigid body or of the other elastic body",
                     WRITTEN_INSTEAD,
                 ),
             },
@@ -402,7 +471,7 @@ impl Deck {
                 };
                 let first = words.first().and_then(|word| number(word));
                 match &mut interaction.behavior {
-                    Behavior::Hard => {}
+                    Behavior::Hard | Behavior::Tied { .. } => {}
                     Behavior::Linear { slope: value, .. }
                     | Behavior::Exponential {
                         clearance: value, ..

@@ -30,9 +30,11 @@
 //! | contact: reading its keywords | `interaction` |
 //! | contact: rigid bodies, their shapes, their motion | `rigid`, `tool`, `steps` |
 //! | contact: the contacts made of them | `contact` |
+//! | contact: two elastic bodies | `bodies` |
 //! | OP=NEW in later steps | `replaced` |
 
 mod block;
+mod bodies;
 mod build;
 mod contact;
 mod contact_parts;

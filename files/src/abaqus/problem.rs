@@ -100,6 +100,7 @@ impl Built {
         let analysis = analysis(built);
         let quadrature = quadrature(built);
         let motions = built.take_motions(matches!(analysis, Analysis::Axisymmetric {}));
+        built.check_loads_of_tools();
         let of_temperatures = built.load_of_temperatures();
         let warms = of_temperatures.is_some();
         let factors = built.factors_of_steps(warms);
@@ -148,10 +149,11 @@ impl Built {
             let source = contact::Source {
                 said: &self.deck.contact,
                 pairs: &self.pairs,
+                clearances: &self.clearances,
                 tools: &self.tools,
                 mesh,
                 materials: &elastic.materials,
-                axisymmetric: matches!(elastic.analysis, Analysis::Axisymmetric {}),
+                thickness: elastic.thickness,
                 motions: &elastic.motions,
             };
             source.contacts(&elastic.factors)
@@ -208,6 +210,64 @@ fn without_step(mut faults: Findings) -> Vec<Violation> {
 }
 
 impl Built {
+    /// Reports forces on rigid bodies that no contact passes on, or that several contacts would, each as a whole; and rows of rotations
+    /// and moments at other nodes than theirs.
+    fn check_loads_of_tools(&mut self) {
+        let mut pairs = vec![0; self.tools.bodies.len()];
+        for name in self.pairs.iter().flatten() {
+            if let Some((body, _)) = self.tools.by_surface.get(name) {
+                pairs[*body] += 1;
+            }
+        }
+        let mut told: BTreeSet<usize> = BTreeSet::new();
+        let mut doubts: Vec<(u64, String)> = Vec::new();
+        for Row { row, name } in self.forces.iter().filter(|row| row.row.value != 0.0) {
+            for (number, rotates) in self.tools.loaded.get(name).map_or(&[][..], |on| &on.0) {
+                let line = self.tools.bodies[*number].line;
+                if *rotates && row.component < 3 {
+                    if told.insert(*number) {
+                        let got = format!(
+                            "a force on `{name:.60}`, the node of the rotations of the *RIGID BODY on line {line}"
+                        );
+                        doubts.push((row.line, got));
+                    }
+                } else if pairs[*number] != 1 && told.insert(*number) {
+                    let got = format!(
+                        "a force on `{name:.60}`, the reference node of the *RIGID BODY on line {line}, which is in {} contact pairs",
+                        pairs[*number]
+                    );
+                    doubts.push((row.line, got));
+                }
+            }
+        }
+        for (line, got) in doubts {
+            self.doubt(
+                line,
+                got,
+                "a force on the reference node of a rigid body in one contact pair",
+                "Write all lines that the body may touch as one surface, and pair it with one surface of the body.",
+            );
+        }
+        let rows = std::mem::take(&mut self.deck.contact.turning);
+        let lines: BTreeMap<u64, u64> = rows.iter().map(|row| (row.line, row.component)).collect();
+        let turns = |line: u64, on: &[(usize, bool)], alone: bool| {
+            let component = *lines.get(&line)?;
+            let all = on.iter().all(|(_, rotates)| *rotates == (component == 3));
+            (alone && all).then_some(line)
+        };
+        let held = self.tools.rows.iter();
+        let held = held.filter_map(|row| turns(row.row.line, &row.on, row.alone));
+        let forces = self.forces.iter().filter_map(|row| {
+            let (on, alone) = self.tools.loaded.get(&row.name)?;
+            turns(row.row.line, on, *alone)
+        });
+        let meant: BTreeSet<u64> = held.chain(forces).collect();
+        for row in rows.into_iter().filter(|row| !meant.contains(&row.line)) {
+            let (got, expected, hint) = row.doubt;
+            self.doubt(row.line, got, expected, hint);
+        }
+    }
+
     pub(super) fn doubt(&mut self, line: u64, got: impl Into<String>, expected: &str, hint: &str) {
         let reason = Reason::NotUnderstood;
         self.doubts
@@ -233,8 +293,8 @@ impl Built {
                     "the reference node of the *RIGID BODY on line {}",
                     body.line
                 ),
-                "a rigid body that *BOUNDARY moves",
-                "A rigid body is moved here by a given displacement, not by a force. Prescribe a displacement in the deck, have it converted (`signorini convert`), and give the contact `normal_force` in place of `indentation` in the JSON (docs/how-to/tools.md).",
+                "a set of reference nodes only, or of nodes of plane elements only",
+                "Write a row of its own for the reference node.",
             );
         }
         let label = self.raw.node_labels[*first as usize];
@@ -585,6 +645,13 @@ fn loads(built: &mut Built, analysis: &Analysis, thickness: f64) -> Vec<Load> {
     }
     let mut used: BTreeMap<String, bool> = BTreeMap::new();
     for Row { row, name } in std::mem::take(&mut built.forces) {
+        if built.tools.bears_alone(&name) {
+            continue;
+        }
+        // told with the rows for rigid bodies
+        if ![1, 2].contains(&row.component) {
+            continue;
+        }
         let count = || {
             let nodes = built.raw.node_sets.get(&name);
             let mut nodes = nodes.into_iter().flatten();

@@ -28,6 +28,8 @@ pub(super) struct Tools {
     pub(super) members: BTreeSet<u32>,
     /// Rows of `*BOUNDARY` for reference nodes, in the order of the deck.
     pub(super) rows: Vec<Moving>,
+    /// By the name of a set that `*CLOAD` names: its reference nodes, if it has any, and whether it has no other nodes.
+    pub(super) loaded: BTreeMap<String, (BodyNodes, bool)>,
 }
 
 /// A rigid body.
@@ -56,6 +58,34 @@ pub(super) struct Moving {
 pub(super) const MOST_POINTS: usize = 10_000;
 
 impl Tools {
+    /// Finds the reference nodes in sets of nodes that bear forces.
+    pub(super) fn note_loaded<'a>(
+        &mut self,
+        names: impl Iterator<Item = &'a String>,
+        sets: &BTreeMap<String, Vec<u32>>,
+    ) {
+        let single = single_nodes(&self.bodies);
+        if single.is_empty() {
+            return;
+        }
+        for name in names {
+            if self.loaded.contains_key(name) {
+                continue;
+            }
+            let nodes = sets.get(name).map_or(&[][..], |nodes| nodes);
+            let on = nodes.iter().filter_map(|node| single.get(node).copied());
+            let on: BodyNodes = on.collect();
+            let alone = on.len() == nodes.len();
+            self.loaded
+                .insert(name.clone(), (on, alone && !nodes.is_empty()));
+        }
+    }
+
+    /// Whether only reference nodes are in a set that bears a force.
+    pub(super) fn bears_alone(&self, name: &str) -> bool {
+        self.loaded.get(name).is_some_and(|(_, alone)| *alone)
+    }
+
     /// The warning that names the elements of rigid bodies, which are left out of the mesh.
     pub(super) fn warning(&self) -> Option<Warning> {
         let count = self.elements.len();
@@ -129,16 +159,22 @@ impl Search<'_> {
         for (place, number) in self.held_by_nodes(&inside) {
             owner.entry(place).or_insert(number);
         }
-        let attached = self.attached(&owner, &inside);
+        let elastic = self.elastic(&owner);
+        let attached = self.attached(&owner, &inside, &elastic);
         let node = |scope: usize, target: &Target| match self.nodes_of(scope, target)[..] {
             [node] => Some(node),
             _ => None,
         };
-        let known = |(number, (scope, body)): (usize, &(usize, RigidBody))| Body {
-            line: body.line,
-            reference: node(*scope, &body.reference),
-            rotation: body.rotation.as_ref().and_then(|r| node(*scope, r)),
-            attached: attached.contains(&number),
+        let known = |(number, (scope, body)): (usize, &(usize, RigidBody))| {
+            let reference = node(*scope, &body.reference);
+            let rotation = body.rotation.as_ref().and_then(|r| node(*scope, r));
+            let shared = |node: Option<u32>| node.is_some_and(|node| elastic[node as usize]);
+            Body {
+                line: body.line,
+                reference,
+                rotation,
+                attached: attached.contains(&number) || shared(reference) || shared(rotation),
+            }
         };
         tools.bodies = bodies.iter().enumerate().map(known).collect();
         for (scope, place) in self.names.scopes.iter().enumerate() {
@@ -204,13 +240,8 @@ impl Search<'_> {
         (0..self.numbered.len() as u32).filter_map(body).collect()
     }
 
-    /// The numbers of the rigid bodies that share nodes with the elastic body, that is with plane elements of no rigid
-    /// body.
-    fn attached(
-        &self,
-        owner: &BTreeMap<u32, usize>,
-        inside: &BTreeMap<u32, usize>,
-    ) -> BTreeSet<usize> {
+    /// Whether each node belongs to the elastic body, that is to plane elements of no rigid body.
+    fn elastic(&self, owner: &BTreeMap<u32, usize>) -> Vec<bool> {
         let mut elastic = vec![false; self.raw.nodes.len()];
         for (place, kind) in self.numbered.iter().enumerate() {
             if matches!(kind, Numbered::Plane(_)) && !owner.contains_key(&(place as u32)) {
@@ -219,6 +250,16 @@ impl Search<'_> {
                 }
             }
         }
+        elastic
+    }
+
+    /// The numbers of the rigid bodies that share nodes with the elastic body.
+    fn attached(
+        &self,
+        owner: &BTreeMap<u32, usize>,
+        inside: &BTreeMap<u32, usize>,
+        elastic: &[bool],
+    ) -> BTreeSet<usize> {
         let shares = |place: &u32| self.corners(*place).iter().any(|n| elastic[*n as usize]);
         let by_elements = owner.iter().filter(|(place, _)| shares(place));
         let by_nodes = inside.iter().filter(|(node, _)| elastic[**node as usize]);
@@ -288,11 +329,7 @@ impl Search<'_> {
 
     /// The rows that move reference nodes.
     fn rows(&self, bodies: &[Body], mut held: Vec<(usize, Held)>) -> Vec<Moving> {
-        let mut single: BTreeMap<u32, (usize, bool)> = BTreeMap::new();
-        for (number, body) in bodies.iter().enumerate() {
-            single.extend(body.reference.map(|node| (node, (number, false))));
-            single.extend(body.rotation.map(|node| (node, (number, true))));
-        }
+        let single = single_nodes(bodies);
         held.sort_by_key(|(_, row)| row.line);
         // many rows may name the same large set
         let mut known: BTreeMap<(usize, Target), (BodyNodes, bool)> = BTreeMap::new();
@@ -313,6 +350,16 @@ impl Search<'_> {
         }
         rows
     }
+}
+
+/// The reference and rotation nodes of rigid bodies: of each the number of its body, and whether it is the rotation node.
+fn single_nodes(bodies: &[Body]) -> BTreeMap<u32, (usize, bool)> {
+    let mut single: BTreeMap<u32, (usize, bool)> = BTreeMap::new();
+    for (number, body) in bodies.iter().enumerate() {
+        single.extend(body.reference.map(|node| (node, (number, false))));
+        single.extend(body.rotation.map(|node| (node, (number, true))));
+    }
+    single
 }
 
 /// The members of a set; none of a set that there is not.

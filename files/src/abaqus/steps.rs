@@ -9,11 +9,15 @@ use super::tool::Point;
 use super::written::{Distributed, Force, Prescribed, on_line};
 use solver::error::{Reason, Violation};
 
-/// The motion of a reference node.
+/// What moves a rigid body: along x, along y and around its reference node, a given displacement or rotation, or a load.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Motion {
-    /// The displacement of the reference node at the end of each step.
-    pub(super) ends: Vec<Point>,
+    /// The place of the reference node.
+    pub(super) reference: Point,
+    /// Whether each is a load.
+    pub(super) free: [bool; 3],
+    /// At the end of each step: the displacements and the rotation, or the forces and the moment.
+    pub(super) ends: Vec<[f64; 3]>,
 }
 
 /// The largest relative difference of values that count as equal, since numbers in files are rounded.
@@ -57,8 +61,26 @@ impl Built {
                 }
             }
         }
+        let mut loads = vec![vec![[None::<f64>; 3]; count]; bodies.len()];
+        for Row { row, name } in &self.forces {
+            let step = self.deck.contact.step_of(row.line);
+            for (number, rotates) in self.tools.loaded.get(name).map_or(&[][..], |on| &on.0) {
+                let kind = match (row.component, rotates) {
+                    (1 | 2, false) => row.component as usize - 1,
+                    (6, false) | (3, true) => 2,
+                    _ => continue,
+                };
+                *loads[*number][step][kind].get_or_insert(0.0) += row.value;
+            }
+        }
+        let later: Vec<[bool; 3]> = held
+            .iter()
+            .map(|ends| {
+                [0, 1, 2].map(|k| ends[0][k].is_none() && ends.iter().any(|e| e[k].is_some()))
+            })
+            .collect();
         // what a step does not change stays
-        for ends in &mut held {
+        for ends in held.iter_mut().chain(&mut loads) {
             for step in 1..count {
                 for kind in 0..3 {
                     ends[step][kind] = ends[step][kind].or(ends[step - 1][kind]);
@@ -71,9 +93,8 @@ impl Built {
             .map(|row| row.row.line)
             .collect();
         self.prescribed.retain(|row| !alone.contains(&row.row.line));
-        let motions = bodies.iter().zip(&held);
-        let motions = motions
-            .map(|(body, held)| self.motion(body, held, axisymmetric))
+        let motions = (0..bodies.len())
+            .map(|k| self.motion(&bodies[k], &held[k], later[k], &loads[k], axisymmetric))
             .collect();
         self.tools.bodies = bodies;
         self.tools.rows = rows;
@@ -84,9 +105,11 @@ impl Built {
         &mut self,
         body: &Body,
         held: &[[Option<f64>; 3]],
+        later: [bool; 3],
+        loads: &[[Option<f64>; 3]],
         axisymmetric: bool,
     ) -> Option<Motion> {
-        if body.reference.is_none() {
+        let Some(reference) = body.reference else {
             self.doubt(
                 body.line,
                 "*RIGID BODY",
@@ -94,37 +117,67 @@ impl Built {
                 "Name one node, or a set of one.",
             );
             return None;
-        }
-        let turned = |values: &[Option<f64>; 3]| values[2].is_some_and(|angle| angle != 0.0);
-        if held.iter().any(turned) {
+        };
+        // a body of revolution moves along its axis only
+        let moves = |k: usize| !axisymmetric || k == 1;
+        let across =
+            |end: &[Option<f64>; 3]| [0, 2].into_iter().any(|k| end[k].is_some_and(|u| u != 0.0));
+        let loaded_across = (0..3).any(|k| {
+            !moves(k)
+                && loads
+                    .iter()
+                    .any(|end| end[k].is_some_and(|load| load != 0.0))
+        });
+        if axisymmetric && (held.iter().any(across) || loaded_across) {
             self.doubt(
                 body.line,
-                "a rigid body that rotates",
-                "rotation 6 held at 0",
-                "Rigid bodies are only displaced here.",
+                "a rigid body of revolution that moves radially or rotates, or is loaded so",
+                "one that moves along the axis",
+                "A ring that widens or tilts is no rigid body.",
             );
             return None;
         }
-        // what the first step holds stays held
-        let components = ["1", "2", "6"].into_iter().zip(held[0]);
-        let free =
-            components.filter(|(name, value)| value.is_none() && !(axisymmetric && *name != "2"));
-        let free: Vec<&str> = free.map(|(name, _)| name).collect();
-        if !free.is_empty() {
-            let when = match held.len() {
-                1 => "",
-                _ => " in the first step",
+        let free = [0, 1, 2].map(|k| moves(k) && held[0][k].is_none());
+        let named = |which: [bool; 3]| {
+            let names = ["1", "2", "6"].into_iter().zip(which);
+            let names = names.filter(|(_, is)| *is).map(|(name, _)| name);
+            names.collect::<Vec<_>>().join(", ")
+        };
+        let loaded = |k: usize| {
+            loads
+                .iter()
+                .any(|end| end[k].is_some_and(|load| load != 0.0))
+        };
+        let pushed = (0..3).any(|k| free[k] && loaded(k));
+        let late = [0, 1, 2].map(|k| free[k] && later[k]);
+        if late.contains(&true) || free.contains(&true) && !pushed {
+            let (which, when) = match (late.contains(&true), held.len()) {
+                (true, _) => (late, " in the first step, and held later"),
+                (false, 1) => (free, ""),
+                (false, _) => (free, " in the first step"),
             };
             let got = format!(
                 "a rigid body whose reference node is free in {}{when}",
-                free.join(", ")
+                named(which)
             );
-            self.doubt(body.line, got, "displacements 1 and 2 and rotation 6 of its reference node prescribed by *BOUNDARY", WRITTEN_INSTEAD);
+            self.doubt(
+                body.line,
+                got,
+                "displacements 1 and 2 and rotation 6 of its reference node prescribed by *BOUNDARY, or a force or moment by *CLOAD along those that are free",
+                WRITTEN_INSTEAD,
+            );
             return None;
         }
-        let end = |values: &[Option<f64>; 3]| [0, 1].map(|k| values[k].unwrap_or(0.0));
+        let end = |step: usize| {
+            [0, 1, 2].map(|k| {
+                let of = if free[k] { loads } else { held };
+                of[step][k].filter(|_| moves(k)).unwrap_or(0.0)
+            })
+        };
         Some(Motion {
-            ends: held.iter().map(end).collect(),
+            reference: self.raw.nodes[reference as usize],
+            free,
+            ends: (0..held.len()).map(end).collect(),
         })
     }
 
@@ -164,7 +217,11 @@ impl Built {
                 moving.row.components.len() * moving.on.len(),
             )
         };
-        let of_tools = self.tools.rows.iter().map(moves);
+        let forces = self.forces.iter().map(|Row { row, name }| {
+            let on = self.tools.loaded.get(name);
+            (row.line, on.map_or(0, |(on, _)| on.len()))
+        });
+        let of_tools = self.tools.rows.iter().map(moves).chain(forces);
         let line =
             beyond(of_nodes, MOST_DISPLACEMENTS).or_else(|| beyond(of_tools, MOST_MOTIONS))?;
         Some(on_line(
@@ -285,9 +342,11 @@ impl Built {
             .pressures
             .iter()
             .map(|Row { row, name }| ((0, name), row.line, row.value));
+        let on_mesh = |Row { name, .. }: &&Row<Force>| !self.tools.bears_alone(name);
         let forces = self
             .forces
             .iter()
+            .filter(on_mesh)
             .map(|Row { row, name }| ((row.component, name), row.line, row.value));
         let mut numbers = BTreeMap::new();
         let mut sums: BTreeMap<(usize, usize), f64> = BTreeMap::new();
@@ -375,17 +434,18 @@ fn proportion(
     Ok(factors)
 }
 
-/// The factors of indentations and of tangential displacements at the end of each step; `None` if the contacts do not
-/// share them. `moved`: both displacements of each contact by step.
-pub(super) fn common_factors(moved: &[&[[f64; 2]]]) -> Option<Vec<[f64; 2]>> {
+/// The factors on several quantities at the end of each step; `None` if the contacts do not share them. `moved`: the quantities
+/// of each contact by step; `absent`: the factor on one that no contact has.
+pub(super) fn common_factors<const N: usize>(
+    moved: &[&[[f64; N]]],
+    absent: [f64; N],
+) -> Option<Vec<[f64; N]>> {
     let count = moved.first()?.len();
-    let mut found = vec![[0.0; 2]; count];
-    for kind in [0, 1] {
+    let mut found = vec![absent; count];
+    for kind in 0..N {
         let mut common: Option<Vec<f64>> = None;
         for contact in moved {
-            let most = contact.iter().map(|m| m[kind]).fold(0.0, |most: f64, m| {
-                if m.abs() >= most.abs() { m } else { most }
-            });
+            let most = largest(contact)[kind];
             if most == 0.0 {
                 continue;
             }
@@ -403,11 +463,20 @@ pub(super) fn common_factors(moved: &[&[[f64; 2]]]) -> Option<Vec<[f64; 2]>> {
                 None => common = Some(factors),
             }
         }
-        let common = common.unwrap_or_else(|| vec![f64::from(u8::from(kind == 0)); count]);
-        found
-            .iter_mut()
-            .zip(common)
-            .for_each(|(found, factor)| found[kind] = factor);
+        for (found, factor) in found.iter_mut().zip(common.into_iter().flatten()) {
+            found[kind] = factor;
+        }
     }
     Some(found)
+}
+
+/// The largest value of each quantity in all steps, by size but with its sign; the last one of equal size.
+pub(super) fn largest<const N: usize>(moved: &[[f64; N]]) -> [f64; N] {
+    std::array::from_fn(|kind| {
+        let all = moved.iter().map(|m| m[kind]);
+        all.fold(
+            0.0,
+            |most: f64, m| if m.abs() >= most.abs() { m } else { most },
+        )
+    })
 }

@@ -28,6 +28,8 @@ pub(super) const READ: &[&str] = &[
     "INITIAL CONDITIONS",
     "RIGID BODY",
     "CONTACT PAIR",
+    "CLEARANCE",
+    "TIE",
     "SURFACE INTERACTION",
     "SURFACE BEHAVIOR",
     "FRICTION",

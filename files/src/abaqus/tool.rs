@@ -293,8 +293,7 @@ fn circle(pieces: &[Piece]) -> Option<(Point, f64, bool)> {
 pub(super) fn met(points: &[Point], place: Point, n: Point, behind: f64) -> Option<(f64, Point)> {
     let t = [n[1], -n[0]];
     let hit = |pair: &[Point]| {
-        let along = pair.iter().map(|p| dot(minus(*p, place), t));
-        let [a, b]: [f64; 2] = along.collect::<Vec<_>>().try_into().ok()?;
+        let [a, b] = [0, 1].map(|k| dot(minus(pair[k], place), t));
         if a == b || a.min(b) > 0.0 || a.max(b) < 0.0 {
             return None;
         }

@@ -58,6 +58,7 @@ const FILES: &[(&str, &[u8])] = files! {
     "docs/gallery/press_fit.json"
     "docs/gallery/fretting.json"
     "tests/data/abaqus/ring-cpe8.inp"
+    "tests/data/abaqus/pair-fit-cpe8.inp"
     "tests/data/abaqus/roller-cpe8.inp"
     "tests/data/gmsh/hertz.geo"
     "tests/data/gmsh/hertz-tri6-msh41-binary.msh"

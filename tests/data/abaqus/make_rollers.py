@@ -33,21 +33,25 @@ def written(nodes, elements, name):
     return lines + [f"{label}, " + ", ".join(map(str, cell)) for label, cell in elements]
 
 
-def deck(name, body, tool, interaction, steps):
+def deck(name, body, tool, interaction, steps, reference=9001):
     """The body is held at v = 0 and touched at v = 1; the tool touches by its sides S1."""
     nodes, elements, [_, last], [low, _] = body
     lines = ["*HEADING", f"{name}, with a rigid tool", "** written by make_rollers.py"] + written(nodes, elements, "BODY")
-    lines += written(tool[0], tool[1], "TOOL") + ["*NODE", "9001, 0., 0.", "9002, 0., 0."]
+    lines += written(tool[0], tool[1], "TOOL") + ["*NODE", f"{reference}, 0., 0.", f"{reference + 1}, 0., 0."]
     lines += ["*ELSET, ELSET=FRONT"] + [f"{e}," for e in last] + ["*NSET, NSET=HELD"] + [f"{n}," for n in low]
     lines += ["*SURFACE, NAME=FACE", "FRONT, S3", "*SURFACE, NAME=RIGID", "TOOL, S1"]
     lines += ["*MATERIAL, NAME=M", "*ELASTIC", "1000., .3", "*SOLID SECTION, ELSET=BODY, MATERIAL=M"]
-    lines += ["*SOLID SECTION, ELSET=TOOL, MATERIAL=M", "*RIGID BODY, NSET=NTOOL, REF NODE=9001, ROT NODE=9002"]
+    lines += ["*SOLID SECTION, ELSET=TOOL, MATERIAL=M", f"*RIGID BODY, NSET=NTOOL, REF NODE={reference}, ROT NODE={reference + 1}"]
     lines += ["*SURFACE INTERACTION, NAME=I"] + interaction
-    lines += ["*CONTACT PAIR, INTERACTION=I, TYPE=NODE TO SURFACE", "FACE, RIGID", "*BOUNDARY", "HELD, 1, 2", "9002, 1, 3"]
+    lines += ["*CONTACT PAIR, INTERACTION=I, TYPE=NODE TO SURFACE", "FACE, RIGID", "*BOUNDARY", "HELD, 1, 2", f"{reference + 1}, 1, 3"]
     for x, y in steps:
-        lines += ["*STEP", "*STATIC", "0.2, 1.", "*BOUNDARY", f"9001, 1, 1, {x}", f"9001, 2, 2, {y}"]
+        lines += ["*STEP", "*STATIC", "0.2, 1.", "*BOUNDARY", f"{reference}, 1, 1, {x}", f"{reference}, 2, 2, {y}"]
         lines += ["*NODE PRINT, NSET=NBODY", "U", "*END STEP"]
-    (HERE / f"{name}.inp").write_text("\n".join(lines + [""]))
+    return "\n".join(lines + [""])
+
+
+def write(name, *parts):
+    (HERE / f"{name}.inp").write_text(deck(name, *parts))
 
 
 def block(width, height, grade):
@@ -73,16 +77,24 @@ def around(radius, thick, middle, half, across, base, downwards):
 
 HARD = ["*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", "1e7, 1e-3"]
 
-deck("roller-cpe8", block(3.0, 3.0, 0.6), around(4.0, 0.5, 4.0, 0.4, 30, 5001, -1), HARD, [(0, -0.05)])
-
 
 def disc(u, v):
     angle, r = 0.5 * math.pi * 0.9 * (1 - 2 * u), 0.4 + 0.6 * v
     return r * math.sin(angle), -r * math.cos(angle)
 
 
-deck("disc-cpe8", patch(1, 30, 3, disc), patch(5001, 1, 1, lambda u, v: (2 - 4 * u, -1 - 0.5 * v)), HARD, [(0, 0.02)])
+def main():
+    roller = block(3.0, 3.0, 0.6), around(4.0, 0.5, 4.0, 0.4, 30, 5001, -1), HARD, [(0, -0.05)]
+    write("roller-cpe8", *roller)
+    # the same under a force
+    pushed = deck("push-cpe8", *roller).replace("9001, 2, 2, -0.05", "*CLOAD\n9001, 2, -30.")
+    (HERE / "push-cpe8.inp").write_text(pushed)
+    write("disc-cpe8", patch(1, 30, 3, disc), patch(5001, 1, 1, lambda u, v: (2 - 4 * u, -1 - 0.5 * v)), HARD, [(0, 0.02)])
 
-# all of the face sticks at first, and slides in the end
-FRICTION = HARD + ["*FRICTION, ELASTIC SLIP=1E-4", "0.3, 1e5"]
-deck("drag-cpe8", block(1.0, 2.0, 0.0), patch(5001, 1, 1, lambda u, v: (-3 + 6 * u, 0.5 * v)), FRICTION, [(0, -0.02), (0.01, -0.02)])
+    # all of the face sticks at first, and slides in the end
+    friction = HARD + ["*FRICTION, ELASTIC SLIP=1E-4", "0.3, 1e5"]
+    write("drag-cpe8", block(1.0, 2.0, 0.0), patch(5001, 1, 1, lambda u, v: (-3 + 6 * u, 0.5 * v)), friction, [(0, -0.02), (0.01, -0.02)])
+
+
+if __name__ == "__main__":
+    main()
