@@ -7,7 +7,7 @@ use std::path::Path;
 use serde_json::Value;
 
 /// What the rows are about; a row without a title is none.
-const TITLES: [&str; 26] = [
+const TITLES: [&str; 28] = [
     "Published values beside the rows",
     "Patch test",
     "Rigid modes",
@@ -34,7 +34,12 @@ const TITLES: [&str; 26] = [
     "Limits of the nonlocal radius",
     "Invariances",
     "Balance and variational inequality",
+    "Obstacles under loads",
+    "Two elastic bodies",
 ];
+
+/// The number of the last row.
+const LAST: u64 = TITLES.len() as u64 - 1;
 
 /// Of more lines than this the worst are shown.
 const MOST_SHOWN: usize = 16;
@@ -49,11 +54,11 @@ pub(crate) fn rows(records: &Path) -> String {
             .or_default()
             .push(line);
     }
-    let missing: Vec<u64> = (1..=25).filter(|row| !rows.contains_key(row)).collect();
+    let missing: Vec<u64> = (1..=LAST).filter(|row| !rows.contains_key(row)).collect();
     assert!(missing.is_empty(), "rows without a line: {missing:?}");
     let mut out = String::new();
     // the rows first, what has no row after them
-    for row in (1..=25).chain([0]) {
+    for row in (1..=LAST).chain([0]) {
         let title = TITLES[row as usize];
         match row {
             0 => writeln!(out, "## {title}\n").unwrap(),

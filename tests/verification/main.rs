@@ -52,6 +52,7 @@ mod obstacle_loads;
 mod obstacle_normals;
 mod obstacle_points;
 mod overlaps;
+mod pair_references;
 mod pairs;
 mod patch;
 mod profiles;

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 /// One line of the table.
 pub(crate) struct Line<'a> {
-    /// Row of docs/verification.md, 1 … 25; 0: another published value.
+    /// Row of docs/verification.md, 1 … 27; 0: another published value.
     pub(crate) row: u32,
     /// The quantity and its case, in words.
     pub(crate) what: &'a str,
