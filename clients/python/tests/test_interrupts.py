@@ -10,6 +10,7 @@ import functools
 import gc
 import io
 import multiprocessing
+import multiprocessing.connection
 import os
 import pathlib
 import random
@@ -39,10 +40,12 @@ def in_process(work: Callable[..., None], *arguments: Any) -> None:
     """Does something in a process of its own: what measures coverage has a lock that a signal may leave closed."""
     process = multiprocessing.get_context("spawn").Process(target=observed, args=(work, *arguments))
     process.start()
-    process.join(150)
-    if process.is_alive():
+    if not multiprocessing.connection.wait([process.sentinel], 150):
         process.kill()
         raise AssertionError("it hangs")
+    # a process that another thread starts collects those that have ended: then it is seen a moment later here
+    while process.exitcode is None:
+        time.sleep(0.01)
     assert process.exitcode == 0, "its error is on standard error"
 
 
