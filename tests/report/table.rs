@@ -67,11 +67,16 @@ pub(crate) fn rows(records: &Path) -> String {
         let lines = &mut rows.get_mut(&row).unwrap();
         let count = lines.len();
         if count > MOST_SHOWN {
-            lines.sort_by(|a, b| used(b).total_cmp(&used(a)));
+            // orders of convergence are always shown
+            let rank = |line: &Value| (line["order"].is_number(), used(line));
+            lines.sort_by(|a, b| {
+                let ((first, a), (second, b)) = (rank(a), rank(b));
+                second.cmp(&first).then(b.total_cmp(&a))
+            });
             lines.truncate(MOST_SHOWN);
             writeln!(
                 out,
-                "The {MOST_SHOWN} of {count} lines that come nearest to what is allowed.\n"
+                "{MOST_SHOWN} of {count} lines: those with orders of convergence, and those that come nearest to what is allowed.\n"
             )
             .unwrap();
         }

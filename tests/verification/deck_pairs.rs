@@ -5,6 +5,7 @@ use files::abaqus;
 use solver::problem::{Condition, History, Problem};
 use solver::solution::Warning;
 
+use crate::record::held;
 use crate::support::{close, solve};
 
 fn deck(name: &str) -> String {
@@ -109,6 +110,28 @@ fn a_clearance_below_zero_is_an_interference() {
             .any(|w| w.message.contains("are parabolas")),
         "{:?}",
         summary.warnings
+    );
+    held(
+        27,
+        "press fit of quarter rings in plane strain, a deck: force",
+        "16:12 elements",
+        summary.normal_force,
+        lame,
+        1e-3,
+    );
+    let flat = text.replace("CPE8", "CPS8").replace(
+        "*STEP\n",
+        "*CLEARANCE, SLAVE=FACEA, MASTER=FACEB, VALUE=-0.001\n*STEP\n",
+    );
+    let force = solve(&read(&flat).0).summary.normal_force;
+    let lame = 0.328_125 * 0.5 * std::f64::consts::PI;
+    held(
+        27,
+        "press fit of quarter rings in plane stress, a deck: force",
+        "16:12 elements",
+        force,
+        lame,
+        1e-3,
     );
     let apart = gap("0.25").contacts[0].gap.unwrap();
     assert_eq!((apart.interference, apart.clearance), (None, Some(0.25)));
