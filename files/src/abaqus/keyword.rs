@@ -559,6 +559,9 @@ impl Deck {
                     self.here.put(moved, turned);
                 }
                 let part = std::mem::replace(&mut self.here, std::mem::take(&mut self.assembly));
+                if self.instances.len() > MOST_PARTS {
+                    return Block::Skip;
+                }
                 if self.instances.iter().any(|(known, _)| *known == name) {
                     let got = format!("the instance `{name:.60}` a second time");
                     self.fault(
@@ -596,8 +599,12 @@ impl Deck {
         Block::Skip
     }
 
-    /// A copy of the part that an instance names.
+    /// A copy of the part that an instance names. The first instance beyond the limit is reported and kept, without
+    /// content; those after it are neither.
     fn instantiated(&mut self, keyword: &Keyword, line: u64) -> Part {
+        if self.instances.len() > MOST_PARTS {
+            return Part::default();
+        }
         let Some(name) = self.named(keyword, "PART") else {
             self.here.incomplete = Incomplete::ALL;
             self.fault(
