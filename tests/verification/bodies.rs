@@ -561,3 +561,48 @@ fn an_interference_is_swept_and_stepped() {
     let (found, _) = family.member(&other, Start::Anew, &mut ()).unwrap();
     assert!((found.normal_force / whole_force - 1.0).abs() < 1e-12);
 }
+
+/// Bodies that lie on one another and are held or moved together carry no force: not one of rounding either.
+#[test]
+fn bodies_that_only_lie_on_one_another_do_not_press() {
+    for (y, shift, incremental) in [
+        (1.0, 0.0, false),
+        (1.0, 0.01, true),
+        (0.7, 0.01, false),
+        (0.7, -3.0, true),
+        (100.3, 0.01, true),
+    ] {
+        let at = |from: f64| [y + from, y + from + 0.5, y + from + 1.0];
+        let friction = json!({
+            "coefficient": 0.3, "nonlocal_radius": 0.3, "elastic_slip": 1e-4,
+            "history": if incremental { "incremental" } else { "total" },
+        });
+        let solution = solved(&json!({
+            "analysis": {"kind": "plane_strain"},
+            "mesh": {"grids": {
+                "lower": {"x": even(0.1, 2.1, 7), "y": at(-1.0)},
+                "upper": {"x": even(0.1, 2.1, 5), "y": at(0.0)},
+            }, "refine": 1},
+            "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+            "supports": [
+                {"boundary": "lower.bottom", "ux": 0, "uy": 0},
+                {"boundary": "upper.top", "ux": shift, "uy": 0},
+            ],
+            "loads": [{"boundary": "upper.top", "pressure": 10}],
+            "contacts": [{"boundary": "lower.top", "against": {"boundary": "upper.bottom"}, "friction": friction}],
+            "steps": [{"name": "press", "supports": 0}, {"name": "shift"}],
+        }));
+        assert!(
+            solution.summary.converged,
+            "{y} {shift}: {:?}",
+            solution.summary.warnings
+        );
+        let contact = &solution.summary.contacts["lower.top"];
+        assert_eq!(
+            (contact.normal_force, contact.friction_force),
+            (0.0, 0.0),
+            "{y} {shift}"
+        );
+        assert!(contact.contact.is_empty(), "{y} {shift}");
+    }
+}

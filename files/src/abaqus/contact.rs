@@ -263,7 +263,9 @@ impl Source<'_> {
             let most = largest(&shape.moved)[0].abs();
             self.behavior(&interaction.behavior, placed.edges, most, remarks);
         }
-        let turns = shape.free[2] || shape.moved.iter().any(|m| m[2] != 0.0);
+        // of a body that only forces move the result states the moment about the reference node
+        let turned = shape.moved.iter().any(|m| m[2] != 0.0);
+        let turns = turned || placed.motion.may_turn && shape.free.contains(&true);
         Some(Made {
             contact: Contact {
                 boundary: surfaces.boundary.to_owned(),

@@ -14,6 +14,8 @@ use solver::error::{Reason, Violation};
 pub(super) struct Motion {
     /// The place of the reference node.
     pub(super) reference: Point,
+    /// Whether it may turn: a body of revolution may not.
+    pub(super) may_turn: bool,
     /// Whether each is a load.
     pub(super) free: [bool; 3],
     /// At the end of each step: the displacements and the rotation, or the forces and the moment.
@@ -176,6 +178,7 @@ impl Built {
         };
         Some(Motion {
             reference: self.raw.nodes[reference as usize],
+            may_turn: moves(2),
             free,
             ends: (0..held.len()).map(end).collect(),
         })
@@ -245,7 +248,7 @@ impl Built {
                 line,
                 got,
                 "supports that hold from the first step on",
-                &format!("The support would hold the body from the beginning. Write it in the first step if that is intended. {WRITTEN_INSTEAD}"),
+                "The support would hold the body from the beginning. Write it in the first step if that is intended. A support that begins later, which would also have to know what was displaced by then, is possible in no problem, in JSON neither.",
             );
         }
         let loads = self.values_of_loads();

@@ -11,7 +11,11 @@ use base::run::Document;
 use clap::Args;
 use files::plot::{self, AxisLimits, Limits, Parts, Plot, Size, Style, Texts, Theme, image};
 use service::formats::{self, Format};
-use solver::{mesh::Mesh, problem::Problem, solution::Iteration};
+use solver::{
+    mesh::Mesh,
+    problem::{Contact, Problem},
+    solution::Iteration,
+};
 use strum::VariantArray;
 
 /// The help text of `-o`.
@@ -137,9 +141,9 @@ pub(super) enum Part {
 }
 
 impl Output {
-    /// Reads the name of a file for a problem with these contact boundaries; the error is the reason why the file
+    /// Reads the name of a file for a problem with these contacts; the error is the reason why the file
     /// cannot be written. This is called before the problem is solved, which may take hours.
-    pub(super) fn parse(path: &Path, contacts: &[&str]) -> Result<Output, String> {
+    pub(super) fn parse(path: &Path, contacts: &[Contact]) -> Result<Output, String> {
         if path.as_os_str() == "-" {
             return Ok(Output {
                 path: None,
@@ -243,12 +247,10 @@ impl Output {
 }
 
 /// The part of a result that a file's name states before its extension, or the usual part for the extension.
-fn part(format: Format, stem: &str, contacts: &[&str]) -> Result<Part, String> {
+fn part(format: Format, stem: &str, contacts: &[Contact]) -> Result<Part, String> {
     let words: Vec<&str> = stem.split('.').collect();
     let last = words.last().copied().unwrap_or_default();
-    if format.image().is_some() {
-        return Ok(Part::Plot(last.parse().unwrap_or(Plot::Profile)));
-    }
+    let has_profile = |name: &str| contacts.iter().any(|contact| contact.is_on(name));
     // a boundary may have any name, also with dots or one of the words below: an existing name takes precedence
     let after = words.iter().enumerate();
     let after = after.filter(|(_, word)| **word == "profile");
@@ -256,7 +258,7 @@ fn part(format: Format, stem: &str, contacts: &[&str]) -> Result<Part, String> {
         .map(|(place, _)| words[place + 1..].join("."))
         .collect();
     named.retain(|name| !name.is_empty());
-    let known = named.iter().find(|name| contacts.contains(&name.as_str()));
+    let known = named.iter().find(|name| has_profile(name));
     let asked = match known.or(named.last()) {
         Some(boundary) => Some(("profile", Some(boundary.clone()))),
         None => ["summary", "profile", "history", "fields"]
@@ -265,6 +267,15 @@ fn part(format: Format, stem: &str, contacts: &[&str]) -> Result<Part, String> {
             .map(|word| (word, None)),
     };
     let ending = format.name();
+    if format.image().is_some() {
+        return match (known, last.parse()) {
+            (None, Ok(plot)) => Ok(Part::Plot(plot)),
+            (Some(name), _) => Err(format!(
+                "a figure shows the profiles of all contact boundaries, and not of {name:?} alone: name it NAME.profile.{ending}"
+            )),
+            (None, Err(_)) => Ok(Part::Plot(Plot::Profile)),
+        };
+    }
     match (asked, format) {
         (Some(("summary", _)), Format::Json) => Ok(Part::Summary),
         (Some(("summary", _)), _) => Err("the summary is written as .json only".into()),
@@ -287,11 +298,18 @@ fn part(format: Format, stem: &str, contacts: &[&str]) -> Result<Part, String> {
     }
 }
 
-fn one_of(contacts: &[&str], asked: Option<String>, ending: &str) -> Result<String, String> {
-    let known = contacts.join(", ");
-    match (asked, contacts) {
+fn one_of(contacts: &[Contact], asked: Option<String>, ending: &str) -> Result<String, String> {
+    let own = contacts.iter().map(|contact| contact.boundary.as_str());
+    let facing = contacts
+        .iter()
+        .filter_map(|contact| contact.against.as_ref());
+    let all = own
+        .clone()
+        .chain(facing.map(|against| against.boundary.as_str()));
+    let known = all.clone().collect::<Vec<_>>().join(", ");
+    match (asked, &own.collect::<Vec<_>>()[..]) {
         (_, []) => Err("the problem has no contact, and so no profile; displacements and stresses are written as .vtu, .npz and .json".into()),
-        (Some(name), _) if contacts.contains(&name.as_str()) => Ok(name),
+        (Some(name), _) if all.clone().any(|boundary| boundary == name) => Ok(name),
         (Some(name), _) => Err(format!(
             "the problem has no contact boundary {name:?}; it has: {known}"
         )),
@@ -345,9 +363,16 @@ pub(super) fn print(text: &str) -> std::io::Result<()> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use serde_json::json;
 
     fn asked(name: &str, contacts: &[&str]) -> Result<(Part, Format), String> {
-        Output::parse(Path::new(name), contacts).map(|output| (output.part, output.format))
+        let contact = |name: &&str| {
+            let (boundary, against) = name.split_once('|').unwrap_or((name, ""));
+            let against = (!against.is_empty()).then(|| json!({"boundary": against}));
+            serde_json::from_value(json!({"boundary": boundary, "against": against})).unwrap()
+        };
+        let contacts: Vec<Contact> = contacts.iter().map(contact).collect();
+        Output::parse(Path::new(name), &contacts).map(|output| (output.part, output.format))
     }
 
     #[test]
@@ -403,6 +428,26 @@ mod tests {
             let error = asked(name, &contacts).unwrap_err();
             assert!(error.contains(part), "{name}: {error}");
         }
+    }
+
+    #[test]
+    fn both_sides_of_a_pair_of_bodies_have_a_profile() {
+        let pair = ["low.top|up.bottom"];
+        for (name, boundary) in [
+            ("r.csv", "low.top"),
+            ("r.profile.low.top.csv", "low.top"),
+            ("r.profile.up.bottom.csv", "up.bottom"),
+        ] {
+            assert_eq!(
+                asked(name, &pair).unwrap().0,
+                Part::Profile(boundary.into()),
+                "{name}"
+            );
+        }
+        let error = asked("r.profile.other.csv", &pair).unwrap_err();
+        assert!(error.contains("it has: low.top, up.bottom"), "{error}");
+        let error = asked("r.profile.up.bottom.svg", &pair).unwrap_err();
+        assert!(error.contains("all contact boundaries"), "{error}");
     }
 
     #[test]

@@ -85,9 +85,9 @@ pub(super) fn run(
     let start = Instant::now();
     let (problem, _) = problem(file)?;
     let parse_s = start.elapsed().as_secs_f64();
-    let contacts = problem.contacts.iter();
-    let contacts: Vec<&str> = contacts.map(|contact| contact.boundary.as_str()).collect();
-    let outputs = output.iter().map(|path| Output::parse(path, &contacts));
+    let outputs = output
+        .iter()
+        .map(|path| Output::parse(path, &problem.contacts));
     let outputs = outputs.collect::<Result<Vec<_>, _>>().map_err(refuse)?;
     look.check(&outputs).map_err(refuse)?;
     let stored = stored_mesh(&problem, file, mesh.as_deref())?;

@@ -114,6 +114,21 @@ impl End {
     }
 }
 
+/// The state without contact, if what touches presses by rounding only: two bodies that touch where they are at rest, or that
+/// move together. Friction then has the bound of no pressure. Else the state itself.
+fn opened(system: &System<'_>, measured: Measured, outcome: Outcome) -> Measured {
+    if outcome != Outcome::Converged || system.presses(&measured.reactions) {
+        return measured;
+    }
+    let mut state = measured.state;
+    for (active, node) in state.active.iter_mut().zip(&system.nodes) {
+        *active = node.bonded;
+    }
+    let without = vec![0.0; system.nodes.len()];
+    let bound = system.friction_bound(&without);
+    Measured::with_force(system, state, measured.elastic_force, bound)
+}
+
 pub(super) fn finish(recorder: Recorder<'_, '_>, end: End) -> Finished {
     let end = match recorder.controls.algorithm {
         // stops by a test of its own
@@ -124,7 +139,7 @@ pub(super) fn finish(recorder: Recorder<'_, '_>, end: End) -> Finished {
             &recorder.history,
         ),
     };
-    let measured = end.measured;
+    let measured = opened(recorder.system, end.measured, end.outcome);
     Finished {
         tractions: recorder
             .system

@@ -61,7 +61,7 @@ impl Measured {
             .fold(0.0f64, |a, &b| a.max(b));
         let residuals = Residuals {
             kkt: system.kkt_residual(&state, &elastic_force, &bound),
-            friction: if bound_change == 0.0 {
+            friction: if bound_change == 0.0 || !system.presses(&reactions) {
                 0.0
             } else {
                 bound_change / scale

@@ -78,9 +78,7 @@ pub fn numbers(
     finished: &Finished,
     observer: &mut dyn Observer,
 ) -> Result<(BTreeMap<String, ContactSummary>, Vec<Warning>), SolveError> {
-    if finished.outcome == Outcome::Converged {
-        unheld::held(system, &finished.state, &finished.bound)?;
-    }
+    unheld::held(system, finished)?;
     let mut stop = || observer.stop();
     let state = FinalState::new(system, finished, &mut stop);
     let mut warnings = system.model.warnings.clone();
@@ -254,9 +252,7 @@ pub fn report(
     if system.semidefinite && finished.outcome != Outcome::Canceled {
         held(system, finished)?;
     }
-    if finished.outcome == Outcome::Converged {
-        unheld::held(system, &finished.state, &finished.bound)?;
-    }
+    unheld::held(system, finished)?;
     let state = FinalState::new(system, finished, &mut stop);
     let (inside, difference) = Inside::new(&state)?;
     let mut warnings = system.model.warnings.clone();

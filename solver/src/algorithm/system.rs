@@ -18,6 +18,10 @@ use crate::problem::{Condition, FrictionPoints};
 /// The part of the largest bound below which a friction point counts as open: its anchor then follows it.
 const OPEN: f64 = 1e-12;
 
+/// The part of the forces that displace a contact below which reactions are rounding: of these forces, and of normals by
+/// coordinates a hundred times as large as the body. Of reactions that small no two digits would be known.
+const ROUNDED: f64 = 1e-11;
+
 /// The part of a contact's length within which nodes are equally near to an obstacle.
 const NEAREST: f64 = 1e-9;
 
@@ -840,7 +844,7 @@ impl<'a> System<'a> {
     }
 
     /// The largest force or complementarity defect for a given friction bound, divided by the largest nodal reaction.
-    /// If nothing touches, it is divided by the largest load or friction force or, since a body may be at rest again,
+    /// If nothing presses, it is divided by the largest load or friction force or, since a body may be at rest again,
     /// by the problem's own force. `elastic`: Ŝ v − f̂ of the state.
     pub(super) fn kkt_residual(&self, state: &State, elastic: &[f64], bound: &[f64]) -> f64 {
         let mut friction = vec![0.0; state.v.len()];
@@ -887,15 +891,24 @@ impl<'a> System<'a> {
     }
 
     fn scale(&self, reactions: &[f64], friction: &[f64]) -> f64 {
-        let largest = |values: &[f64]| values.iter().fold(0.0f64, |a, b| a.max(b.abs()));
-        let scale = match largest(reactions) {
-            0.0 => largest(&self.load)
-                .max(largest(friction))
-                .max(self.reference_force),
-            reaction => reaction,
+        let scale = if self.presses(reactions) {
+            largest_size(reactions)
+        } else {
+            let acting = largest_size(&self.load).max(largest_size(friction));
+            acting.max(self.reference_force)
         };
         scale.max(f64::MIN_POSITIVE)
     }
+
+    /// Whether reactions are more than the rounding of the forces that displace the contact.
+    pub(super) fn presses(&self, reactions: &[f64]) -> bool {
+        let displacing = largest_size(&self.load).max(self.reference_force);
+        largest_size(reactions) > ROUNDED * displacing
+    }
+}
+
+fn largest_size(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |most, value| most.max(value.abs()))
 }
 
 /// How the node i of a contact follows another contact; none unless the node belongs to that other contact alone.

@@ -1,10 +1,46 @@
 //! Obstacles under loads that nothing holds: neither pressure nor friction of the final state resists one of their motions.
 
-use crate::algorithm::system::{Point, State, System};
+use crate::algorithm::finished::Finished;
+use crate::algorithm::system::{Patch, Point, State, System};
 use crate::error::SolveError;
+use crate::solution::Outcome;
 
-/// Checks that contact and friction of the final state resist all unknown motions of obstacles. `bound`: the friction bound.
-pub(super) fn held(system: &System<'_>, state: &State, bound: &[f64]) -> Result<(), SolveError> {
+/// The rotation of an obstacle (radians) beyond which iterations that do not converge have run away.
+const TURNED_OVER: f64 = 1.0;
+
+/// Checks that nothing moves an obstacle without end: that contact and friction of a converged state resist all its unknown
+/// motions, and that iterations without end do not turn it over.
+pub(super) fn held(system: &System<'_>, finished: &Finished) -> Result<(), SolveError> {
+    match finished.outcome {
+        Outcome::Converged => resisted(system, &finished.state, &finished.bound),
+        Outcome::NotConverged | Outcome::ContactCycling if finished.slide.is_none() => {
+            not_turned_over(system, &finished.state)
+        }
+        _ => Ok(()),
+    }
+}
+
+fn not_turned_over(system: &System<'_>, state: &State) -> Result<(), SolveError> {
+    for (p, patch) in system.patches.iter().enumerate() {
+        let tool = patch.contact.tool.as_ref();
+        let turns = tool.is_some_and(|tool| tool.loads[2].is_some());
+        let [.., tilt] = system.obstacle_motions(&state.v, p);
+        if turns && tilt.abs() > TURNED_OVER {
+            return Err(unheld(patch, 2));
+        }
+    }
+    Ok(())
+}
+
+fn unheld(patch: &Patch<'_>, motion: usize) -> SolveError {
+    SolveError::ObstacleUnheld {
+        contact: patch.contact.name.clone(),
+        motion: MOTIONS[motion].to_owned(),
+    }
+}
+
+/// Checks that contact and friction of a state resist all unknown motions of obstacles. `bound`: the friction bound.
+fn resisted(system: &System<'_>, state: &State, bound: &[f64]) -> Result<(), SolveError> {
     for (p, patch) in system.patches.iter().enumerate() {
         let Some(tool) = &patch.contact.tool else {
             continue;
@@ -48,10 +84,7 @@ pub(super) fn held(system: &System<'_>, state: &State, bound: &[f64]) -> Result<
             rows.push(scaled([0, 1, 2].map(|other| f64::from(other == *k))));
         }
         if let Some(k) = first_dependent(&rows, free.len()) {
-            return Err(SolveError::ObstacleUnheld {
-                contact: patch.contact.name.clone(),
-                motion: MOTIONS[free[k]].to_owned(),
-            });
+            return Err(unheld(patch, free[k]));
         }
     }
     Ok(())

@@ -63,9 +63,12 @@ impl Checks {
             };
             all.check(self.shared_nodes(&model, &models, problem));
             all.check(self.supported_contact_nodes(&model, &problem.steps, fixed));
-            all.check(self.nodes_held_along_tool(&model, fixed));
+            let moves = all.check(self.nodes_held_along_tool(&model, fixed));
             all.check(self.nodes_of_pair(mesh, &model, &models, fixed));
             all.check(self.tangential_force_borne(&model, &problem.steps));
+            if moves.is_some() {
+                all.check(self.moment_borne(&model, &problem.steps));
+            }
             models.push(model);
         }
         all.check(self.oblique_supports(&models, fixed, problem));

@@ -19,6 +19,10 @@ use crate::solution::WarningCode;
 /// The ratio of the lengths of facing edges above which the coarser side should not carry the law.
 const MUCH_COARSER: f64 = 3.0;
 
+/// The gap, as a part of the largest coordinate, that rounding leaves between bodies that lie on one another: a mean of
+/// differences of coordinates, a few roundings each.
+const ROUNDED: f64 = 16.0 * f64::EPSILON;
+
 /// A contact boundary, the part of it that an obstacle or another body faces.
 pub(super) struct Faced {
     pub(super) boundary: ContactBoundary,
@@ -220,8 +224,14 @@ impl Checks {
             None => *gap,
             Some(given) => given.clearance.unwrap_or(0.0),
         };
+        let size = boundary.positions.iter().flatten();
+        let size = size.fold(0.0f64, |most, x| most.max(x.abs()));
         let profile = coupling.gaps.iter().map(|gap| Profile {
-            distance: distance(gap),
+            // bodies that lie on one another neither overlap nor gape by what rounding leaves of their coordinates
+            distance: match distance(gap) {
+                gap if gap.abs() <= ROUNDED * size => 0.0,
+                gap => gap,
+            },
             slope: 0.0,
         });
         let turned = match contact.used_normal() {

@@ -6,8 +6,9 @@ use super::checks::{ALIGNED, Checks};
 use super::contact_model::ContactModel;
 use super::level::Level;
 use super::supports::Held;
+use super::tool::Tool;
 use crate::contact::ContactBoundary;
-use crate::error::{AllChecks, Checked, Reason};
+use crate::error::{AllChecks, Checked, Reason, rounded};
 use crate::friction::BoundLaw;
 use crate::problem::{Analysis, Condition, Contact, Normalization, Step};
 
@@ -76,13 +77,13 @@ impl Checks {
                 "Without it neither a tilt nor a moment has a meaning.",
             ));
         }
-        if !turns && contact.about.is_some() {
+        if !contact.is_tool() && contact.about.is_some() {
             all.fail(self.report(
                 at("about"),
                 Reason::NotUsed,
-                "a point without `tilt` and `moment`",
-                "no `about`, or a tilt or a moment (also 0) about it",
-                "An obstacle that does not turn needs no point; with \"moment\": 0 it turns freely.",
+                "a point without a force, a moment or a tilt of the obstacle",
+                "no `about`, or one of `normal_force`, `tangential_force`, `moment` and `tilt` (also 0)",
+                "With a force the moment that holds the obstacle is stated about this point; with \"moment\": 0 it turns freely.",
             ));
         }
         if contact.is_tool() {
@@ -115,6 +116,7 @@ impl Checks {
                 ("tangential_force", contact.tangential_force.is_some()),
                 ("tilt", contact.tilt.is_some()),
                 ("moment", contact.moment.is_some()),
+                ("about", contact.about.is_some()),
             ];
             for (field, _) in across.into_iter().filter(|(_, given)| *given) {
                 all.fail(self.report(
@@ -228,31 +230,12 @@ impl Checks {
         else {
             return Ok(());
         };
-        let boundary = &contact.boundary;
-        let upright = (0..boundary.nodes.len()).all(|i| (tool.row(i, 0)[0] - 1.0).abs() <= ALIGNED);
-        if contact.condition != Condition::Unilateral || !upright || spring > 0.0 {
+        if !presses_straight(contact, tool) || spring > 0.0 {
             return Ok(());
         }
-        let length: f64 = boundary.weights.iter().sum();
-        let most = |normal: f64| match contact.friction.as_ref().map(|law| &law.bound) {
-            None => 0.0,
-            // the literal average of the thesis has no such limit
-            Some(BoundLaw::Pressure { average, .. })
-                if average.normalization == Normalization::PeakOne =>
-            {
-                f64::INFINITY
-            }
-            Some(BoundLaw::Pressure {
-                coefficient,
-                cohesion,
-                shear_cap,
-                ..
-            }) => (shear_cap * length).min(cohesion * length + coefficient * normal),
-            Some(BoundLaw::Prescribed(_)) => f64::INFINITY,
-        };
         for level in Level::ends_of(steps) {
             let [normal, tangential] = [normal * level.forces[0], tangential * level.forces[1]];
-            let most = most(normal);
+            let most = most_friction(contact, normal);
             if tangential.abs() > most * (1.0 + ALIGNED) {
                 return Err(self.report(
                     format!("{}/tangential_force", contact.pointer),
@@ -265,4 +248,87 @@ impl Checks {
         }
         Ok(())
     }
+
+    /// Checks that pressure can bear the moment of an obstacle whose normal force is given, too: the force must act between the
+    /// ends of the contact. With friction on a curved contact that does not follow before solving.
+    pub(super) fn moment_borne(&mut self, contact: &ContactModel, steps: &[Step]) -> Checked {
+        let Some(tool) = &contact.tool else {
+            return Ok(());
+        };
+        let [Some(normal), tangential, Some(moment)] = tool.loads else {
+            return Ok(());
+        };
+        let straight = presses_straight(contact, tool);
+        let [normal_spring, tangential_spring, rotational_spring] = tool.stiffness;
+        let nodes = 0..contact.boundary.nodes.len();
+        let unknown = contact.condition != Condition::Unilateral
+            || normal_spring > 0.0
+            || rotational_spring > 0.0
+            || contact.friction.is_some() && !straight
+            || nodes.clone().any(|i| tool.row(i, 0)[0] <= ALIGNED);
+        if unknown || !tool.turns {
+            return Ok(());
+        }
+        // the distance of the normal force from `about` along t, of a pressure at each node
+        let arms = nodes.map(|i| -tool.row(i, 2)[0] / tool.row(i, 0)[0]);
+        let (start, end) = arms.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), arm| {
+            (a.min(arm), b.max(arm))
+        });
+        let edge = ALIGNED * (end - start);
+        let ([_, along], [_, height]) = (tool.row(0, 1), tool.row(0, 2));
+        for level in Level::ends_of(steps) {
+            let [normal, moment] = [normal * level.forces[0], moment * level.forces[2]];
+            // friction changes it where `about` does not lie in the plane of a straight contact
+            let friction = match tangential {
+                _ if contact.friction.is_none() || height.abs() <= edge => [0.0; 2],
+                Some(force) if tangential_spring == 0.0 => [force * level.forces[1] * along; 2],
+                _ => [-1.0, 1.0].map(|sign| sign * most_friction(contact, normal)),
+            };
+            let [a, b] = friction.map(|friction| (height * friction - moment) / normal);
+            let nearest = match (a.max(b), a.min(b)) {
+                (before, _) if before <= start + edge => before,
+                (_, after) if after >= end - edge => after,
+                _ => continue,
+            };
+            return Err(self.report(
+                format!("{}/moment", contact.pointer),
+                Reason::Impossible,
+                format!(
+                    "a moment of {moment} with a normal force of {normal}: the force acts at the distance {} from `about` along t",
+                    rounded(nearest)
+                ),
+                format!("a distance between {} and {}, the ends of the contact", rounded(start), rounded(end)),
+                "Beyond an end the obstacle tips over and there is no equilibrium. Give a `tilt` in place of the moment, a smaller moment, or a spring by `stiffness`.",
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// The largest tangential force that friction on a contact with one normal bears at a normal force; infinite if it is not limited.
+fn most_friction(contact: &ContactModel, normal: f64) -> f64 {
+    let length: f64 = contact.boundary.weights.iter().sum();
+    match contact.friction.as_ref().map(|law| &law.bound) {
+        None => 0.0,
+        // the literal average of the thesis has no such limit
+        Some(BoundLaw::Pressure { average, .. })
+            if average.normalization == Normalization::PeakOne =>
+        {
+            f64::INFINITY
+        }
+        Some(BoundLaw::Pressure {
+            coefficient,
+            cohesion,
+            shear_cap,
+            ..
+        }) => (shear_cap * length).min(cohesion * length + coefficient * normal),
+        Some(BoundLaw::Prescribed(_)) => f64::INFINITY,
+    }
+}
+
+/// Whether an obstacle presses a contact that has one normal, against which it is pushed.
+fn presses_straight(contact: &ContactModel, tool: &Tool) -> bool {
+    let mut nodes = 0..contact.boundary.nodes.len();
+    contact.condition == Condition::Unilateral
+        && nodes.all(|i| (tool.row(i, 0)[0] - 1.0).abs() <= ALIGNED)
 }

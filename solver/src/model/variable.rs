@@ -174,6 +174,7 @@ impl Checks {
             moved.friction.clone_from(&law);
             all.check(self.supported_contact_nodes(&moved, steps, fixed));
             all.check(self.tangential_force_borne(&moved, steps));
+            all.check(self.moment_borne(&moved, steps));
             laws.push(law);
         }
         all.check(self.thesis_elements(problem, &model.mesh));

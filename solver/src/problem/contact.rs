@@ -49,7 +49,8 @@ pub struct Contact {
     /// it is in equilibrium. A normal force P at a distance e from `about` along t is a moment −P e about that point.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moment: Option<f64>,
-    /// The point `[x, y]` of `tilt` and `moment`, through which `normal_force` and `tangential_force` act.
+    /// The point `[x, y]` of `tilt` and `moment`, through which `normal_force` and `tangential_force` act. With one of these
+    /// forces alone: the point about which the result states the moment that keeps the obstacle from turning.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub about: Option<[f64; 2]>,
     /// Springs between an obstacle under forces and the ground, such as the testing machine: they bear their part of the

@@ -1121,7 +1121,9 @@ class Contact(Part):
     """A boundary that may touch a rigid obstacle or another elastic body.
 
     boundary: Name of the boundary.
-    about: The point `[x, y]` of `tilt` and `moment`, through which `normal_force` and `tangential_force` act.
+    about: The point `[x, y]` of `tilt` and `moment`, through which `normal_force` and `tangential_force` act. With
+        one of these forces alone: the point about which the result states the moment that keeps the obstacle from
+        turning.
     against: The boundary of another elastic body that faces this one, in place of an obstacle. This boundary
         carries the law: it should be the finer one, or of equally fine ones that which is covered as a whole.
     condition: The contact condition.

@@ -17,7 +17,7 @@ use service::{
     formats,
     verbs::{page::MAX_PAGE_SIZE, results::PARTIAL},
 };
-use solver::solution::ContactProfile;
+use solver::{problem::Contact, solution::ContactProfile};
 use tokio::{runtime::Handle, task::block_in_place};
 
 use super::{
@@ -88,6 +88,12 @@ struct Scalars {
     steps: Vec<Step>,
 }
 
+/// The contacts of a problem.
+#[derive(Deserialize)]
+struct Contacts {
+    contacts: Vec<Contact>,
+}
+
 #[derive(Deserialize)]
 struct Step {
     name: String,
@@ -115,11 +121,10 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         .map(String::as_str)
         .collect();
     if !arguments.output.is_empty() {
-        // all names are read before anything is fetched
-        let outputs = arguments
-            .output
-            .iter()
-            .map(|path| Output::parse(path, &contacts));
+        // all names are read before a file is written
+        let problem: Contacts = service.get(&format!("{base}/problem")).await?;
+        let outputs = arguments.output.iter();
+        let outputs = outputs.map(|path| Output::parse(path, &problem.contacts));
         let outputs = match outputs.collect::<Result<Vec<_>, _>>() {
             Ok(outputs) => outputs,
             Err(problem) => {

@@ -334,7 +334,7 @@ impl PatchView<'_> {
             warn(
                 WarningCode::FrictionLostAtEnd,
                 format!(
-                    "The averaged pressure reaches beyond the end of the obstacle, or of the boundary, and {:.1} % of the friction is lost there: at full sliding the friction force would be {:.3} of μ times the normal force. Choose a smaller nonlocal_radius, or \"normalization\": \"conserving\".",
+                    "The averaged pressure reaches beyond the end of the contact boundary, and {:.1} % of the friction is lost there: at full sliding the friction force would be {:.3} of μ times the normal force. Choose a smaller nonlocal_radius, or \"normalization\": \"conserving\".",
                     100.0 * lost,
                     1.0 - lost
                 ),
@@ -438,7 +438,7 @@ impl PatchView<'_> {
         if across == 0 {
             "The error of its peak is unknown.".to_owned()
         } else if ends.any(|i| self.active(i) && self.may_be_sharp(i)) {
-            "At the end of the obstacle the pressure is unbounded: its peak grows with every finer mesh.".to_owned()
+            "At the sharp end of the contact the pressure is unbounded: its peak grows with every finer mesh.".to_owned()
         } else {
             let off = 100.0 * SMOOTH_PEAK / (across * across) as f64;
             format!("The peak of a smooth pressure is then wrong by up to {off:.1} %.")
