@@ -805,6 +805,9 @@ fn decimal_commas_are_told() {
         good.replace("1000., .3", "1000., .3, 20."),
         good.replace("2.5\n", "2.5,,\n"),
         good.replace("\n2, .5, 0\n", "\n2, .5, 0, 0,\n"),
+        // as CalculiX's own decks have it
+        good.replace("\n2, .5, 0\n", "\n2, .5, 0, , 0.\n"),
+        good.replace("*SOLID SECTION", "*SOLID SECTION, OFFSET=0.5"),
     ] {
         near(corner(&same), thick);
     }
@@ -820,6 +823,7 @@ fn decimal_commas_are_told() {
         ("1000., .3", "1000,0, 0,3", "4 elastic constants"),
         ("2.5\n", "2,5\n", "`2,5`"),
         ("\n2, .5, 0\n", "\n2, 0,5, 0,0\n", "`2, 0,5, 0,0`"),
+        ("\n2, .5, 0\n", "\n2, .5, 0, , 5\n", "`2, .5, 0, , 5`"),
         ("R, 1, 2.", "R, 1, 2,5", "`R, 1, 2,5`: 4 fields"),
         ("L, 1, 2\n", "L, 1, 2, 0,0\n", "`L, 1, 2, 0,0`: 5 fields"),
     ] {

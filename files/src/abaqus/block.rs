@@ -365,13 +365,18 @@ impl Deck {
         let label = words.next().and_then(|w| w.parse::<u64>().ok());
         let mut place = [0.0; 3];
         let mut sound = label.is_some();
+        let mut height = "";
         for (axis, word) in words.by_ref().take(3).enumerate() {
             match number(word) {
                 Some(value) => place[axis] = value,
                 None => sound &= word.is_empty(),
             }
+            height = word;
         }
-        if words.any(|word| !word.is_empty()) {
+        // decks have a zero after a blank z; after a number it may be the rest of one with a decimal comma
+        let nothing =
+            |word: &str| word.is_empty() || height.is_empty() && number(word) == Some(0.0);
+        if words.any(|word| !nothing(word)) {
             self.here.incomplete.nodes = true;
             let got = format!("`{text:.60}`");
             let expected = "a node: its number, and at most x, y, z";

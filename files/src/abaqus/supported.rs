@@ -58,7 +58,11 @@ pub(super) const PARAMETERS: &[(&str, &[&str])] = &[
     ("MATERIAL", &["NAME"]),
     ("ELASTIC", &["TYPE", "MODULI", "DEPENDENCIES"]),
     ("ORIENTATION", &["NAME", "SYSTEM", "DEFINITION", "LOCAL DIRECTIONS"]),
-    ("SOLID SECTION", &["ELSET", "MATERIAL", "ORIENTATION", "CONTROLS"]),
+    // of plane elements an offset, along the thickness, does not matter
+    (
+        "SOLID SECTION",
+        &["ELSET", "MATERIAL", "ORIENTATION", "CONTROLS", "OFFSET"],
+    ),
     ("STEP", &["NAME", "NLGEOM", "PERTURBATION", "INC", "INCF", "AMPLITUDE", "EXTRAPOLATION", "UNSYMM", "SOLVER", "CONVERT SDI"]),
     ("STATIC", &["DIRECT", "SOLVER", "TIME RESET", "TOTAL TIME AT START", "RIKS", "STABILIZE", "ALLSDTOL", "CONTINUE", "FACTOR"]),
 ];
