@@ -3,7 +3,7 @@
 
 use std::{borrow::Cow, fmt::Write};
 
-use solver::solution::{ContactProfile, Iteration};
+use solver::solution::{ContactProfile, Iteration, ObstacleMotion};
 
 /// Columns of equal length, in the order in which they are written.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -74,13 +74,14 @@ impl Table {
         ] }
     }
 
-    /// A table with one row for each iteration. A column from a nested field of the JSON has both names.
+    /// A table with one row for each iteration. A column from a nested field of the JSON has both names. Where loads move an
+    /// obstacle there are columns of its motion.
     #[rustfmt::skip]
     pub fn of_history<'a>(rows: impl IntoIterator<Item = &'a Iteration, IntoIter: Clone>) -> Table {
         let rows = rows.into_iter();
         let real = |name, value: fn(&Iteration) -> f64| column(name, Values::Real(rows.clone().map(value).collect()));
         let whole = |name, value: fn(&Iteration) -> u32| column(name, Values::Whole(rows.clone().map(value).collect()));
-        Table { columns: vec![
+        let mut columns = vec![
             whole("k",                 |row| row.k),
             column("stage", Values::Text(rows.clone().map(|row| row.stage.as_str().into()).collect())),
             whole("step",              |row| row.step),
@@ -98,7 +99,19 @@ impl Table {
             real("force_tangential",   |row| row.force.tangential),
             real("contraction",        |row| row.contraction.unwrap_or(f64::NAN)),
             whole("inner",             |row| row.inner),
-        ] }
+        ];
+        if rows.clone().any(|row| row.motion.is_some()) {
+            let motion = |name, value: fn(&ObstacleMotion) -> f64| {
+                let of = |row: &Iteration| row.motion.as_ref().map_or(f64::NAN, value);
+                column(name, Values::Real(rows.clone().map(of).collect()))
+            };
+            columns.extend([
+                motion("motion_indentation",             |m| m.indentation),
+                motion("motion_tangential_displacement", |m| m.tangential_displacement),
+                motion("motion_tilt",                    |m| m.tilt),
+            ]);
+        }
+        Table { columns }
     }
 
     /// Returns the number of rows.
@@ -274,6 +287,7 @@ pub(crate) mod tests {
                 normal: 50.0,
                 tangential: -14.0,
             },
+            motion: None,
             contraction: None,
             inner: 2,
         };
@@ -374,6 +388,22 @@ pub(crate) mod tests {
         assert!(rows[0]["r_f"].is_null() && rows[1]["r_f"] == 0.25);
         assert_eq!(rows[1]["force_tangential"], -14.0);
         assert_eq!(rows[0]["stage"], "frictionless");
+    }
+
+    #[test]
+    fn a_history_under_loads_has_the_motion_of_the_obstacle() {
+        let mut rows = history();
+        let motion = ObstacleMotion {
+            indentation: 0.5,
+            tangential_displacement: -0.25,
+            tilt: 0.125,
+        };
+        rows[1].motion = Some(motion);
+        let csv = Table::of_history(&rows).csv().unwrap();
+        let lines: Vec<&str> = csv.split("\r\n").collect();
+        let names = "motion_indentation,motion_tangential_displacement,motion_tilt";
+        assert!(lines[0].ends_with(names), "{}", lines[0]);
+        assert!(lines[1].ends_with(",,,") && lines[2].ends_with(",0.5,-0.25,0.125"));
     }
 
     #[test]

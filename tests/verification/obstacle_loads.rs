@@ -546,11 +546,16 @@ fn a_held_obstacle_states_its_moment() {
         let base = json!({"boundary": "top", "obstacle": {"kind": "circle", "radius": 8, "center": 0.2}, "normal_force": 10, "about": [0, 0]});
         solved(&block(6.0, 0.1, &merged(base, more)))
     };
-    let (held, tilted) = (punch(json!({})), punch(json!({"tilt": 0})));
-    let [held, tilted] = [&held, &tilted].map(top);
+    let (solution, tilted) = (punch(json!({})), punch(json!({"tilt": 0})));
+    let [held, tilted] = [&solution, &tilted].map(top);
     let moment = held.moment.unwrap();
     assert!((moment + 2.0).abs() < 0.02, "{moment}");
     assert_eq!(held.moment, tilted.moment);
+    let row = solution.history.last().unwrap();
+    assert_eq!(
+        row.motion.map(|m| (m.indentation, m.tilt)),
+        held.indentation.zip(held.tilt)
+    );
     assert_eq!(held.tilt, Some(0.0));
 }
 

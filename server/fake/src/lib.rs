@@ -68,6 +68,7 @@ pub fn iteration(k: u32) -> Iteration {
             normal: 50.0,
             tangential: 14.0,
         },
+        motion: None,
         contraction: (k > 2).then_some(0.1),
         inner: 2,
     }

@@ -126,6 +126,7 @@ pub(crate) const MIRRORS: &[Mirror] = &[
         "friction: solution::FrictionCount { slip, stick }",
         "force: solution::ForcePair { normal: normal_force, tangential: tangential_force }",
     ]).theirs(&["wall_s: 0.0"]),
+    fields("ObstacleMotion", "solution::ObstacleMotion").answer(),
     fields("Result", "results::JobResult").answer(),
     fields("StepResult", "results::StepResult").answer(),
     fields("Summary", "solution::Summary").answer()

@@ -195,6 +195,7 @@ impl<'s, 'a> Recorder<'s, 'a> {
                     * system.normal_force(0..system.nodes.len(), &measured.reactions),
                 tangential: system.circumference * (friction + held),
             },
+            motion: system.motion_by_loads(&measured.state.v),
             contraction: row.contraction,
             inner: row.inner,
         };

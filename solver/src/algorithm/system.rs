@@ -14,6 +14,7 @@ use crate::linear::Dense;
 use crate::model::{ContactModel, Level, Model};
 use crate::observer::{Observer, go_on};
 use crate::problem::{Condition, FrictionPoints};
+use crate::solution::ObstacleMotion;
 
 /// The part of the largest bound below which a friction point counts as open: its anchor then follows it.
 const OPEN: f64 = 1e-12;
@@ -588,6 +589,24 @@ impl<'a> System<'a> {
             None => Vec::new(),
             Some(opposite) => opposite.motions(&self.opposite_at_rest, v),
         }
+    }
+
+    /// The motion of the obstacle that loads move, if there is one such obstacle.
+    pub fn motion_by_loads(&self, v: &[f64]) -> Option<ObstacleMotion> {
+        let loaded = |patch: &Patch<'_>| {
+            let tool = patch.contact.tool.as_ref();
+            tool.is_some_and(|tool| tool.free().next().is_some())
+        };
+        let mut loaded = (0..self.patches.len()).filter(|p| loaded(&self.patches[*p]));
+        let (Some(patch), None) = (loaded.next(), loaded.next()) else {
+            return None;
+        };
+        let [indentation, tangential_displacement, tilt] = self.obstacle_motions(v, patch);
+        Some(ObstacleMotion {
+            indentation,
+            tangential_displacement,
+            tilt,
+        })
     }
 
     /// The motions of the obstacle of a contact in a state: indentation, tangential displacement and tilt.

@@ -661,6 +661,9 @@ pub struct Iteration {
     pub friction: FrictionCount,
     /// Forces of the state after the iteration.
     pub force: ForcePair,
+    /// The motion of the obstacle that loads move; absent unless a problem has one such obstacle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<ObstacleMotion>,
     /// Contraction q = |Δτ_k|/|Δτ_{k−1}|; absent in the first sweeps.
     pub contraction: Option<f64>,
     /// Newton steps of the convex problem.
@@ -694,6 +697,17 @@ pub struct ForcePair {
     pub normal: f64,
     /// Tangential force ∫σ_t.
     pub tangential: f64,
+}
+
+/// How far an obstacle is moved, by its loads or as given.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ObstacleMotion {
+    /// Along the direction in which it is pushed (length).
+    pub indentation: f64,
+    /// Perpendicular to that, along t (length).
+    pub tangential_displacement: f64,
+    /// Counter-clockwise (radians).
+    pub tilt: f64,
 }
 
 /// Columns along a contact boundary in order of arc length: one entry per node of Γ_C, or one per

@@ -281,6 +281,11 @@ class History(Columns):
     contraction: Array
     inner: Array
     wall_s: Array
+    motion_indentation: Array | None = None
+    """Motion of the obstacle that loads move, along the direction of its indentation (length); `None` without one."""
+    motion_tangential_displacement: Array | None = None
+    motion_tilt: Array | None = None
+    """Counter-clockwise (radians)."""
     about: Mapping[str, Any] = field(default_factory=dict, repr=False)
     partial: bool = False
 
