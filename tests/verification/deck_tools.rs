@@ -162,9 +162,14 @@ fn a_punch_is_pressed_and_dragged_in_steps() {
     let text = deck(PUNCH, FRICTION, "9000, 6, 6\n", &steps);
     let problem = read(&text);
     let contact = &problem.contacts[0];
+    // held against turning: the result states the moment about the reference node
     assert_eq!(
-        (contact.normal_force, contact.tangential_force),
-        (Some(100.0), Some(15.0))
+        (
+            contact.normal_force,
+            contact.tangential_force,
+            contact.about
+        ),
+        (Some(100.0), Some(15.0), Some([0.0, 0.0]))
     );
     let factors: Vec<[f64; 2]> = problem
         .steps
@@ -188,6 +193,11 @@ fn forces_that_nothing_passes_on_are_refused() {
     let push = load("9000, 2, -20.\n");
     let second = "*SURFACE, TYPE=SEGMENTS, NAME=OTHER\nSTART, 0.6, 1.\nLINE, -0.6, 1.\n*RIGID BODY, ANALYTICAL SURFACE=OTHER, REF NODE=9001\n*NODE\n9001, 0., 1.\n";
     for (text, told) in [
+        // a force along a motion that is prescribed
+        (
+            deck(ROLLER, "", "9000, 1, 2\n9000, 6, 6\n", &push),
+            "along 2 of its reference node, whose motion *BOUNDARY prescribes",
+        ),
         // free without a force
         (deck(ROLLER, "", "9000, 6, 6\n", &push), ""),
         (

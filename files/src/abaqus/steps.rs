@@ -151,6 +151,18 @@ impl Built {
                 .any(|end| end[k].is_some_and(|load| load != 0.0))
         };
         let pushed = (0..3).any(|k| free[k] && loaded(k));
+        if let Some(k) = (0..3).find(|&k| !free[k] && moves(k) && loaded(k)) {
+            self.doubt(
+                body.line,
+                format!(
+                    "a rigid body with a load (*CLOAD) along {} of its reference node, whose motion *BOUNDARY prescribes",
+                    ["1", "2", "6"][k]
+                ),
+                "either a load or a prescribed motion, which needs no load",
+                "Delete the row of *BOUNDARY if the load moves the body, or the row of *CLOAD.",
+            );
+            return None;
+        }
         let late = [0, 1, 2].map(|k| free[k] && later[k]);
         if late.contains(&true) || free.contains(&true) && !pushed {
             let (which, when) = match (late.contains(&true), held.len()) {
