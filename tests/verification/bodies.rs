@@ -606,3 +606,46 @@ fn bodies_that_only_lie_on_one_another_do_not_press() {
         assert!(contact.contact.is_empty(), "{y} {shift}");
     }
 }
+
+/// The other body ends at a node of this one: no edge is cut. A given distance far from that of the meshes is told. Where nothing
+/// rubs, errors of friction are parts of what presses.
+#[test]
+fn warnings_of_pairs_are_about_these_pairs() {
+    let ends = json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grids": {
+            "a": {"x": [0, 1, 2, 2.5, 3, 3.5, 4, 5, 6], "y": [0, 1, 2]},
+            "b": {"x": [2, 4], "y": [2, 3]},
+        }, "refine": 2},
+        "materials": [{"youngs_modulus": 1000, "poissons_ratio": 0.3}],
+        "supports": [{"boundary": "a.bottom", "ux": 0, "uy": 0}, {"boundary": "b.top", "ux": 0, "uy": -0.02}],
+        "contacts": [{"boundary": "a.top", "against": {"boundary": "b.bottom"}}],
+    });
+    let has = |value: &Value, code| {
+        let warnings = solved(value).summary.warnings;
+        warnings.iter().any(|warning| warning.code == code)
+    };
+    assert!(!has(&ends, WarningCode::ObstacleCutsEdge));
+    let mut inside = ends.clone();
+    inside["mesh"]["grids"]["b"]["x"] = json!([2.05, 4]);
+    assert!(has(&inside, WarningCode::ObstacleCutsEdge));
+    assert!(!has(&ends, WarningCode::GapDiffers));
+    let mut apart = ends;
+    apart["mesh"]["grids"]["b"]["y"] = json!([2.5, 3.5]);
+    apart["contacts"][0]["gap"] = json!({"clearance": 0});
+    assert!(has(&apart, WarningCode::GapDiffers));
+    let rings = solved(&json!({
+        "analysis": {"kind": "axisymmetric"},
+        "mesh": {"grids": {"hub": {"x": [10, 12, 15, 20], "y": [0, 1]}, "shaft": {"x": [5, 7, 10], "y": [0, 1]}}, "refine": 1},
+        "materials": [{"youngs_modulus": 210000, "poissons_ratio": 0.3}],
+        "supports": [
+            {"boundary": "hub.bottom", "uy": 0}, {"boundary": "hub.top", "uy": 0},
+            {"boundary": "shaft.bottom", "uy": 0}, {"boundary": "shaft.top", "uy": 0},
+        ],
+        "contacts": [{"boundary": "hub.left", "against": {"boundary": "shaft.right"}, "gap": {"interference": 0.01},
+            "friction": {"coefficient": 0.1, "nonlocal_radius": 0, "elastic_slip": 1e-5}}],
+    }));
+    assert_eq!(rings.summary.accuracy.unwrap().verdict, Verdict::Good);
+    let mut codes = rings.summary.warnings.iter().map(|warning| warning.code);
+    assert!(codes.all(|code| code != WarningCode::NormalsDiffer));
+}

@@ -646,3 +646,75 @@ fn friction_to_both_sides_holds_an_obstacle() {
     let found = solved(&problem);
     assert!((top(&found).tangential_force + 1.5603835450825023).abs() < 1e-8);
 }
+
+fn told(solution: &Solution, code: WarningCode) -> bool {
+    solution
+        .summary
+        .warnings
+        .iter()
+        .any(|warning| warning.code == code)
+}
+
+/// A circle that turns about its own centre stays where it is. Contact along the body's normals does not know that, which is told;
+/// along those of the obstacle it presses as if it had not turned.
+#[test]
+fn a_rotation_that_shifts_a_round_obstacle_is_told() {
+    let circle = |about: [f64; 2], more: Value| {
+        let base = json!({"boundary": "top", "obstacle": {"kind": "circle", "radius": 8}, "normal_force": 20, "about": about});
+        solved(&block(6.0, 0.1, &merged(base, more)))
+    };
+    for (about, more, shifts) in [
+        ([0.0, 8.0], json!({"tilt": 0.02}), true),
+        ([0.0, 8.0], json!({"moment": 0}), true),
+        ([0.0, 2.0], json!({"tilt": 0.02}), true),
+        ([0.0, 0.2], json!({"tilt": 0.02}), false),
+        ([0.0, 8.0], json!({}), false),
+    ] {
+        let found = told(&circle(about, more.clone()), WarningCode::LargeTilt);
+        assert_eq!(found, shifts, "{about:?} {more}");
+    }
+    let obstacle = json!({"tilt": 0.02, "normal": "obstacle", "direction": [0, -1]});
+    let solution = circle([0.0, 8.0], obstacle);
+    assert!(!told(&solution, WarningCode::LargeTilt));
+    assert!(top(&solution).moment.unwrap().abs() < 1e-4);
+}
+
+/// What a new user met: a tilt in half a model, a direction away from the body, an obstacle that its spring holds off the body.
+#[test]
+fn careless_loads_are_refused_or_solved() {
+    let mut half = block(
+        6.0,
+        0.2,
+        &json!({"boundary": "top", "obstacle": {"kind": "flat", "from": 0, "to": 0.6}, "normal_force": 10, "tilt": 0.01, "about": [0, 0]}),
+    );
+    half["mesh"]["grid"]["x"] = json!([0, 0.3, 0.6, 1, 3, 6]);
+    half["supports"] =
+        json!([{"boundary": "left", "ux": 0}, {"boundary": "bottom", "ux": 0, "uy": 0}]);
+    assert_eq!(refused(&half), ["/contacts/0/tilt"]);
+    let flat = |more: Value| {
+        let base =
+            json!({"boundary": "top", "obstacle": {"kind": "flat", "from": -0.6, "to": 0.6}});
+        block(6.0, 0.2, &merged(base, more))
+    };
+    let away = flat(json!({"normal_force": 10, "direction": [0, 1]}));
+    assert_eq!(refused(&away), ["/contacts/0/direction"]);
+    let pulled = solved(&flat(
+        json!({"normal_force": -5, "stiffness": {"normal": 5}}),
+    ));
+    assert!((top(&pulled).indentation.unwrap() + 1.0).abs() < 1e-12);
+    let mut fine = flat(json!({"normal_force": -5, "stiffness": {"normal": 5}}));
+    fine["mesh"]["refine"] = json!(2);
+    solved(&fine);
+    assert!(told(&pulled, WarningCode::NoContact) && !told(&pulled, WarningCode::OutOfBalance));
+    // factors on what is not there
+    let mut steps = flat(json!({"normal_force": 10}));
+    steps["steps"] = json!([{"indentation": 0.5}, {"moment": 1}]);
+    let found = solved(&steps);
+    let pointers: Vec<&str> = found
+        .summary
+        .warnings
+        .iter()
+        .map(|w| w.pointer.as_str())
+        .collect();
+    assert!(pointers.contains(&"/steps/0/indentation") && !pointers.contains(&"/steps/1/moment"));
+}

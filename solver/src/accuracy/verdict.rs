@@ -63,8 +63,11 @@ impl Finding {
     }
 }
 
+/// The part of the normal force below which a friction force is rounding: nothing rubs.
+const NO_FRICTION: f64 = 1e-9;
+
 /// The reference size, not negative, by which the error of a quantity is divided: for a force or a peak its own size;
-/// for a tangential force the friction force; for an end the length of the contact; for a tangential displacement or a tilt at
+/// for a tangential force the friction force, and where nothing rubs for both, and for the peak of σ_t, what presses; for an end the length of the contact; for a tangential displacement or a tilt at
 /// least the indentation, and that by length of the contact. `own`: the values of a kind at the
 /// same contact. `images`: the number of equal parts of the contact, of which one is modelled.
 pub(super) fn scale(
@@ -80,8 +83,13 @@ pub(super) fn scale(
                 own(QuantityName::ContactEnd).into_iter(),
             )
     };
-    let pushed = || own(QuantityName::Indentation).iter().sum::<f64>().abs();
+    let sum = |name: QuantityName| own(name).iter().sum::<f64>().abs();
+    let pushed = || sum(QuantityName::Indentation);
+    let pressed = sum(QuantityName::NormalForce);
+    let rubs = sum(QuantityName::FrictionForce) > NO_FRICTION * pressed;
     let scale = match name {
+        QuantityName::TangentialForce | QuantityName::FrictionForce if !rubs => pressed,
+        QuantityName::PeakTangentialStress if !rubs => sum(QuantityName::PeakNormalStress),
         QuantityName::TangentialForce => own(QuantityName::FrictionForce).iter().sum(),
         name if name.is_extent() => of_contact(),
         // an obstacle may hardly move sideways, or turn, at all
@@ -253,7 +261,19 @@ pub(super) fn by_error(q: &EstimatedQuantity, doubt: Option<Doubt>) -> Option<Fi
 /// The value of a quantity, how far it may be wrong, and the main cause, in words.
 fn uncertainty(q: &EstimatedQuantity, error: f64, relative: f64) -> String {
     let is_end = q.quantity.is_extent();
-    let (value, part, finer) = (q.value, percent(relative), q.finer.unwrap_or_default());
+    let (value, finer) = (q.value, q.finer.unwrap_or_default());
+    let of_itself = (error - relative * value.abs()).abs() <= 1e-3 * error;
+    let part = match q.quantity {
+        _ if of_itself || !relative.is_finite() => percent(relative),
+        QuantityName::TangentialDisplacement => format!("{} of the indentation", percent(relative)),
+        QuantityName::Tilt => {
+            format!(
+                "{} of the indentation by the length of the contact",
+                percent(relative)
+            )
+        }
+        _ => percent(relative),
+    };
     let mostly = |share: Option<f64>| share.is_some_and(|share| share > 0.5 * error);
     let of_load = |why: &str| {
         let of = if is_end {

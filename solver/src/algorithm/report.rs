@@ -356,7 +356,11 @@ fn imbalance_of_obstacles(
         } else {
             1.0
         };
-        let size = (arm * force[0].hypot(force[1])).max(on_body.abs());
+        // of a load that a spring bears alone rounding is left, too
+        let given = system.circumference * load.abs().max(spring.abs());
+        let size = (arm * force[0].hypot(force[1]))
+            .max(on_body.abs())
+            .max(given);
         let floor = FORCE_FLOOR * arm * system.circumference * system.reference_force;
         if left != 0.0 {
             most = most.max(left.abs() / size.max(floor));
@@ -507,7 +511,8 @@ impl Inside {
             Some(opposite) => opposite.with_reactions(&contact_force),
         };
         let contact_force = body.nodal_forces(&contact_force);
-        let floor = FORCE_FLOOR * system.reference_force;
+        let by_motion = system.force_by_motion(&state.finished.state.v);
+        let floor = FORCE_FLOOR * system.reference_force.max(by_motion);
         let first = usize::from(model.section.axisymmetric());
         let (mut sum, mut size) = ([0.0; 2], 0.0);
         let interior = body.map.unknowns - contact_force.len();

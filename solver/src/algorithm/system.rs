@@ -276,15 +276,30 @@ impl<'a> System<'a> {
             system.add(contact, averages, observer)?;
         }
         system.set_level(Level::FULL);
-        let most =
-            |values: &mut dyn Iterator<Item = f64>| values.fold(0.0f64, |a, b| a.max(b.abs()));
-        let stiffest = most(&mut (0..system.load.len()).map(|i| system.stiffness.at(i, i)));
-        let pushed = most(&mut model.contacts.iter().flat_map(|contact| {
+        let pushed = model.contacts.iter().flat_map(|contact| {
             let pushed = [contact.indentation, contact.tangential_displacement];
             pushed.into_iter().chain(contact.overlap())
-        }));
-        system.reference_force = (stiffest * pushed).max(most(&mut system.load.iter().copied()));
+        });
+        let pushed = pushed.fold(0.0f64, |most, length| most.max(length.abs()));
+        let loads = largest_size(&system.load);
+        system.reference_force = (system.stiffest() * pushed).max(loads);
         Ok(system)
+    }
+
+    /// The force that a unit displacement of the stiffest contact unknown needs (force / length).
+    fn stiffest(&self) -> f64 {
+        let diagonal = (0..self.load.len()).map(|i| self.stiffness.at(i, i).abs());
+        diagonal.fold(0.0, f64::max)
+    }
+
+    /// A nodal force like [`System::reference_force`] by the motion of the obstacle that loads move.
+    pub fn force_by_motion(&self, v: &[f64]) -> f64 {
+        let motion = self.motion_by_loads(v);
+        let moved = motion.map_or(0.0, |motion| {
+            let across = motion.tangential_displacement.abs();
+            motion.indentation.abs().max(across)
+        });
+        self.stiffest() * moved
     }
 
     fn add(

@@ -5,18 +5,19 @@ use crate::algorithm::system::{Patch, Point, State, System};
 use crate::error::SolveError;
 use crate::solution::Outcome;
 
-/// The rotation of an obstacle (radians) beyond which iterations that do not converge have run away.
+/// The rotation by its moment (radians) beyond which an obstacle has run away: rotations are small ones.
 const TURNED_OVER: f64 = 1.0;
 
 /// Checks that nothing moves an obstacle without end: that contact and friction of a converged state resist all its unknown
-/// motions, and that iterations without end do not turn it over.
+/// motions, and that it is not turned over, also where iterations do not converge.
 pub(super) fn held(system: &System<'_>, finished: &Finished) -> Result<(), SolveError> {
+    if finished.outcome == Outcome::Converged {
+        resisted(system, &finished.state, &finished.bound)?;
+    }
     match finished.outcome {
-        Outcome::Converged => resisted(system, &finished.state, &finished.bound),
-        Outcome::NotConverged | Outcome::ContactCycling if finished.slide.is_none() => {
-            not_turned_over(system, &finished.state)
-        }
-        _ => Ok(()),
+        Outcome::Canceled => Ok(()),
+        _ if finished.slide.is_some() => Ok(()),
+        _ => not_turned_over(system, &finished.state),
     }
 }
 

@@ -18,7 +18,7 @@ use crate::element::gauss::GAUSS_3;
 const MIRRORED: f64 = 0.35;
 
 /// How far beyond its very ends the other chain is continued (part of its last edge).
-const BEYOND: f64 = 0.05;
+pub const BEYOND: f64 = 0.05;
 
 /// The number of equal parts of a segment that are integrated by three points each: exact for straight edges in one.
 const PARTS: usize = 2;
@@ -187,13 +187,15 @@ pub fn couple(
     }
 }
 
+/// The number of places of an edge at which it is seen whether the other chain faces it.
+pub const SAMPLES: usize = 32;
+
 /// How much of an edge the other chain faces, as a part of it, and the least distance there (length); none if it faces nothing.
 pub fn partly_faced(
     own: &ContactBoundary,
     other: &ContactBoundary,
     edge: usize,
 ) -> Option<(f64, f64)> {
-    const SAMPLES: usize = 32;
     let facing = Facing::new(own, other);
     let at = |k: usize| (2 * k + 1) as f64 / SAMPLES as f64 - 1.0;
     let hits = (0..SAMPLES).filter_map(|k| {

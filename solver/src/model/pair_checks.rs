@@ -218,6 +218,7 @@ impl Checks {
             self.overlap(&boundary, &other, &coupling, contact, pointer)?;
         }
         self.warn_of_coarser(&boundary, &other, &coupling, contact, pointer);
+        self.warn_of_given_gap(&boundary, &coupling, contact, pointer);
         let distance = |gap: &f64| match contact.gap {
             // what is bonded stays as it lies
             None if contact.condition == Condition::Bonded => 0.0,
@@ -298,7 +299,13 @@ impl Checks {
             let Some((part, gap)) = mortar::partly_faced(own, other, edge) else {
                 continue;
             };
-            if gap > NEAR * length {
+            // the last edges of the other body go on for a little
+            let ends = [0, other.edge_count() - 1].map(|last| other.edge_arc(last));
+            let longest = ends
+                .iter()
+                .fold(0.0f64, |most, [start, end, _]| most.max(end - start));
+            let beyond = mortar::BEYOND * longest + length / mortar::SAMPLES as f64;
+            if gap > NEAR * length || part * length <= beyond {
                 continue;
             }
             let [[x0, y0], [x1, y1]] =
@@ -339,7 +346,7 @@ impl Checks {
             Reason::Impossible,
             format!("bodies that overlap by {:.3e} between `{}` and `{against}`", -least, contact.boundary),
             format!("an overlap of at most {most:.3e}, half the length of the shorter boundary"),
-            "The two boundaries must be the sides by which the bodies touch; an overlap is also given by \"gap\": {\"interference\": …}.",
+            "The two boundaries must be the sides by which two bodies touch, and not two sides of one; an overlap is also given by \"gap\": {\"interference\": …}.",
         ))
     }
 
@@ -418,6 +425,35 @@ impl Checks {
             .find(|e| !covered[*e])
             .unwrap_or(covered.len());
         Ok(start..end)
+    }
+
+    /// Warns of a given distance that is far from that of the meshes.
+    fn warn_of_given_gap(
+        &mut self,
+        own: &ContactBoundary,
+        coupling: &Coupling,
+        contact: &Contact,
+        pointer: &str,
+    ) {
+        /// The largest difference, in lengths of the contact: the corners of a coarse polygon differ by less from its circle.
+        const MOST: f64 = 0.05;
+        let Some(given) = &contact.gap else { return };
+        let given = given
+            .clearance
+            .unwrap_or(-given.interference.unwrap_or(0.0));
+        let differences = coupling.gaps.iter().map(|gap| gap - given);
+        let most = differences.max_by(|a, b| a.abs().total_cmp(&b.abs()));
+        let Some(most) = most.filter(|most| most.abs() > MOST * own.length()) else {
+            return;
+        };
+        self.warn(
+            WarningCode::GapDiffers,
+            &format!("{pointer}/gap"),
+            format!(
+                "The distance of the bodies is given as {given:.3e}, but at one place that of their meshes is {:.3e}: they touch as if they fitted one another. Leave `gap` out if they lie as they are drawn.",
+                given + most
+            ),
+        );
     }
 
     /// Warns where the side that carries the law is much the coarser one.

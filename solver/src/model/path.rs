@@ -92,13 +92,29 @@ impl Checks {
         if problem.steps.is_empty() {
             return;
         }
-        let given = multiplied(problem);
-        let given: Vec<&Multiplied> = given.iter().filter(|one| one.given).collect();
+        let all = multiplied(problem);
+        for one in all.iter().filter(|one| !one.given) {
+            self.warn_of_no_effect(&problem.steps, one);
+        }
+        let given: Vec<&Multiplied> = all.iter().filter(|one| one.given).collect();
         for one in &given {
             self.warn_of_small_factors(&problem.steps, one);
         }
         self.warn_of_return(problem);
         self.warn_of_no_memory(problem, &given);
+    }
+
+    /// Tells of a factor on what the problem does not have; 0 and 1 are also what a step has that does not name it.
+    fn warn_of_no_effect(&mut self, steps: &[Step], Multiplied { name, factor, .. }: &Multiplied) {
+        let named = |step: &Step| ![0.0, 1.0].contains(&factor(step));
+        if let Some(i) = steps.iter().position(named) {
+            let factor = factor(&steps[i]);
+            self.warn(
+                WarningCode::NeverApplied,
+                &format!("/steps/{i}/{name}"),
+                format!("The factor {factor} on `{name}` acts on nothing: the problem has no `{name}` other than 0. Give the value that it is a factor on, too."),
+            );
+        }
     }
 
     /// Tells of factors that are all so small that they may be meant as lengths, and of a value that no step applies.

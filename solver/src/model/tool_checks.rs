@@ -153,7 +153,18 @@ impl Checks {
         pointer: &str,
     ) -> Checked<[f64; 2]> {
         if let Some([x, y]) = contact.direction {
-            return Ok([x, y].map(|a| a / x.hypot(y)));
+            let direction = [x, y].map(|a| a / x.hypot(y));
+            let away = |n: &[f64; 2]| direction[0] * n[0] + direction[1] * n[1] > -ALIGNED;
+            if contact.normal_force.is_some() && outward.iter().all(away) {
+                return Err(self.report(
+                    format!("{pointer}/direction"),
+                    Reason::Impossible,
+                    format!("[{x}, {y}], which points away from the body or along it"),
+                    "a direction into the body somewhere on the contact",
+                    "`normal_force` pushes the obstacle along `direction`.",
+                ));
+            }
+            return Ok(direction);
         }
         let first = outward[0];
         let off = |(n, error): (&[f64; 2], &f64)| {
@@ -188,7 +199,8 @@ impl Checks {
                 continue;
             };
             let axes = [boundary.normals[i], boundary.tangent(i)];
-            for k in tool.free() {
+            let tilted = tool.motions(&Level::FULL)[2] != 0.0;
+            for k in tool.free().chain(tilted.then_some(2)) {
                 let row = tool.row(i, k);
                 let size = row[0].hypot(row[1]);
                 let error = ALIGNED + boundary.normal_errors[i];
@@ -204,12 +216,16 @@ impl Checks {
                 }
                 let [x, y] = boundary.positions[i];
                 let [motion, load] = FIELDS[k];
+                let (field, caused) = match tool.loads[k] {
+                    Some(_) => (load, format!(" that `{load}` causes")),
+                    None => (motion, String::new()),
+                };
                 return Err(self.report(
-                    format!("{}/{load}", contact.pointer),
+                    format!("{}/{field}", contact.pointer),
                     Reason::Conflict,
-                    format!("node {node} of the contact at ({x}, {y}), which a support holds along the `{motion}` that `{load}` causes"),
+                    format!("node {node} of the contact at ({x}, {y}), which a support holds along the `{motion}`{caused}"),
                     format!("a contact whose nodes no support holds along the `{motion}`"),
-                    "On a line of symmetry an obstacle can only move along this line: model the whole body for a tangential force or a moment. Else end the contact one edge before the support with `from` or `to`.",
+                    "On a line of symmetry an obstacle can only move along this line: model the whole body for a tangential force, a moment or a tilt. Else end the contact one edge before the support with `from` or `to`.",
                 ));
             }
         }
@@ -233,14 +249,14 @@ impl Checks {
         if !presses_straight(contact, tool) || spring > 0.0 {
             return Ok(());
         }
-        for level in Level::ends_of(steps) {
+        for (i, level) in Level::ends_of(steps).into_iter().enumerate() {
             let [normal, tangential] = [normal * level.forces[0], tangential * level.forces[1]];
             let most = most_friction(contact, normal);
             if tangential.abs() > most * (1.0 + ALIGNED) {
                 return Err(self.report(
                     format!("{}/tangential_force", contact.pointer),
                     Reason::Impossible,
-                    format!("a tangential force of {tangential} with a normal force of {normal}"),
+                    format!("a tangential force of {tangential} with a normal force of {normal}{}", at_end(steps, i)),
                     format!("at most {most}, which friction can bear"),
                     "Beyond it the obstacle slides away and there is no equilibrium. Give a `tangential_displacement` for sliding, a smaller force, or a spring by `stiffness`.",
                 ));
@@ -276,7 +292,7 @@ impl Checks {
         });
         let edge = ALIGNED * (end - start);
         let ([_, along], [_, height]) = (tool.row(0, 1), tool.row(0, 2));
-        for level in Level::ends_of(steps) {
+        for (i, level) in Level::ends_of(steps).into_iter().enumerate() {
             let [normal, moment] = [normal * level.forces[0], moment * level.forces[2]];
             // friction changes it where `about` does not lie in the plane of a straight contact
             let friction = match tangential {
@@ -290,11 +306,18 @@ impl Checks {
                 (_, after) if after >= end - edge => after,
                 _ => continue,
             };
+            let rubbed = match (tangential, friction) {
+                (Some(_), [force, _]) if force != 0.0 => {
+                    format!(" and a tangential force of {}", rounded(force * along))
+                }
+                _ => String::new(),
+            };
             return Err(self.report(
                 format!("{}/moment", contact.pointer),
                 Reason::Impossible,
                 format!(
-                    "a moment of {moment} with a normal force of {normal}: the force acts at the distance {} from `about` along t",
+                    "a moment of {moment} with a normal force of {normal}{rubbed}{}: the force acts at the distance {} from `about` along t",
+                    at_end(steps, i),
                     rounded(nearest)
                 ),
                 format!("a distance between {} and {}, the ends of the contact", rounded(start), rounded(end)),
@@ -302,6 +325,14 @@ impl Checks {
             ));
         }
         Ok(())
+    }
+}
+
+/// The load step of a level, in words; empty without steps.
+fn at_end(steps: &[Step], step: usize) -> String {
+    match steps {
+        [] => String::new(),
+        _ => format!(" at the end of step {step}"),
     }
 }
 

@@ -45,7 +45,7 @@ impl Checks {
         };
         let [x, y] = mesh.nodes[first as usize];
         format!(
-            " Two nodes, {first} and {second} counted from 0, are both at ({x}, {y}) and not connected ({} such pairs in total): merge them where the mesh was made, in Gmsh with `Coherence Mesh;`.",
+            " Two nodes, {first} and {second} counted from 0, are both at ({x}, {y}) and not connected ({} such pairs in total): merge them where the mesh was made, in Gmsh with `Coherence Mesh;`, unless two bodies touch there.",
             self.unmerged.len()
         )
     }

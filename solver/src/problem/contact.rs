@@ -25,8 +25,9 @@ pub struct Contact {
     /// gap = profile − indentation.
     #[serde(default)]
     pub indentation: f64,
-    /// The force that presses the obstacle against the body (force, as `normal_force` of the summary; in a half model that
-    /// of the half), instead of an indentation: the obstacle moves along `direction` until it is in equilibrium.
+    /// The force that presses the obstacle against the body along `direction` (force, that part of `force` in the summary; on a
+    /// straight boundary its `normal_force`; in a half model that of the half), instead of an indentation: the obstacle moves
+    /// along `direction` until it is in equilibrium.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normal_force: Option<f64>,
     /// The direction `[x, y]` that the indentation moves the obstacle along, as a rigid body; its length does not
@@ -408,7 +409,7 @@ pub fn elastic_slip_rule(indentation: f64, tangential_displacement: f64) -> Stri
     let value = SLIP_PART * moved;
     if value > 0.0 && value.is_finite() {
         format!(
-            "If it is not known, take a thousandth of the slip, here of the displacement of the obstacle: {value:.1e}."
+            "If it is not known, take a thousandth of the slip, here of the displacement of what the body touches: {value:.1e}."
         )
     } else {
         "If it is not known, take a thousandth of the slip that you expect, such as the displacement of the body beside the obstacle."

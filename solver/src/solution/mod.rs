@@ -435,6 +435,8 @@ pub enum WarningCode {
     MaterialJunction,
     /// Two bodies in contact of which the much coarser one carries the law.
     CoarserSideCarriesLaw,
+    /// A given distance of two bodies that is far from that of their meshes.
+    GapDiffers,
     /// A gap that is closed across the normals of the contact, which the total law counts as slip.
     ClosingCountsAsSlip,
     /// Edges longer than the nonlocal radius.
@@ -560,6 +562,7 @@ impl WarningCode {
             | PolygonTooCoarse
             | RangeCutsMesh
             | CoarserSideCarriesLaw
+            | GapDiffers
             | ClosingCountsAsSlip
             | MeshTooCoarseForContact
             | MeshTooCoarseForRadius => Severity::Warning,

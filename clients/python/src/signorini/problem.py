@@ -1140,9 +1140,9 @@ class Contact(Part):
         −P e about that point.
     normal: The direction that gap and normal displacement are measured along; absent: `body`, and `mean` against
         another body.
-    normal_force: The force that presses the obstacle against the body (force, as `normal_force` of the summary; in
-        a half model that of the half), instead of an indentation: the obstacle moves along `direction` until it is
-        in equilibrium.
+    normal_force: The force that presses the obstacle against the body along `direction` (force, that part of
+        `force` in the summary; on a straight boundary its `normal_force`; in a half model that of the half),
+        instead of an indentation: the obstacle moves along `direction` until it is in equilibrium.
     obstacle: The rigid obstacle that faces the boundary. Required unless `against` is set.
     stiffness: Springs between an obstacle under forces and the ground, such as the testing machine: they bear their
         part of the forces.

@@ -131,6 +131,9 @@ fn reasons(code: WarningCode) -> (&'static str, &'static str) {
         MaterialJunction => (
             "Where two materials meet at the surface in contact, the pressure has no limit as the mesh is refined. Its value at that node depends on the mesh alone.",
             "Use forces, and the pressure averaged over a length. Do not quote the peak."),
+        GapDiffers => (
+            "`gap` is the same distance everywhere, for surfaces that fit one another. Where the meshes are farther apart or overlap by more, the bodies touch as if they were drawn otherwise.",
+            "Leave `gap` out if the bodies lie as they are drawn; else check the sizes and places of both meshes."),
         CoarserSideCarriesLaw => (
             "Pressure and friction live on the nodes of the boundary that carries the law. Where it is much coarser than the boundary that faces it, the finer mesh opposite is of no use.",
             "Let `boundary` and `against` change places, or refine the boundary that carries the law."),

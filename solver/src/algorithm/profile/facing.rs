@@ -83,8 +83,9 @@ impl PatchView<'_> {
             });
             profile.nonlocal_pressure.push(mean(&own.nonlocal_pressure));
             profile.friction_bound.push(bound);
-            let ratio = mean(&own.friction_ratio).clamp(0.0, 1.0);
-            profile.friction_ratio.push(ratio);
+            let rubbing = profile.tangential_stress.last().map_or(0.0, |t| t.abs());
+            let ratio = if bound > 0.0 { rubbing / bound } else { 0.0 };
+            profile.friction_ratio.push(ratio.min(1.0));
             profile.state.push(own.state[*most]);
         }
         Some((&pair.boundary, profile))

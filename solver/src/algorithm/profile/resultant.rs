@@ -9,6 +9,12 @@ use crate::solution::{Warning, WarningCode};
 /// as a part of the force: a tenth of what `good` promises of a force.
 const SAME: f64 = 0.001;
 
+/// The same for an obstacle whose normal force is given.
+const SAME_AS_GIVEN: f64 = 1e-4;
+
+/// The sine of the largest angle with the radius of normals that count as radial.
+const RADIAL: f64 = 1e-9;
+
 impl PatchView<'_> {
     /// The force on the body along x and y; in axisymmetry its radial component is 0.
     pub(super) fn resultant(&self) -> [f64; 2] {
@@ -59,7 +65,18 @@ impl PatchView<'_> {
             false => summary.normal_force.hypot(summary.tangential_force),
         };
         let size = x.hypot(y);
-        if (sums - size).abs() <= SAME * sums {
+        // who gives the force compares it
+        let given = contact.tool.as_ref().filter(|tool| tool.loads[0].is_some());
+        let differs = match given {
+            Some(tool) => {
+                let [along, _] = tool.components([x, y]);
+                (summary.normal_force - along).abs() > SAME_AS_GIVEN * sums
+            }
+            None => (sums - size).abs() > SAME * sums,
+        };
+        // a cylinder has no axial force to compare
+        let radial = |n: &[f64; 2]| revolved && n[1].abs() <= RADIAL;
+        if !differs || contact.boundary.normals.iter().all(radial) {
             return;
         }
         let force = match revolved {

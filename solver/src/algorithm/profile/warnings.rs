@@ -41,6 +41,9 @@ const LEFT: f64 = 1e-12;
 /// The largest slope of an obstacle at its middle, as a part of its slope over the first edge beside it.
 const LEVEL: f64 = 1e-3;
 
+/// The largest part of what a tilt does to the gap that may be left out.
+const LEFT_OUT_OF_TILT: f64 = 0.05;
+
 /// The largest rotation of an obstacle that counts as small (radians).
 const LARGE_TILT: f64 = 0.05;
 
@@ -155,6 +158,37 @@ impl PatchView<'_> {
                 ),
             });
         }
+        let tool = self.patch.contact.tool.as_ref();
+        let turns = tool.is_some_and(|tool| tilt != 0.0 || tool.loads[2].is_some());
+        let left_out = self.part_of_tilt_left_out();
+        if turns && left_out > LEFT_OUT_OF_TILT {
+            warnings.push(Warning {
+                code: WarningCode::LargeTilt,
+                pointer: self.patch.contact.pointer.clone(),
+                message: format!(
+                    "A rotation about `about` moves the obstacle along the body, too, and with \"normal\": \"body\" its shape does not follow: that leaves out {:.0} % of what the rotation does to the gap, and the moment is that of pressures along the body's normals. Give \"normal\": \"obstacle\" and a `direction`, or an `about` near the contact if only the slope of the obstacle is meant.",
+                    100.0 * left_out
+                ),
+            });
+        }
+    }
+
+    /// What a unit tilt would do to the gap by moving the obstacle's shape along the body, which contact along the body's normals
+    /// leaves out: the largest of it in the contact, as a part of what the tilt does to the gap.
+    fn part_of_tilt_left_out(&self) -> f64 {
+        let contact = self.patch.contact;
+        let (Some(tool), NormalOf::Body) = (&contact.tool, contact.normal) else {
+            return 0.0;
+        };
+        let s = &contact.boundary.s;
+        let (mut left_out, mut done) = (0.0f64, 0.0f64);
+        for i in (1..self.count() - 1).filter(|&i| self.active(i)) {
+            let slope = (contact.profile[i + 1] - contact.profile[i - 1]) / (s[i + 1] - s[i - 1]);
+            let [against, along] = tool.row(i, 2);
+            left_out = left_out.max((along * slope).abs());
+            done = done.max(against.abs());
+        }
+        if left_out > 0.0 { left_out / done } else { 0.0 }
     }
 
     /// The message for a body that touches the obstacle at no node: how far the obstacle is from it.
