@@ -808,6 +808,7 @@ fn decimal_commas_are_told() {
         // as CalculiX's own decks have it
         good.replace("\n2, .5, 0\n", "\n2, .5, 0, , 0.\n"),
         good.replace("*SOLID SECTION", "*SOLID SECTION, OFFSET=0.5"),
+        good.replace("2.5\n", "2.500   , 5\n"),
     ] {
         near(corner(&same), thick);
     }

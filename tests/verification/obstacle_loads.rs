@@ -481,6 +481,24 @@ fn an_obstacle_that_tips_over_is_refused() {
         matches!(part, [[start, end]] if *start > 6.0 && (end - 6.6).abs() < 1e-9),
         "{part:?}"
     );
+    // on every side of a block, pushed against it: a force at e along t is the moment −P e
+    for (side, held, about) in [
+        ("bottom", "top", [0.0, -6.0]),
+        ("left", "right", [-6.0, 0.0]),
+        ("right", "left", [6.0, 0.0]),
+    ] {
+        for (e, falls) in [(5.9, false), (-5.9, false), (6.1, true), (-6.1, true)] {
+            let mut block = block(
+                6.0,
+                0.5,
+                &json!({"boundary": side, "obstacle": {"kind": "flat"},
+                "normal_force": 10, "moment": -10.0 * e, "about": about}),
+            );
+            block["mesh"]["grid"]["y"] = json!([-6, -3, 0, 3, 6]);
+            block["supports"] = json!([{"boundary": held, "ux": 0, "uy": 0}]);
+            assert_eq!(refused(&block).is_empty(), !falls, "{side} {e}");
+        }
+    }
     // only at the end of a step
     let mut steps = punch(json!({"normal_force": 10, "moment": -4, "about": [0, 0]}));
     steps["steps"] = json!([{"moment": 1}, {"moment": 1.51}, {"moment": 1}]);
@@ -690,7 +708,7 @@ fn careless_loads_are_refused_or_solved() {
     half["mesh"]["grid"]["x"] = json!([0, 0.3, 0.6, 1, 3, 6]);
     half["supports"] =
         json!([{"boundary": "left", "ux": 0}, {"boundary": "bottom", "ux": 0, "uy": 0}]);
-    assert_eq!(refused(&half), ["/contacts/0/tilt"]);
+    assert!(told(&solved(&half), WarningCode::SymmetricDrag));
     let flat = |more: Value| {
         let base =
             json!({"boundary": "top", "obstacle": {"kind": "flat", "from": -0.6, "to": 0.6}});
@@ -698,6 +716,17 @@ fn careless_loads_are_refused_or_solved() {
     };
     let away = flat(json!({"normal_force": 10, "direction": [0, 1]}));
     assert_eq!(refused(&away), ["/contacts/0/direction"]);
+    // glue may be pulled, and sheared
+    for direction in [[0, 1], [1, 0]] {
+        let glued = json!({"normal_force": 10, "direction": direction, "condition": "bonded"});
+        solved(&flat(glued));
+    }
+    // a force is borne, however small it is beside what moves the obstacle along
+    let light = flat(json!({"normal_force": 1e-10, "tangential_displacement": 0.01}));
+    assert!((top(&solved(&light)).normal_force / 1e-10 - 1.0).abs() < 1e-6);
+    let mut light = flat(json!({"normal_force": 10}));
+    light["steps"] = json!([{"normal_force": 1e-12}, {"normal_force": 1}]);
+    solved(&light);
     let pulled = solved(&flat(
         json!({"normal_force": -5, "stiffness": {"normal": 5}}),
     ));
@@ -716,5 +745,31 @@ fn careless_loads_are_refused_or_solved() {
         .iter()
         .map(|w| w.pointer.as_str())
         .collect();
-    assert!(pointers.contains(&"/steps/0/indentation") && !pointers.contains(&"/steps/1/moment"));
+    assert!(pointers.contains(&"/steps"), "{pointers:?}");
+    steps["steps"] = json!([{"loads": 0.5}, {"moment": 1}]);
+    let found = solved(&steps);
+    assert!(!told(&found, WarningCode::NeverApplied));
+}
+
+/// What a stiff body beside does not bear makes nothing of what a soft one bears.
+#[test]
+fn a_stiff_contact_that_is_open_silences_no_soft_one() {
+    let solution = solved(&json!({
+        "analysis": {"kind": "plane_strain"},
+        "mesh": {"grids": {
+            "a": {"x": [0, 1, 2], "y": [0, 1]},
+            "b": {"x": [5, 6, 7], "y": [0, 1]},
+        }, "refine": 2},
+        "materials": [
+            {"group": "a", "youngs_modulus": 2e11, "poissons_ratio": 0.3},
+            {"group": "b", "youngs_modulus": 1e3, "poissons_ratio": 0.3},
+        ],
+        "supports": [{"boundary": "a.bottom", "ux": 0, "uy": 0}, {"boundary": "b.bottom", "ux": 0, "uy": 0}],
+        "contacts": [
+            {"boundary": "a.top", "obstacle": {"kind": "flat"}, "indentation": -1},
+            {"boundary": "b.top", "obstacle": {"kind": "flat"}, "indentation": 1e-4},
+        ],
+    }));
+    let soft = &solution.summary.contacts["b.top"];
+    assert!(soft.normal_force > 0.2, "{}", soft.normal_force);
 }

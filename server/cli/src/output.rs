@@ -269,8 +269,8 @@ fn part(format: Format, stem: &str, contacts: &[Contact]) -> Result<Part, String
     let ending = format.name();
     if format.image().is_some() {
         return match (known, last.parse()) {
-            (None, Ok(plot)) => Ok(Part::Plot(plot)),
-            (Some(name), _) => Err(format!(
+            (_, Ok(plot)) => Ok(Part::Plot(plot)),
+            (Some(name), Err(_)) => Err(format!(
                 "a figure shows the profiles of all contact boundaries, and not of {name:?} alone: name it NAME.profile.{ending}"
             )),
             (None, Err(_)) => Ok(Part::Plot(Plot::Profile)),

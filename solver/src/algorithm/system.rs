@@ -934,10 +934,25 @@ impl<'a> System<'a> {
         scale.max(f64::MIN_POSITIVE)
     }
 
-    /// Whether reactions are more than the rounding of the forces that displace the contact.
+    /// Whether the reactions of some contact are more than the rounding of the forces that displace it. Those to a given normal force
+    /// are, however small it is.
     pub(super) fn presses(&self, reactions: &[f64]) -> bool {
-        let displacing = largest_size(&self.load).max(self.reference_force);
-        largest_size(reactions) > ROUNDED * displacing
+        self.patches.iter().any(|patch| {
+            let range = self.range(patch);
+            let largest = largest_size(&reactions[range.clone()]);
+            let tool = patch.contact.tool.as_ref();
+            if tool.is_some_and(|tool| tool.loads[0].is_some() && tool.stiffness[0] == 0.0) {
+                return largest > 0.0;
+            }
+            let displacing = self.nodes[range].iter().flat_map(|node| {
+                let dofs = [node.normal, node.tangent];
+                dofs.map(|dof| match dof {
+                    Dof::Free(dof) => self.load[dof].abs(),
+                    Dof::Fixed(_) => 0.0,
+                })
+            });
+            largest > ROUNDED * displacing.fold(0.0, f64::max)
+        })
     }
 }
 

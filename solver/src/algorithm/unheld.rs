@@ -3,6 +3,7 @@
 use crate::algorithm::finished::Finished;
 use crate::algorithm::system::{Patch, Point, State, System};
 use crate::error::SolveError;
+use crate::problem::Condition;
 use crate::solution::Outcome;
 
 /// The rotation by its moment (radians) beyond which an obstacle has run away: rotations are small ones.
@@ -23,8 +24,10 @@ pub(super) fn held(system: &System<'_>, finished: &Finished) -> Result<(), Solve
 
 fn not_turned_over(system: &System<'_>, state: &State) -> Result<(), SolveError> {
     for (p, patch) in system.patches.iter().enumerate() {
+        // glue and springs hold it, however far it turns
         let tool = patch.contact.tool.as_ref();
-        let turns = tool.is_some_and(|tool| tool.loads[2].is_some());
+        let turns = patch.contact.condition == Condition::Unilateral
+            && tool.is_some_and(|tool| tool.loads[2].is_some() && tool.stiffness[2] == 0.0);
         let [.., tilt] = system.obstacle_motions(&state.v, p);
         if turns && tilt.abs() > TURNED_OVER {
             return Err(unheld(patch, 2));

@@ -427,7 +427,7 @@ impl Checks {
         Ok(start..end)
     }
 
-    /// Warns of a given distance that is far from that of the meshes.
+    /// Warns of a given distance, the same everywhere, of meshes that do not fit one another.
     fn warn_of_given_gap(
         &mut self,
         own: &ContactBoundary,
@@ -435,23 +435,21 @@ impl Checks {
         contact: &Contact,
         pointer: &str,
     ) {
-        /// The largest difference, in lengths of the contact: the corners of a coarse polygon differ by less from its circle.
+        /// The largest difference of distances, in lengths of the contact: coarse polygons of a circle differ by less.
         const MOST: f64 = 0.05;
-        let Some(given) = &contact.gap else { return };
-        let given = given
-            .clearance
-            .unwrap_or(-given.interference.unwrap_or(0.0));
-        let differences = coupling.gaps.iter().map(|gap| gap - given);
-        let most = differences.max_by(|a, b| a.abs().total_cmp(&b.abs()));
-        let Some(most) = most.filter(|most| most.abs() > MOST * own.length()) else {
+        let gaps = coupling.gaps.iter().copied();
+        let [least, most] = [
+            gaps.clone().fold(f64::INFINITY, f64::min),
+            gaps.fold(f64::NEG_INFINITY, f64::max),
+        ];
+        if contact.gap.is_none() || most - least <= MOST * own.length() {
             return;
-        };
+        }
         self.warn(
             WarningCode::GapDiffers,
             &format!("{pointer}/gap"),
             format!(
-                "The distance of the bodies is given as {given:.3e}, but at one place that of their meshes is {:.3e}: they touch as if they fitted one another. Leave `gap` out if they lie as they are drawn.",
-                given + most
+                "The distance of the bodies is given as the same everywhere, but that of their meshes goes from {least:.3e} to {most:.3e}: they touch as if they fitted one another. Leave `gap` out if they lie as they are drawn."
             ),
         );
     }

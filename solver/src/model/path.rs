@@ -93,9 +93,7 @@ impl Checks {
             return;
         }
         let all = multiplied(problem);
-        for one in all.iter().filter(|one| !one.given) {
-            self.warn_of_no_effect(&problem.steps, one);
-        }
+        self.warn_of_no_effect(&problem.steps, &all);
         let given: Vec<&Multiplied> = all.iter().filter(|one| one.given).collect();
         for one in &given {
             self.warn_of_small_factors(&problem.steps, one);
@@ -104,15 +102,27 @@ impl Checks {
         self.warn_of_no_memory(problem, &given);
     }
 
-    /// Tells of a factor on what the problem does not have; 0 and 1 are also what a step has that does not name it.
-    fn warn_of_no_effect(&mut self, steps: &[Step], Multiplied { name, factor, .. }: &Multiplied) {
-        let named = |step: &Step| ![0.0, 1.0].contains(&factor(step));
-        if let Some(i) = steps.iter().position(named) {
-            let factor = factor(&steps[i]);
+    /// Tells of factors on motions and forces of obstacles that no contact has; 0 and 1 are also what a step has that does not name
+    /// them, and supports and loads may be meant to be 0.
+    fn warn_of_no_effect(&mut self, steps: &[Step], all: &[Multiplied]) {
+        let named = |one: &&Multiplied| {
+            let mut factors = steps.iter().map(one.factor);
+            factors.any(|factor| ![0.0, 1.0].contains(&factor))
+        };
+        let of_obstacles = all
+            .iter()
+            .filter(|one| !["loads", "supports"].contains(&one.name));
+        let idle: Vec<String> = of_obstacles
+            .filter(|one| !one.given)
+            .filter(named)
+            .map(|one| format!("`{}`", one.name))
+            .collect();
+        if !idle.is_empty() {
+            let idle = idle.join(", ");
             self.warn(
                 WarningCode::NeverApplied,
-                &format!("/steps/{i}/{name}"),
-                format!("The factor {factor} on `{name}` acts on nothing: the problem has no `{name}` other than 0. Give the value that it is a factor on, too."),
+                "/steps",
+                format!("Load steps have factors on {idle}, but no contact has a value there other than 0: they act on nothing. Give the contact the value that they are factors on, or leave them out."),
             );
         }
     }

@@ -65,12 +65,21 @@ impl Checks {
                 continue;
             };
             let pushed = contact.pushed_along_body(end);
-            let (field, d) = match own != 0.0 {
-                true => ("tangential_displacement", own),
-                false if pushed.abs() > ALIGNED * contact.indentation.abs() => {
-                    ("direction", pushed)
-                }
-                false => continue,
+            let tilt = match &contact.tool {
+                Some(tool) => tool.motions(&Level::FULL)[2],
+                None => 0.0,
+            };
+            let (field, moved) = if own != 0.0 {
+                (
+                    "tangential_displacement",
+                    format!("displaced along it by {own}"),
+                )
+            } else if tilt != 0.0 {
+                ("tilt", format!("turned by {tilt}"))
+            } else if pushed.abs() > ALIGNED * contact.indentation.abs() {
+                ("direction", format!("displaced along it by {pushed}"))
+            } else {
+                continue;
             };
             let [x, y] = boundary.positions[end];
             let (what, instead) = if on_axis(end) {
@@ -81,13 +90,13 @@ impl Checks {
             } else {
                 (
                     "a line of symmetry",
-                    "Model the whole body, or remove the drag. If the support is a wall rather than a symmetry line, end the contact one edge before it.",
+                    "Model the whole body, or leave that out. If the support is a wall rather than a symmetry line, end the contact one edge before it.",
                 )
             };
             self.warn(
                 WarningCode::SymmetricDrag,
                 &format!("{}/{field}", contact.pointer),
-                format!("The contact ends on {what}, at ({x}, {y}), and its obstacle is displaced along it by {d}: beyond that end it would be dragged the opposite way. {instead}"),
+                format!("The contact ends on {what}, at ({x}, {y}), and its obstacle is {moved}: beyond that end it would move the opposite way. {instead}"),
             );
         }
     }

@@ -155,7 +155,10 @@ impl Checks {
         if let Some([x, y]) = contact.direction {
             let direction = [x, y].map(|a| a / x.hypot(y));
             let away = |n: &[f64; 2]| direction[0] * n[0] + direction[1] * n[1] > -ALIGNED;
-            if contact.normal_force.is_some() && outward.iter().all(away) {
+            let pressed = contact.condition == Condition::Unilateral
+                && contact.normal_force.is_some()
+                && contact.stiffness.unwrap_or_default().normal == 0.0;
+            if pressed && outward.iter().all(away) {
                 return Err(self.report(
                     format!("{pointer}/direction"),
                     Reason::Impossible,
@@ -199,8 +202,7 @@ impl Checks {
                 continue;
             };
             let axes = [boundary.normals[i], boundary.tangent(i)];
-            let tilted = tool.motions(&Level::FULL)[2] != 0.0;
-            for k in tool.free().chain(tilted.then_some(2)) {
+            for k in tool.free() {
                 let row = tool.row(i, k);
                 let size = row[0].hypot(row[1]);
                 let error = ALIGNED + boundary.normal_errors[i];
@@ -216,16 +218,12 @@ impl Checks {
                 }
                 let [x, y] = boundary.positions[i];
                 let [motion, load] = FIELDS[k];
-                let (field, caused) = match tool.loads[k] {
-                    Some(_) => (load, format!(" that `{load}` causes")),
-                    None => (motion, String::new()),
-                };
                 return Err(self.report(
-                    format!("{}/{field}", contact.pointer),
+                    format!("{}/{load}", contact.pointer),
                     Reason::Conflict,
-                    format!("node {node} of the contact at ({x}, {y}), which a support holds along the `{motion}`{caused}"),
+                    format!("node {node} of the contact at ({x}, {y}), which a support holds along the `{motion}` that `{load}` causes"),
                     format!("a contact whose nodes no support holds along the `{motion}`"),
-                    "On a line of symmetry an obstacle can only move along this line: model the whole body for a tangential force, a moment or a tilt. Else end the contact one edge before the support with `from` or `to`.",
+                    "On a line of symmetry an obstacle can only move along this line: model the whole body for a tangential force or a moment. Else end the contact one edge before the support with `from` or `to`.",
                 ));
             }
         }

@@ -411,7 +411,7 @@ pub enum WarningCode {
     ElasticSlipLarge,
     /// Load steps that reach only a small part of the indentation or the tangential displacement.
     FactorsSmall,
-    /// A displacement, a load or a prescribed displacement that no load step applies.
+    /// A displacement, a load or a prescribed displacement that no load step applies, or a factor of a step on none.
     NeverApplied,
     /// A load step that drags the obstacle back while its indentation or the loads change.
     DragReturns,
@@ -435,7 +435,7 @@ pub enum WarningCode {
     MaterialJunction,
     /// Two bodies in contact of which the much coarser one carries the law.
     CoarserSideCarriesLaw,
-    /// A given distance of two bodies that is far from that of their meshes.
+    /// A given distance of two bodies, the same everywhere, of meshes that do not fit one another.
     GapDiffers,
     /// A gap that is closed across the normals of the contact, which the total law counts as slip.
     ClosingCountsAsSlip,

@@ -51,8 +51,8 @@ fn reasons(code: WarningCode) -> (&'static str, &'static str) {
     use WarningCode::*;
     match code {
         LargeTilt => (
-            "Gaps are linear in the tilt, as of a small rotation: at 0.05 radians (3°) a point of the obstacle at the distance r from its centre is off by 0.00125 r.",
-            "Draw the obstacle nearer to its final position, so that it turns less, or hold it against turning."),
+            "Gaps are linear in the tilt, as of a small rotation: at 0.05 radians (3°) a point of the obstacle at the distance r from its centre is off by 0.00125 r. Contact along the body's normals moreover leaves out that a rotation about a distant point moves the obstacle's shape along the body.",
+            "Draw the obstacle nearer to its final position, so that it turns less, or hold it against turning. A round obstacle that turns about a distant point needs \"normal\": \"obstacle\" and a `direction`."),
         UnitsDisagree => (
             "Forces are integrals of stresses over lengths, so a force in the wrong unit is wrong by a power of ten, and nothing in the computation can notice it.",
             "Use units that belong together, for example mm, N and MPa (1 N/mm² is 1 MPa), or m, N and Pa, and convert every number that was given in another unit."),
@@ -99,7 +99,7 @@ fn reasons(code: WarningCode) -> (&'static str, &'static str) {
             "Values in `steps` multiply those of the contacts: they are factors, not lengths. A length in their place is multiplied by the length in the contact, and the obstacle hardly moves.",
             "Write 1 for the whole indentation or tangential displacement, 0.5 for a half. If the contact has a unit length, so that the factors are lengths, nothing is wrong."),
         NeverApplied => (
-            "What the problem gives is multiplied by 0 in every load step: the result is that of a problem without it.",
+            "What the problem gives is multiplied by 0 in every load step, or a step has a factor on what the problem does not have: the result is that of a problem without it.",
             "Name it in the steps that are to apply it: 1 is the whole. tangential_displacement is 0 in a step that does not name it, everything else 1."),
         DragReturns => (
             "The factors of a step are reached from those of the step before. One that leaves tangential_displacement out has 0 there, and drags the obstacle back while it is pushed or unloaded: the friction force changes its sign.",

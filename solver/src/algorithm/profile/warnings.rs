@@ -166,7 +166,7 @@ impl PatchView<'_> {
                 code: WarningCode::LargeTilt,
                 pointer: self.patch.contact.pointer.clone(),
                 message: format!(
-                    "A rotation about `about` moves the obstacle along the body, too, and with \"normal\": \"body\" its shape does not follow: that leaves out {:.0} % of what the rotation does to the gap, and the moment is that of pressures along the body's normals. Give \"normal\": \"obstacle\" and a `direction`, or an `about` near the contact if only the slope of the obstacle is meant.",
+                    "A rotation about `about` moves the obstacle along the body, too, and with \"normal\": \"body\" its shape does not follow: that leaves out up to {:.0} % of what the rotation does to the gap, and the moment is that of pressures along the body's normals. Give \"normal\": \"obstacle\" and a `direction`, or an `about` near the contact if only the slope of the obstacle is meant.",
                     100.0 * left_out
                 ),
             });
@@ -184,9 +184,10 @@ impl PatchView<'_> {
         let (mut left_out, mut done) = (0.0f64, 0.0f64);
         for i in (1..self.count() - 1).filter(|&i| self.active(i)) {
             let slope = (contact.profile[i + 1] - contact.profile[i - 1]) / (s[i + 1] - s[i - 1]);
-            let [against, along] = tool.row(i, 2);
-            left_out = left_out.max((along * slope).abs());
-            done = done.max(against.abs());
+            left_out = left_out.max((tool.row(i, 2)[1] * slope).abs());
+            // a contact of one node, which may be that about which the obstacle turns, is as long as its neighbours are apart
+            let beside = [i - 1, i, i + 1].map(|i| tool.row(i, 2)[0].abs());
+            done = beside.into_iter().fold(done, f64::max);
         }
         if left_out > 0.0 { left_out / done } else { 0.0 }
     }
