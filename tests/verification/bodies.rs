@@ -607,7 +607,7 @@ fn bodies_that_only_lie_on_one_another_do_not_press() {
     }
 }
 
-/// The other body ends at a node of this one: no edge is cut. A given distance far from that of the meshes is told. Where nothing
+/// The other body ends at a node of this one: no edge is cut. A given distance of meshes that do not fit is told. Where nothing
 /// rubs, errors of friction are parts of what presses.
 #[test]
 fn warnings_of_pairs_are_about_these_pairs() {

@@ -624,10 +624,19 @@ fn an_obstacle_that_is_pulled_beyond_its_friction_slides_away() {
     );
 }
 
-/// A large tilt is warned of.
+/// A force outside the punch tips it over, which is told, and never a number. A large tilt is warned of.
 #[test]
-fn a_large_tilt_is_told_of() {
+fn an_obstacle_that_nothing_holds_is_told_of() {
     let flat = json!({"boundary": "top", "obstacle": {"kind": "flat", "from": -0.5, "to": 0.5}, "normal_force": 10, "about": [0, 0]});
+    let tipping = block(6.0, 0.1, &merged(flat.clone(), json!({"moment": -6.0})));
+    let result = solver::solve(&problem(&tipping.to_string()), &mut ());
+    let told = match result {
+        Err(SolveError::ObstacleUnheld { .. }) => true,
+        Err(SolveError::Invalid(violations)) => violations[0].pointer == "/contacts/0/moment",
+        Ok(solution) => !solution.summary.converged,
+        Err(error) => panic!("{error}"),
+    };
+    assert!(told);
     let soft = block(
         6.0,
         0.1,

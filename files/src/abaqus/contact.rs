@@ -265,7 +265,7 @@ impl Source<'_> {
         }
         // of a body that only forces move the result states the moment about the reference node
         let turned = shape.moved.iter().any(|m| m[2] != 0.0);
-        let turns = turned || placed.motion.may_turn && shape.free.contains(&true);
+        let has_point = turned || placed.motion.may_turn && shape.free.contains(&true);
         Some(Made {
             contact: Contact {
                 boundary: surfaces.boundary.to_owned(),
@@ -279,7 +279,7 @@ impl Source<'_> {
                 tangential_force: None,
                 tilt: None,
                 moment: None,
-                about: turns.then_some(shape.about),
+                about: has_point.then_some(shape.about),
                 stiffness: None,
                 normal: Some(NormalOf::Obstacle),
                 condition: Default::default(),

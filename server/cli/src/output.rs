@@ -11,11 +11,7 @@ use base::run::Document;
 use clap::Args;
 use files::plot::{self, AxisLimits, Limits, Parts, Plot, Size, Style, Texts, Theme, image};
 use service::formats::{self, Format};
-use solver::{
-    mesh::Mesh,
-    problem::{Contact, Problem},
-    solution::Iteration,
-};
+use solver::{mesh::Mesh, problem::Problem, solution::Iteration};
 use strum::VariantArray;
 
 /// The help text of `-o`.
@@ -140,10 +136,36 @@ pub(super) enum Part {
     Plot(Plot),
 }
 
+/// The names of the boundaries that have a profile.
+#[derive(Debug, Default)]
+pub(super) struct Profiles {
+    /// Those of the contacts.
+    pub(super) contacts: Vec<String>,
+    /// Those of the bodies that face them.
+    pub(super) facing: Vec<String>,
+}
+
+impl Profiles {
+    pub(super) fn of(problem: &Problem) -> Profiles {
+        let contacts = problem.contacts.iter();
+        let facing = contacts
+            .clone()
+            .filter_map(|contact| contact.against.as_ref());
+        Profiles {
+            contacts: contacts.map(|contact| contact.boundary.clone()).collect(),
+            facing: facing.map(|against| against.boundary.clone()).collect(),
+        }
+    }
+
+    fn has(&self, name: &String) -> bool {
+        self.contacts.contains(name) || self.facing.contains(name)
+    }
+}
+
 impl Output {
-    /// Reads the name of a file for a problem with these contacts; the error is the reason why the file
+    /// Reads the name of a file for a problem with these profiles; the error is the reason why the file
     /// cannot be written. This is called before the problem is solved, which may take hours.
-    pub(super) fn parse(path: &Path, contacts: &[Contact]) -> Result<Output, String> {
+    pub(super) fn parse(path: &Path, profiles: &Profiles) -> Result<Output, String> {
         if path.as_os_str() == "-" {
             return Ok(Output {
                 path: None,
@@ -174,7 +196,7 @@ impl Output {
         }
         Ok(Output {
             path: Some(path.to_path_buf()),
-            part: part(format, stem, contacts).map_err(error)?,
+            part: part(format, stem, profiles).map_err(error)?,
             format,
         })
     }
@@ -247,10 +269,9 @@ impl Output {
 }
 
 /// The part of a result that a file's name states before its extension, or the usual part for the extension.
-fn part(format: Format, stem: &str, contacts: &[Contact]) -> Result<Part, String> {
+fn part(format: Format, stem: &str, profiles: &Profiles) -> Result<Part, String> {
     let words: Vec<&str> = stem.split('.').collect();
     let last = words.last().copied().unwrap_or_default();
-    let has_profile = |name: &str| contacts.iter().any(|contact| contact.is_on(name));
     // a boundary may have any name, also with dots or one of the words below: an existing name takes precedence
     let after = words.iter().enumerate();
     let after = after.filter(|(_, word)| **word == "profile");
@@ -258,7 +279,7 @@ fn part(format: Format, stem: &str, contacts: &[Contact]) -> Result<Part, String
         .map(|(place, _)| words[place + 1..].join("."))
         .collect();
     named.retain(|name| !name.is_empty());
-    let known = named.iter().find(|name| has_profile(name));
+    let known = named.iter().find(|name| profiles.has(name));
     let asked = match known.or(named.last()) {
         Some(boundary) => Some(("profile", Some(boundary.clone()))),
         None => ["summary", "profile", "history", "fields"]
@@ -293,29 +314,24 @@ fn part(format: Format, stem: &str, contacts: &[Contact]) -> Result<Part, String
         (Some(("history", _)), _) => Ok(Part::History),
         (asked, _) => {
             let boundary = asked.and_then(|(_, boundary)| boundary);
-            one_of(contacts, boundary, ending).map(Part::Profile)
+            one_of(profiles, boundary, ending).map(Part::Profile)
         }
     }
 }
 
-fn one_of(contacts: &[Contact], asked: Option<String>, ending: &str) -> Result<String, String> {
-    let own = contacts.iter().map(|contact| contact.boundary.as_str());
-    let facing = contacts
-        .iter()
-        .filter_map(|contact| contact.against.as_ref());
-    let all = own
-        .clone()
-        .chain(facing.map(|against| against.boundary.as_str()));
-    let known = all.clone().collect::<Vec<_>>().join(", ");
-    match (asked, &own.collect::<Vec<_>>()[..]) {
+fn one_of(profiles: &Profiles, asked: Option<String>, ending: &str) -> Result<String, String> {
+    let all = [&profiles.contacts[..], &profiles.facing]
+        .concat()
+        .join(", ");
+    match (asked, &profiles.contacts[..]) {
         (_, []) => Err("the problem has no contact, and so no profile; displacements and stresses are written as .vtu, .npz and .json".into()),
-        (Some(name), _) if all.clone().any(|boundary| boundary == name) => Ok(name),
+        (Some(name), _) if profiles.has(&name) => Ok(name),
         (Some(name), _) => Err(format!(
-            "the problem has no contact boundary {name:?}; it has: {known}"
+            "the problem has no contact boundary {name:?}; it has: {all}"
         )),
-        (None, [only]) => Ok(only.to_string()),
+        (None, [only]) => Ok(only.clone()),
         (None, [first, ..]) => Err(format!(
-            "the problem has several contact boundaries ({known}); name one, as in NAME.profile.{first}.{ending}"
+            "the problem has several contact boundaries ({all}); name one, as in NAME.profile.{first}.{ending}"
         )),
     }
 }
@@ -363,16 +379,13 @@ pub(super) fn print(text: &str) -> std::io::Result<()> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use serde_json::json;
 
     fn asked(name: &str, contacts: &[&str]) -> Result<(Part, Format), String> {
-        let contact = |name: &&str| {
-            let (boundary, against) = name.split_once('|').unwrap_or((name, ""));
-            let against = (!against.is_empty()).then(|| json!({"boundary": against}));
-            serde_json::from_value(json!({"boundary": boundary, "against": against})).unwrap()
+        let profiles = Profiles {
+            contacts: contacts.iter().map(|name| (*name).to_owned()).collect(),
+            facing: vec!["roller.bottom".to_owned()],
         };
-        let contacts: Vec<Contact> = contacts.iter().map(contact).collect();
-        Output::parse(Path::new(name), &contacts).map(|output| (output.part, output.format))
+        Output::parse(Path::new(name), &profiles).map(|output| (output.part, output.format))
     }
 
     #[test]
@@ -432,11 +445,11 @@ mod tests {
 
     #[test]
     fn both_sides_of_a_pair_of_bodies_have_a_profile() {
-        let pair = ["low.top|up.bottom"];
+        let pair = ["block.top"];
         for (name, boundary) in [
-            ("r.csv", "low.top"),
-            ("r.profile.low.top.csv", "low.top"),
-            ("r.profile.up.bottom.csv", "up.bottom"),
+            ("r.csv", "block.top"),
+            ("r.profile.block.top.csv", "block.top"),
+            ("r.profile.roller.bottom.csv", "roller.bottom"),
         ] {
             assert_eq!(
                 asked(name, &pair).unwrap().0,
@@ -445,8 +458,11 @@ mod tests {
             );
         }
         let error = asked("r.profile.other.csv", &pair).unwrap_err();
-        assert!(error.contains("it has: low.top, up.bottom"), "{error}");
-        let error = asked("r.profile.up.bottom.svg", &pair).unwrap_err();
+        assert!(
+            error.contains("it has: block.top, roller.bottom"),
+            "{error}"
+        );
+        let error = asked("r.profile.roller.bottom.svg", &pair).unwrap_err();
         assert!(error.contains("all contact boundaries"), "{error}");
     }
 

@@ -25,7 +25,7 @@ use solver::{
 
 use super::{
     exit::{Ended, Exit, refuse},
-    output::{self, Output},
+    output::{self, Output, Profiles},
     progress::{To, View},
     report,
 };
@@ -85,9 +85,8 @@ pub(super) fn run(
     let start = Instant::now();
     let (problem, _) = problem(file)?;
     let parse_s = start.elapsed().as_secs_f64();
-    let outputs = output
-        .iter()
-        .map(|path| Output::parse(path, &problem.contacts));
+    let profiles = Profiles::of(&problem);
+    let outputs = output.iter().map(|path| Output::parse(path, &profiles));
     let outputs = outputs.collect::<Result<Vec<_>, _>>().map_err(refuse)?;
     look.check(&outputs).map_err(refuse)?;
     let stored = stored_mesh(&problem, file, mesh.as_deref())?;

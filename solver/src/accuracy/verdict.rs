@@ -67,9 +67,9 @@ impl Finding {
 const NO_FRICTION: f64 = 1e-9;
 
 /// The reference size, not negative, by which the error of a quantity is divided: for a force or a peak its own size;
-/// for a tangential force the friction force, and where nothing rubs for both, and for the peak of σ_t, what presses; for an end the length of the contact; for a tangential displacement or a tilt at
-/// least the indentation, and that by length of the contact. `own`: the values of a kind at the
-/// same contact. `images`: the number of equal parts of the contact, of which one is modelled.
+/// for a tangential force the friction force, and where nothing rubs for both, and for the peak of σ_t, what presses; for an
+/// end the length of the contact; for a tangential displacement or a tilt at least the indentation, and that by length of
+/// the contact. `own`: the values of a kind at the same contact. `images`: the number of equal parts of the contact, of which one is modelled.
 pub(super) fn scale(
     name: QuantityName,
     value: f64,

@@ -63,10 +63,10 @@ impl Checks {
             };
             all.check(self.shared_nodes(&model, &models, problem));
             all.check(self.supported_contact_nodes(&model, &problem.steps, fixed));
-            let moves = all.check(self.nodes_held_along_tool(&model, fixed));
+            let unhindered = all.check(self.nodes_held_along_tool(&model, fixed));
             all.check(self.nodes_of_pair(mesh, &model, &models, fixed));
             all.check(self.tangential_force_borne(&model, &problem.steps));
-            if moves.is_some() {
+            if unhindered.is_some() {
                 all.check(self.moment_borne(&model, &problem.steps));
             }
             models.push(model);

@@ -16,8 +16,8 @@ pub struct Tool {
     pub loads: [Option<f64>; 3],
     /// The stiffness of the springs between the obstacle and the ground, against each motion.
     pub stiffness: [f64; 3],
-    /// Whether it has a tilt or a moment, about a given point.
-    pub turns: bool,
+    /// Whether a point is given, about which it turns or the moment that keeps it from turning is stated.
+    pub has_point: bool,
     /// The direction of the indentation, a unit vector.
     direction: [f64; 2],
     /// By node and motion: the components of a unit motion against the contact's normal and along its t.
@@ -51,7 +51,7 @@ impl Tool {
             motions: [0.0; 3],
             loads: [None; 3],
             stiffness: [stiffness.normal, stiffness.tangential, stiffness.rotational],
-            turns: contact.about.is_some(),
+            has_point: contact.about.is_some(),
             direction: [a, b],
             rows: (0..boundary.nodes.len()).map(row).collect(),
         };

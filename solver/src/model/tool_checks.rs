@@ -280,7 +280,7 @@ impl Checks {
             || rotational_spring > 0.0
             || contact.friction.is_some() && !straight
             || nodes.clone().any(|i| tool.row(i, 0)[0] <= ALIGNED);
-        if unknown || !tool.turns {
+        if unknown || !tool.has_point {
             return Ok(());
         }
         // the distance of the normal force from `about` along t, of a pressure at each node

@@ -115,7 +115,8 @@ pub struct EstimatedQuantity {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub measurement: Option<f64>,
     /// The error relative to the value; for a tangential force relative to the friction force, for an extent relative
-    /// to the length of the contact.
+    /// to the length of the contact, for a tangential displacement or a tilt of an obstacle relative to at least its
+    /// indentation, and that by length of the contact. Where nothing rubs, errors of friction are relative to what presses.
     pub relative: Option<f64>,
     /// How the error was found.
     pub method: ErrorMethod,

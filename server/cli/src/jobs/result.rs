@@ -17,13 +17,13 @@ use service::{
     formats,
     verbs::{page::MAX_PAGE_SIZE, results::PARTIAL},
 };
-use solver::{problem::Contact, solution::ContactProfile};
+use solver::solution::ContactProfile;
 use tokio::{runtime::Handle, task::block_in_place};
 
 use super::{
     super::{
         exit::Exit,
-        output::{self, Look, Output, Part},
+        output::{self, Look, Output, Part, Profiles},
         report,
         service::{Connection, Service, misunderstood, segment},
     },
@@ -88,10 +88,20 @@ struct Scalars {
     steps: Vec<Step>,
 }
 
-/// The contacts of a problem.
+/// What of a problem says which bodies face its contacts; a newer service may send more.
 #[derive(Deserialize)]
-struct Contacts {
-    contacts: Vec<Contact>,
+struct Faced {
+    contacts: Vec<FacedContact>,
+}
+
+#[derive(Deserialize)]
+struct FacedContact {
+    against: Option<Boundary>,
+}
+
+#[derive(Deserialize)]
+struct Boundary {
+    boundary: String,
 }
 
 #[derive(Deserialize)]
@@ -122,9 +132,9 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         .collect();
     if !arguments.output.is_empty() {
         // all names are read before a file is written
-        let problem: Contacts = service.get(&format!("{base}/problem")).await?;
+        let profiles = profiles(&service, &base, &contacts).await?;
         let outputs = arguments.output.iter();
-        let outputs = outputs.map(|path| Output::parse(path, &problem.contacts));
+        let outputs = outputs.map(|path| Output::parse(path, &profiles));
         let outputs = match outputs.collect::<Result<Vec<_>, _>>() {
             Ok(outputs) => outputs,
             Err(problem) => {
@@ -193,6 +203,17 @@ pub(super) async fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         .map(|step| (step.name.as_str(), &step.summary));
     output::print(&report::result(None, &scalars.summary, steps))?;
     Ok(Exit::Ok)
+}
+
+/// The boundaries of a job that have a profile, of which the result names those of the contacts.
+async fn profiles(service: &Service, base: &str, contacts: &[&str]) -> anyhow::Result<Profiles> {
+    let problem: Faced = service.get(&format!("{base}/problem")).await?;
+    let facing = problem.contacts.into_iter();
+    let facing = facing.filter_map(|contact| contact.against);
+    Ok(Profiles {
+        contacts: contacts.iter().map(|name| (*name).to_owned()).collect(),
+        facing: facing.map(|against| against.boundary).collect(),
+    })
 }
 
 impl Arguments {

@@ -38,7 +38,7 @@ impl PatchView<'_> {
             widths,
         } = self.extents();
         let tool = self.patch.contact.tool.as_ref();
-        let turns = tool.filter(|tool| tool.turns);
+        let with_point = tool.filter(|tool| tool.has_point);
         let [indentation, tangential_displacement, tilt] = self.motions;
         let loads = [0, 1, 2].map(|motion| circumference * self.load_of_obstacle(motion));
         ContactSummary {
@@ -49,7 +49,7 @@ impl PatchView<'_> {
                 Some(tool) => tool.force([loads[0], loads[1]]),
                 None => self.resultant(),
             }),
-            moment: turns.map(|_| loads[2]),
+            moment: with_point.map(|_| loads[2]),
             normal: self.patch.contact.normal,
             normal_force: circumference * self.system.normal_force(range, &self.forces.reactions),
             tangential_force: circumference * tangential,
